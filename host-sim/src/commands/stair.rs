@@ -1,0 +1,189 @@
+//! `vsj stair`: the stair experiment in closed loop on the fixed-point controller.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::{Args, Parser, ValueEnum};
+use host_sim::bad_input;
+use host_sim::experiment::{Experiment, Run, paper_spring};
+use host_sim::output::files::{Files, write_csv};
+use host_sim::output::{plots, terminal};
+use host_sim::plant_file;
+use host_sim::record::Record;
+use host_sim::schedule::{Between, Schedule};
+use host_sim::stair::{Report, Rows};
+use indicatif::{ProgressBar, ProgressStyle};
+use model::{Amplifier, Gains, Plant, Settings};
+
+/// Run the stair experiment in closed loop on the fixed-point controller, beside the report's Table 3
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj stair                                   the report's experiment, on the terminal
+  vsj stair --out out/stair                   with CSV and plots
+  vsj stair --controller none --input step    the spring left alone, ideal steps
+  vsj stair --limit-v 1000 --kp 8 --ki 2.7    another amplifier, other gains
+  vsj stair --input schedule.csv --json       any schedule with columns time_s,voltage_v")]
+pub(crate) struct Arguments {
+    /// Whose steps, CSV and voltage are shown: the spring left alone, or the report's controller
+    #[arg(long, value_enum, default_value_t = Controller::Paper)]
+    controller: Controller,
+    /// The spring: `paper`, or a plant file
+    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
+    plant: String,
+    /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns
+    /// time_s,voltage_v
+    #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
+    input: String,
+    /// What the voltage does between two rows of an input file
+    #[arg(long, value_enum, default_value_t)]
+    between: Between,
+    /// Highest voltage of the amplifier, in V
+    #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
+    limit_v: f64,
+    /// Lowest voltage of the amplifier, in V
+    #[arg(long, default_value_t = 0.0, value_name = "V", allow_negative_numbers = true)]
+    min_v: f64,
+    /// Fastest change of the amplifier, in V/s; without it, no limit
+    #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
+    slew_v_per_s: Option<f64>,
+    /// Width of the DAC, in bits
+    #[arg(long, default_value_t = 12, value_name = "BITS")]
+    dac_bits: u32,
+    /// Proportional gain of the controller
+    #[arg(long, default_value_t = Gains::PAPER.proportional, value_name = "GAIN", allow_negative_numbers = true)]
+    kp: f64,
+    /// Integral gain of the controller, in 1/s
+    #[arg(long, default_value_t = Gains::PAPER.integral_per_s, value_name = "GAIN", allow_negative_numbers = true)]
+    ki: f64,
+    /// Ticks per second, 100 to 10 000
+    #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
+    rate_hz: f64,
+    /// Write stair.csv, stiffness.svg and voltage.svg to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Time between two rows of the CSV, in s; without it, every tick
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    every: Option<f64>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Controller {
+    /// The target is the voltage
+    None,
+    /// The report's proportional-integral pre-compensator
+    Paper,
+}
+
+/// Lets the main job be what the command line says without arguments.
+#[derive(Parser)]
+struct Defaults {
+    #[command(flatten)]
+    arguments: Arguments,
+}
+
+impl Arguments {
+    /// What `vsj` does when it is told nothing: the report's experiment, with files.
+    pub(crate) fn main_job() -> Self {
+        Defaults::parse_from(["vsj", "--out", "out/stair"]).arguments
+    }
+
+    fn settings(&self, plant: Plant) -> Settings {
+        Settings {
+            rate_hz: self.rate_hz,
+            plant,
+            gains: Some(Gains { proportional: self.kp, integral_per_s: self.ki }),
+            amplifier: Amplifier {
+                min_v: self.min_v,
+                slew_v_per_s: self.slew_v_per_s,
+                dac_bits: self.dac_bits,
+                ..Amplifier::up_to(self.limit_v)
+            },
+        }
+    }
+
+    /// Ticks between two rows of the CSV.
+    fn stride(&self) -> Result<usize> {
+        match self.every {
+            None => Ok(1),
+            Some(every) if every.is_finite() && every > 0.0 => Ok((every * self.rate_hz).round().max(1.0) as usize),
+            Some(every) => bad_input!("--every {every}: expected a positive number of seconds"),
+        }
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let stride = arguments.stride()?;
+    let plant = plant_file::load(&arguments.plant)?;
+    let mut record = None;
+    let (name, schedule) = match arguments.input.as_str() {
+        "stair" => ("the stair".to_owned(), Schedule::stair()),
+        "step" => ("the stair of ideal steps".to_owned(), Schedule::ideal_stair()),
+        file => {
+            let read = record.insert(Record::open(Path::new(file))?);
+            (file.to_owned(), Schedule::from_record(read, arguments.between))
+        }
+    };
+    let experiment = Experiment { name, schedule, settings: arguments.settings(plant) };
+
+    let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
+    let run = experiment.run(|done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+
+    let rows = match &record {
+        Some(record) => Rows::Record(record),
+        None => Rows::Table3 { same: arguments.input == "stair" && is_the_reports(&experiment.settings) },
+    };
+    let controlled = arguments.controller == Controller::Paper;
+    let report = Report::new(&experiment, &run, &rows, controlled)?;
+    let paths = match &arguments.out {
+        Some(folder) => write(folder, &experiment, &run, &report, controlled, stride)?,
+        None => Vec::new(),
+    };
+    if arguments.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        print!("{}", terminal::text(&report));
+        for path in paths {
+            println!("wrote {}", path.display());
+        }
+    }
+    Ok(())
+}
+
+/// True if Table 3's simulated columns should come out.
+fn is_the_reports(settings: &Settings) -> bool {
+    settings.plant == Plant::PAPER
+        && settings.gains == Some(Gains::PAPER)
+        && settings.amplifier.slew_v_per_s.is_none()
+        && settings.amplifier.min_v == 0.0
+        && settings.amplifier.max_v >= 700.0
+}
+
+fn write(
+    folder: &Path,
+    experiment: &Experiment,
+    run: &Run,
+    report: &Report,
+    controlled: bool,
+    stride: usize,
+) -> Result<Vec<PathBuf>> {
+    let samples = if controlled { &run.with } else { &run.without };
+    let spring = paper_spring()?;
+    let mut files = Files::new(folder)?;
+    files.add("stair.csv", |out| write_csv(out, experiment, run, samples, &spring, stride))?;
+    for (name, svg) in [
+        ("stiffness.svg", plots::stiffness(experiment, run, report)),
+        ("voltage.svg", plots::voltage(experiment, run, samples)),
+    ] {
+        files.add(name, |out| out.write_all(svg.as_bytes()))?;
+    }
+    files.finish()
+}

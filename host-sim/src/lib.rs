@@ -1,0 +1,29 @@
+//! Runs the controller of the `model` crate on a host, beside references that are not it.
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`schedule`], [`record`] | what voltage is asked for: the report's stair, or a file |
+//! | [`reference`] | the loop in continuous time, solved exactly in double precision |
+//! | [`sampled`] | the loop at the controller's own rate, in double precision |
+//! | [`experiment`] | fixed point and reference side by side over a schedule |
+//! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the fastest any controller could be |
+//! | [`stair`] | what a run says |
+//! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
+//! | [`plant_file`] | the spring as a file |
+//! | [`output`] | terminal, JSON, CSV, plots |
+
+pub mod bad_input;
+pub mod bound;
+pub mod experiment;
+pub mod misprint;
+pub mod output;
+pub mod plant_file;
+pub mod record;
+pub mod reference;
+pub mod response;
+pub mod sampled;
+pub mod schedule;
+pub mod stair;
+pub mod table3;
+
+pub use bad_input::BadInput;

@@ -1,0 +1,65 @@
+//! `vsj`: the stiffness controller of a piezo variable-stiffness spring, on a host.
+
+mod commands;
+
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
+use host_sim::BadInput;
+
+/// Simulates the variable-stiffness spring and its controller, with the code that runs in the amplifier's MCU.
+///
+/// Without a command it runs the report's stair experiment and writes its files to out/stair.
+#[derive(Parser)]
+#[command(
+    name = "vsj",
+    version,
+    after_help = "Exit codes: 0 success, 1 the work itself failed, 2 bad arguments or bad input."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Stair(commands::stair::Arguments),
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return usage(&error),
+    };
+    let done = match cli.command {
+        Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
+        None => commands::stair::run(&commands::stair::Arguments::main_job()),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("vsj: {error:#}");
+            ExitCode::from(if error.is::<BadInput>() { 2 } else { 1 })
+        }
+    }
+}
+
+/// Help and version as they are; a wrong argument as one line.
+fn usage(error: &clap::Error) -> ExitCode {
+    if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+        // A closed pipe is no failure of ours.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    let text = error.render().to_string();
+    let what: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let what = what.join(" ");
+    eprintln!("{}: {}; see `--help`", Cli::command().get_name(), what.trim_start_matches("error: "));
+    ExitCode::from(2)
+}

@@ -1,0 +1,108 @@
+//! Files of a run: all of them, or none.
+
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use model::Spring;
+use tempfile::NamedTempFile;
+
+use crate::bad_input;
+use crate::experiment::{Experiment, Run, Sample};
+
+/// Files that are written beside their place and moved there only when all are complete.
+pub struct Files {
+    folder: PathBuf,
+    written: Vec<(NamedTempFile, PathBuf)>,
+}
+
+impl Files {
+    /// Files for `folder`, which is made if it does not exist.
+    ///
+    /// # Errors
+    /// [`crate::BadInput`] if it cannot be made.
+    pub fn new(folder: &Path) -> Result<Self> {
+        if let Err(error) = std::fs::create_dir_all(folder) {
+            bad_input!("{}: cannot be made: {error}; expected a folder to write to", folder.display());
+        }
+        Ok(Self { folder: folder.to_owned(), written: Vec::new() })
+    }
+
+    /// Writes one file, for now under another name.
+    ///
+    /// # Errors
+    /// If the disk is full or not writable.
+    pub fn add(&mut self, name: &str, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
+        let path = self.folder.join(name);
+        let complete = || -> std::io::Result<NamedTempFile> {
+            let mut buffer = BufWriter::new(tempfile::Builder::new().prefix(".vsj-").tempfile_in(&self.folder)?);
+            write(&mut buffer)?;
+            Ok(buffer.into_inner()?)
+        };
+        let file = complete().with_context(|| format!("{} cannot be written", path.display()))?;
+        self.written.push((file, path));
+        Ok(())
+    }
+
+    /// Moves every file to its place and tells their paths.
+    ///
+    /// # Errors
+    /// If the folder has become read-only meanwhile.
+    pub fn finish(self) -> Result<Vec<PathBuf>> {
+        let mut paths = Vec::new();
+        for (file, path) in self.written {
+            let kept = file.persist(&path).with_context(|| format!("{} cannot be written", path.display()))?;
+            readable_by_all(&kept).with_context(|| path.display().to_string())?;
+            paths.push(path);
+        }
+        Ok(paths)
+    }
+}
+
+/// Temporary files are private; results are not.
+#[cfg(unix)]
+fn readable_by_all(file: &std::fs::File) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn readable_by_all(_: &std::fs::File) -> std::io::Result<()> {
+    Ok(())
+}
+
+/// The run as CSV, one row every `stride` ticks.
+///
+/// # Errors
+/// As the sink's.
+pub fn write_csv(
+    out: &mut dyn Write,
+    experiment: &Experiment,
+    run: &Run,
+    samples: &[Sample],
+    spring: &Spring,
+    stride: usize,
+) -> std::io::Result<()> {
+    writeln!(
+        out,
+        "# {} at {} Hz, fixed point; stiffness in volts of equivalent static voltage",
+        experiment.name, run.rate_hz
+    )?;
+    writeln!(out, "time_s,target_v,applied_v,dac_code,stiffness,youngs_modulus_pa")?;
+    let mut reader = experiment.schedule.reader();
+    for (tick, sample) in samples.iter().enumerate().step_by(stride) {
+        let time = run.time_s(tick);
+        writeln!(
+            out,
+            "{},{:.6},{:.6},{},{:.6},{:.1}",
+            // Ticks fall on decimal times at most rates; nine decimals hide what floats make of them.
+            (time * 1e9).round() / 1e9,
+            reader.at(time),
+            sample.applied.to_f64(),
+            sample.code.0,
+            sample.stiffness.to_f64(),
+            spring.estimate_pa(sample.stiffness),
+        )?;
+    }
+    Ok(())
+}

@@ -1,0 +1,5 @@
+//! What a person gets to see: text on the terminal, files in a folder.
+
+pub mod files;
+pub mod plots;
+pub mod terminal;

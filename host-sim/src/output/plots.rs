@@ -1,0 +1,66 @@
+//! Plots of a run as SVG.
+
+use kuva::prelude::*;
+
+use crate::experiment::{Experiment, Run, Sample};
+use crate::stair::Report;
+
+/// Points that a line is drawn with; more cannot be seen.
+const MOST_POINTS: usize = 4000;
+
+const TARGET: &str = "#888888";
+const WITH: &str = "#0072b2";
+const WITHOUT: &str = "#d55e00";
+const MEASURED: &str = "#000000";
+
+/// Target, stiffness with and without controller, and the measured points.
+pub fn stiffness(experiment: &Experiment, run: &Run, report: &Report) -> String {
+    let measured: Vec<(f64, f64)> = report.rows.iter().filter_map(|row| Some((row.time_s, row.measured?))).collect();
+    let mut plots: Vec<Plot> = vec![
+        line(target(experiment, run), TARGET, "target").with_dashed().into(),
+        line(points(run, &run.without, |s| s.stiffness.to_f64()), WITHOUT, "without controller").into(),
+        line(points(run, &run.with, |s| s.stiffness.to_f64()), WITH, "with controller").into(),
+    ];
+    if !measured.is_empty() {
+        plots.push(
+            ScatterPlot::new().with_data(measured).with_color(MEASURED).with_size(3.5).with_legend("measured").into(),
+        );
+    }
+    render(plots, "Stiffness of the spring", "scaled stiffness [V]")
+}
+
+/// Target and the voltage put across the spring.
+pub fn voltage(experiment: &Experiment, run: &Run, samples: &[Sample]) -> String {
+    let plots: Vec<Plot> = vec![
+        line(target(experiment, run), TARGET, "target").with_dashed().into(),
+        line(points(run, samples, |s| s.applied.to_f64()), WITH, "applied").into(),
+    ];
+    render(plots, "Voltage across the spring", "voltage [V]")
+}
+
+fn target(experiment: &Experiment, run: &Run) -> Vec<(f64, f64)> {
+    let mut reader = experiment.schedule.reader();
+    (0..run.with.len()).step_by(stride(run)).map(|tick| (run.time_s(tick), reader.at(run.time_s(tick)))).collect()
+}
+
+fn points(run: &Run, samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<(f64, f64)> {
+    (0..samples.len()).step_by(stride(run)).map(|tick| (run.time_s(tick), value(&samples[tick]))).collect()
+}
+
+fn stride(run: &Run) -> usize {
+    run.with.len().div_ceil(MOST_POINTS)
+}
+
+fn line(data: Vec<(f64, f64)>, colour: &str, name: &str) -> LinePlot {
+    LinePlot::new().with_data(data).with_color(colour).with_stroke_width(1.5).with_legend(name)
+}
+
+fn render(plots: Vec<Plot>, title: &str, y_label: &str) -> String {
+    let layout = Layout::auto_from_plots(&plots)
+        .with_title(title)
+        .with_x_label("time [s]")
+        .with_y_label(y_label)
+        .with_width(900.0)
+        .with_height(480.0);
+    render_to_svg(plots, layout)
+}

@@ -1,0 +1,160 @@
+//! Records of an experiment as CSV: `time_s`, `voltage_v` and perhaps a measured column.
+//!
+//! One header row, columns by name in any order, lines that start with `#` are comments.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::bad_input;
+use crate::bad_input::BadInput;
+
+/// One row of a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// In s, increasing.
+    pub time_s: f64,
+    /// Commanded voltage in V.
+    pub voltage_v: f64,
+    /// Scaled stiffness in V, where the file has the column.
+    pub measured: Option<f64>,
+}
+
+/// A checked record: at least two rows, every number finite, time increasing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// What to call it in messages.
+    pub name: String,
+    /// The rows in order of time.
+    pub rows: Vec<Row>,
+}
+
+/// The measured column unless another is asked for.
+pub const MEASURED: &str = "stiffness";
+
+impl Record {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`BadInput`] with file, line, column and what was expected.
+    pub fn open(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&name, &text),
+            Err(error) => bad_input!("{name}: cannot be read: {error}"),
+        }
+    }
+
+    /// Reads the text of a file; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Record::open`].
+    pub fn parse(name: &str, text: &str) -> Result<Self> {
+        let place = Place { name, text };
+        let mut reader =
+            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|error| place.unreadable(&error))?.clone();
+        let column = |wanted: &str| header.iter().position(|name| name == wanted);
+        let required = |wanted| {
+            column(wanted).ok_or_else(|| {
+                let found = header.iter().collect::<Vec<_>>().join(",");
+                let at = place.of(header.position());
+                BadInput(format!(
+                    "{at}: no column `{wanted}`; expected a header with time_s and voltage_v, found `{found}`"
+                ))
+            })
+        };
+        let (time, voltage, measured) = (required("time_s")?, required("voltage_v")?, column(MEASURED));
+
+        let mut rows: Vec<Row> = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(|error| place.unreadable(&error))?;
+            let number = |index: usize| match record[index].parse::<f64>() {
+                Ok(number) if number.is_finite() => Ok(number),
+                _ => {
+                    let (at, column) = (place.of(record.position()), &header[index]);
+                    Err(BadInput(format!("{at}, column {column}: `{}` is not a finite number", &record[index])))
+                }
+            };
+            let row =
+                Row { time_s: number(time)?, voltage_v: number(voltage)?, measured: measured.map(number).transpose()? };
+            if let Some(last) = rows.last()
+                && row.time_s <= last.time_s
+            {
+                let (now, before, at) = (row.time_s, last.time_s, place.of(record.position()));
+                bad_input!("{at}, column time_s: {now} follows {before}; expected increasing times");
+            }
+            rows.push(row);
+        }
+        if rows.len() < 2 {
+            bad_input!("{name}: {} row(s) of data; expected at least 2", rows.len());
+        }
+        Ok(Self { name: name.to_owned(), rows })
+    }
+}
+
+/// Names places of a text.
+struct Place<'a> {
+    name: &'a str,
+    text: &'a str,
+}
+
+impl Place<'_> {
+    /// File and line of a record. Its position is where the reader stood before comments and blank lines.
+    fn of(&self, position: Option<&csv::Position>) -> String {
+        let start = position.map_or(0, |at| at.byte() as usize).min(self.text.len());
+        let skipped =
+            self.text[start..].lines().take_while(|line| line.trim().is_empty() || line.starts_with('#')).count();
+        let line = 1 + self.text[..start].matches('\n').count() + skipped;
+        format!("{}, line {line}", self.name)
+    }
+
+    fn unreadable(&self, error: &csv::Error) -> BadInput {
+        let at = self.of(error.position());
+        BadInput(match error.kind() {
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                format!("{at}: {len} field(s); expected {expected_len} as in the header")
+            }
+            _ => format!("{at}: {error}; expected CSV"),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(text: &str) -> String {
+        let error = Record::parse("data.csv", text).unwrap_err();
+        error.downcast_ref::<BadInput>().expect("the caller's to mend").0.clone()
+    }
+
+    #[test]
+    fn columns_come_in_any_order_with_comments_between() {
+        let text = "# a\r\nstiffness,voltage_v,time_s\r\n0,100,1\r\n# b\r\n5, 200 ,2";
+        let record = Record::parse("r", text).unwrap();
+        assert_eq!(record.rows[1], Row { time_s: 2.0, voltage_v: 200.0, measured: Some(5.0) });
+    }
+
+    #[test]
+    fn every_fault_is_named_with_its_place() {
+        for (text, expected) in [
+            ("", "no column `time_s`"),
+            ("time_s,volts\n0,1\n", "line 1: no column `voltage_v`"),
+            ("time_s,voltage_v\n", "0 row(s) of data; expected at least 2"),
+            ("time_s,voltage_v\n0,1\n", "1 row(s)"),
+            ("time_s,voltage_v\n0,1\n1,abc\n", "line 3, column voltage_v: `abc` is not a finite number"),
+            ("time_s,voltage_v\n0,1\n1,NaN\n", "line 3, column voltage_v: `NaN`"),
+            ("time_s,voltage_v\ninf,1\n1,1\n", "line 2, column time_s: `inf`"),
+            ("time_s,voltage_v\n0,1\n0,2\n", "line 3, column time_s: 0 follows 0; expected increasing times"),
+            ("# a\n\ntime_s,voltage_v\r\n0,1\r\n# b\r\n\r\n1,x", "line 7, column voltage_v: `x`"),
+            ("# a\ntime_s,volts\n0,1\n", "line 2: no column `voltage_v`"),
+            ("time_s,voltage_v\n0,1\n1\n", "line 3: 1 field(s); expected 2 as in the header"),
+            ("time_s,voltage_v,stiffness\n0,1,\n1,2,3\n", "line 2, column stiffness: `` is not a finite number"),
+        ] {
+            let got = message(text);
+            assert!(got.starts_with("data.csv") && got.contains(expected), "{text:?}: {got}");
+            assert!(!got.contains('\n'), "more than one line: {got}");
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! The controlled spring in continuous time and double precision, solved exactly.
+//!
+//! Independent of the `model` crate: no ticks, no converter, no fixed point. With the relaxed part `w` and the
+//! integrator `z`,
+//!
+//! ```text
+//! y = w + share (u - w)          dw/dt = (u - w) / tau
+//! c = Kp (target - y) + z        dz/dt = (u - z) Ki / Kp
+//! u = c within range and slew    (then dz/dt is Ki times the error)
+//! ```
+//!
+//! While `u = c` this is linear with a target that is straight between samples: one matrix exponential, computed once,
+//! is the exact step (first-order hold). At a limit, `u` is itself a straight line and `w`, `z` follow it in closed
+//! form; the moments at which limits begin and end to act are found by bisection.
+
+use nalgebra::Matrix4;
+
+/// The loop to be solved, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loop {
+    /// Instantaneous share of a change, 0 to 1.
+    pub share: f64,
+    /// Time constant of the rest, in s.
+    pub time_constant_s: f64,
+    /// Proportional and integral gain (1/s) of the controller; `None` puts the target out as it is.
+    pub gains: Option<(f64, f64)>,
+    /// Lowest and highest voltage, in V.
+    pub range_v: (f64, f64),
+    /// Fastest change of the voltage, in V/s; infinite where there is no limit.
+    pub slew_v_per_s: f64,
+}
+
+/// A solution in progress, sample by sample.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    system: Loop,
+    /// Commanded voltage by `w`, `z` and the target.
+    law: [f64; 3],
+    /// Ki / Kp
+    reset_per_s: f64,
+    sample_s: f64,
+    /// What one whole sample with `u = c` makes of `w`, `z`, the target and its slope: rows for `w` and `z`.
+    whole: [[f64; 4]; 2],
+    w: f64,
+    z: f64,
+    u: f64,
+    /// Target at the end of the last sample.
+    target: f64,
+    /// True if the whole-sample step may be tried: nothing limits and nothing has jumped.
+    free: bool,
+}
+
+/// What determines the voltage for a while.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mode {
+    /// The control law.
+    Free,
+    /// Straight: at an end of the range (slope 0) or at the slew, until the law comes back to it.
+    Straight { slope: f64 },
+}
+
+/// How far beyond a limit still counts as at it, in V.
+const TOLERANCE_V: f64 = 1e-9;
+
+impl Loop {
+    /// A spring at rest without voltage, to be solved in steps of `sample_s`.
+    pub fn at_rest(self, sample_s: f64) -> Solution {
+        let (law, reset_per_s) = match self.gains {
+            None => ([0.0, 0.0, 1.0], 0.0),
+            Some((proportional, integral)) => {
+                let denominator = 1.0 + proportional * self.share;
+                let law = [-proportional * (1.0 - self.share), 1.0, proportional].map(|term| term / denominator);
+                (law, integral / proportional)
+            }
+        };
+        let mut solution = Solution {
+            system: self,
+            law,
+            reset_per_s,
+            sample_s,
+            whole: [[0.0; 4]; 2],
+            w: 0.0,
+            z: 0.0,
+            u: 0.0,
+            target: 0.0,
+            free: self.range_v.0 <= 0.0 && self.slew_v_per_s.is_infinite(),
+        };
+        solution.whole = solution.transition(sample_s);
+        solution
+    }
+}
+
+impl Solution {
+    /// One sample passes, the target going straight from `from_v` to `to_v`; returns the stiffness at its end.
+    ///
+    /// `from_v` may differ from the last sample's end: the target has jumped.
+    #[inline]
+    pub fn step(&mut self, from_v: f64, to_v: f64) -> f64 {
+        let slope = (to_v - from_v) / self.sample_s;
+        if self.free && from_v == self.target {
+            let [w, z] = self.moved(&self.whole, from_v, slope);
+            let u = self.law_at(w, z, to_v);
+            if u >= self.system.range_v.0 && u <= self.system.range_v.1 {
+                (self.w, self.z, self.u, self.target) = (w, z, u, to_v);
+                return self.stiffness();
+            }
+        }
+        self.advance(from_v, slope, self.sample_s);
+        self.stiffness()
+    }
+
+    /// Any stretch of time passes, the target starting at `from_v` with a `slope` in V/s.
+    pub fn advance(&mut self, from_v: f64, slope: f64, duration_s: f64) {
+        let mut passed = 0.0;
+        while passed < duration_s {
+            let target = from_v + slope * passed;
+            let mode = self.mode(target, slope);
+            let rest = duration_s - passed;
+            let mut lasts = rest;
+            if self.after(mode, target, slope, rest).broken(mode, target + slope * rest, slope) {
+                // The mode ends within: find where, but always get on.
+                let (mut good, mut bad) = (0.0, rest);
+                for _ in 0..60 {
+                    let middle = 0.5 * (good + bad);
+                    if self.after(mode, target, slope, middle).broken(mode, target + slope * middle, slope) {
+                        bad = middle;
+                    } else {
+                        good = middle;
+                    }
+                }
+                lasts = bad.max(1e-9).min(rest);
+            }
+            *self = self.after(mode, target, slope, lasts);
+            passed += lasts;
+        }
+        self.jump(from_v + slope * duration_s);
+    }
+
+    /// The target jumps to `target_v` now. Without a slew limit the voltage, and part of the stiffness, follow at once.
+    pub fn jump(&mut self, target_v: f64) {
+        let (lowest, highest) = self.system.range_v;
+        let wanted = self.law_at(self.w, self.z, target_v);
+        if self.system.slew_v_per_s.is_infinite() {
+            self.u = wanted.clamp(lowest, highest);
+        }
+        self.target = target_v;
+        self.free = self.system.slew_v_per_s.is_infinite() && (lowest..=highest).contains(&wanted);
+    }
+
+    /// Scaled stiffness now, in V.
+    #[inline]
+    pub fn stiffness(&self) -> f64 {
+        self.w + self.system.share * (self.u - self.w)
+    }
+
+    /// Voltage across the spring now, in V.
+    pub fn voltage(&self) -> f64 {
+        self.u
+    }
+
+    #[inline]
+    fn law_at(&self, w: f64, z: f64, target: f64) -> f64 {
+        self.law[0] * w + self.law[1] * z + self.law[2] * target
+    }
+
+    /// How fast the law moves, in V/s, while it is followed.
+    fn law_slope(&self, slope: f64) -> f64 {
+        let (dw, dz) = ((self.u - self.w) / self.system.time_constant_s, (self.u - self.z) * self.reset_per_s);
+        self.law[0] * dw + self.law[1] * dz + self.law[2] * slope
+    }
+
+    /// What determines the voltage from now on; moves `u` where it can follow at once.
+    fn mode(&mut self, target: f64, slope: f64) -> Mode {
+        self.jump(target);
+        let (lowest, highest) = self.system.range_v;
+        let ahead = self.law_at(self.w, self.z, target) - self.u;
+        let slew = self.system.slew_v_per_s;
+        // Where the law would have the voltage go: where it is already, or else where it is heading.
+        let pull = if ahead.abs() > TOLERANCE_V { ahead } else { self.law_slope(slope) };
+        let at_end = if pull > 0.0 { self.u >= highest - TOLERANCE_V } else { self.u <= lowest + TOLERANCE_V };
+        if at_end && pull != 0.0 {
+            Mode::Straight { slope: 0.0 }
+        } else if ahead.abs() > TOLERANCE_V || pull.abs() > slew {
+            Mode::Straight { slope: slew.copysign(pull) }
+        } else {
+            Mode::Free
+        }
+    }
+
+    /// The solution after `duration_s` in one mode.
+    fn after(&self, mode: Mode, target: f64, slope: f64, duration_s: f64) -> Self {
+        let mut next = self.clone();
+        match mode {
+            Mode::Free => {
+                let other;
+                let transition = if duration_s == self.sample_s {
+                    &self.whole
+                } else {
+                    other = self.transition(duration_s);
+                    &other
+                };
+                [next.w, next.z] = self.moved(transition, target, slope);
+                next.u = self.law_at(next.w, next.z, target + slope * duration_s);
+            }
+            Mode::Straight { slope } => {
+                next.w = follow(self.w, self.u, slope, 1.0 / self.system.time_constant_s, duration_s);
+                next.z = follow(self.z, self.u, slope, self.reset_per_s, duration_s);
+                next.u = self.u + slope * duration_s;
+            }
+        }
+        next
+    }
+
+    /// True if `mode` cannot have led here.
+    fn broken(&self, mode: Mode, target: f64, slope: f64) -> bool {
+        let (lowest, highest) = self.system.range_v;
+        let ahead = self.law_at(self.w, self.z, target) - self.u;
+        let outside = self.u > highest + TOLERANCE_V || self.u < lowest - TOLERANCE_V;
+        match mode {
+            Mode::Free => outside || self.law_slope(slope).abs() > self.system.slew_v_per_s * (1.0 + 1e-9),
+            Mode::Straight { slope } if slope != 0.0 => outside || ahead * slope < 0.0,
+            // At an end of the range: until the law wants to go back inside.
+            Mode::Straight { .. } => {
+                let end = if self.u > 0.5 * (lowest + highest) { 1.0 } else { -1.0 };
+                ahead * end < -TOLERANCE_V
+            }
+        }
+    }
+
+    #[inline]
+    fn moved(&self, transition: &[[f64; 4]; 2], target: f64, slope: f64) -> [f64; 2] {
+        // The states last: their sum is what the next sample waits for.
+        transition.map(|[by_w, by_z, by_target, by_slope]| {
+            by_target * target + by_slope * slope + by_w * self.w + by_z * self.z
+        })
+    }
+
+    /// The exact transition over `duration_s` while the law is followed.
+    fn transition(&self, duration_s: f64) -> [[f64; 4]; 2] {
+        let (relaxation, reset) = (1.0 / self.system.time_constant_s, self.reset_per_s);
+        let [by_w, by_z, by_target] = self.law;
+        #[rustfmt::skip]
+        let rates = Matrix4::new(
+            (by_w - 1.0) * relaxation, by_z * relaxation, by_target * relaxation, 0.0,
+            by_w * reset, (by_z - 1.0) * reset, by_target * reset, 0.0,
+            0.0, 0.0, 0.0, 1.0,
+            0.0, 0.0, 0.0, 0.0,
+        );
+        let moved = (rates * duration_s).exp();
+        [0, 1].map(|row| [0, 1, 2, 3].map(|column| moved[(row, column)]))
+    }
+}
+
+/// A first-order lag of `rate` per second that follows a voltage starting at `u` with a `slope`.
+fn follow(state: f64, u: f64, slope: f64, rate: f64, duration_s: f64) -> f64 {
+    if rate == 0.0 {
+        return state;
+    }
+    let behind = slope / rate;
+    u + slope * duration_s - behind + (state - u + behind) * (-rate * duration_s).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAPER: Loop = Loop {
+        share: 1.0 / 11.0,
+        time_constant_s: 5.5,
+        gains: Some((4.0, 1.35)),
+        range_v: (0.0, 1e9),
+        slew_v_per_s: f64::INFINITY,
+    };
+
+    /// Classical Runge-Kutta with very small steps, limits by clamping: other mathematics, the same answer.
+    fn runge_kutta(system: &Loop, target: impl Fn(f64) -> f64, end_s: f64) -> f64 {
+        let (kp, ki) = system.gains.unwrap();
+        let voltage = |t: f64, x: [f64; 2]| {
+            let law = (kp * (target(t) - (1.0 - system.share) * x[0]) + x[1]) / (1.0 + kp * system.share);
+            law.clamp(system.range_v.0, system.range_v.1)
+        };
+        let rates = |t: f64, x: [f64; 2]| {
+            let u = voltage(t, x);
+            [(u - x[0]) / system.time_constant_s, (u - x[1]) * ki / kp]
+        };
+        let (h, mut x) = (1e-4, [0.0; 2]);
+        let along = |x: [f64; 2], k: [f64; 2], h: f64| [x[0] + h * k[0], x[1] + h * k[1]];
+        let steps = (end_s / h).round() as usize;
+        for step in 0..steps {
+            let t = step as f64 * h;
+            let k1 = rates(t, x);
+            let k2 = rates(t + h / 2.0, along(x, k1, h / 2.0));
+            let k3 = rates(t + h / 2.0, along(x, k2, h / 2.0));
+            let k4 = rates(t + h, along(x, k3, h));
+            for i in 0..2 {
+                x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+            }
+        }
+        x[0] + system.share * (voltage(end_s, x) - x[0])
+    }
+
+    fn solve(system: Loop, target: impl Fn(f64) -> f64, sample_s: f64, end_s: f64) -> f64 {
+        let mut solution = system.at_rest(sample_s);
+        for sample in 0..(end_s / sample_s).round() as usize {
+            let t = sample as f64 * sample_s;
+            solution.step(target(t), target(t + sample_s));
+        }
+        solution.stiffness()
+    }
+
+    #[test]
+    fn agrees_with_runge_kutta_free_and_limited() {
+        let ramp = |t: f64| 100.0 * (t / 0.5).clamp(0.0, 1.0);
+        for limit in [1e9, 250.0, 120.0] {
+            let system = Loop { range_v: (0.0, limit), ..PAPER };
+            for end in [0.3, 0.5, 2.0, 6.0] {
+                let (got, expected) = (solve(system, ramp, 0.01, end), runge_kutta(&system, ramp, end));
+                assert!((got - expected).abs() < 2e-4, "limit {limit}, {end} s: {got} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_sample_time_does_not_matter() {
+        let target = |t: f64| if t < 3.0 { 100.0 * t.min(1.0) } else { 40.0_f64.max(100.0 - 400.0 * (t - 3.0)) };
+        for (limit, slew) in [(1e9, f64::INFINITY), (130.0, f64::INFINITY), (1e9, 150.0), (130.0, 90.0)] {
+            let system = Loop { range_v: (0.0, limit), slew_v_per_s: slew, ..PAPER };
+            let coarse = solve(system, target, 0.05, 8.0);
+            let fine = solve(system, target, 0.001, 8.0);
+            assert!((coarse - fine).abs() < 1e-5, "{limit} {slew}: {coarse} {fine}");
+        }
+    }
+
+    #[test]
+    fn a_slew_limits_the_voltage_and_is_left_again() {
+        let system = Loop { slew_v_per_s: 100.0, ..PAPER };
+        let mut solution = system.at_rest(0.01);
+        solution.jump(100.0);
+        for _ in 0..100 {
+            solution.step(100.0, 100.0);
+        }
+        assert!((solution.voltage() - 100.0).abs() < 1e-6, "one second at 100 V/s: {}", solution.voltage());
+        for _ in 0..5000 {
+            solution.step(100.0, 100.0);
+        }
+        assert!((solution.stiffness() - 100.0).abs() < 1e-3, "{}", solution.stiffness());
+    }
+
+    #[test]
+    fn without_a_controller_it_is_the_plain_exponential() {
+        let mut solution = Loop { gains: None, ..PAPER }.at_rest(0.1);
+        solution.jump(100.0);
+        assert!((solution.stiffness() - 100.0 / 11.0).abs() < 1e-12);
+        for _ in 0..55 {
+            solution.step(100.0, 100.0);
+        }
+        assert!((solution.stiffness() - (100.0 - 1000.0 / 11.0 * (-1f64).exp())).abs() < 1e-9);
+    }
+}

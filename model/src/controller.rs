@@ -1,0 +1,130 @@
+//! One tick of the whole controller.
+//!
+//! [`Settings`] are what a person writes, in SI units and floats. [`Settings::check`] turns them, once and off the hot
+//! path, into a [`Config`] of scaled fixed-point numbers, or into an error that names the field. [`Config::tick`] sees
+//! nothing else.
+
+use crate::amplifier::{self, Amplifier, Limits};
+use crate::error::OutOfRange;
+use crate::estimator::{self, Plant};
+use crate::pre_compensator::{self, Gains, ProportionalIntegral};
+use crate::units::{DacCode, SampleTime, ScaledStiffness, Volts};
+
+/// Everything the controller is built from, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Ticks per second, 100 to 10 000 Hz.
+    pub rate_hz: f64,
+    /// The spring that the estimator runs.
+    pub plant: Plant,
+    /// Gains of the pre-compensator; `None` puts the target out as it is.
+    pub gains: Option<Gains>,
+    /// The amplifier and its limits.
+    pub amplifier: Amplifier,
+}
+
+impl Settings {
+    /// The report's spring, controller and range at 1 kHz.
+    pub const PAPER: Self =
+        Self { rate_hz: 1000.0, plant: Plant::PAPER, gains: Some(Gains::PAPER), amplifier: Amplifier::PAPER };
+
+    /// Scales the settings for the tick.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<Config, OutOfRange> {
+        let sample_time = SampleTime::from_rate(self.rate_hz)?;
+        let estimator = estimator::Config::new(&self.plant, sample_time)?;
+        let pre_compensator = match &self.gains {
+            None => PreCompensator::None,
+            Some(gains) => {
+                PreCompensator::ProportionalIntegral(ProportionalIntegral::new(gains, &self.plant, sample_time)?)
+            }
+        };
+        Ok(Config { estimator, pre_compensator, amplifier: amplifier::Config::new(&self.amplifier, sample_time)? })
+    }
+}
+
+/// How the voltage is led to its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PreCompensator {
+    /// The target is the voltage.
+    None,
+    /// Past the target and back, around the estimate.
+    ProportionalIntegral(ProportionalIntegral),
+}
+
+/// A checked configuration, scaled for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    estimator: estimator::Config,
+    pre_compensator: PreCompensator,
+    amplifier: amplifier::Config,
+}
+
+/// What the controller remembers from tick to tick; the default is a spring at rest without voltage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    estimator: estimator::State,
+    pre_compensator: pre_compensator::State,
+    amplifier: amplifier::State,
+}
+
+/// What a tick is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Input {
+    /// Static voltage of the desired stiffness.
+    pub target: Volts,
+}
+
+/// What a tick says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// The target that was pursued: the input's, held inside the amplifier's range.
+    pub target: Volts,
+    /// Voltage after slew and range, before rounding.
+    pub voltage: Volts,
+    /// What to write to the DAC now.
+    pub code: DacCode,
+    /// The voltage that `code` stands for.
+    pub applied: Volts,
+    /// Stiffness with `applied` just put across the spring.
+    pub stiffness: ScaledStiffness,
+    /// The limits that acted.
+    pub limits: Limits,
+}
+
+impl Config {
+    /// The range of voltages that is really used.
+    pub fn range(&self) -> (Volts, Volts) {
+        self.amplifier.range()
+    }
+
+    /// One tick: no heap, no float, no panic, no loop.
+    #[inline(always)]
+    pub fn tick(&self, state: &mut State, input: Input) -> Output {
+        let (target, moved) = self.amplifier.reachable(input.target);
+        let wanted = match &self.pre_compensator {
+            PreCompensator::None => target,
+            PreCompensator::ProportionalIntegral(it) => it.voltage(&state.pre_compensator, target, &state.estimator),
+        };
+        let drive = self.amplifier.drive(&mut state.amplifier, wanted);
+        let stiffness = self.estimator.estimate(&state.estimator, drive.applied);
+        self.estimator.advance(&mut state.estimator, drive.applied);
+        if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
+            it.track(&mut state.pre_compensator, drive.voltage);
+        }
+        let limits = drive.limits.with(Limits::TARGET, moved);
+        Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits }
+    }
+
+    /// Takes over a running `state` without a bump: with the same `target`, the next voltage is the last one.
+    ///
+    /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once.
+    pub fn adopt(&self, state: &mut State, target: Volts) {
+        if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
+            let (target, _) = self.amplifier.reachable(target);
+            it.align(&mut state.pre_compensator, state.amplifier.voltage(), target, &state.estimator);
+        }
+    }
+}

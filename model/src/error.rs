@@ -1,0 +1,44 @@
+//! The one error of this crate: a value that a person set is outside what is allowed.
+
+use core::fmt;
+use core::ops::RangeInclusive;
+
+/// A named value outside its allowed range; NaN is outside of every range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfRange {
+    /// Name of the setting, as in [`crate::Settings`].
+    pub field: &'static str,
+    /// The refused value, in `unit`.
+    pub value: f64,
+    /// Lowest allowed value, in `unit`.
+    pub lowest: f64,
+    /// Highest allowed value, in `unit`.
+    pub highest: f64,
+    /// Unit of the three numbers.
+    pub unit: &'static str,
+}
+
+impl OutOfRange {
+    /// Returns `value` if it lies in `allowed`.
+    pub(crate) fn check(
+        field: &'static str,
+        value: f64,
+        allowed: RangeInclusive<f64>,
+        unit: &'static str,
+    ) -> Result<f64, Self> {
+        if allowed.contains(&value) {
+            return Ok(value);
+        }
+        let (lowest, highest) = allowed.into_inner();
+        Err(Self { field, value, lowest, highest, unit })
+    }
+}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { field, value, lowest, highest, unit } = self;
+        write!(f, "{field} = {value} is not allowed: expected {lowest} to {highest} {unit}")
+    }
+}
+
+impl core::error::Error for OutOfRange {}

@@ -1,0 +1,44 @@
+//! What is true about the variable-stiffness spring, its amplifier and its control, in fixed point.
+//!
+//! No heap, no `unsafe`, no hardware, and no floating point once a [`Config`] is built: the same bits on a host and on
+//! the MCU. One tick is [`Config::tick`], a pure function of the configuration, the state and the input, and data goes
+//! through it one way:
+//!
+//! ```text
+//! target [V] -> pre-compensator -> amplifier limits -> DAC code
+//!                      ^                     |
+//!                      +---- estimator <-----+   (runs on the voltage really applied)
+//! ```
+//!
+//! A desired stiffness in Pa or N/m becomes a target in volts off the hot path, in [`stiffness`].
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`stiffness`] | Young's modulus against voltage, spring constant of the cantilever, both ways |
+//! | [`estimator`] | the spring's relaxation, run on the applied voltage |
+//! | [`pre_compensator`] | proportional-integral drive past the target and back |
+//! | [`amplifier`] | range, slew, rounding to a DAC code, and back to volts |
+//! | [`controller`] | the four in one tick; settings in SI, checked once |
+//! | [`units`], [`coefficient`] | the number formats |
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod amplifier;
+pub mod coefficient;
+pub mod controller;
+pub mod error;
+pub mod estimator;
+pub mod pre_compensator;
+pub mod stiffness;
+pub mod units;
+
+pub use amplifier::{Amplifier, Limits};
+pub use controller::{Config, Input, Output, PreCompensator, Settings, State};
+pub use error::OutOfRange;
+pub use estimator::Plant;
+pub use pre_compensator::Gains;
+pub use stiffness::Spring;
+pub use units::{DacCode, SampleTime, ScaledStiffness, Volts};

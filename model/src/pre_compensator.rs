@@ -1,0 +1,136 @@
+//! The proportional-integral pre-compensator: drives the voltage past the target and back.
+//!
+//! It closes a loop around the estimate, `u = Kp e + z`, `dz/dt = Ki e`, `e = target - y`. Two things make it more than
+//! that line:
+//!
+//! - **No delay in the loop.** Part of the stiffness follows the voltage at once, `y = w + share (u - w)`, so `u` stands
+//!   on both sides. Solved for it, with the estimator's relaxed part `w` and `g = 1 / (1 + Kp share)`:
+//!   `u = g z + (1 - g) w + g Kp (target - w)`.
+//! - **Anti-windup by structure.** While nothing limits, `Kp e = u - z`, so `dz/dt = (u - z) Ki / Kp`: the integrator is
+//!   a first-order lag, with the reset time `Kp / Ki`, of the voltage *that the amplifier really gave* after slew and
+//!   range. Limited, it follows the output instead of running away, and it cannot leave the amplifier's range
+//!   (Astrom and Haegglund's tracking form; Hanus's conditioning).
+//!
+//! Rounding to a DAC code is left out of that feedback: an integrator that tracked codes would stop short of the target
+//! by up to a fraction of a code.
+
+use crate::coefficient::{Gain, Rate, upper};
+use crate::error::OutOfRange;
+use crate::estimator::{self, Plant};
+use crate::units::{Accumulator, SampleTime, Signal, Volts};
+
+/// Volts of proportional action beyond which any range is at its end, so that no more need be computed.
+const ENOUGH_V: f64 = 1024.0;
+
+/// Gains in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Volts per volt of error, 0.001 to 100, and no more than what brings the spring to its target in one tick.
+    pub proportional: f64,
+    /// Volts per volt of error and second, 0 to `proportional` / two sample times.
+    pub integral_per_s: f64,
+}
+
+impl Gains {
+    /// The gains that reproduce the report's column "with controller"; it does not print them.
+    pub const PAPER: Self = Self { proportional: 4.0, integral_per_s: 1.35 };
+}
+
+/// The pre-compensator for one plant and sample time, scaled for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ProportionalIntegral {
+    /// Kp g
+    error_gain: Gain,
+    /// Errors beyond +-this drive the voltage to an end of any range all the same.
+    largest_error: Signal,
+    /// 1 - g
+    relaxed_gain: Gain,
+    /// g
+    integrator_gain: Gain,
+    /// T Ki / Kp
+    reset: Rate,
+}
+
+/// The integrator as it enters the voltage, g z, in volts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    integrator: Accumulator,
+}
+
+impl ProportionalIntegral {
+    /// For a checked `plant`.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names `proportional_gain` or `integral_gain_per_s`.
+    pub fn new(gains: &Gains, plant: &Plant, sample_time: SampleTime) -> Result<Self, OutOfRange> {
+        let seconds = sample_time.seconds();
+        // One tick moves the relaxed part by a (1 + Kp) / (1 + Kp share) of its distance; more than all of it rings.
+        let (share, a) = (plant.share, plant.relaxed_in(sample_time));
+        let deadbeat = if a > share { (1.0 - a) / (a - share) } else { f64::INFINITY };
+        let highest = deadbeat.min(100.0);
+        let proportional = OutOfRange::check("proportional_gain", gains.proportional, 0.001..=highest, "V/V")?;
+        let fastest = proportional / (2.0 * seconds);
+        let integral = OutOfRange::check("integral_gain_per_s", gains.integral_per_s, 0.0..=fastest, "1/s")?;
+        let g = 1.0 / (1.0 + proportional * share);
+        Ok(Self {
+            error_gain: Gain::new(proportional * g),
+            largest_error: Signal::from_num((ENOUGH_V / (proportional * g)).min(ENOUGH_V)),
+            relaxed_gain: Gain::new(1.0 - g),
+            integrator_gain: Gain::new(g),
+            // The slowest check above allows exactly 1/2, which a rate cannot hold.
+            reset: Rate::new((seconds * integral / proportional).min(0.499_999_999)),
+        })
+    }
+
+    /// The voltage that this loop asks for, before the amplifier's limits.
+    #[inline(always)]
+    pub(crate) fn voltage(&self, state: &State, target: Volts, spring: &estimator::State) -> Volts {
+        Volts(upper(state.integrator).saturating_add(self.without_integrator(target, spring)))
+    }
+
+    /// `(1 - g) w + g Kp (target - w)`
+    #[inline(always)]
+    fn without_integrator(&self, target: Volts, spring: &estimator::State) -> Signal {
+        let relaxed = spring.relaxed();
+        let error = (target.0 - relaxed).max(-self.largest_error).min(self.largest_error);
+        self.relaxed_gain.times(relaxed) + self.error_gain.times(error)
+    }
+
+    /// One sample time passes with `driven` at the amplifier's input, after limits and before rounding.
+    #[inline(always)]
+    pub(crate) fn track(&self, state: &mut State, driven: Volts) {
+        let lag = self.integrator_gain.times(driven.0).saturating_sub(upper(state.integrator));
+        state.integrator += self.reset.step(lag);
+    }
+
+    /// Sets the integrator so that, at this `target`, the loop asks for the `driven` voltage again.
+    pub(crate) fn align(&self, state: &mut State, driven: Volts, target: Volts, spring: &estimator::State) {
+        let integrator = driven.0.saturating_sub(self.without_integrator(target, spring));
+        state.integrator = Accumulator::from_bits(i64::from(integrator.to_bits()) << 32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_gains_are_named() {
+        let time = SampleTime::from_rate(1000.0).unwrap();
+        let named = |proportional, integral_per_s| {
+            ProportionalIntegral::new(&Gains { proportional, integral_per_s }, &Plant::PAPER, time).unwrap_err().field
+        };
+        assert_eq!(named(-4.0, 1.35), "proportional_gain");
+        assert_eq!(named(0.0, 1.35), "proportional_gain");
+        assert_eq!(named(f64::NAN, 1.35), "proportional_gain");
+        assert_eq!(named(4.0, -1.35), "integral_gain_per_s");
+        assert_eq!(named(4.0, f64::NAN), "integral_gain_per_s");
+        // A reset faster than two ticks cannot be sampled.
+        assert_eq!(named(4.0, 2001.0), "integral_gain_per_s");
+        // The spring would be past its target after one tick, back after two, and so on.
+        let slow = SampleTime::from_rate(100.0).unwrap();
+        let quick = Plant { share: 0.0, time_constant_s: 0.1 };
+        let error = ProportionalIntegral::new(&Gains { proportional: 20.0, integral_per_s: 1.0 }, &quick, slow);
+        assert_eq!(error.unwrap_err().field, "proportional_gain");
+    }
+}

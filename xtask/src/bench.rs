@@ -1,0 +1,209 @@
+//! ns per sample of the closed loop, beside what Python users have.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+use serde_json::{Value, json};
+
+use crate::shell;
+
+/// Samples in one run of a contender: 70 s at 1 kHz and the one at 0 s, as in `rivals.py` and the Rust bench.
+const SAMPLES: u32 = 70_001;
+/// Rivals and Rust take turns, because a machine's speed changes within minutes.
+const ROUNDS: usize = 3;
+const BENCH: &str = "closed_loop";
+
+struct Contender {
+    /// Key in the output of `rivals.py`, or id in the Rust bench.
+    name: &'static str,
+    what: &'static str,
+    rust: bool,
+    /// Allowed time as a multiple of numba's.
+    bound: Option<f64>,
+}
+
+const NUMBA: &str = "numba";
+const CONTENDERS: [Contender; 5] = [
+    Contender { name: "lsim", what: "scipy.signal.lsim", rust: false, bound: None },
+    Contender { name: "lfilter", what: "scipy.signal.lfilter", rust: false, bound: None },
+    Contender { name: NUMBA, what: "numba, plain loop", rust: false, bound: None },
+    Contender { name: "fixed_tick", what: "Rust, the MCU's fixed-point tick", rust: true, bound: Some(1.5) },
+    Contender { name: "reference_f64", what: "Rust, f64 reference", rust: true, bound: Some(0.7) },
+];
+
+/// Options of `cargo xtask bench`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Print the table as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// One line of the table.
+struct Row {
+    contender: &'static Contender,
+    ns: f64,
+    to_numba: f64,
+}
+
+impl Row {
+    fn within_bound(&self) -> bool {
+        self.contender.bound.is_none_or(|bound| self.to_numba <= bound)
+    }
+}
+
+/// `cargo xtask bench`.
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let metadata = shell::metadata()?;
+    find_bench(&metadata)?;
+    let target = Path::new(metadata["target_directory"].as_str().context("cargo metadata names no target directory")?);
+    let python = python(target)?;
+    shell::run(cargo_bench().arg("--no-run"))?;
+
+    let mut rounds = Vec::new();
+    for round in 1..=ROUNDS {
+        eprintln!("round {round} of {ROUNDS}");
+        rounds.push(measure(&python, target)?);
+    }
+    let rows = rows(&rounds);
+    if args.json {
+        println!("{}", report(&rows));
+    } else {
+        print!("{}", table(&rows));
+    }
+    if !rows.iter().all(Row::within_bound) {
+        bail!("Rust is slower than its bounds allow");
+    }
+    Ok(())
+}
+
+/// One round: ns per sample of each contender, in their order.
+fn measure(python: &Path, target: &Path) -> Result<[f64; CONTENDERS.len()]> {
+    let rivals = shell::json(shell::command(python).arg("xtask/bench/rivals.py"))?;
+    let criterion = target.join("criterion").join(BENCH);
+    let estimates = |name: &str| criterion.join(name).join("new/estimates.json");
+    // What an earlier run left must not be taken for this one's.
+    for contender in CONTENDERS.iter().filter(|c| c.rust) {
+        let _ = fs::remove_file(estimates(contender.name));
+    }
+    shell::run(&mut cargo_bench())?;
+
+    let mut times = [0.0; CONTENDERS.len()];
+    for (time, contender) in times.iter_mut().zip(&CONTENDERS) {
+        let name = contender.name;
+        *time = if contender.rust {
+            let path = estimates(name);
+            let text = fs::read_to_string(&path).with_context(|| {
+                format!("bench `{BENCH}` left no {}: does it have the id `{name}`?", path.display())
+            })?;
+            let estimates: Value = serde_json::from_str(&text)?;
+            estimates["median"]["point_estimate"].as_f64().map(|ns| ns / f64::from(SAMPLES))
+        } else {
+            rivals[name].as_f64()
+        }
+        .with_context(|| format!("no time for {name}"))?;
+    }
+    Ok(times)
+}
+
+/// Median over the rounds, of the times and of the ratios. A ratio is taken within its round: both saw the same machine.
+fn rows(rounds: &[[f64; CONTENDERS.len()]]) -> Vec<Row> {
+    let numba = CONTENDERS.iter().position(|c| c.name == NUMBA).expect("numba is in the list");
+    let row = |(i, contender)| Row {
+        contender,
+        ns: median(rounds.iter().map(|times| times[i])),
+        to_numba: median(rounds.iter().map(|times| times[i] / times[numba])),
+    };
+    CONTENDERS.iter().enumerate().map(row).collect()
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn table(rows: &[Row]) -> String {
+    let mut text = format!("{:<34}{:>14}{:>12}   bound\n", "closed loop, 70 s at 1 kHz", "ns per sample", "to numba");
+    for row @ Row { contender, ns, to_numba } in rows {
+        let bound = match contender.bound {
+            None => String::new(),
+            Some(bound) if row.within_bound() => format!("{bound:.2} met"),
+            Some(bound) => format!("{bound:.2} NOT MET"),
+        };
+        text += format!("{:<34}{ns:>14.2}{to_numba:>12.2}   {bound}", contender.what).trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+fn report(rows: &[Row]) -> Value {
+    let row = |row: &Row| {
+        json!({"name": row.contender.name, "ns_per_sample": row.ns, "to_numba": row.to_numba,
+               "bound": row.contender.bound, "within_bound": row.within_bound()})
+    };
+    json!({"samples": SAMPLES, "rounds": ROUNDS, "rows": rows.iter().map(row).collect::<Vec<_>>(),
+           "within_bounds": rows.iter().all(Row::within_bound)})
+}
+
+fn cargo_bench() -> Command {
+    let mut command = shell::cargo();
+    command.args(["bench", "-p", "host-sim", "--bench", BENCH]);
+    command
+}
+
+/// An error before minutes are spent on Python, if the Rust side is missing.
+fn find_bench(metadata: &Value) -> Result<()> {
+    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
+    let packages = list(&metadata["packages"]).into_iter().filter(|package| package["name"] == "host-sim");
+    let is_bench = |target: &Value| target["name"] == BENCH && list(&target["kind"]).contains(&json!("bench"));
+    if !packages.flat_map(|package| list(&package["targets"])).any(|target| is_bench(&target)) {
+        bail!("host-sim has no bench `{BENCH}`: expected host-sim/benches/{BENCH}.rs");
+    }
+    Ok(())
+}
+
+/// Python with the rivals' packages, in a venv of its own under the target directory.
+fn python(target: &Path) -> Result<PathBuf> {
+    let venv = target.join("bench-venv");
+    let python = venv.join("bin/python");
+    let requirements = shell::root().join("xtask/bench/requirements.txt");
+    let installed = venv.join("requirements.txt");
+    let wanted = fs::read(&requirements).with_context(|| format!("cannot read {}", requirements.display()))?;
+    if python.exists() && fs::read(&installed).is_ok_and(|there| there == wanted) {
+        eprintln!("bench: {} is up to date", venv.display());
+        return Ok(python);
+    }
+    eprintln!("bench: installing scipy and numba into {}", venv.display());
+    shell::run(shell::command("python3").args(["-m", "venv", "--clear"]).arg(&venv))
+        .context("python3 with its module venv is needed (Debian, Ubuntu: apt-get install python3-venv)")?;
+    shell::run(shell::command(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&requirements))?;
+    // Last: its presence says that the rest succeeded.
+    fs::write(&installed, wanted).with_context(|| format!("cannot write {}", installed.display()))?;
+    Ok(python)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_round_does_not_move_the_ratio() {
+        let quiet = [4000.0, 6.0, 5.0, 7.0, 3.0];
+        let slow = quiet.map(|ns| ns * 3.0);
+        let rows = rows(&[quiet, slow, quiet]);
+        assert_eq!(rows[3].ns, 7.0);
+        assert_eq!(rows[3].to_numba, 1.4);
+        assert!(rows.iter().all(Row::within_bound));
+    }
+
+    #[test]
+    fn a_missed_bound_is_marked() {
+        let rows = rows(&[[4000.0, 6.0, 5.0, 7.0, 4.0]]);
+        assert!(rows[3].within_bound() && !rows[4].within_bound());
+        assert!(table(&rows).trim_end().ends_with("NOT MET"));
+        assert_eq!(report(&rows)["within_bounds"], false);
+    }
+}

@@ -1,0 +1,65 @@
+//! The project's chores, one command each.
+
+mod bench;
+mod setup;
+mod shell;
+mod test;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+/// The project's chores, one command each.
+#[derive(Parser)]
+#[command(
+    name = "cargo xtask",
+    bin_name = "cargo xtask",
+    after_help = "\
+Examples:
+  cargo xtask setup            make a fresh machine ready
+  cargo xtask test             everything that must pass before a change goes in
+  cargo xtask bench --json     speed beside Python, as JSON
+
+Exit codes: 0 success, 1 the work failed, 2 bad arguments."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Install what a fresh machine lacks
+    ///
+    /// Reads rust-toolchain.toml and has rustup add the toolchain, the components and the MCU's target.
+    /// Harmless when repeated; needs the network only if something is missing.
+    Setup,
+    /// Setup, then every check and test
+    Test,
+    /// Compare the host's speed with Python's
+    ///
+    /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Exits with 1 if Rust is slower
+    /// than its bounds allow.
+    #[command(after_help = "Example:\n  cargo xtask bench --json | jq .within_bounds")]
+    Bench(bench::Args),
+}
+
+fn main() -> ExitCode {
+    let command = Cli::command().mut_subcommand("test", |c| c.after_help(test::help()).term_width(0));
+    let cli = match Cli::from_arg_matches(&command.get_matches()) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
+    let result = match cli.command {
+        Command::Setup => setup::run(),
+        Command::Test => test::run(),
+        Command::Bench(args) => bench::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
