@@ -19,6 +19,7 @@
 //! | [`pre_compensator`] | proportional-integral drive past the target and back |
 //! | [`amplifier`] | range, slew, rounding to a DAC code, and back to volts |
 //! | [`controller`] | the four in one tick; settings in SI, checked once |
+//! | [`supervisor`] | whether a voltage may leave at all |
 //! | [`units`], [`coefficient`] | the number formats |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -33,6 +34,7 @@ pub mod error;
 pub mod estimator;
 pub mod pre_compensator;
 pub mod stiffness;
+pub mod supervisor;
 pub mod units;
 
 pub use amplifier::{Amplifier, Limits};

@@ -1,0 +1,424 @@
+//! The supervisor: it alone decides whether a voltage may leave.
+//!
+//! Two steps in each tick. [`Supervisor::decide`], before the controller, takes the command and everything that speaks
+//! against a voltage and says what the controller is to do. [`Supervisor::release`], after it, turns the controller's
+//! output into a [`Drive`], and nobody else can make a `Drive` that is not zero. A board's amplifier port takes only that.
+//!
+//! ```text
+//!             arm (interlock closed, host heard)
+//!   Disarmed -----------------------------------> Armed --+ host silent: target ramps to zero, then disarmed
+//!      ^  ^                                       |  |    |
+//!      |  +------------------- disarm ------------+  |<---+ host heard again: its target counts again
+//!      |                                             | any fault
+//!      +--- disarm (the acknowledgement) --- Faulted <+
+//! ```
+//!
+//! Zero volts and a disabled amplifier in every state but `Armed`. The first fault stays until a disarm acknowledges it;
+//! arming again is a command of its own. In one tick a fault wins over every command, and disarm over arm.
+//!
+//! No heap, no float, no panic in a tick; times are counted in ticks.
+
+use crate::amplifier::Limits;
+use crate::controller::Output;
+use crate::error::OutOfRange;
+use crate::units::{Accumulator, DacCode, SampleTime, Signal, Volts};
+
+/// Why a voltage was taken away. The numbers are used in logs, frames and after a reset, and never change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// The program stopped itself.
+    Panic = 1,
+    /// The processor stopped the program.
+    HardFault = 2,
+    /// Too many ticks were missed.
+    Overrun = 3,
+    /// The interlock opened.
+    Interlock = 4,
+    /// A task did not check in, or the watchdog had to reset the chip.
+    Watchdog = 5,
+    /// The amplifier's monitors disagree with what was put out.
+    Monitor = 6,
+    /// The settings were refused.
+    Config = 7,
+}
+
+impl Fault {
+    const ALL: [Self; 7] =
+        [Self::Panic, Self::HardFault, Self::Overrun, Self::Interlock, Self::Watchdog, Self::Monitor, Self::Config];
+
+    /// Stable number, 1 to 255; zero stands for no fault.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// Lower case, for logs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Panic => "panic",
+            Self::HardFault => "hard-fault",
+            Self::Overrun => "overrun",
+            Self::Interlock => "interlock",
+            Self::Watchdog => "watchdog",
+            Self::Monitor => "monitor",
+            Self::Config => "config",
+        }
+    }
+
+    /// The fault of a code; `None` for zero and unknown numbers.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|fault| fault.code() == code)
+    }
+}
+
+/// Whether a voltage may leave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Zero volts; may be armed.
+    Disarmed,
+    /// The controller drives the amplifier.
+    Armed,
+    /// Zero volts until a disarm acknowledges the fault.
+    Faulted(Fault),
+}
+
+/// What a person or a host orders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// Let voltages out.
+    Arm,
+    /// Take the voltage away; acknowledges a fault.
+    Disarm,
+}
+
+/// Why an arm command was not followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Refusal {
+    /// A fault waits for its acknowledgement.
+    Faulted = 1,
+    /// The interlock is open.
+    InterlockOpen = 2,
+    /// No frame from the host within its time.
+    HostSilent = 3,
+}
+
+/// Limits of the supervision, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Silence of the host, in s, after which the target is ramped down, 0.01 to 60.
+    pub host_timeout_s: f64,
+    /// How fast the target then falls, in V/s, 10 to 100 000.
+    pub ramp_v_per_s: f64,
+    /// Missed ticks that are forgiven at once, 1 to 100.
+    pub missed_ticks_allowed: u32,
+    /// Time in s after which one of them is forgotten, one sample time to 60.
+    pub forget_missed_s: f64,
+    /// Largest difference in V between the amplifier's voltage monitor and what was put out, 1 to 1000.
+    pub monitor_tolerance_v: f64,
+    /// Largest reading of the current monitor, in A, either direction, 1e-6 to 1.
+    pub max_current_a: f64,
+    /// How long, in s, a monitor may disagree, one sample time to 10; longer than the amplifier takes to settle.
+    pub monitor_time_s: f64,
+}
+
+impl Settings {
+    /// Half a second without a host, then 700 V/s down; five missed ticks, one forgotten a second; 35 V, 5 % of the
+    /// report's range, and 2 mA for 50 ms.
+    pub const DEFAULT: Self = Self {
+        host_timeout_s: 0.5,
+        ramp_v_per_s: 700.0,
+        missed_ticks_allowed: 5,
+        forget_missed_s: 1.0,
+        monitor_tolerance_v: 35.0,
+        max_current_a: 2e-3,
+        monitor_time_s: 0.05,
+    };
+
+    /// Scales the settings for the tick.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the field.
+    pub fn check(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
+        let seconds = sample_time.seconds();
+        let ticks = |field, value, lowest: f64, highest| {
+            let checked = OutOfRange::check(field, value, lowest.max(seconds)..=highest, "s")?;
+            Ok::<u32, OutOfRange>(libm::round(checked / seconds) as u32)
+        };
+        let ramp = OutOfRange::check("ramp_v_per_s", self.ramp_v_per_s, 10.0..=1e5, "V/s")?;
+        let allowed = f64::from(self.missed_ticks_allowed);
+        OutOfRange::check("missed_ticks_allowed", allowed, 1.0..=100.0, "ticks")?;
+        let tolerance = OutOfRange::check("monitor_tolerance_v", self.monitor_tolerance_v, 1.0..=1000.0, "V")?;
+        let current = OutOfRange::check("max_current_a", self.max_current_a, 1e-6..=1.0, "A")?;
+        let forget = ticks("forget_missed_s", self.forget_missed_s, 0.0, 60.0)?;
+        Ok(Config {
+            host_timeout: ticks("host_timeout_s", self.host_timeout_s, 0.01, 60.0)?,
+            ramp_step: Accumulator::from_num((ramp * seconds).min(1000.0)),
+            miss_cost: forget,
+            miss_limit: forget.saturating_mul(self.missed_ticks_allowed),
+            tolerance: Signal::from_num(tolerance),
+            max_current_ua: libm::round(current * 1e6) as i32,
+            monitor_ticks: ticks("monitor_time_s", self.monitor_time_s, 0.0, 10.0)?,
+        })
+    }
+}
+
+/// Checked limits, scaled for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    host_timeout: u32,
+    ramp_step: Accumulator,
+    /// A missed tick costs as many as it takes to forget it; each tick gives one back.
+    miss_cost: u32,
+    miss_limit: u32,
+    tolerance: Signal,
+    max_current_ua: i32,
+    monitor_ticks: u32,
+}
+
+/// What the amplifier says about itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Monitors {
+    /// Voltage at its output, in V.
+    pub voltage: Volts,
+    /// Current into the spring, in uA.
+    pub current_ua: i32,
+}
+
+/// What a tick knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inputs {
+    /// Given since the last tick.
+    pub command: Option<Command>,
+    /// Static voltage of the desired stiffness.
+    pub target: Volts,
+    /// Ticks since the last valid frame of the host.
+    pub ticks_since_host: u32,
+    /// The safety circuit is closed.
+    pub interlock_closed: bool,
+    /// Ticks that were left out just before this one.
+    pub missed_ticks: u32,
+    /// Readings of the amplifier, where it has monitors.
+    pub monitors: Option<Monitors>,
+    /// What somebody else found: a task that does not check in, refused settings.
+    pub fault: Option<Fault>,
+}
+
+impl Default for Inputs {
+    /// Nothing ordered, nobody heard, interlock open: nothing that could let a voltage out.
+    fn default() -> Self {
+        Self {
+            command: None,
+            target: Volts::ZERO,
+            ticks_since_host: u32::MAX,
+            interlock_closed: false,
+            missed_ticks: 0,
+            monitors: None,
+            fault: None,
+        }
+    }
+}
+
+/// What the controller is to do in this tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// Zero volts: let the estimate follow a spring without voltage.
+    Rest,
+    /// The first tick with voltage: take over from rest, then pursue.
+    Start(Volts),
+    /// Pursue this target.
+    Pursue(Volts),
+}
+
+/// A code that may be written to the DAC, with the amplifier's enable. Only [`Supervisor::release`] makes one with voltage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drive {
+    code: DacCode,
+    enabled: bool,
+}
+
+impl Drive {
+    /// Zero volts, amplifier off.
+    pub const SAFE: Self = Self { code: DacCode(0), enabled: false };
+
+    /// For the DAC.
+    pub const fn code(self) -> DacCode {
+        self.code
+    }
+
+    /// For the enable output.
+    pub const fn enabled(self) -> bool {
+        self.enabled
+    }
+}
+
+/// The state machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Supervisor {
+    config: Config,
+    state: State,
+    /// The host is silent and the target on its way down; 64 bits so that the slowest ramp moves.
+    ramp: Option<Accumulator>,
+    pursued: Volts,
+    misses: u32,
+    disagreed: u32,
+    driven: Volts,
+    refusal: Option<Refusal>,
+}
+
+impl Supervisor {
+    /// Disarmed, or after a reset by a fault still faulted, so that somebody has to acknowledge it.
+    pub const fn new(config: Config, last_fault: Option<Fault>) -> Self {
+        let state = match last_fault {
+            None => State::Disarmed,
+            Some(fault) => State::Faulted(fault),
+        };
+        Self {
+            config,
+            state,
+            ramp: None,
+            pursued: Volts::ZERO,
+            misses: 0,
+            disagreed: 0,
+            driven: Volts::ZERO,
+            refusal: None,
+        }
+    }
+
+    /// The state after the last tick.
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// The target is on its way down because the host is silent.
+    pub const fn ramping(&self) -> bool {
+        self.ramp.is_some()
+    }
+
+    /// Why the last tick's arm command was not followed.
+    pub const fn refusal(&self) -> Option<Refusal> {
+        self.refusal
+    }
+
+    /// For logs: `disarmed`, `armed`, `ramping` (armed, host silent), `faulted`.
+    pub const fn label(&self) -> &'static str {
+        match (self.state, self.ramping()) {
+            (State::Disarmed, _) => "disarmed",
+            (State::Armed, false) => "armed",
+            (State::Armed, true) => "ramping",
+            (State::Faulted(_), _) => "faulted",
+        }
+    }
+
+    /// First half of a tick.
+    #[inline]
+    pub fn decide(&mut self, inputs: &Inputs) -> Decision {
+        self.refusal = None;
+        let was_armed = self.state == State::Armed;
+        // Both watch in every state, so that nothing that happened while disarmed is held against a new start.
+        let overrun = self.too_many_misses(inputs.missed_ticks);
+        let disagreement = self.disagrees(inputs.monitors);
+        if let Some(fault) = inputs.fault {
+            self.fail(fault);
+        }
+        if self.state == State::Armed {
+            if !inputs.interlock_closed {
+                self.fail(Fault::Interlock);
+            } else if disagreement {
+                self.fail(Fault::Monitor);
+            } else if overrun {
+                self.fail(Fault::Overrun);
+            }
+        }
+        // A fault of this very tick is not acknowledged by a command that was given before anybody could know of it.
+        if self.state == State::Armed || !was_armed {
+            match inputs.command {
+                Some(Command::Disarm) if inputs.fault.is_none() => self.state = State::Disarmed,
+                Some(Command::Arm) => self.arm(inputs),
+                _ => {}
+            }
+        }
+        let target = if self.state == State::Armed { self.follow(inputs) } else { None };
+        let Some(target) = target else {
+            self.ramp = None;
+            self.pursued = Volts::ZERO;
+            return Decision::Rest;
+        };
+        self.pursued = target;
+        if was_armed { Decision::Pursue(target) } else { Decision::Start(target) }
+    }
+
+    /// Second half of a tick: what may leave of the controller's `output`.
+    #[inline]
+    pub fn release(&mut self, output: &Output) -> Drive {
+        if self.state != State::Armed {
+            self.driven = Volts::ZERO;
+            return Drive::SAFE;
+        }
+        self.driven = output.applied;
+        Drive { code: output.code, enabled: true }
+    }
+
+    /// Limits as a log shows them: those of a resting controller are of no interest.
+    pub fn limits(&self, output: &Output) -> Limits {
+        if self.state == State::Armed { output.limits } else { Limits::NONE }
+    }
+
+    /// The first fault stays.
+    fn fail(&mut self, fault: Fault) {
+        if !matches!(self.state, State::Faulted(_)) {
+            self.state = State::Faulted(fault);
+        }
+    }
+
+    fn arm(&mut self, inputs: &Inputs) {
+        self.refusal = match self.state {
+            State::Armed => None,
+            State::Faulted(_) => Some(Refusal::Faulted),
+            State::Disarmed if !inputs.interlock_closed => Some(Refusal::InterlockOpen),
+            State::Disarmed if self.silent(inputs) => Some(Refusal::HostSilent),
+            State::Disarmed => {
+                self.state = State::Armed;
+                (self.misses, self.disagreed) = (0, 0);
+                None
+            }
+        };
+    }
+
+    fn silent(&self, inputs: &Inputs) -> bool {
+        inputs.ticks_since_host > self.config.host_timeout
+    }
+
+    /// The target while armed; `None` once the ramp of a silent host has come down, which disarms.
+    fn follow(&mut self, inputs: &Inputs) -> Option<Volts> {
+        if !self.silent(inputs) {
+            self.ramp = None;
+            return Some(inputs.target);
+        }
+        let start = self.ramp.unwrap_or(Accumulator::from_bits(i64::from(self.pursued.0.to_bits()) << 32));
+        let next = start.saturating_sub(self.config.ramp_step);
+        if next <= Accumulator::ZERO {
+            self.state = State::Disarmed;
+            return None;
+        }
+        self.ramp = Some(next);
+        Some(Volts(Signal::from_bits((next.to_bits() >> 32) as i32)))
+    }
+
+    fn too_many_misses(&mut self, missed: u32) -> bool {
+        self.misses = self.misses.saturating_sub(1).saturating_add(missed.saturating_mul(self.config.miss_cost));
+        self.misses > self.config.miss_limit
+    }
+
+    fn disagrees(&mut self, monitors: Option<Monitors>) -> bool {
+        let far = monitors.is_some_and(|monitors| {
+            let off = monitors.voltage.0.saturating_sub(self.driven.0).saturating_abs();
+            off > self.config.tolerance || monitors.current_ua.saturating_abs() > self.config.max_current_ua
+        });
+        self.disagreed = if far { self.disagreed.saturating_add(1) } else { 0 };
+        self.disagreed > self.config.monitor_ticks
+    }
+}
+
+#[cfg(test)]
+mod tests;
