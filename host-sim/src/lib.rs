@@ -10,11 +10,13 @@
 //! | [`stair`] | what a run says |
 //! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
 //! | [`plant_file`] | the spring as a file |
+//! | [`log`] | the log that the firmware writes, decoded |
 //! | [`output`] | terminal, JSON, CSV, plots |
 
 pub mod bad_input;
 pub mod bound;
 pub mod experiment;
+pub mod log;
 pub mod misprint;
 pub mod output;
 pub mod plant_file;

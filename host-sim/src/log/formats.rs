@@ -1,0 +1,118 @@
+//! The format strings of a firmware image: what its frames mean.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use anyhow::Result;
+use defmt_decoder::{DecodeError, Table};
+use object::{Object, ObjectSection, ObjectSymbol};
+use serde::{Deserialize, Serialize};
+
+use super::line::Line;
+use super::shape::{Formatted, Shape, Stop, Walk};
+use crate::bad_input;
+
+/// How the frames are packed, as the image says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Encoding {
+    /// Frames follow each other without a mark: after a damaged one nothing more can be found.
+    Raw,
+    /// Frames end with a zero byte that occurs nowhere else: reading goes on after a damaged one.
+    Rzcobs,
+}
+
+/// What the log of one firmware image is decoded with.
+pub struct Formats {
+    table: Table,
+    encoding: Encoding,
+    timestamp: Option<Shape>,
+    formatted: BTreeMap<u16, Formatted>,
+}
+
+/// The part of a defmt symbol's name that is needed here.
+#[derive(Deserialize)]
+struct Symbol {
+    tag: String,
+    data: String,
+}
+
+impl Formats {
+    /// Reads them from the bytes of an ELF file.
+    ///
+    /// # Errors
+    /// [`crate::BadInput`] if it is not one, or not of a firmware that logs with defmt 0.3 to 1.x.
+    pub fn parse(elf: &[u8]) -> Result<Self> {
+        let table = match Table::parse(elf) {
+            Ok(Some(table)) => table,
+            Ok(None) => bad_input!("has no .defmt section; expected the ELF file of the firmware that wrote the log"),
+            Err(error) => {
+                let why = error.to_string().lines().collect::<Vec<_>>().join(", ");
+                bad_input!("{why}; expected the ELF file of the firmware that wrote the log")
+            }
+        };
+        let encoding = match table.encoding() {
+            defmt_decoder::Encoding::Raw => Encoding::Raw,
+            defmt_decoder::Encoding::Rzcobs => Encoding::Rzcobs,
+            other => bad_input!("packs its log as {other:?}; expected raw or rzcobs"),
+        };
+        let mut formats = Self { table, encoding, timestamp: None, formatted: BTreeMap::new() };
+        formats.collect(elf)?;
+        Ok(formats)
+    }
+
+    /// How the frames are packed.
+    pub fn encoding(&self) -> Encoding {
+        self.encoding
+    }
+
+    /// The table keeps its strings to itself, so they are read once more.
+    fn collect(&mut self, elf: &[u8]) -> Result<()> {
+        let elf = object::File::parse(elf)?;
+        let is_defmt = |name: &str| name == ".defmt" || name.starts_with(".defmt.");
+        let sections: Vec<_> =
+            elf.sections().filter(|s| s.name().is_ok_and(is_defmt)).map(|section| section.index()).collect();
+        for symbol in elf.symbols() {
+            let (Ok(name), Some(section)) = (symbol.name(), symbol.section_index()) else { continue };
+            if !sections.contains(&section) {
+                continue;
+            }
+            // Markers of the linker script are no strings.
+            let Ok(Symbol { tag, data }) = serde_json::from_str(name) else { continue };
+            match (tag.as_str(), u16::try_from(symbol.address())) {
+                ("defmt_timestamp", _) => self.timestamp = Shape::of(&data),
+                ("defmt_bitflags_value", _) | (_, Err(_)) => {}
+                (tag, Ok(index)) => {
+                    self.formatted.insert(index, Formatted::new(tag, data));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The frame at the start of `bytes`, and how many bytes it has.
+    pub(super) fn decode(&self, bytes: &[u8]) -> Result<(Line, usize), Stop> {
+        // The decoder allocates and recurses as a frame tells it to; one that is damaged would tell it anything.
+        self.walk(bytes)?;
+        let decoded = catch_unwind(AssertUnwindSafe(|| {
+            let (frame, length) = self.table.decode(bytes)?;
+            Ok((Line::new(&frame), length))
+        }));
+        match decoded {
+            Ok(Ok(decoded)) => Ok(decoded),
+            Ok(Err(DecodeError::UnexpectedEof)) => Err(Stop::More),
+            // A panic: a value that the decoder cannot show, such as a date beyond the year 9999.
+            Ok(Err(DecodeError::Malformed)) | Err(_) => Err(Stop::Damaged),
+        }
+    }
+
+    fn walk(&self, bytes: &[u8]) -> Result<(), Stop> {
+        let mut walk = Walk::new(&self.formatted, bytes);
+        let index = walk.index()?;
+        if let Some(timestamp) = &self.timestamp {
+            walk.shape(timestamp)?;
+        }
+        let line = self.formatted.get(&index).filter(|formatted| formatted.is_line).ok_or(Stop::Damaged)?;
+        walk.shape(line.whole.as_ref().ok_or(Stop::Damaged)?)
+    }
+}

@@ -1,0 +1,38 @@
+//! The firmware's log: [defmt](https://defmt.ferrous-systems.com) frames, decoded as they come.
+//!
+//! A [`Decoder`] is fed bytes, in pieces of any size, and gives [`Item`]s: lines, and stretches that could not be read.
+//! A [`Summary`] adds them up. Neither knows where the bytes come from.
+//!
+//! ```no_run
+//! use host_sim::log::{Decoder, Formats, Item, Summary};
+//!
+//! let mut decoder = Decoder::new(Formats::parse(&std::fs::read("firmware.elf")?)?);
+//! let mut summary = Summary::default();
+//! let mut items = decoder.feed(&std::fs::read("log.bin")?);
+//! items.extend(decoder.finish());
+//! for item in &items {
+//!     summary.add(item);
+//!     if let Item::Line(line) = item {
+//!         println!("{}", line.message);
+//!     }
+//! }
+//! # Ok::<(), anyhow::Error>(())
+//! ```
+//!
+//! defmt frames carry no checksum: a damaged frame that happens to have the form of a whole one is taken for one.
+
+mod decoder;
+mod event;
+mod formats;
+mod frames;
+mod line;
+mod shape;
+mod summary;
+mod text;
+
+pub use decoder::{Decoder, Item};
+pub use event::Event;
+pub use formats::{Encoding, Formats};
+pub use line::{Level, Line};
+pub use summary::{Boot, Done, Fault, LimitLines, Summary};
+pub use text::{CSV_HEADER, TABLE_HEADER, csv_row, summary_text, table_row};

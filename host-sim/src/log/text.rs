@@ -1,0 +1,147 @@
+//! A log as text: table, CSV, summary.
+
+use std::borrow::Cow;
+use std::fmt::Write;
+
+use model::Limits;
+
+use super::{Event, Item, Line, Summary};
+
+/// First line of the table.
+pub const TABLE_HEADER: &str = "    time [s]  level  message";
+
+/// First line of the CSV.
+pub const CSV_HEADER: &str = "time_s,level,event,message";
+
+/// A line of the table, without its end.
+pub fn table_row(item: &Item) -> String {
+    match item {
+        Item::Line(line) => {
+            let time = line.time_us.map_or_else(|| "-".to_owned(), seconds);
+            let level = line.level.map_or_else(|| "-".to_owned(), |level| level.to_string());
+            format!("{time:>12}  {level:<5}  {}{}", one_line(&line.message), limits(line))
+        }
+        other => format!("{:>12}  {:<5}  {}", "-", "-", damage(other)),
+    }
+}
+
+/// A row of the CSV, without its end; damage as a comment.
+pub fn csv_row(item: &Item) -> String {
+    match item {
+        Item::Line(line) => {
+            let time = line.time_us.map(seconds).unwrap_or_default();
+            let level = line.level.map(|level| level.to_string().to_lowercase()).unwrap_or_default();
+            format!("{time},{level},{},{}", line.event.name(), quoted(&one_line(&line.message)))
+        }
+        other => format!("# {}", damage(other)),
+    }
+}
+
+/// The summary, several lines.
+pub fn summary_text(summary: &Summary) -> String {
+    let mut text = String::from("summary\n");
+    let Summary { lines, errors, warnings, .. } = summary;
+    entry(&mut text, "lines", &format!("{lines} (error {errors}, warn {warnings})"));
+    entry(&mut text, "starts", &starts(summary));
+    entry(&mut text, "ticks", &summary.ticks.to_string());
+    entry(&mut text, "overruns", &summary.overruns.to_string());
+    let lateness = summary.worst_lateness_us.map_or_else(|| "-".to_owned(), |us| format!("{us} us"));
+    entry(&mut text, "worst lateness", &lateness);
+    entry(&mut text, "time in limits", &time_in_limits(summary));
+    entry(&mut text, "faults", &faults(summary));
+    if let Some(done) = &summary.done {
+        let run = format!("{} ticks, {} missed, digest {:016x}", done.ticks, done.missed, done.digest);
+        entry(&mut text, "run", &run);
+        entry(&mut text, "instructions", &format!("{} to {} a tick, mean {}", done.min, done.max, done.mean));
+    }
+    if summary.damaged_frames > 0 {
+        let Summary { damaged_frames, damaged_bytes, .. } = summary;
+        entry(&mut text, "damaged", &format!("frames {damaged_frames}, bytes {damaged_bytes}"));
+    }
+    if summary.cut_off_bytes > 0 {
+        entry(&mut text, "cut off", &format!("bytes {} of a last frame", summary.cut_off_bytes));
+    }
+    text
+}
+
+fn starts(summary: &Summary) -> String {
+    let mut text = summary.boots.len().to_string();
+    for (number, boot) in summary.boots.iter().enumerate() {
+        text += if number == 0 { ": " } else { ", " };
+        text += &one_line(&boot.reset);
+        if boot.last_fault != 0 {
+            text += &format!(" after fault {}", boot.last_fault);
+        }
+    }
+    if summary.boots_not_seen > 0 {
+        text += &format!("; {} more without a boot line", summary.boots_not_seen);
+    }
+    text
+}
+
+fn time_in_limits(summary: &Summary) -> String {
+    let mut text = match summary.limited_s {
+        Some(time) => format!("{time:.3} s (ticks {})", summary.limited_ticks),
+        None => format!("- (ticks {}, their rate is not known)", summary.limited_ticks),
+    };
+    let lines = summary.limit_lines;
+    for (name, count) in
+        [("upper", lines.upper), ("lower", lines.lower), ("slew", lines.slew), ("target", lines.target)]
+    {
+        if count > 0 {
+            text += &format!(", {name} x{count}");
+        }
+    }
+    text
+}
+
+fn faults(summary: &Summary) -> String {
+    let all: u64 = summary.faults.iter().map(|fault| fault.count).sum();
+    let mut text = all.to_string();
+    for (number, fault) in summary.faults.iter().enumerate() {
+        text += if number == 0 { ": " } else { ", " };
+        text += &format!("{} (code {}) x{}", one_line(&fault.name), fault.code, fault.count);
+    }
+    text
+}
+
+/// The names of a limit line's bits.
+fn limits(line: &Line) -> String {
+    let Event::Limit { bits, .. } = line.event else { return String::new() };
+    let names =
+        [(Limits::UPPER, "upper"), (Limits::LOWER, "lower"), (Limits::SLEW, "slew"), (Limits::TARGET, "target")];
+    let names: Vec<&str> = names.iter().filter(|(limit, _)| bits & limit.bits() != 0).map(|&(_, name)| name).collect();
+    if names.is_empty() { " (none)".to_owned() } else { format!(" ({})", names.join(", ")) }
+}
+
+fn damage(item: &Item) -> String {
+    match item {
+        Item::Line(_) => String::new(),
+        Item::Damaged { offset, bytes } => format!("damaged: {bytes} bytes at byte {offset} are no frame"),
+        Item::Lost { offset } => format!("damaged: no frame at byte {offset}, and a raw log has no mark to go on from"),
+        Item::Unread { bytes } => format!("damaged: {bytes} bytes not read"),
+        Item::CutOff { offset, bytes } => format!("cut off: {bytes} bytes at byte {offset} are no whole frame"),
+    }
+}
+
+fn entry(text: &mut String, name: &str, value: &str) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "  {name:<15} {value}");
+}
+
+fn seconds(us: u64) -> String {
+    format!("{}.{:06}", us / 1_000_000, us % 1_000_000)
+}
+
+/// A damaged frame must not be able to steer a terminal.
+fn one_line(text: &str) -> Cow<'_, str> {
+    if !text.contains(char::is_control) {
+        return Cow::Borrowed(text);
+    }
+    let escaped = text.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() });
+    Cow::Owned(escaped.collect())
+}
+
+fn quoted(text: &str) -> Cow<'_, str> {
+    if text.contains(['"', ',']) { format!("\"{}\"", text.replace('"', "\"\"")).into() } else { text.into() }
+}
