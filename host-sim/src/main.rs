@@ -24,6 +24,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Log(commands::log::Arguments),
     Stair(commands::stair::Arguments),
 }
 
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Err(error) => return usage(&error),
     };
     let done = match cli.command {
+        Some(Command::Log(arguments)) => commands::log::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),
     };

@@ -1,0 +1,217 @@
+//! `vsj log`: the firmware's log as text.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, IsTerminal, Read, StdoutLock, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use host_sim::bad_input;
+use host_sim::log::{
+    CSV_HEADER, Decoder, Encoding, Formats, Item, Line, Summary, TABLE_HEADER, csv_row, summary_text, table_row,
+};
+use serde::Serialize;
+
+/// Decode the firmware's log into a table and a summary, from a file or as it comes
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj log firmware.elf capture.bin            a file that a debug probe wrote
+  qemu-system-arm ... | vsj log firmware.elf  live; Ctrl-C ends it with the summary
+  vsj log firmware.elf capture.bin --csv      columns time_s,level,event,message
+  vsj log firmware.elf capture.bin --json     one object with lines and summary
+
+Exit codes: 0 all read, 1 damaged or cut off but what could be read is printed, 2 not the log of this ELF.")]
+pub(crate) struct Arguments {
+    /// The ELF file of the very build that wrote the log
+    #[arg(value_name = "ELF")]
+    elf: PathBuf,
+    /// The log as it left the MCU; `-` is stdin
+    #[arg(value_name = "FILE", default_value = "-")]
+    file: PathBuf,
+    /// Columns time_s,level,event,message; the summary as comments
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
+    /// One JSON object on stdout, at the end
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    encoding: Encoding,
+    lines: Vec<Line>,
+    damaged: Vec<Damage>,
+    summary: Summary,
+}
+
+/// A stretch of the log that is no frame.
+#[derive(Serialize)]
+struct Damage {
+    offset: u64,
+    /// Not known where a raw log stops to make sense; the summary has them.
+    bytes: Option<u64>,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let elf = match std::fs::read(&arguments.elf) {
+        Ok(elf) => elf,
+        Err(error) => bad_input!("{}: cannot be read: {error}; expected an ELF file", arguments.elf.display()),
+    };
+    let formats = match Formats::parse(&elf) {
+        Ok(formats) => formats,
+        Err(error) => bad_input!("{}: {error:#}", arguments.elf.display()),
+    };
+    let source = open(&arguments.file)?;
+    let mut printer = Printer { arguments, out: io::stdout().lock(), lines: Vec::new(), damaged: Vec::new() };
+    match decode(source, formats, &mut printer) {
+        // Who closes the pipe has seen enough.
+        Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
+        done => done,
+    }
+}
+
+fn open(path: &Path) -> Result<Box<dyn Read>> {
+    if path == Path::new("-") {
+        if io::stdin().is_terminal() {
+            bad_input!("stdin is a terminal; expected a FILE, or a log from a pipe");
+        }
+        // Ctrl-C goes to the whole pipe. Who writes to it ends, and then so do we, with the summary; the second ends us.
+        let mut before = false;
+        ctrlc::set_handler(move || {
+            if std::mem::replace(&mut before, true) {
+                std::process::exit(130);
+            }
+        })?;
+        return Ok(Box::new(io::stdin()));
+    }
+    // A folder opens like a file, and fails only when it is read.
+    let file = match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => Err(ErrorKind::IsADirectory.into()),
+        _ => File::open(path),
+    };
+    match file {
+        Ok(file) => Ok(Box::new(file)),
+        Err(error) => bad_input!("{}: cannot be read: {error}; expected the log of the firmware", path.display()),
+    }
+}
+
+fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>) -> Result<()> {
+    let encoding = formats.encoding();
+    let mut decoder = Decoder::new(formats);
+    let mut summary = Summary::default();
+    let mut buffer = [0; 1 << 13];
+    let mut empty = true;
+    let mut broken = None;
+    printer.start()?;
+    loop {
+        let read = match source.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(read) => read,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => {
+                broken = Some(error);
+                break;
+            }
+        };
+        empty = false;
+        for item in decoder.feed(&buffer[..read]) {
+            summary.add(&item);
+            printer.item(item)?;
+        }
+        printer.out.flush()?;
+    }
+    if let Some(item) = decoder.finish() {
+        summary.add(&item);
+        printer.item(item)?;
+    }
+    let verdict = verdict(printer.arguments, &summary, empty);
+    printer.end(encoding, summary)?;
+    let name = name(&printer.arguments.file);
+    match broken {
+        Some(error) => Err(anyhow::Error::msg(error.to_string())).with_context(|| format!("{name}: cannot be read on")),
+        None => verdict,
+    }
+}
+
+/// What is wrong with the log.
+fn verdict(arguments: &Arguments, summary: &Summary, empty: bool) -> Result<()> {
+    let (name, elf) = (name(&arguments.file), arguments.elf.display());
+    let Summary { lines, damaged_frames, damaged_bytes, cut_off_bytes, .. } = summary;
+    if empty {
+        bad_input!("{name}: empty; expected the log of the firmware");
+    }
+    if *lines == 0 && *damaged_frames > 0 {
+        bad_input!("{name}: none of its frames fits {elf}; expected the log of this very build");
+    }
+    let mut wrong = Vec::new();
+    if let Some(first) = summary.first_damage {
+        wrong.push(format!("{damaged_frames} damaged frames ({damaged_bytes} bytes), the first at byte {first}"));
+    }
+    if *cut_off_bytes > 0 {
+        wrong.push(format!("cut off, the last {cut_off_bytes} bytes are no whole frame"));
+    }
+    if !wrong.is_empty() {
+        // Frames have no checksum: a few of another build's may pass.
+        let foreign = if damaged_frames > lines { "; is it the log of another build?" } else { "" };
+        bail!("{name}: {}; {lines} lines were read{foreign}", wrong.join("; "));
+    }
+    Ok(())
+}
+
+fn name(path: &Path) -> String {
+    if path == Path::new("-") { "stdin".to_owned() } else { path.display().to_string() }
+}
+
+/// Prints what the options ask for.
+struct Printer<'a> {
+    arguments: &'a Arguments,
+    out: StdoutLock<'static>,
+    /// For `--json`, which is one object.
+    lines: Vec<Line>,
+    damaged: Vec<Damage>,
+}
+
+impl Printer<'_> {
+    fn start(&mut self) -> io::Result<()> {
+        match (self.arguments.json, self.arguments.csv) {
+            (true, _) => return Ok(()),
+            (_, true) => writeln!(self.out, "{CSV_HEADER}")?,
+            _ => writeln!(self.out, "{TABLE_HEADER}")?,
+        }
+        self.out.flush()
+    }
+
+    fn item(&mut self, item: Item) -> io::Result<()> {
+        match (self.arguments.json, self.arguments.csv) {
+            (true, _) => {
+                match item {
+                    Item::Line(line) => self.lines.push(line),
+                    Item::Damaged { offset, bytes } => self.damaged.push(Damage { offset, bytes: Some(bytes) }),
+                    Item::Lost { offset } => self.damaged.push(Damage { offset, bytes: None }),
+                    Item::Unread { .. } | Item::CutOff { .. } => {}
+                }
+                Ok(())
+            }
+            (_, true) => writeln!(self.out, "{}", csv_row(&item)),
+            _ => writeln!(self.out, "{}", table_row(&item)),
+        }
+    }
+
+    fn end(&mut self, encoding: Encoding, summary: Summary) -> Result<()> {
+        if self.arguments.json {
+            let (lines, damaged) = (std::mem::take(&mut self.lines), std::mem::take(&mut self.damaged));
+            let report = Report { encoding, lines, damaged, summary };
+            writeln!(self.out, "{}", serde_json::to_string(&report)?)?;
+        } else if self.arguments.csv {
+            for line in summary_text(&summary).lines() {
+                writeln!(self.out, "# {line}")?;
+            }
+        } else {
+            write!(self.out, "\n{}", summary_text(&summary))?;
+        }
+        Ok(self.out.flush()?)
+    }
+}
