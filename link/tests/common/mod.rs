@@ -1,0 +1,97 @@
+//! Messages of every kind, for the tests.
+
+use link::reply::Firmware;
+use link::session::Counters;
+use link::{Desired, Fault, Reason, Reply, Request, State, Status, Telemetry, WireVolts};
+use proptest::prelude::*;
+
+/// Any finite or infinite number. NaN is left out because it does not equal itself; it has its own test.
+fn number() -> impl Strategy<Value = f64> {
+    any::<f64>().prop_filter("NaN", |number| !number.is_nan())
+}
+
+fn fault() -> impl Strategy<Value = Fault> {
+    any::<u8>().prop_map(Fault)
+}
+
+fn volts() -> impl Strategy<Value = WireVolts> {
+    any::<i32>().prop_map(WireVolts)
+}
+
+pub(crate) fn request() -> impl Strategy<Value = Request> {
+    prop_oneof![
+        Just(Request::Hello),
+        Just(Request::Status),
+        number().prop_map(|v| Request::Set(Desired::ScaledVolts(v))),
+        number().prop_map(|v| Request::Set(Desired::Pascal(v))),
+        number().prop_map(|v| Request::Set(Desired::NewtonPerMetre(v))),
+        Just(Request::Arm),
+        Just(Request::Disarm),
+        fault().prop_map(Request::Acknowledge),
+        Just(Request::Heartbeat),
+        any::<u16>().prop_map(|every_ticks| Request::Stream { every_ticks }),
+    ]
+}
+
+fn state() -> impl Strategy<Value = State> {
+    prop::sample::select(vec![State::Disarmed, State::Armed, State::Ramping, State::Faulted])
+}
+
+fn reason() -> impl Strategy<Value = Reason> {
+    prop_oneof![
+        (number(), number()).prop_map(|(lowest, highest)| Reason::OutOfRange { lowest, highest }),
+        Just(Reason::NotArmed),
+        fault().prop_map(Reason::Faulted),
+        any::<u8>().prop_map(Reason::BadVersion),
+        Just(Reason::HelloFirst),
+        any::<u16>().prop_map(|newest| Reason::Stale { newest }),
+        Just(Reason::SequenceReused),
+        Just(Reason::UnknownRequest),
+        Just(Reason::InterlockOpen),
+        fault().prop_map(Reason::OtherFault),
+        Just(Reason::HostSilent),
+    ]
+}
+
+fn telemetry() -> impl Strategy<Value = Telemetry> {
+    (any::<u64>(), state(), volts(), volts(), volts(), prop::option::of(volts()), any::<u16>(), any::<u8>()).prop_map(
+        |(tick, state, target, applied, estimate, measured, code, limits)| Telemetry {
+            tick,
+            state,
+            target,
+            applied,
+            estimate,
+            measured,
+            code,
+            limits,
+        },
+    )
+}
+
+fn status() -> impl Strategy<Value = Status> {
+    (any::<[u8; 3]>(), any::<[u32; 4]>(), fault(), fault(), telemetry(), any::<[u32; 7]>()).prop_map(
+        |([major, minor, patch], numbers, fault, last_fault, sample, counts)| {
+            let [revision, rate_hz, silence_limit_ticks, overruns] = numbers;
+            let [accepted, repeated, damaged, oversize, bad_version, out_of_order, unknown] = counts;
+            Status {
+                firmware: Firmware { major, minor, patch, revision },
+                rate_hz,
+                silence_limit_ticks,
+                overruns,
+                fault,
+                last_fault,
+                sample,
+                counters: Counters { accepted, repeated, damaged, oversize, bad_version, out_of_order, unknown },
+            }
+        },
+    )
+}
+
+pub(crate) fn reply() -> impl Strategy<Value = Reply> {
+    prop_oneof![
+        (state(), volts()).prop_map(|(state, target)| Reply::Ack { state, target }),
+        reason().prop_map(Reply::Refused),
+        status().prop_map(Reply::Status),
+        telemetry().prop_map(Reply::Telemetry),
+    ]
+}

@@ -1,0 +1,225 @@
+//! Damaged frames: none accepted wrongly, none crashes, and the first whole frame afterwards is understood.
+
+mod by_hand;
+mod common;
+
+use std::cell::Cell;
+
+use by_hand::by_hand;
+use link::frame::MAX_FRAME;
+use link::{Action, Frame, Packet, Receiver, Reply, Request, Sequence, Session, Status};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+
+/// What makes a packet itself.
+type Told = (u8, u8, u16, Vec<u8>);
+
+fn told(packet: &Packet<'_>) -> Told {
+    (packet.version, packet.kind, packet.sequence.0, packet.message.to_vec())
+}
+
+fn received(receiver: &mut Receiver, bytes: &[u8]) -> Vec<Told> {
+    bytes.iter().filter_map(|&byte| receiver.on_byte(byte).as_ref().map(told)).collect()
+}
+
+fn only(frame: &Frame) -> Told {
+    received(&mut Receiver::new(), frame.as_bytes()).pop().expect("a whole frame is understood")
+}
+
+/// What may happen to a frame on its way.
+#[derive(Clone, Debug)]
+enum Damage {
+    /// Bits flipped, by position.
+    Flip(Vec<prop::sample::Index>),
+    /// The end is missing.
+    Truncate(prop::sample::Index),
+    /// The beginning is missing.
+    Behead(prop::sample::Index),
+    /// A stretch is missing.
+    Cut(prop::sample::Index, prop::sample::Index),
+    /// A stretch came twice.
+    Double(prop::sample::Index, prop::sample::Index),
+    /// The head of this frame, the tail of another one.
+    Splice(prop::sample::Index, prop::sample::Index),
+    /// Something in the middle of it.
+    Insert(prop::sample::Index, Vec<u8>),
+    /// Something in its place.
+    Garbage(Vec<u8>),
+}
+
+fn damage() -> impl Strategy<Value = Damage> {
+    use any as a;
+    type At = prop::sample::Index;
+    prop_oneof![
+        prop::collection::vec(a::<At>(), 1..12).prop_map(Damage::Flip),
+        a::<At>().prop_map(Damage::Truncate),
+        a::<At>().prop_map(Damage::Behead),
+        a::<(At, At)>().prop_map(|(from, to)| Damage::Cut(from, to)),
+        a::<(At, At)>().prop_map(|(from, to)| Damage::Double(from, to)),
+        a::<(At, At)>().prop_map(|(head, tail)| Damage::Splice(head, tail)),
+        (a::<At>(), prop::collection::vec(a::<u8>(), 1..40)).prop_map(|(at, bytes)| Damage::Insert(at, bytes)),
+        prop::collection::vec(a::<u8>(), 0..400).prop_map(Damage::Garbage),
+    ]
+}
+
+fn damaged(frame: &[u8], other: &[u8], damage: &Damage) -> Vec<u8> {
+    let range = |from: &prop::sample::Index, to: &prop::sample::Index| {
+        let (from, to) = (from.index(frame.len()), to.index(frame.len()));
+        from.min(to)..from.max(to)
+    };
+    let mut bytes = frame.to_vec();
+    match damage {
+        Damage::Flip(bits) => bits.iter().map(|bit| bit.index(8 * frame.len())).for_each(|bit| {
+            bytes[bit / 8] ^= 1 << (bit % 8);
+        }),
+        Damage::Truncate(at) => bytes.truncate(at.index(frame.len())),
+        Damage::Behead(at) => drop(bytes.drain(..=at.index(frame.len()))),
+        Damage::Cut(from, to) => drop(bytes.drain(range(from, to))),
+        Damage::Double(from, to) => {
+            let range = range(from, to);
+            bytes.splice(range.end..range.end, frame[range].to_vec());
+        }
+        Damage::Splice(head, tail) => {
+            bytes.truncate(head.index(frame.len()));
+            bytes.extend_from_slice(&other[tail.index(other.len())..]);
+        }
+        Damage::Insert(at, more) => {
+            let at = at.index(frame.len());
+            bytes.splice(at..at, more.iter().copied());
+        }
+        Damage::Garbage(garbage) => bytes.clone_from(garbage),
+    }
+    bytes
+}
+
+/// Always the same 10 000, so that a failure can be repeated.
+fn runner() -> TestRunner {
+    let config = Config { cases: 10_000, failure_persistence: None, ..Config::default() };
+    TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &[7; 32]))
+}
+
+fn frames() -> impl Strategy<Value = Vec<(u16, Request, Damage)>> {
+    prop::collection::vec((any::<u16>(), common::request(), damage()), 1..4)
+}
+
+#[test]
+fn ten_thousand_damaged_streams_give_nothing_that_was_not_sent() {
+    let replies = (frames(), any::<u16>(), common::reply());
+    let (kept, lost) = (Cell::new(0), Cell::new(0));
+    runner()
+        .run(&replies, |(sent, sequence, reply)| {
+            let last = Frame::new(Sequence(sequence), &reply);
+            let frames: Vec<Frame> =
+                sent.iter().map(|(sequence, request, _)| Frame::new(Sequence(*sequence), request)).collect();
+            let mut allowed: Vec<Told> = frames.iter().map(only).collect();
+            allowed.push(only(&last));
+
+            let mut receiver = Receiver::new();
+            let mut wire = Vec::new();
+            for (frame, (_, _, damage)) in frames.iter().zip(&sent) {
+                wire.extend(damaged(frame.as_bytes(), last.as_bytes(), damage));
+            }
+            let got = received(&mut receiver, &wire);
+            prop_assert!(got.iter().all(|told| allowed.contains(told)), "{got:?} from {wire:?}");
+            kept.set(kept.get() + got.len());
+            lost.set(lost.get() + frames.len().saturating_sub(got.len()));
+            // Whatever came before, and without any pause. The delimiter in front may complete a frame whose own was lost.
+            let got = received(&mut receiver, last.as_bytes());
+            prop_assert_eq!(got.last(), Some(&only(&last)));
+            prop_assert!(got.iter().all(|told| allowed.contains(told)));
+            Ok(())
+        })
+        .unwrap();
+    // Damage that changes nothing (a cut of nothing) or hits only a delimiter leaves a frame whole; most do not.
+    assert!(lost.get() > 10_000, "{kept:?} kept, {lost:?} lost");
+}
+
+#[test]
+fn a_session_under_ten_thousand_damaged_streams_applies_only_what_was_sent() {
+    runner()
+        .run(&frames(), |sent| {
+            let mut session = Session::new(500);
+            let frames: Vec<Frame> =
+                sent.iter().map(|(sequence, request, _)| Frame::new(Sequence(*sequence), request)).collect();
+            let hello = Frame::new(Sequence(0), &Request::Hello);
+            let mut wire = hello.as_bytes().to_vec();
+            for (frame, (_, _, damage)) in frames.iter().zip(&sent) {
+                wire.extend(damaged(frame.as_bytes(), hello.as_bytes(), damage));
+            }
+            wire.extend(Frame::new(Sequence(1), &Request::Disarm).as_bytes());
+            let mut applied = Vec::new();
+            for &byte in &wire {
+                if let Some(Action::Apply(request)) = session.on_byte(byte, 0) {
+                    applied.push(request);
+                    session.answer(&Reply::Status(Status::default()));
+                }
+            }
+            for request in &applied {
+                let was_sent = sent.iter().any(|(_, known, _)| known == request);
+                prop_assert!(was_sent || matches!(request, Request::Hello | Request::Disarm), "{request:?}");
+            }
+            prop_assert!(session.counters().accepted as usize == applied.len());
+            // The Disarm at the end: applied whatever came before, unless a whole frame with its very number and content did.
+            let repeated = session.counters().repeated > 0 && applied.contains(&Request::Disarm);
+            prop_assert!(applied.last() == Some(&Request::Disarm) || repeated);
+            Ok(())
+        })
+        .unwrap();
+}
+
+/// Sound CRC, arbitrary content: what a program with another idea of the protocol would send.
+#[test]
+fn ten_thousand_sound_frames_with_foreign_content_are_answered_or_dropped() {
+    let content = (any::<u8>(), any::<u16>(), prop::collection::vec(any::<u8>(), 0..60));
+    runner()
+        .run(&content, |(version, sequence, bytes)| {
+            let frame = by_hand(version % 3, b'Q', sequence, &bytes);
+            let mut session = Session::new(500);
+            let mut answers = 0;
+            for byte in frame {
+                answers += usize::from(session.on_byte(byte, 0).is_some());
+            }
+            prop_assert_eq!(answers, 1);
+            Ok(())
+        })
+        .unwrap();
+}
+
+#[test]
+fn every_single_and_double_bit_flip_is_noticed() {
+    let frame = Frame::new(Sequence(0x0102), &Reply::Status(Status::default()));
+    let bits = 8 * frame.as_bytes().len();
+    let whole = only(&frame);
+    let (mut flips, mut receiver) = (0, Receiver::new());
+    for first in 0..bits {
+        for second in first..bits {
+            let mut bytes = frame.as_bytes().to_vec();
+            bytes[first / 8] ^= 1 << (first % 8);
+            if second != first {
+                bytes[second / 8] ^= 1 << (second % 8);
+            }
+            // A delimiter at the end, in case the frame's own is hit: then the rest may be whole.
+            bytes.push(0);
+            let got = received(&mut receiver, &bytes);
+            assert!(got.is_empty() || got == [whole.clone()], "bits {first} and {second}: {got:?}");
+            flips += usize::from(got.is_empty());
+        }
+    }
+    assert!(flips > 10_000, "{flips} of {bits} bits");
+}
+
+#[test]
+fn a_frame_that_never_ends_is_dropped_and_counted_once() {
+    let mut receiver = Receiver::new();
+    for _ in 0..100_000 {
+        assert!(receiver.on_byte(0x55).is_none());
+    }
+    let frame = Frame::new(Sequence(9), &Request::Heartbeat);
+    assert_eq!(received(&mut receiver, frame.as_bytes()).len(), 1);
+    assert_eq!((receiver.oversize(), receiver.damaged()), (1, 0));
+    // One byte too long, and just not.
+    assert!(received(&mut receiver, &[&[1; MAX_FRAME - 1][..], &[0]].concat()).is_empty());
+    assert_eq!((receiver.oversize(), receiver.damaged()), (2, 0));
+    assert!(received(&mut receiver, &[&[1; MAX_FRAME - 2][..], &[0]].concat()).is_empty());
+    assert_eq!((receiver.oversize(), receiver.damaged()), (2, 1));
+}

@@ -1,0 +1,107 @@
+//! The wire format, byte by byte. If one of these changes, hosts and MCUs in the field no longer understand each other:
+//! give [`link::VERSION`] a new number. CRC and framing are checked here against independent code, bit by bit.
+
+mod by_hand;
+
+use by_hand::by_hand;
+use link::reply::Firmware;
+use link::session::Counters;
+use link::{Desired, Fault, Frame, Message, Reason, Reply, Request, Sequence, State, Status, Telemetry, WireVolts};
+
+fn check<M: Message>(message: &M, kind: u8, golden: &str) {
+    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let bytes: Vec<u8> =
+        (0..golden.len() / 2).map(|at| u8::from_str_radix(&golden[2 * at..2 * at + 2], 16).unwrap()).collect();
+    // Neither 0 nor symmetric, so that a swap shows.
+    let frame = Frame::new(Sequence(0x0102), message);
+    assert_eq!(hex(frame.as_bytes()), hex(&by_hand(1, kind, 0x0102, &bytes)), "expected message {golden}");
+}
+
+#[test]
+fn requests() {
+    for (request, golden) in [
+        (Request::Hello, "00"),
+        (Request::Status, "01"),
+        (Request::Set(Desired::ScaledVolts(300.0)), "02000000000000c07240"),
+        (Request::Set(Desired::Pascal(1.5e9)), "0201000000c00b5ad641"),
+        (Request::Set(Desired::NewtonPerMetre(0.25)), "0202000000000000d03f"),
+        (Request::Arm, "03"),
+        (Request::Disarm, "04"),
+        (Request::Acknowledge(Fault(4)), "0504"),
+        (Request::Heartbeat, "06"),
+        (Request::Stream { every_ticks: 300 }, "07ac02"),
+    ] {
+        check(&request, b'Q', golden);
+    }
+}
+
+#[test]
+fn replies() {
+    let sample = Telemetry {
+        tick: 70_000,
+        state: State::Armed,
+        target: WireVolts(314_572_800),
+        applied: WireVolts(-1),
+        estimate: WireVolts(2),
+        measured: None,
+        code: 4095,
+        limits: 9,
+    };
+    let status = Status {
+        firmware: Firmware { major: 1, minor: 2, patch: 3, revision: 0x1234_5678 },
+        rate_hz: 1000,
+        silence_limit_ticks: 500,
+        overruns: 4,
+        fault: Fault(1),
+        last_fault: Fault(5),
+        sample,
+        counters: Counters {
+            accepted: 10,
+            repeated: 11,
+            damaged: 12,
+            oversize: 13,
+            bad_version: 14,
+            out_of_order: 15,
+            unknown: 16,
+        },
+    };
+    for (reply, golden) in [
+        (Reply::Ack { state: State::Disarmed, target: WireVolts(0) }, "000000"),
+        (Reply::Ack { state: State::Armed, target: WireVolts(1) }, "000102"),
+        (Reply::Ack { state: State::Ramping, target: WireVolts(64) }, "00028001"),
+        (Reply::Ack { state: State::Faulted, target: WireVolts(-1) }, "000301"),
+        (Reply::Refused(Reason::OutOfRange { lowest: 0.0, highest: 700.0 }), "010000000000000000000000000000e08540"),
+        (Reply::Refused(Reason::NotArmed), "0101"),
+        (Reply::Refused(Reason::Faulted(Fault(3))), "010203"),
+        (Reply::Refused(Reason::BadVersion(1)), "010301"),
+        (Reply::Refused(Reason::HelloFirst), "0104"),
+        (Reply::Refused(Reason::Stale { newest: 300 }), "0105ac02"),
+        (Reply::Refused(Reason::SequenceReused), "0106"),
+        (Reply::Refused(Reason::UnknownRequest), "0107"),
+        (Reply::Refused(Reason::InterlockOpen), "0108"),
+        (Reply::Refused(Reason::OtherFault(Fault(1))), "010901"),
+        (Reply::Refused(Reason::HostSilent), "010a"),
+        (Reply::Status(status), "02010203f8acd19101e807f403040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
+        (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f09"),
+        (Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }), "03f0a20401808080ac0201040106ff1f09"),
+    ] {
+        check(&reply, b'A', golden);
+        if let Reply::Refused(reason) = reply {
+            assert_eq!(golden[2..4], format!("{:02x}", reason.code()), "{reason}");
+        }
+    }
+}
+
+/// One whole frame as it lies on the wire.
+#[test]
+fn a_whole_frame() {
+    let frame = Frame::new(Sequence(1), &Request::Hello);
+    assert_eq!(frame.as_bytes(), by_hand(1, b'Q', 1, &[0]));
+    assert_eq!(frame.as_bytes(), [0, 4, 1, b'Q', 1, 1, 5, 0x85, 0xcf, 0xa5, 0x47, 0]);
+}
+
+#[test]
+fn fault_codes() {
+    let names = (0..=8).map(|code| Fault(code).name()).collect::<Vec<_>>().join(" ");
+    assert_eq!(names, "none panic hard-fault overrun interlock watchdog monitor config unknown");
+}

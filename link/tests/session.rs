@@ -1,0 +1,203 @@
+//! The MCU's side of the talk: what is applied, what is answered, what is dropped.
+
+use link::session::Counters;
+use link::{Action, Desired, Frame, Message, Reason, Receiver, Reply, Request, Sequence, Session, State};
+use link::{Telemetry, WireVolts};
+
+const ACK: Reply = Reply::Ack { state: State::Armed, target: WireVolts(5) };
+const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
+
+/// A session, with what it applied and what it answered.
+struct Mcu {
+    session: Session,
+    now: u64,
+    applied: Vec<Request>,
+}
+
+impl Mcu {
+    fn new() -> Self {
+        Self { session: Session::new(500), now: 0, applied: Vec::new() }
+    }
+
+    fn greeted(sequence: u16) -> Self {
+        let mut mcu = Self::new();
+        assert_eq!(mcu.hear(sequence, &Request::Hello), Some((sequence, ACK)));
+        mcu.applied.clear();
+        mcu
+    }
+
+    fn hear<M: Message>(&mut self, sequence: u16, message: &M) -> Option<(u16, Reply)> {
+        self.hear_frame(&Frame::new(Sequence(sequence), message))
+    }
+
+    fn hear_frame(&mut self, frame: &Frame) -> Option<(u16, Reply)> {
+        let mut sent = Vec::new();
+        for &byte in frame.as_bytes() {
+            match self.session.on_byte(byte, self.now) {
+                Some(Action::Apply(request)) => {
+                    self.applied.push(request);
+                    sent.extend_from_slice(self.session.answer(&ACK));
+                }
+                Some(Action::Send(bytes)) => sent.extend_from_slice(bytes),
+                None => {}
+            }
+        }
+        reply(&sent)
+    }
+
+    fn refusal(&mut self, sequence: u16, request: &Request) -> Option<Reason> {
+        match self.hear(sequence, request) {
+            Some((same, Reply::Refused(reason))) if same == sequence => Some(reason),
+            _ => None,
+        }
+    }
+}
+
+fn reply(bytes: &[u8]) -> Option<(u16, Reply)> {
+    let mut receiver = Receiver::new();
+    bytes
+        .iter()
+        .filter_map(|&byte| receiver.on_byte(byte).map(|packet| (packet.sequence.0, packet.read().unwrap())))
+        .next()
+}
+
+#[test]
+fn a_repeated_request_is_answered_again_and_applied_once() {
+    let mut mcu = Mcu::greeted(10);
+    for _ in 0..3 {
+        assert_eq!(mcu.hear(11, &SET), Some((11, ACK)));
+    }
+    assert_eq!(mcu.applied, [SET]);
+    assert_eq!(mcu.session.counters(), Counters { accepted: 2, repeated: 2, ..Counters::default() });
+}
+
+/// Also when telemetry and refusals went out in between.
+#[test]
+fn the_answer_to_be_repeated_is_kept() {
+    let mut mcu = Mcu::greeted(10);
+    mcu.hear(11, &SET);
+    mcu.session.telemetry(Telemetry::default(), 0);
+    assert!(mcu.refusal(9, &SET).is_some());
+    mcu.hear(8, &Request::Disarm);
+    assert_eq!(mcu.hear(11, &SET), Some((11, ACK)));
+    assert_eq!(mcu.applied, [SET, Request::Disarm]);
+}
+
+#[test]
+fn a_late_request_is_refused() {
+    let mut mcu = Mcu::greeted(10);
+    mcu.hear(12, &Request::Arm);
+    assert_eq!(mcu.refusal(11, &SET), Some(Reason::Stale { newest: 12 }));
+    assert_eq!(mcu.refusal(10, &SET), Some(Reason::Stale { newest: 12 }));
+    assert_eq!(mcu.applied, [Request::Arm]);
+    assert_eq!(mcu.session.counters().out_of_order, 2);
+}
+
+#[test]
+fn lost_requests_leave_a_gap_that_does_not_matter_and_numbers_run_on_past_their_end() {
+    let mut mcu = Mcu::greeted(65_500);
+    mcu.hear(65_535, &Request::Arm);
+    mcu.hear(3, &SET);
+    assert_eq!(mcu.applied, [Request::Arm, SET]);
+    assert_eq!(mcu.refusal(65_535, &Request::Arm), Some(Reason::Stale { newest: 3 }));
+}
+
+#[test]
+fn another_request_of_the_same_number_is_refused() {
+    let mut mcu = Mcu::greeted(10);
+    mcu.hear(11, &SET);
+    assert_eq!(mcu.refusal(11, &Request::Arm), Some(Reason::SequenceReused));
+    assert_eq!(mcu.refusal(11, &Request::Set(Desired::ScaledVolts(300.1))), Some(Reason::SequenceReused));
+    assert_eq!(mcu.applied, [SET]);
+}
+
+#[test]
+fn nothing_but_disarm_is_applied_before_a_hello() {
+    let mut mcu = Mcu::new();
+    for (sequence, request) in [Request::Status, SET, Request::Arm, Request::Heartbeat].iter().enumerate() {
+        assert_eq!(mcu.refusal(sequence as u16, request), Some(Reason::HelloFirst));
+    }
+    assert!(mcu.session.host_silent(0));
+    assert_eq!(mcu.hear(4, &Request::Disarm), Some((4, ACK)));
+    assert_eq!(mcu.applied, [Request::Disarm]);
+    assert_eq!(mcu.refusal(5, &SET), Some(Reason::HelloFirst), "a Disarm is no Hello");
+}
+
+#[test]
+fn disarm_is_applied_late_reused_and_from_another_version_and_does_not_shift_the_order() {
+    let mut mcu = Mcu::greeted(10);
+    mcu.hear(20, &SET);
+    assert_eq!(mcu.hear(15, &Request::Disarm), Some((15, ACK)));
+    assert_eq!(mcu.hear(20, &Request::Disarm), Some((20, ACK)));
+    let foreign = Frame::with_version(link::VERSION + 1, Sequence(1), &Request::Disarm);
+    assert_eq!(mcu.hear_frame(&foreign), Some((1, ACK)));
+    assert_eq!(mcu.applied, [SET, Request::Disarm, Request::Disarm, Request::Disarm]);
+    assert_eq!(mcu.refusal(19, &SET), Some(Reason::Stale { newest: 20 }));
+    mcu.hear(21, &Request::Disarm);
+    assert_eq!(mcu.refusal(21, &SET), Some(Reason::SequenceReused), "one in its place counts as any other");
+}
+
+#[test]
+fn a_hello_starts_the_order_anew() {
+    let mut mcu = Mcu::greeted(40_000);
+    mcu.hear(40_001, &Request::Stream { every_ticks: 10 });
+    assert!(mcu.session.telemetry_due(10));
+    assert_eq!(mcu.hear(7, &Request::Hello), Some((7, ACK)));
+    assert!(!mcu.session.telemetry_due(1000), "telemetry goes on for a host that did not ask");
+    assert_eq!(mcu.hear(8, &SET), Some((8, ACK)));
+}
+
+#[test]
+fn another_version_is_told_ours() {
+    let mut mcu = Mcu::greeted(0);
+    let frame = Frame::with_version(9, Sequence(1), &SET);
+    assert_eq!(mcu.hear_frame(&frame), Some((1, Reply::Refused(Reason::BadVersion(link::VERSION)))));
+    assert_eq!((mcu.session.counters().bad_version, mcu.applied.len()), (1, 0));
+}
+
+#[test]
+fn an_echo_of_our_own_answer_is_dropped() {
+    let mut mcu = Mcu::greeted(0);
+    assert_eq!(mcu.hear(1, &ACK), None);
+    assert_eq!(mcu.session.counters().unknown, 1);
+}
+
+#[test]
+fn only_accepted_and_repeated_frames_are_signs_of_life() {
+    let mut mcu = Mcu::new();
+    assert_eq!(mcu.session.silent_ticks(1000), None);
+    mcu.now = 1000;
+    mcu.hear(10, &Request::Hello);
+    assert!(!mcu.session.host_silent(1500));
+    assert!(mcu.session.host_silent(1501));
+    mcu.now = 1600;
+    mcu.hear(11, &Request::Heartbeat);
+    mcu.now = 1700;
+    mcu.hear(11, &Request::Heartbeat);
+    assert_eq!(mcu.session.silent_ticks(1700), Some(0));
+    mcu.now = 2100;
+    mcu.hear(9, &Request::Heartbeat);
+    mcu.hear(11, &SET);
+    mcu.hear(9, &Request::Disarm);
+    mcu.hear_frame(&Frame::with_version(2, Sequence(12), &SET));
+    mcu.hear(12, &ACK);
+    assert_eq!(mcu.session.silent_ticks(2100), Some(400));
+}
+
+#[test]
+fn telemetry_keeps_its_period_leaves_out_what_was_missed_and_stops_with_the_host() {
+    let mut mcu = Mcu::greeted(0);
+    mcu.hear(1, &Request::Stream { every_ticks: 10 });
+    let mut pushed = Vec::new();
+    for now in (0..48).chain(95..700) {
+        if mcu.session.telemetry_due(now) {
+            let sample = Telemetry { tick: now, ..Telemetry::default() };
+            let (sequence, sent) = reply(mcu.session.telemetry(sample, now)).unwrap();
+            assert_eq!(sent, Reply::Telemetry(sample));
+            assert_eq!(usize::from(sequence), pushed.len() + 1);
+            pushed.push(now);
+        }
+    }
+    assert_eq!(pushed[..8], [10, 20, 30, 40, 95, 100, 110, 120], "no burst after the gap, and back on the beat");
+    assert_eq!(pushed.last(), Some(&500), "the host fell silent at 500");
+}
