@@ -1,0 +1,50 @@
+//! One number for a whole run: FNV-1a, 64 bits, over every DAC code and every estimate, little end first.
+
+use crate::control::Tick;
+
+/// The digest so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Digest(u64);
+
+impl Default for Digest {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Digest {
+    /// Adds what left in this tick, and the estimate.
+    pub fn add(&mut self, tick: &Tick) {
+        self.bytes(&tick.drive.code().0.to_le_bytes());
+        self.bytes(&tick.output.stiffness.0.to_bits().to_le_bytes());
+    }
+
+    /// The number.
+    pub const fn value(self) -> u64 {
+        self.0
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Test vectors of the FNV's authors.
+    #[test]
+    fn it_is_fnv_1a() {
+        let of = |text: &str| {
+            let mut digest = Digest::default();
+            digest.bytes(text.as_bytes());
+            digest.value()
+        };
+        assert_eq!(of(""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(of("a"), 0xaf63_dc4c_8601_ec8c);
+        assert_eq!(of("foobar"), 0x8594_4171_f739_67e8);
+    }
+}

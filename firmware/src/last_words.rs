@@ -1,0 +1,73 @@
+//! What survives a reset: a record in memory that start-up leaves alone.
+//!
+//! After power-on this memory holds noise, so the record counts only with its check word. A reset without last words
+//! means that nobody could say anything any more: the watchdog, or the reset pin.
+
+#![allow(unsafe_code)]
+
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+
+use model::supervisor::Fault;
+
+/// "vsj1"
+const MARK: u32 = 0x7673_6a31;
+/// Code for "running".
+const ALIVE: u32 = 0;
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+struct Record {
+    mark: u32,
+    code: u32,
+    tick: u32,
+    check: u32,
+}
+
+struct Kept(UnsafeCell<MaybeUninit<Record>>);
+
+// SAFETY: written only with interrupts off or before they are on, by volatile accesses.
+unsafe impl Sync for Kept {}
+
+#[unsafe(link_section = ".uninit.last_words")]
+static KEPT: Kept = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// What the last run left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Legacy {
+    /// Nothing: the power was off.
+    None,
+    /// It was running until a reset that it did not cause.
+    Silent,
+    /// It stopped itself at this tick.
+    Stopped(Fault, u32),
+}
+
+/// Reads what was left and marks this run as running. Once, at boot.
+pub fn take() -> Legacy {
+    // SAFETY: every bit pattern is a Record; see `Kept`.
+    let record = unsafe { KEPT.0.get().cast::<Record>().read_volatile() };
+    write(ALIVE, 0);
+    if record.mark != MARK || record.check != check(record.code, record.tick) {
+        return Legacy::None;
+    }
+    match u8::try_from(record.code).ok().and_then(Fault::from_code) {
+        Some(fault) => Legacy::Stopped(fault, record.tick),
+        None => Legacy::Silent,
+    }
+}
+
+/// Leaves `fault` for the next run.
+pub fn leave(fault: Fault, tick: u32) {
+    write(u32::from(fault.code()), tick);
+}
+
+fn write(code: u32, tick: u32) {
+    let record = Record { mark: MARK, code, tick, check: check(code, tick) };
+    // SAFETY: see `Kept`.
+    unsafe { KEPT.0.get().cast::<Record>().write_volatile(record) }
+}
+
+fn check(code: u32, tick: u32) -> u32 {
+    !(MARK ^ code.rotate_left(8) ^ tick)
+}

@@ -1,0 +1,45 @@
+//! When things happen on the MCU, and on which pin.
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`board`] | what a board must be able to do |
+//! | [`control`] | one control tick: supervisor, model, supervisor |
+//! | [`pace`] | when the next tick is due, and how many were missed |
+//! | [`roll_call`] | the watchdog is fed only when every task has checked in |
+//! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
+//! | [`digest`] | one number for a whole run |
+//! | `last_words`, `stop` | what survives a reset; panic and hard fault |
+//! | `log` | every log line, in one place |
+//! | `tasks` | the control task and the housekeeping below it |
+//! | `mps2` | the emulated board |
+//! | `nucleo` | the real board |
+//!
+//! The modules with links build on a host too: they are the half of the firmware that can be compared bit for bit.
+#![no_std]
+#![deny(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod board;
+pub mod control;
+pub mod digest;
+pub mod pace;
+pub mod roll_call;
+pub mod script;
+
+#[cfg(feature = "mcu")]
+pub mod last_words;
+#[cfg(feature = "mcu")]
+pub mod log;
+#[cfg(feature = "mps2-an386")]
+pub mod mps2;
+#[cfg(feature = "nucleo-g474re")]
+pub mod nucleo;
+#[cfg(feature = "mcu")]
+pub mod stop;
+#[cfg(feature = "mcu")]
+pub mod tasks;
+
+/// Ticks per second.
+pub const RATE_HZ: u32 = 1000;

@@ -1,0 +1,76 @@
+//! The emulated board: ARM's MPS2 with the AN386 image, a Cortex-M4, as QEMU has it.
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`registers`] | the addresses in use |
+//! | [`vectors`] | the interrupts in use |
+//! | [`time`] | time driver on the two CMSDK timers |
+//! | [`dac`] | amplifier port: every code goes out through a UART, so that the host sees each of them |
+//! | [`watchdog`] | the CMSDK watchdog: interrupt, then reset |
+//! | [`instructions`] | SysTick as a counter of instructions |
+//! | [`actor`] | plays a script: orders, interlock, mishaps |
+//! | [`semihosting`] | which script, and the way out |
+
+#![allow(unsafe_code)]
+
+pub mod actor;
+pub mod dac;
+pub mod instructions;
+pub mod registers;
+pub mod semihosting;
+pub mod time;
+pub mod vectors;
+pub mod watchdog;
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use crate::board::Board;
+use crate::last_words::{self, Legacy};
+use model::supervisor::Fault;
+
+pub use dac::kill;
+
+/// What the script does to the safety circuit; open until it says otherwise.
+static INTERLOCK_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// The board.
+#[derive(Debug)]
+pub struct Mps2 {
+    dac: dac::Dac,
+}
+
+impl Mps2 {
+    /// Sets everything up, voltage first.
+    pub fn init() -> Self {
+        kill();
+        time::init();
+        watchdog::init();
+        Self { dac: dac::Dac }
+    }
+}
+
+impl Board for Mps2 {
+    type Amplifier = dac::Dac;
+
+    fn amplifier(&mut self) -> &mut dac::Dac {
+        &mut self.dac
+    }
+
+    fn interlock_closed(&mut self) -> bool {
+        INTERLOCK_CLOSED.load(Ordering::Relaxed)
+    }
+
+    fn feed_watchdog(&mut self) {
+        watchdog::feed();
+    }
+}
+
+/// Why the chip was reset, and the fault that caused it. The emulator has no register for it, only the last words tell.
+pub fn reset_cause() -> (&'static str, Option<Fault>) {
+    match last_words::take() {
+        Legacy::None => ("power-on", None),
+        Legacy::Silent => ("watchdog", Some(Fault::Watchdog)),
+        Legacy::Stopped(Fault::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
+        Legacy::Stopped(fault, _) => ("software", Some(fault)),
+    }
+}

@@ -1,0 +1,104 @@
+//! Time driver on the two CMSDK timers: one counts for ever, the other is the alarm.
+
+use core::cell::RefCell;
+use core::task::Waker;
+
+use critical_section::{CriticalSection, Mutex};
+use embassy_time_driver::Driver;
+use embassy_time_queue_utils::Queue;
+
+use super::registers::{CLOCK_HZ, TIMER_0, TIMER_1};
+use super::vectors::Line;
+
+/// Counts in 1 us.
+const PER_US: u32 = CLOCK_HZ / 1_000_000;
+/// The time base wraps after 2^27 us, 134 s: a whole number of microseconds, and close to its 32 bits.
+const WRAP_US_LOG2: u32 = 27;
+const TOP: u32 = (PER_US << WRAP_US_LOG2) - 1;
+const COUNT: u32 = 1;
+const INTERRUPT: u32 = 1 << 3;
+
+struct State {
+    wraps: u32,
+    queue: Queue,
+}
+
+struct Cmsdk {
+    state: Mutex<RefCell<State>>,
+}
+
+embassy_time_driver::time_driver_impl!(static DRIVER: Cmsdk = Cmsdk {
+    state: Mutex::new(RefCell::new(State { wraps: 0, queue: Queue::new() })),
+});
+
+/// Starts the clock.
+pub(super) fn init() {
+    TIMER_0.reload.write(TOP);
+    TIMER_0.value.write(TOP);
+    TIMER_0.control.write(COUNT | INTERRUPT);
+    // SAFETY: the handlers are in the table.
+    unsafe {
+        cortex_m::peripheral::NVIC::unmask(Line::Timer0);
+        cortex_m::peripheral::NVIC::unmask(Line::Timer1);
+    }
+}
+
+/// The time base starts anew.
+pub(super) fn on_wrap() {
+    critical_section::with(|cs| {
+        TIMER_0.interrupt.write(1);
+        let mut state = DRIVER.state.borrow_ref_mut(cs);
+        state.wraps = state.wraps.wrapping_add(1);
+    });
+}
+
+/// The alarm went off.
+pub(super) fn on_alarm() {
+    critical_section::with(|cs| {
+        TIMER_1.interrupt.write(1);
+        DRIVER.wake_and_set_alarm(cs);
+    });
+}
+
+impl Cmsdk {
+    fn now_in(&self, cs: CriticalSection<'_>) -> u64 {
+        let elapsed = || TOP - TIMER_0.value.read();
+        let mut wraps = self.state.borrow_ref(cs).wraps;
+        let mut count = elapsed();
+        // Wrapped, but not counted yet: the first reading may have been just before.
+        if TIMER_0.interrupt.read() & 1 != 0 {
+            count = elapsed();
+            wraps = wraps.wrapping_add(1);
+        }
+        (u64::from(wraps) << WRAP_US_LOG2) + u64::from(count / PER_US)
+    }
+
+    fn wake_and_set_alarm(&self, cs: CriticalSection<'_>) {
+        let now = self.now_in(cs);
+        let next = self.state.borrow_ref_mut(cs).queue.next_expiration(now);
+        TIMER_1.control.write(0);
+        if next == u64::MAX {
+            return;
+        }
+        // One too far away goes off early, and is set again.
+        let us = next.saturating_sub(now).clamp(1, 1 << WRAP_US_LOG2) as u32;
+        TIMER_1.reload.write(0);
+        TIMER_1.value.write(us * PER_US);
+        TIMER_1.control.write(COUNT | INTERRUPT);
+    }
+}
+
+impl Driver for Cmsdk {
+    fn now(&self) -> u64 {
+        critical_section::with(|cs| self.now_in(cs))
+    }
+
+    fn schedule_wake(&self, at: u64, waker: &Waker) {
+        critical_section::with(|cs| {
+            let sooner = self.state.borrow_ref_mut(cs).queue.schedule_wake(at, waker);
+            if sooner {
+                self.wake_and_set_alarm(cs);
+            }
+        });
+    }
+}

@@ -1,0 +1,65 @@
+//! Panic, hard fault, unexpected interrupt: voltage off by register first, then last words, log, reset.
+//!
+//! The next run starts faulted and needs an acknowledgement and an arm command.
+
+#![allow(unsafe_code)]
+
+use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use cortex_m::peripheral::SCB;
+use model::supervisor::Fault;
+
+#[cfg(feature = "mps2-an386")]
+use crate::mps2 as board;
+#[cfg(feature = "nucleo-g474re")]
+use crate::nucleo as board;
+use crate::{last_words, log};
+
+/// Ticks since boot, for the log of a fault.
+pub static TICK: AtomicU32 = AtomicU32::new(0);
+
+/// Set by the first who stops: what fails while stopping must not stop again, only reset.
+static STOPPING: AtomicBool = AtomicBool::new(false);
+
+/// Takes the voltage away and resets.
+pub fn stop(fault: Fault, panic: Option<&PanicInfo<'_>>) -> ! {
+    cortex_m::interrupt::disable();
+    board::kill();
+    if !STOPPING.swap(true, Ordering::Relaxed) {
+        let tick = TICK.load(Ordering::Relaxed);
+        last_words::leave(fault, tick);
+        log::fault(fault, tick);
+        if let Some(location) = panic.and_then(PanicInfo::location) {
+            log::panicked(location.file(), location.line());
+        }
+    }
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    stop(Fault::Panic, Some(info))
+}
+
+/// In the fault of a stack that ran out there is no stack to stand on: take a fresh one first. Nothing returns to the old.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+unsafe extern "C" fn hard_fault() -> ! {
+    core::arch::naked_asm!(
+        "ldr r0, =_stack_start",
+        "mov sp, r0",
+        "b {on}",
+        on = sym hard_fault_on_fresh_stack
+    )
+}
+
+extern "C" fn hard_fault_on_fresh_stack() -> ! {
+    stop(Fault::HardFault, None)
+}
+
+/// An interrupt that nobody enabled.
+#[unsafe(export_name = "DefaultHandler")]
+extern "C" fn unexpected() -> ! {
+    stop(Fault::HardFault, None)
+}

@@ -1,0 +1,138 @@
+//! The control task, and the housekeeping below it.
+
+use core::sync::atomic::Ordering;
+
+use embassy_time::{Duration, Instant, Timer, with_timeout};
+use model::supervisor::{Fault, State};
+use model::{Limits, Volts};
+
+use crate::board::{Amplifier, Board};
+use crate::control::{Control, Orders, Senses, Stopwatch, Tick};
+use crate::log::{self, EVENTS, Event, Summary, queue};
+use crate::pace::Pace;
+use crate::roll_call::{Member, RollCall};
+use crate::{RATE_HZ, last_words, stop};
+
+/// Who must be alive.
+pub static ROLL_CALL: RollCall = RollCall::new();
+
+/// Ticks without a complete roll call after which the voltage is taken away, 50 ms; the watchdog follows at 100 ms.
+const ROLL_CALL_TICKS: u32 = RATE_HZ / 20;
+
+/// Where orders come from.
+pub trait Source {
+    /// What came in since the last tick; `None` ends the task.
+    fn orders(&mut self, tick: u32) -> Option<Orders>;
+
+    /// What was done about it.
+    fn done(&mut self, _tick: &Tick) {}
+}
+
+/// Ticks until `source` ends. Returns ticks run and ticks missed.
+pub async fn control<B: Board>(
+    board: &mut B,
+    control: &mut Control,
+    source: &mut impl Source,
+    stopwatch: &mut impl Stopwatch,
+) -> (u32, u32) {
+    ROLL_CALL.enrol(Member::Control);
+    let mut pace = Pace::new(Instant::now().as_micros(), u64::from(1_000_000 / RATE_HZ));
+    let mut report = Report { state: control.supervisor().label(), ..Report::default() };
+    let mut absent: u32 = 0;
+    let mut ticks: u32 = 0;
+    loop {
+        Timer::at(Instant::from_micros(pace.due_us())).await;
+        let arrival = pace.arrive(Instant::now().as_micros());
+        let Some(orders) = source.orders(ticks) else { break };
+        let senses = Senses {
+            interlock_closed: board.interlock_closed(),
+            missed_ticks: arrival.missed_ticks,
+            monitors: board.amplifier().monitors(),
+            fault: (absent > ROLL_CALL_TICKS).then_some(Fault::Watchdog),
+        };
+        let tick = control.tick(&orders, &senses, stopwatch);
+        board.amplifier().put(tick.drive);
+        board.show_armed(tick.drive.enabled());
+        source.done(&tick);
+
+        ticks = ticks.wrapping_add(1);
+        stop::TICK.store(ticks, Ordering::Relaxed);
+        report.overruns = report.overruns.saturating_add(arrival.missed_ticks);
+        report.worst_lateness_us = report.worst_lateness_us.max(arrival.lateness_us);
+        report.tick(ticks, control, &tick);
+
+        ROLL_CALL.check_in(Member::Control);
+        if ROLL_CALL.complete() {
+            absent = 0;
+            board.feed_watchdog();
+        } else {
+            absent = absent.saturating_add(1);
+            if absent == ROLL_CALL_TICKS + 1 {
+                // The reset that follows will not be able to say why.
+                last_words::leave(Fault::Watchdog, ticks);
+            }
+        }
+    }
+    (ticks, report.overruns)
+}
+
+/// What was said last, so that only changes are said.
+#[derive(Default)]
+struct Report {
+    state: &'static str,
+    fault: bool,
+    limits: Limits,
+    overruns: u32,
+    worst_lateness_us: u32,
+    limited_ticks: u32,
+}
+
+impl Report {
+    fn tick(&mut self, number: u32, control: &Control, tick: &Tick) {
+        let supervisor = control.supervisor();
+        let state = supervisor.label();
+        if state != self.state {
+            queue(Event::State(self.state, state));
+            self.state = state;
+        }
+        let fault = match supervisor.state() {
+            State::Faulted(fault) => Some(fault),
+            State::Disarmed | State::Armed => None,
+        };
+        if let (Some(fault), false) = (fault, self.fault) {
+            queue(Event::Fault(fault, number));
+        }
+        self.fault = fault.is_some();
+        let limits = supervisor.limits(&tick.output);
+        if limits != self.limits {
+            queue(Event::Limits(limits.bits(), number));
+            self.limits = limits;
+        }
+        self.limited_ticks = self.limited_ticks.saturating_add(u32::from(limits != Limits::NONE));
+        if number.is_multiple_of(RATE_HZ) {
+            queue(Event::Summary(Summary {
+                tick: number,
+                overruns: self.overruns,
+                worst_lateness_us: self.worst_lateness_us,
+                limited_ticks: self.limited_ticks,
+                state,
+                target: tick.output.target,
+                applied: tick.output.applied,
+                stiffness: Volts(tick.output.stiffness.0),
+            }));
+        }
+    }
+}
+
+/// Logs what the control task queued, and checks in. `each` is called after every event and every 10 ms.
+pub async fn housekeeping(mut each: impl FnMut(Option<&Event>)) -> ! {
+    ROLL_CALL.enrol(Member::Housekeeping);
+    loop {
+        let event = with_timeout(Duration::from_millis(10), EVENTS.receive()).await.ok();
+        if let Some(event) = event {
+            log::event(event);
+        }
+        each(event.as_ref());
+        ROLL_CALL.check_in(Member::Housekeeping);
+    }
+}
