@@ -64,6 +64,18 @@ pub enum Event {
     },
     /// `done ticks=.. ..`: an emulated run is over.
     Done(Done),
+    /// `dropped events=..`: so many lines since the last are missing, because they came too fast.
+    Dropped {
+        /// How many.
+        events: u32,
+    },
+    /// `panic at ..:..`: the program stopped itself.
+    Panic {
+        /// Source file.
+        file: String,
+        /// Line in it.
+        line: u32,
+    },
     /// Anything else.
     Text,
 }
@@ -106,6 +118,8 @@ impl Event {
             Self::Limit { .. } => "limit",
             Self::Summary { .. } => "summary",
             Self::Done(_) => "done",
+            Self::Dropped { .. } => "dropped",
+            Self::Panic { .. } => "panic",
             Self::Text => "text",
         }
     }
@@ -166,6 +180,8 @@ impl Values {
                 mean: self.number("mean=")?,
                 max: self.number("max=")?,
             }),
+            "dropped" => Event::Dropped { events: self.number("events=")? },
+            "panic" => Event::Panic { file: self.text("at")?, line: self.number(":")? },
             _ => return None,
         })
     }
@@ -210,6 +226,12 @@ mod tests {
             ),
             Event::Done(done)
         );
+    }
+
+    #[test]
+    fn a_panic_has_a_place() {
+        let panic = Event::Panic { file: "src/a.rs".into(), line: 7 };
+        assert_eq!(event("panic at {=str}:{=u32}", &["src/a.rs", "7"]), panic);
     }
 
     #[test]

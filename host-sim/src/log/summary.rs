@@ -23,18 +23,22 @@ pub struct Summary {
     pub boots_not_seen: u64,
     /// Ticks, as far as a line tells.
     pub ticks: u64,
-    /// Ticks that came too late.
-    pub overruns: u64,
-    /// The latest of them; none without a summary line.
+    /// Ticks that were missed; none without a summary line, as the next three.
+    pub overruns: Option<u64>,
+    /// How late the latest tick came.
     pub worst_lateness_us: Option<u32>,
     /// Ticks in which a limit acted.
-    pub limited_ticks: u64,
+    pub limited_ticks: Option<u64>,
     /// The same as a time; none if a start's rate is not known.
     pub limited_s: Option<f64>,
     /// How many limit lines name each limit.
     pub limit_lines: LimitLines,
     /// In the order of their first.
     pub faults: Vec<Fault>,
+    /// Times that the program stopped itself.
+    pub panics: u64,
+    /// Lines that the firmware says it did not send.
+    pub dropped: u64,
     /// The end of an emulated run, if the log has it.
     pub done: Option<Done>,
     /// Stretches that are no frame.
@@ -92,6 +96,8 @@ pub struct LimitLines {
 struct Start {
     rate_hz: Option<u32>,
     ticks: u64,
+    /// Tick of the newest summary line.
+    last_summary: u32,
     overruns: u64,
     limited_ticks: u64,
     /// Of the starts before.
@@ -164,12 +170,13 @@ impl Summary {
                 }
             }
             Event::Summary { tick, overruns, worst_lateness_us, limited_ticks, .. } => {
-                // Only here: lines of other tasks can be overtaken by a tick.
-                if u64::from(*tick) < self.start.ticks && u64::from(*limited_ticks) <= self.start.limited_ticks {
+                // Only summaries are sure to come in order.
+                if *tick < self.start.last_summary {
                     self.next_start();
                     self.boots_not_seen += 1;
                 }
                 self.tick(*tick);
+                self.start.last_summary = *tick;
                 self.start.overruns = self.start.overruns.max((*overruns).into());
                 self.start.limited_ticks = self.start.limited_ticks.max((*limited_ticks).into());
                 self.worst_lateness_us = self.worst_lateness_us.max(Some(*worst_lateness_us));
@@ -178,6 +185,8 @@ impl Summary {
                 self.tick(done.ticks);
                 self.done = Some(done.clone());
             }
+            Event::Dropped { events } => self.dropped += u64::from(*events),
+            Event::Panic { .. } => self.panics += 1,
             Event::State { .. } | Event::Text => {}
         }
     }
@@ -201,9 +210,11 @@ impl Summary {
 
     fn total(&mut self) {
         self.ticks = self.before.ticks + self.start.ticks;
-        self.overruns = self.before.overruns + self.start.overruns;
-        self.limited_ticks = self.before.limited_ticks + self.start.limited_ticks;
-        let before = (!self.before.unknown_rate).then_some(self.before.limited_s);
-        self.limited_s = before.zip(self.start.limited_s()).map(|(before, now)| before + now);
+        if self.worst_lateness_us.is_some() {
+            self.overruns = Some(self.before.overruns + self.start.overruns);
+            self.limited_ticks = Some(self.before.limited_ticks + self.start.limited_ticks);
+            let before = (!self.before.unknown_rate).then_some(self.before.limited_s);
+            self.limited_s = before.zip(self.start.limited_s()).map(|(before, now)| before + now);
+        }
     }
 }

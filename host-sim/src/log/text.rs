@@ -1,7 +1,7 @@
 //! A log as text: table, CSV, summary.
 
 use std::borrow::Cow;
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 
 use model::Limits;
 
@@ -44,11 +44,16 @@ pub fn summary_text(summary: &Summary) -> String {
     entry(&mut text, "lines", &format!("{lines} (error {errors}, warn {warnings})"));
     entry(&mut text, "starts", &starts(summary));
     entry(&mut text, "ticks", &summary.ticks.to_string());
-    entry(&mut text, "overruns", &summary.overruns.to_string());
-    let lateness = summary.worst_lateness_us.map_or_else(|| "-".to_owned(), |us| format!("{us} us"));
-    entry(&mut text, "worst lateness", &lateness);
+    entry(&mut text, "overruns", &optional(summary.overruns, ""));
+    entry(&mut text, "worst lateness", &optional(summary.worst_lateness_us, " us"));
     entry(&mut text, "time in limits", &time_in_limits(summary));
     entry(&mut text, "faults", &faults(summary));
+    if summary.panics > 0 {
+        entry(&mut text, "panics", &summary.panics.to_string());
+    }
+    if summary.dropped > 0 {
+        entry(&mut text, "dropped", &format!("lines {}, by the firmware", summary.dropped));
+    }
     if let Some(done) = &summary.done {
         let run = format!("{} ticks, {} missed, digest {:016x}", done.ticks, done.missed, done.digest);
         entry(&mut text, "run", &run);
@@ -80,9 +85,10 @@ fn starts(summary: &Summary) -> String {
 }
 
 fn time_in_limits(summary: &Summary) -> String {
-    let mut text = match summary.limited_s {
-        Some(time) => format!("{time:.3} s (ticks {})", summary.limited_ticks),
-        None => format!("- (ticks {}, their rate is not known)", summary.limited_ticks),
+    let mut text = match (summary.limited_s, summary.limited_ticks) {
+        (Some(time), Some(ticks)) => format!("{time:.3} s (ticks {ticks})"),
+        (None, Some(ticks)) => format!("- (ticks {ticks}, their rate is not known)"),
+        (_, None) => "-".to_owned(),
     };
     let lines = summary.limit_lines;
     for (name, count) in
@@ -127,6 +133,10 @@ fn damage(item: &Item) -> String {
 fn entry(text: &mut String, name: &str, value: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "  {name:<15} {value}");
+}
+
+fn optional<T: Display>(value: Option<T>, unit: &str) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value}{unit}"))
 }
 
 fn seconds(us: u64) -> String {

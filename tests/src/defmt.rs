@@ -1,0 +1,85 @@
+//! A firmware that only logs: its ELF file and its frames, made on the host, as its linker and defmt would make them.
+
+use object::write::{Object, Symbol, SymbolSection};
+use object::{Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
+use serde_json::json;
+
+/// The format strings of a firmware, each with its tag, such as `info`; their places count from 1.
+pub struct Firmware {
+    /// `raw` or `rzcobs`.
+    pub encoding: &'static str,
+    /// Tag and text.
+    pub strings: Vec<(&'static str, &'static str)>,
+}
+
+/// An argument of a line.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "the types say it")]
+pub enum Value<'a> {
+    U8(u8),
+    U16(u16),
+    U32(u32),
+    I32(i32),
+    U64(u64),
+    Str(&'a str),
+}
+
+impl Firmware {
+    /// What the linker would make of the strings, without any code.
+    pub fn elf(&self) -> Vec<u8> {
+        let mut elf = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
+        let section = elf.add_section(Vec::new(), b".defmt".to_vec(), SectionKind::Metadata);
+        elf.append_section_data(section, &vec![0; self.strings.len() + 1], 1);
+        let mut add = |name: String, value: usize, section: SymbolSection| {
+            elf.add_symbol(Symbol {
+                name: name.into_bytes(),
+                value: value as u64,
+                size: 1,
+                kind: SymbolKind::Data,
+                scope: SymbolScope::Linkage,
+                weak: false,
+                section,
+                flags: SymbolFlags::None,
+            });
+        };
+        add("_defmt_version_ = 4".to_owned(), 0, SymbolSection::Absolute);
+        add(format!("_defmt_encoding_ = {}", self.encoding), 0, SymbolSection::Absolute);
+        let strings = self.strings.iter().copied().chain([("timestamp", "{=u64:us}")]);
+        for (number, (tag, text)) in strings.enumerate() {
+            let symbol = json!({"package": "firmware", "disambiguator": number.to_string(), "tag": format!("defmt_{tag}"),
+                "data": text, "crate_name": "firmware"});
+            add(symbol.to_string(), number + 1, SymbolSection::Section(section));
+        }
+        elf.write().expect("the ELF file is small")
+    }
+
+    /// A line as it leaves the MCU.
+    pub fn frame(&self, text: &str, time_us: u64, values: &[Value<'_>]) -> Vec<u8> {
+        let mut frame = self.place(text).to_le_bytes().to_vec();
+        frame.extend(time_us.to_le_bytes());
+        for value in values {
+            match *value {
+                Value::U8(value) => frame.push(value),
+                Value::U16(value) => frame.extend(value.to_le_bytes()),
+                Value::U32(value) => frame.extend(value.to_le_bytes()),
+                Value::I32(value) => frame.extend(value.to_le_bytes()),
+                Value::U64(value) => frame.extend(value.to_le_bytes()),
+                Value::Str(text) => {
+                    frame.extend((text.len() as u32).to_le_bytes());
+                    frame.extend(text.as_bytes());
+                }
+            }
+        }
+        if self.encoding == "rzcobs" {
+            frame = rzcobs::encode(&frame);
+            frame.push(0);
+        }
+        frame
+    }
+
+    /// Where the linker put a string.
+    pub fn place(&self, text: &str) -> u16 {
+        let index = self.strings.iter().position(|(_, string)| *string == text);
+        index.unwrap_or_else(|| panic!("no string `{text}`")) as u16 + 1
+    }
+}
