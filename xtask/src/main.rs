@@ -1,6 +1,10 @@
 //! The project's chores, one command each.
 
 mod bench;
+mod elf;
+mod emulate;
+mod emulator;
+mod image;
 mod setup;
 mod shell;
 mod test;
@@ -18,6 +22,8 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 Examples:
   cargo xtask setup            make a fresh machine ready
   cargo xtask test             everything that must pass before a change goes in
+  cargo xtask emulate          the firmware on the report's stair, under QEMU
+  cargo xtask image            the MCU's images: ELF, bin, hex
   cargo xtask bench --json     speed beside Python, as JSON
 
 Exit codes: 0 success, 1 the work failed, 2 bad arguments."
@@ -31,11 +37,22 @@ struct Cli {
 enum Command {
     /// Install what a fresh machine lacks
     ///
-    /// Reads rust-toolchain.toml and has rustup add the toolchain, the components and the MCU's target.
+    /// Reads rust-toolchain.toml and has rustup add the toolchain, the components and the MCU's target; installs QEMU
+    /// with apt-get.
     /// Harmless when repeated; needs the network only if something is missing.
     Setup,
     /// Setup, then every check and test
     Test,
+    /// Run the firmware on the report's stair under QEMU
+    ///
+    /// 70 s at 1 kHz, in seconds. Shows the decoded log, and exits with 1 unless every DAC code and every estimate is
+    /// the host's, bit for bit, and no tick was missed.
+    #[command(after_help = "Example:\n  cargo xtask emulate --json | jq .instructions_per_tick")]
+    Emulate(emulate::Args),
+    /// Make the MCU's images: ELF, bin and hex
+    ///
+    /// Prints their paths.
+    Image,
     /// Compare the host's speed with Python's
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Exits with 1 if Rust is slower
@@ -53,6 +70,8 @@ fn main() -> ExitCode {
     let result = match cli.command {
         Command::Setup => setup::run(),
         Command::Test => test::run(),
+        Command::Emulate(args) => emulate::run(&args),
+        Command::Image => image::run(),
         Command::Bench(args) => bench::run(&args),
     };
     match result {

@@ -6,13 +6,44 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::shell;
+use crate::{emulator, shell};
 
 /// The pinned toolchain and what goes with it; the only list of it.
 const TOOLCHAIN_FILE: &str = "rust-toolchain.toml";
 
+/// Package of the emulator, Debian and Ubuntu.
+const QEMU_PACKAGE: &str = "qemu-system-arm";
+
 /// `cargo xtask setup`.
 pub(crate) fn run() -> Result<()> {
+    toolchain()?;
+    emulator()
+}
+
+/// QEMU, from the distribution.
+pub(crate) fn emulator() -> Result<()> {
+    if let Ok(version) = shell::command(emulator::QEMU).arg("--version").output() {
+        let text = String::from_utf8_lossy(&version.stdout);
+        eprintln!("setup: {} is there", text.lines().next().unwrap_or(emulator::QEMU));
+        return Ok(());
+    }
+    eprintln!("setup: {} is missing, installing it with apt-get", emulator::QEMU);
+    let help = || format!("install {} by hand, then repeat this command", emulator::QEMU);
+    apt_get(&["update"]).with_context(help)?;
+    apt_get(&["install", "--yes", "--no-install-recommends", QEMU_PACKAGE]).with_context(help)
+}
+
+/// As root, or through sudo.
+fn apt_get(args: &[&str]) -> Result<()> {
+    let is_root = shell::output(shell::command("id").arg("-u"))?.trim() == "0";
+    let mut command = if is_root { shell::command("apt-get") } else { shell::command("sudo") };
+    if !is_root {
+        command.args(["--non-interactive", "apt-get"]);
+    }
+    shell::run(command.args(args).env("DEBIAN_FRONTEND", "noninteractive"))
+}
+
+fn toolchain() -> Result<()> {
     let path = shell::root().join(TOOLCHAIN_FILE);
     let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let (channel, parts) = wanted(&text).with_context(|| format!("cannot use {TOOLCHAIN_FILE}"))?;

@@ -1,0 +1,94 @@
+//! What an image is made of.
+
+use anyhow::{Context, Result, bail};
+use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC, SHT_NOBITS};
+use object::read::elf::{FileHeader, ProgramHeader, SectionHeader};
+use object::{Endianness, Object, ObjectSection, ObjectSymbol};
+
+type Header = FileHeader32<Endianness>;
+
+/// What is written to the flash, without holes.
+pub(crate) struct Flash {
+    pub(crate) address: u32,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// The loadable segments, at their load addresses, in one piece.
+pub(crate) fn flash(elf: &[u8]) -> Result<Flash> {
+    let header = Header::parse(elf)?;
+    let endian = header.endian()?;
+    let mut parts = Vec::new();
+    for segment in header.program_headers(endian, elf)? {
+        if segment.p_type(endian) == PT_LOAD && segment.p_filesz(endian) > 0 {
+            let bytes =
+                segment.data(endian, elf).map_err(|()| anyhow::anyhow!("a segment lies outside of the file"))?;
+            parts.push((segment.p_paddr(endian), bytes));
+        }
+    }
+    parts.sort_by_key(|(address, _)| *address);
+    let address = parts.first().context("nothing to load")?.0;
+    let mut bytes = Vec::new();
+    for (at, part) in parts {
+        let offset = (at - address) as usize;
+        if offset < bytes.len() || offset > 1 << 20 {
+            bail!("segments overlap or lie far apart");
+        }
+        // What the flash holds where nothing was written.
+        bytes.resize(offset, 0xff);
+        bytes.extend_from_slice(part);
+    }
+    Ok(Flash { address, bytes })
+}
+
+/// Bytes of static memory.
+pub(crate) fn ram(elf: &[u8]) -> Result<u32> {
+    let header = Header::parse(elf)?;
+    let endian = header.endian()?;
+    let mut total = 0;
+    for section in header.sections(endian, elf)?.iter() {
+        let in_ram = (0x2000_0000..0x4000_0000).contains(&section.sh_addr(endian));
+        if in_ram && section.sh_flags(endian) & SHF_ALLOC != 0 {
+            total += section.sh_size(endian);
+        }
+        debug_assert!(
+            !in_ram || section.sh_type(endian) == SHT_NOBITS || section.sh_size(endian) > 0 || total < 1 << 20
+        );
+    }
+    Ok(total)
+}
+
+/// A function of the image.
+pub(crate) struct Function {
+    pub(crate) name: String,
+    pub(crate) address: u32,
+    pub(crate) size: u32,
+}
+
+/// Every function, sorted by address; names as rustc shows them, without the hash.
+pub(crate) fn functions(elf: &[u8]) -> Result<Vec<Function>> {
+    let file = object::File::parse(elf)?;
+    let mut functions: Vec<Function> = file
+        .symbols()
+        .filter(|symbol| symbol.kind() == object::SymbolKind::Text && symbol.size() > 0)
+        .map(|symbol| Function {
+            name: format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or("?"))),
+            address: symbol.address() as u32 & !1,
+            size: symbol.size() as u32,
+        })
+        .collect();
+    functions.sort_by_key(|function| function.address);
+    Ok(functions)
+}
+
+/// The value of a symbol.
+pub(crate) fn symbol(elf: &[u8], name: &str) -> Result<u32> {
+    let file = object::File::parse(elf)?;
+    let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+    Ok(symbol.with_context(|| format!("no symbol {name}"))?.address() as u32)
+}
+
+/// A section's contents.
+pub(crate) fn section<'a>(elf: &'a [u8], name: &str) -> Result<&'a [u8]> {
+    let file = object::File::parse(elf)?;
+    Ok(file.section_by_name(name).with_context(|| format!("no section {name}"))?.data()?)
+}

@@ -1,0 +1,107 @@
+//! The stair under QEMU, held against the same code on this machine.
+
+use anyhow::{Result, bail};
+use firmware::script::{self, Script};
+use serde_json::{Value, json};
+
+use crate::emulator::{self, Run, SAFE, Written};
+use crate::image::{self, Board, Opt};
+use crate::setup;
+
+/// Options of `cargo xtask emulate`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Print the result as JSON; the log goes to stderr
+    #[arg(long)]
+    json: bool,
+    /// What the optimiser aims at
+    #[arg(long, value_enum, default_value = "s")]
+    opt: Opt,
+}
+
+/// `cargo xtask emulate`.
+pub(crate) fn run(args: &Args) -> Result<()> {
+    setup::emulator()?;
+    let elf = image::build(Board::Mps2, args.opt)?;
+    let show = |line: &str| if args.json { eprintln!("{line}") } else { println!("{line}") };
+    let run = emulator::play(&elf, "stair", emulator::SHIFT, show)?;
+    let comparison = Comparison::new("stair", &run)?;
+    if args.json {
+        println!("{}", comparison.report(args.opt, &run));
+    } else {
+        println!("{}", comparison.summary(&run));
+    }
+    comparison.check()
+}
+
+/// A run on the target beside the same on the host.
+pub(crate) struct Comparison {
+    pub(crate) ticks: u32,
+    pub(crate) missed: u32,
+    pub(crate) host_digest: String,
+    pub(crate) target_digest: String,
+    /// What left on the wire is what the host computed, tick by tick.
+    pub(crate) first_difference: Option<usize>,
+    pub(crate) instructions: [u32; 3],
+    pub(crate) exit: i32,
+}
+
+impl Comparison {
+    /// Rehearses `name` on this machine.
+    pub(crate) fn new(name: &str, run: &Run) -> Result<Self> {
+        let Some(script) = Script::parse(name) else { bail!("no script `{name}`") };
+        // The board writes zero once before its first tick.
+        let mut expected = vec![SAFE];
+        let digest = script::rehearse(script, |_, tick| {
+            expected.push(Written { code: tick.drive.code().0, enabled: tick.drive.enabled() });
+        })?;
+        let different = expected.iter().zip(&run.dac).position(|(host, target)| host != target);
+        let shorter = expected.len().min(run.dac.len());
+        Ok(Self {
+            ticks: run.number("done", "ticks")?,
+            missed: run.number("done", "missed")?,
+            host_digest: format!("{:x}", digest.value()),
+            target_digest: run.value("done", "digest")?.into(),
+            first_difference: different.or((expected.len() != run.dac.len()).then_some(shorter)),
+            instructions: [run.number("done", "min")?, run.number("done", "mean")?, run.number("done", "max")?],
+            exit: run.exit,
+        })
+    }
+
+    /// An error that says what differs.
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self { host_digest, target_digest, .. } = self;
+        if host_digest != target_digest {
+            bail!("target and host differ: digest {target_digest} on the target, {host_digest} on the host");
+        }
+        if let Some(index) = self.first_difference {
+            bail!("what left on the DAC's wire differs from the host's from write {index} on");
+        }
+        if self.missed != 0 || self.exit != 0 {
+            bail!("{} ticks missed, the emulator's exit code is {}", self.missed, self.exit);
+        }
+        Ok(())
+    }
+
+    fn report(&self, opt: Opt, run: &Run) -> Value {
+        let [min, mean, max] = self.instructions;
+        json!({
+            "ticks": self.ticks, "missed_ticks": self.missed, "host_digest": self.host_digest,
+            "target_digest": self.target_digest, "instructions_per_tick": {"min": min, "mean": mean, "max": max},
+            "exit": self.exit, "opt": opt.name(), "wall_s": run.took.as_secs_f64(), "dac_writes": run.dac.len(),
+        })
+    }
+
+    fn summary(&self, run: &Run) -> String {
+        let [min, mean, max] = self.instructions;
+        format!(
+            "{} ticks in {:.1} s, {} missed; digest {} on the target, {} on the host; \
+             instructions per tick {min} to {max}, mean {mean}",
+            self.ticks,
+            run.took.as_secs_f64(),
+            self.missed,
+            self.target_digest,
+            self.host_digest,
+        )
+    }
+}

@@ -1,0 +1,158 @@
+//! Runs an image under QEMU, its log decoded as it comes, and every code that it wrote to its DAC.
+//!
+//! Under `-icount shift=6,sleep=off` an instruction takes 64 ns of the board's time: runs are repeatable, slower than the
+//! real chip on the board's clock and much faster than real time on ours. 64 ns is also more than the 40 ns that the
+//! board's SysTick counts, so that SysTick tells instructions apart one by one; at shift 3, 8 ns, it sees every fifth.
+
+use std::fs;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+use std::process::Stdio;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use defmt_decoder::{DecodeError, Table};
+
+use crate::{image, shell};
+
+/// The emulator.
+pub(crate) const QEMU: &str = "qemu-system-arm";
+/// See the module.
+pub(crate) const SHIFT: u32 = 6;
+/// No run takes longer on a slow machine.
+const TIMEOUT: Duration = Duration::from_secs(120);
+
+/// A code on the DAC's wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Written {
+    pub(crate) code: u16,
+    pub(crate) enabled: bool,
+}
+
+/// Zero volts, amplifier off.
+pub(crate) const SAFE: Written = Written { code: 0, enabled: false };
+
+/// A finished run.
+pub(crate) struct Run {
+    /// Of the emulator.
+    pub(crate) exit: i32,
+    /// Decoded, level and message; no times.
+    pub(crate) log: Vec<String>,
+    /// What left.
+    pub(crate) dac: Vec<Written>,
+    /// Of our time.
+    pub(crate) took: Duration,
+}
+
+impl Run {
+    /// The value behind `key=` in the last line that starts with `word`.
+    pub(crate) fn value(&self, word: &str, key: &str) -> Result<&str> {
+        let line = self.log.iter().rev().find(|line| line.split_whitespace().nth(1) == Some(word));
+        let line =
+            line.with_context(|| format!("the log has no line `{word}`; its last one is {:?}", self.log.last()))?;
+        let value = line.split_whitespace().find_map(|part| part.strip_prefix(key)?.strip_prefix('='));
+        value.with_context(|| format!("no {key} in `{line}`"))
+    }
+
+    /// As [`Self::value`], a number.
+    pub(crate) fn number(&self, word: &str, key: &str) -> Result<u32> {
+        let value = self.value(word, key)?;
+        value.parse().with_context(|| format!("{key}={value} is no number"))
+    }
+}
+
+/// Plays `script`; `show` hears of every line of the log as it comes.
+pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&str) + Send) -> Result<Run> {
+    let bytes = image::read(elf)?;
+    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
+    let wire = elf.with_file_name(format!("dac-{}-{}", std::process::id(), script.replace(' ', "-")));
+    let start = Instant::now();
+    let mut child = shell::command(QEMU)
+        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"])
+        .args(["-serial", &format!("file:{}", wire.display())])
+        .args(["-icount", &format!("shift={shift},sleep=off")])
+        .args(["-semihosting-config", &format!("enable=on,target=native,arg={script}")])
+        .arg("-kernel")
+        .arg(elf)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(|error| match error.kind() {
+            ErrorKind::NotFound => anyhow::anyhow!("`{QEMU}` is not installed: run cargo xtask setup"),
+            _ => anyhow::anyhow!("cannot start `{QEMU}`: {error}"),
+        })?;
+    let mut output = child.stdout.take().context("the emulator has no output")?;
+    let over = AtomicBool::new(false);
+    let (log, status) = thread::scope(|scope| {
+        let reader = scope.spawn(|| {
+            let log = decode(&table, &mut output, |line| show(line));
+            over.store(true, Ordering::Relaxed);
+            log
+        });
+        while !over.load(Ordering::Relaxed) && start.elapsed() < TIMEOUT {
+            thread::sleep(Duration::from_millis(5));
+        }
+        if !over.load(Ordering::Relaxed) {
+            child.kill()?;
+        }
+        let log = reader.join().map_err(|_| anyhow::anyhow!("the log's reader stopped"))?;
+        anyhow::Ok((log?, child.wait()?))
+    })?;
+    let took = start.elapsed();
+    let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
+    let _ = fs::remove_file(&wire);
+    if took >= TIMEOUT {
+        bail!("the emulator was stopped after {} s; the log's last line is {:?}", took.as_secs(), log.last());
+    }
+    Ok(Run { exit: status.code().unwrap_or(-1), log, dac: written(&dac?), took })
+}
+
+/// Frames to lines.
+fn decode(table: &Table, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Vec<String>> {
+    let mut decoder = table.new_stream_decoder();
+    let mut log = Vec::new();
+    let mut buffer = [0; 4096];
+    loop {
+        let length = source.read(&mut buffer)?;
+        if length == 0 {
+            return Ok(log);
+        }
+        decoder.received(&buffer[..length]);
+        loop {
+            match decoder.decode() {
+                Ok(frame) => {
+                    let level = frame.level().map_or("-", |level| level.as_str());
+                    let line = format!("{level:<5} {}", frame.display_message());
+                    let time = frame.display_timestamp().map(|time| time.to_string()).unwrap_or_default();
+                    show(&format!("{time:>12} {line}"));
+                    log.push(line);
+                }
+                Err(DecodeError::UnexpectedEof) => break,
+                Err(DecodeError::Malformed) => log.push("MALFORMED".into()),
+            }
+        }
+    }
+}
+
+/// The wire's bytes as codes, see the firmware's `mps2::dac`. A first byte without its second was cut off by a stop.
+fn written(bytes: &[u8]) -> Vec<Written> {
+    let is_pair = |pair: &&[u8]| pair[0] & 0x80 != 0 && pair[1] & 0x80 == 0;
+    let code = |pair: &[u8]| Written {
+        code: u16::from(pair[0] & 0x3f) << 6 | u16::from(pair[1]),
+        enabled: pair[0] & 0x40 != 0,
+    };
+    bytes.windows(2).filter(is_pair).map(code).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_code_that_was_cut_off_is_left_out() {
+        let wire = [0x80, 0x00, 0xdb, 0x1b, 0xc1, 0x80, 0x00];
+        assert_eq!(written(&wire), [SAFE, Written { code: 0x1b << 6 | 0x1b, enabled: true }, SAFE]);
+    }
+}

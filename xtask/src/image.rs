@@ -1,0 +1,137 @@
+//! The MCU's images: ELF, bin, hex.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::{elf, shell};
+
+/// What the optimiser aims at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Opt {
+    /// Size, as it is flashed
+    S,
+    /// Speed
+    #[value(name = "3")]
+    Three,
+}
+
+impl Opt {
+    pub(crate) const ALL: [Self; 2] = [Self::S, Self::Three];
+
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::S => "s",
+            Self::Three => "3",
+        }
+    }
+
+    const fn profile(self) -> &'static str {
+        match self {
+            Self::S => "firmware",
+            Self::Three => "firmware-3",
+        }
+    }
+}
+
+/// Binary and feature have the board's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Board {
+    Nucleo,
+    Mps2,
+}
+
+impl Board {
+    pub(crate) const ALL: [Self; 2] = [Self::Nucleo, Self::Mps2];
+
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Nucleo => "nucleo-g474re",
+            Self::Mps2 => "mps2-an386",
+        }
+    }
+}
+
+/// Builds an image and returns its ELF file.
+pub(crate) fn build(board: Board, opt: Opt) -> Result<PathBuf> {
+    let name = board.name();
+    let target = target_directory()?;
+    shell::run(
+        shell::cargo().args(["build", "--quiet", "--package", "firmware", "--bin", name, "--features", name]).args([
+            "--profile",
+            opt.profile(),
+            "--target",
+            shell::MCU,
+        ]),
+    )?;
+    Ok(target.join(shell::MCU).join(opt.profile()).join(name))
+}
+
+/// Where cargo builds.
+pub(crate) fn target_directory() -> Result<PathBuf> {
+    let metadata = shell::metadata()?;
+    Ok(metadata["target_directory"].as_str().context("cargo metadata names no target directory")?.into())
+}
+
+/// `cargo xtask image`.
+pub(crate) fn run() -> Result<()> {
+    for board in Board::ALL {
+        let path = build(board, Opt::S)?;
+        let flash = elf::flash(&read(&path)?).with_context(|| format!("in {}", path.display()))?;
+        let (bin, hex) = (path.with_extension("bin"), path.with_extension("hex"));
+        write(&bin, &flash.bytes)?;
+        write(&hex, intel_hex(flash.address, &flash.bytes).as_bytes())?;
+        println!("{}\n{}\n{}", path.display(), bin.display(), hex.display());
+    }
+    Ok(())
+}
+
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Intel HEX with 16 bytes a line.
+fn intel_hex(address: u32, bytes: &[u8]) -> String {
+    let mut text = String::new();
+    let mut line = |kind: u8, offset: u16, data: &[u8]| {
+        let [high, low] = offset.to_be_bytes();
+        let mut record = vec![data.len() as u8, high, low, kind];
+        record.extend_from_slice(data);
+        let sum = record.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)).wrapping_neg();
+        record.push(sum);
+        text.push(':');
+        text.extend(record.iter().map(|byte| format!("{byte:02X}")));
+        text.push('\n');
+    };
+    let mut upper = None;
+    for (index, chunk) in bytes.chunks(16).enumerate() {
+        let at = address + 16 * index as u32;
+        if upper != Some(at >> 16) {
+            upper = Some(at >> 16);
+            line(4, 0, &((at >> 16) as u16).to_be_bytes());
+        }
+        line(0, at as u16, chunk);
+    }
+    line(1, 0, &[]);
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hex_is_as_intel_wrote_it() {
+        let text =
+            intel_hex(0x0800_fff0, &[0x21, 0x46, 1, 0x36, 1, 0x21, 0x47, 1, 0x36, 0, 0x7e, 0xfe, 9, 0xd2, 0x19, 1, 5]);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], ":020000040800F2");
+        assert_eq!(lines[1], ":10FFF000214601360121470136007EFE09D2190152");
+        assert_eq!(lines[2..], [":020000040801F1", ":0100000005FA", ":00000001FF"]);
+    }
+}
