@@ -11,11 +11,13 @@
 //! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
 //! | [`plant_file`] | the spring as a file |
 //! | [`log`] | the log that the firmware writes, decoded |
+//! | [`mod@link`] | the serial link to the MCU |
 //! | [`output`] | terminal, JSON, CSV, plots |
 
 pub mod bad_input;
 pub mod bound;
 pub mod experiment;
+pub mod link;
 pub mod log;
 pub mod misprint;
 pub mod output;

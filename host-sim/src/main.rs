@@ -24,6 +24,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Link(commands::link::Arguments),
     Log(commands::log::Arguments),
     Stair(commands::stair::Arguments),
 }
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Err(error) => return usage(&error),
     };
     let done = match cli.command {
+        Some(Command::Link(arguments)) => commands::link::run(&arguments),
         Some(Command::Log(arguments)) => commands::log::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),

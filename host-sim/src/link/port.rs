@@ -1,0 +1,100 @@
+//! Where the MCU is: a serial device or pseudo-terminal by its path, `unix:PATH` or `tcp:HOST:PORT` for the emulator.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use anyhow::Result;
+
+use crate::bad_input;
+
+/// Longest wait for a byte.
+const POLL: Duration = Duration::from_millis(5);
+/// Longest wait until bytes are taken.
+const WRITE: Duration = Duration::from_secs(1);
+
+/// An open port.
+pub struct Port {
+    name: String,
+    stream: Box<dyn Stream>,
+}
+
+trait Stream: Read + Write {}
+impl<T: Read + Write> Stream for T {}
+
+impl Port {
+    /// Opens a port by its name. `baud` counts for serial devices only.
+    ///
+    /// # Errors
+    /// [`crate::BadInput`] if it cannot be opened.
+    pub fn open(name: &str, baud: u32) -> Result<Self> {
+        let opened = if let Some(path) = name.strip_prefix("unix:") {
+            unix(path)
+        } else if let Some(address) = name.strip_prefix("tcp:") {
+            tcp(address)
+        } else {
+            serial(name, baud)
+        };
+        match opened {
+            Ok(stream) => Ok(Self { name: name.to_owned(), stream }),
+            Err(error) => {
+                bad_input!("{name}: cannot be opened: {error}; expected a serial device, unix:PATH or tcp:HOST:PORT")
+            }
+        }
+    }
+
+    /// What it was called.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Bytes that have come; none after a few milliseconds without.
+    ///
+    /// # Errors
+    /// If the other side is gone.
+    pub fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.stream.read(buffer) {
+            Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
+            Err(error)
+                if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
+            {
+                Ok(0)
+            }
+            read => read,
+        }
+    }
+
+    /// Sends all of `bytes`.
+    ///
+    /// # Errors
+    /// If they are not taken within a second, or the other side is gone.
+    pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.stream.write_all(bytes)
+    }
+}
+
+fn serial(path: &str, baud: u32) -> io::Result<Box<dyn Stream>> {
+    // The open port is locked against a second program: two hosts would talk across each other.
+    Ok(Box::new(serialport::new(path, baud).timeout(POLL).open()?))
+}
+
+fn tcp(address: &str) -> io::Result<Box<dyn Stream>> {
+    let stream = TcpStream::connect(address)?;
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(POLL))?;
+    stream.set_write_timeout(Some(WRITE))?;
+    Ok(Box::new(stream))
+}
+
+#[cfg(unix)]
+fn unix(path: &str) -> io::Result<Box<dyn Stream>> {
+    let stream = std::os::unix::net::UnixStream::connect(path)?;
+    stream.set_read_timeout(Some(POLL))?;
+    stream.set_write_timeout(Some(WRITE))?;
+    Ok(Box::new(stream))
+}
+
+#[cfg(not(unix))]
+fn unix(_: &str) -> io::Result<Box<dyn Stream>> {
+    Err(ErrorKind::Unsupported.into())
+}

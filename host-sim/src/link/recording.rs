@@ -1,0 +1,208 @@
+//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness` that a [`crate::record::Record`] is read from.
+//!
+//! Each row leaves the program in one piece, the moment it is known: whenever the recording stops, by Ctrl-C, by a lost
+//! cable, by the end of the disk, the file ends with a complete row.
+
+use std::fs::File;
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use link::{Status, Telemetry};
+use serde::Serialize;
+
+use crate::bad_input;
+
+/// A recording on its way.
+pub struct Recording {
+    path: PathBuf,
+    file: File,
+    /// Bytes up to the end of the last complete row.
+    complete: u64,
+    rate_hz: f64,
+    every_ticks: u64,
+    measured: bool,
+    first_tick: Option<u64>,
+    last_tick: u64,
+    summary: Summary,
+}
+
+/// What was recorded.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Rows of data.
+    pub rows: u64,
+    /// From the first row to the last one, in s.
+    pub seconds: f64,
+    /// Samples that did not arrive: damaged on the way, or never sent because the line was full.
+    pub lost: u64,
+    /// Samples without a reading of the sensor, which had some before.
+    pub without_reading: u64,
+    /// `measured` by the sensor, or the controller's `estimate` where there is none.
+    pub stiffness: &'static str,
+}
+
+impl Recording {
+    /// Starts a file. One that exists is kept unless `replace`: a measurement cannot be made again.
+    ///
+    /// # Errors
+    /// [`crate::BadInput`] if it cannot be made.
+    pub fn new(path: &Path, replace: bool, status: &Status, every_ticks: u16) -> Result<Self> {
+        let file = match File::options().write(true).create_new(!replace).create(replace).truncate(replace).open(path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                bad_input!("{}: exists; expected a new file, or --force", path.display())
+            }
+            Err(error) => bad_input!("{}: cannot be made: {error}; expected a file to write to", path.display()),
+        };
+        let measured = status.sample.measured.is_some();
+        let stiffness = if measured { "measured" } else { "estimate" };
+        let mut recording = Self {
+            path: path.to_owned(),
+            file,
+            complete: 0,
+            rate_hz: f64::from(status.rate_hz.max(1)),
+            every_ticks: u64::from(every_ticks.max(1)),
+            measured,
+            first_tick: None,
+            last_tick: 0,
+            summary: Summary { stiffness, ..Summary::default() },
+        };
+        let source = if measured {
+            "as the sensor measured it"
+        } else {
+            "as the controller estimates it, for want of a sensor: no measurement"
+        };
+        let rate = status.rate_hz;
+        recording.put(&format!(
+            "# recorded over the serial link, control at {rate} Hz; voltage_v across the spring; stiffness {source}\n\
+             time_s,voltage_v,stiffness\n"
+        ))?;
+        Ok(recording)
+    }
+
+    /// Adds a sample; one that came before is left out.
+    ///
+    /// # Errors
+    /// If the disk is full, or the MCU has restarted.
+    pub fn add(&mut self, sample: &Telemetry) -> Result<()> {
+        let first = *self.first_tick.get_or_insert(sample.tick);
+        if sample.tick < first {
+            bail!("the MCU restarted after {} rows; {} ends there", self.summary.rows, self.path.display());
+        }
+        if self.summary.rows > 0 {
+            if sample.tick <= self.last_tick {
+                return Ok(());
+            }
+            // Half a period is jitter, not a loss.
+            let periods = (sample.tick - self.last_tick + self.every_ticks / 2) / self.every_ticks;
+            self.summary.lost += periods.saturating_sub(1);
+        }
+        let stiffness = if self.measured { sample.measured } else { Some(sample.estimate) };
+        let Some(stiffness) = stiffness else {
+            self.summary.without_reading += 1;
+            return Ok(());
+        };
+        let time_s = (sample.tick - first) as f64 / self.rate_hz;
+        // Nine decimals hide what floats make of decimal times.
+        let time = (time_s * 1e9).round() / 1e9;
+        self.put(&format!("{time},{:.6},{:.6}\n", sample.applied.to_f64(), stiffness.to_f64()))?;
+        self.last_tick = sample.tick;
+        self.summary.rows += 1;
+        self.summary.seconds = time;
+        Ok(())
+    }
+
+    /// What has been recorded.
+    pub fn summary(&self) -> &Summary {
+        &self.summary
+    }
+
+    fn put(&mut self, text: &str) -> Result<()> {
+        let written = self.file.write_all(text.as_bytes());
+        if written.is_err() {
+            // What of the row got through must go. Should that fail too, the first error is the one to tell.
+            let _ = self.file.set_len(self.complete);
+            let _ = self.file.seek(SeekFrom::Start(self.complete));
+        }
+        written.with_context(|| format!("{} cannot be written", self.path.display()))?;
+        self.complete += text.len() as u64;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Record;
+    use link::WireVolts;
+
+    fn status(measured: bool) -> Status {
+        let sample = Telemetry { measured: measured.then_some(WireVolts(0)), ..Telemetry::default() };
+        Status { rate_hz: 1000, sample, ..Status::default() }
+    }
+
+    fn sample(tick: u64) -> Telemetry {
+        let volts = |v: i32| WireVolts(v << 20);
+        Telemetry { tick, applied: volts(100), estimate: volts(9), measured: Some(volts(8)), ..Telemetry::default() }
+    }
+
+    fn start(folder: &Path, measured: bool) -> (PathBuf, Recording) {
+        let path = folder.join("r.csv");
+        let recording = Recording::new(&path, false, &status(measured), 10).unwrap();
+        (path, recording)
+    }
+
+    #[test]
+    fn rows_are_readable_before_the_recording_ends_repeats_left_out_and_losses_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, mut recording) = start(folder.path(), true);
+        for tick in [5000, 5010, 5010, 5000, 5050, 5061] {
+            recording.add(&sample(tick)).unwrap();
+        }
+        recording.add(&Telemetry { measured: None, ..sample(5070) }).unwrap();
+        let read = Record::open(&path).unwrap();
+        let times: Vec<f64> = read.rows.iter().map(|row| row.time_s).collect();
+        assert_eq!(times, [0.0, 0.01, 0.05, 0.061]);
+        assert_eq!((read.rows[1].voltage_v, read.rows[1].measured), (100.0, Some(8.0)));
+        let Summary { rows, lost, without_reading, .. } = recording.summary();
+        assert_eq!((*rows, *lost, *without_reading), (4, 3, 1));
+    }
+
+    #[test]
+    fn without_a_sensor_the_file_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, mut recording) = start(folder.path(), false);
+        recording.add(&sample(1)).unwrap();
+        recording.add(&sample(11)).unwrap();
+        assert!(std::fs::read_to_string(&path).unwrap().contains("no measurement"));
+        assert_eq!(Record::open(&path).unwrap().rows[0].measured, Some(9.0));
+    }
+
+    #[test]
+    fn a_restart_of_the_mcu_ends_the_recording_and_keeps_its_rows() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, mut recording) = start(folder.path(), true);
+        recording.add(&sample(500)).unwrap();
+        recording.add(&sample(510)).unwrap();
+        assert!(recording.add(&sample(3)).unwrap_err().to_string().contains("restarted after 2 rows"));
+        assert_eq!(Record::open(&path).unwrap().rows.len(), 2);
+    }
+
+    #[test]
+    fn a_file_that_exists_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, _) = start(folder.path(), true);
+        let error = Recording::new(&path, false, &status(true), 10).err().unwrap();
+        assert!(error.is::<crate::BadInput>() && error.to_string().contains("--force"), "{error}");
+        Recording::new(&path, true, &status(true), 10).unwrap();
+    }
+
+    /// A device that is always full stands for a disk that is.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_told() {
+        let error = Recording::new(Path::new("/dev/full"), true, &status(true), 10).err().unwrap();
+        assert!(error.to_string().contains("/dev/full cannot be written"), "{error}");
+    }
+}

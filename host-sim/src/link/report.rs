@@ -1,0 +1,161 @@
+//! What the MCU says, as text and JSON.
+
+use link::session::Counters;
+use link::{Status, Telemetry};
+use model::Limits;
+use serde::Serialize;
+
+/// One sample of the loop.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Time of the tick since the MCU started, in s.
+    pub time_s: f64,
+    /// Number of the tick.
+    pub tick: u64,
+    /// `disarmed`, `armed`, `ramping` (armed, host silent) or `faulted`.
+    pub state: &'static str,
+    /// Target, in V.
+    pub target_v: f64,
+    /// Voltage across the spring, in V.
+    pub applied_v: f64,
+    /// Estimated scaled stiffness, in V.
+    pub estimate_v: f64,
+    /// The sensor's scaled stiffness in V, where there is one.
+    pub measured_v: Option<f64>,
+    /// DAC code.
+    pub dac_code: u16,
+    /// Limits that acted.
+    pub limits: Vec<&'static str>,
+}
+
+/// Everything about the MCU.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StatusReport {
+    /// Protocol version.
+    pub protocol: u8,
+    /// Version and git revision of the program.
+    pub firmware: String,
+    /// Ticks per second, in Hz.
+    pub rate_hz: u32,
+    /// Host silence that is allowed, in s.
+    pub silence_limit_s: f64,
+    /// Late ticks.
+    pub overruns: u32,
+    /// The fault that is present.
+    pub fault: &'static str,
+    /// Its stable number, 0 for none.
+    pub fault_code: u8,
+    /// The fault that caused the last reset.
+    pub last_fault: &'static str,
+    /// The latest sample.
+    pub sample: Row,
+    /// What came over the link, the MCU's count.
+    pub link: Counters,
+}
+
+impl Row {
+    /// Heads a table of rows.
+    pub const HEADER: &'static str = "    time  state       target   applied  estimate  measured   DAC  limits\n     \
+                                      [s]                [V]       [V]       [V]       [V]  code";
+
+    /// A sample of an MCU that makes `rate_hz` ticks a second.
+    pub fn new(sample: &Telemetry, rate_hz: u32) -> Self {
+        Self {
+            time_s: sample.tick as f64 / f64::from(rate_hz.max(1)),
+            tick: sample.tick,
+            state: sample.state.name(),
+            target_v: sample.target.to_f64(),
+            applied_v: sample.applied.to_f64(),
+            estimate_v: sample.estimate.to_f64(),
+            measured_v: sample.measured.map(|measured| measured.to_f64()),
+            dac_code: sample.code,
+            limits: [
+                ("upper", Limits::UPPER),
+                ("lower", Limits::LOWER),
+                ("slew", Limits::SLEW),
+                ("target", Limits::TARGET),
+            ]
+            .into_iter()
+            .filter(|(_, limit)| sample.limits & limit.bits() != 0)
+            .map(|(name, _)| name)
+            .collect(),
+        }
+    }
+
+    /// One line of a table.
+    pub fn line(&self) -> String {
+        let measured = self.measured_v.map_or_else(|| "-".to_owned(), |volts| format!("{volts:.3}"));
+        let Self { time_s, state, target_v, applied_v, estimate_v, dac_code, .. } = self;
+        let limits = if self.limits.is_empty() { "-".to_owned() } else { self.limits.join("+") };
+        format!(
+            "{time_s:8.2}  {state:8} {target_v:9.3} {applied_v:9.3} {estimate_v:9.3} {measured:>9} {dac_code:5}  {limits}"
+        )
+    }
+}
+
+impl StatusReport {
+    /// What a status says.
+    pub fn new(status: &Status) -> Self {
+        let firmware = &status.firmware;
+        let revision = match firmware.revision {
+            0 => String::new(),
+            revision => format!(" ({revision:08x})"),
+        };
+        Self {
+            protocol: link::VERSION,
+            firmware: format!("{}.{}.{}{revision}", firmware.major, firmware.minor, firmware.patch),
+            rate_hz: status.rate_hz,
+            silence_limit_s: f64::from(status.silence_limit_ticks) / f64::from(status.rate_hz.max(1)),
+            overruns: status.overruns,
+            fault: status.fault.name(),
+            fault_code: status.fault.0,
+            last_fault: status.last_fault.name(),
+            sample: Row::new(&status.sample, status.rate_hz),
+            link: status.counters,
+        }
+    }
+
+    /// A few lines of text.
+    pub fn text(&self) -> String {
+        let Self { firmware, protocol, rate_hz, silence_limit_s, overruns, fault, last_fault, sample, link, .. } = self;
+        let measured = sample.measured_v.map_or_else(|| "no sensor".to_owned(), |volts| format!("{volts:.3} V"));
+        let limits = if sample.limits.is_empty() { "none".to_owned() } else { sample.limits.join(", ") };
+        format!(
+            "state      {}, fault {fault}, last reset's {last_fault}\n\
+             target     {:.3} V\n\
+             applied    {:.3} V, DAC code {}\n\
+             stiffness  {:.3} V estimated; measured: {measured}\n\
+             limits     {limits}\n\
+             running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
+             firmware   {firmware}, protocol {protocol}, host may be silent for {silence_limit_s} s\n\
+             link       {} accepted, {} repeated, {} damaged, {} oversize, {} bad version, {} out of order, {} unknown\n",
+            sample.state,
+            sample.target_v,
+            sample.applied_v,
+            sample.dac_code,
+            sample.estimate_v,
+            sample.time_s,
+            sample.tick,
+            link.accepted,
+            link.repeated,
+            link.damaged,
+            link.oversize,
+            link.bad_version,
+            link.out_of_order,
+            link.unknown,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_have_names() {
+        let sample = Telemetry { tick: 1500, limits: 1 | 8, ..Telemetry::default() };
+        let row = Row::new(&sample, 1000);
+        assert_eq!((row.time_s, row.limits.join("+").as_str()), (1.5, "upper+target"));
+        assert_eq!(Row::HEADER.lines().next().unwrap().find("limits"), row.line().find("upper"));
+    }
+}
