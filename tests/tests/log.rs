@@ -66,6 +66,7 @@ fn frames(encoding: &'static str) -> Vec<Vec<u8>> {
         summary(2_000_450, [2000, 3, 1250, 27], "armed", 250_000),
         fw.frame(FAULT, 2_400_000, &[U8(3), Str("overrun"), U32(2399)]),
         boot(1_210, "software", 3),
+        fw.frame(FAULT, 1_900, &[U8(3), Str("overrun"), U32(1)]),
         limit(2_001, 8, 1),
         summary(1_000_450, [1000, 0, 9, 4], "safe", 0),
         fw.frame(DONE, 70_000_450, &[U32(70_000), U32(0), U64(0xbeef_0042), U32(91), U32(96), U32(131)]),
@@ -297,7 +298,7 @@ proptest! {
 
     #[test]
     fn garbage_between_frames_is_skipped(
-        garbage in proptest::collection::vec(any::<u8>(), 0..300), place in 0..14usize,
+        garbage in proptest::collection::vec(any::<u8>(), 0..300), place in 0..15usize,
     ) {
         let mut frames = frames("rzcobs");
         let count = frames.len();
@@ -439,4 +440,21 @@ fn time_in_limits_needs_the_rate() {
     assert_eq!((unseen.limited_ticks, unseen.limited_s), (Some(27), None));
     let no_summary = summary(&decode("rzcobs", &frames[..4].concat()));
     assert_eq!((no_summary.overruns, no_summary.limited_s), (None, None));
+}
+
+#[test]
+fn a_fault_counts_once_however_often_it_is_told() {
+    let frames = frames("rzcobs");
+    let faults = |frames: &[Vec<u8>]| {
+        let faults = summary(&decode("rzcobs", &frames.concat())).faults;
+        faults.iter().map(|fault| fault.count).sum::<u64>()
+    };
+    assert_eq!(faults(&frames), 1);
+    // The crash swallowed the line before the restart.
+    assert_eq!(faults(&[&frames[..8], &frames[9..]].concat()), 1);
+    // The log starts with the restart.
+    assert_eq!(faults(&frames[9..]), 1);
+    // It happens again.
+    let again = [&frames[..], &frames[8..]].concat();
+    assert_eq!(faults(&again), 2);
 }

@@ -23,7 +23,7 @@ pub struct Summary {
     pub boots_not_seen: u64,
     /// Ticks, as far as a line tells.
     pub ticks: u64,
-    /// Ticks that were missed; none without a summary line, as the next three.
+    /// Ticks that were missed; none if no line tells, as in the next three. As of each start's last summary line.
     pub overruns: Option<u64>,
     /// How late the latest tick came.
     pub worst_lateness_us: Option<u32>,
@@ -33,7 +33,7 @@ pub struct Summary {
     pub limited_s: Option<f64>,
     /// How many limit lines name each limit.
     pub limit_lines: LimitLines,
-    /// In the order of their first.
+    /// In the order of their first. One that is told again after the restart it led to counts once.
     pub faults: Vec<Fault>,
     /// Times that the program stopped itself.
     pub panics: u64,
@@ -98,6 +98,10 @@ struct Start {
     ticks: u64,
     /// Tick of the newest summary line.
     last_summary: u32,
+    /// Code of the newest fault line.
+    last_fault: Option<u8>,
+    /// Code of a fault that the start before told already.
+    told: Option<u8>,
     overruns: u64,
     limited_ticks: u64,
     /// Of the starts before.
@@ -148,13 +152,20 @@ impl Summary {
         self.warnings += u64::from(line.level == Some(Level::Warn));
         match &line.event {
             Event::Boot { version, git, reset, last_fault, rate_hz } => {
+                // The fault that led here is told once more; its first line may have got lost in the crash.
+                let told = self.start.last_fault.filter(|code| code == last_fault);
                 self.next_start();
                 self.start.rate_hz = Some(*rate_hz);
+                self.start.told = told;
                 let (version, git, reset) = (version.clone(), git.clone(), reset.clone());
                 self.boots.push(Boot { version, git, reset, last_fault: *last_fault, rate_hz: *rate_hz });
             }
             Event::Fault { code, name, tick } => {
                 self.tick(*tick);
+                self.start.last_fault = Some(*code);
+                if self.start.told.take() == Some(*code) {
+                    return;
+                }
                 match self.faults.iter_mut().find(|fault| fault.code == *code && fault.name == *name) {
                     Some(fault) => fault.count += 1,
                     None => self.faults.push(Fault { code: *code, name: name.clone(), count: 1 }),
@@ -177,18 +188,25 @@ impl Summary {
                 }
                 self.tick(*tick);
                 self.start.last_summary = *tick;
-                self.start.overruns = self.start.overruns.max((*overruns).into());
+                self.missed(*overruns);
                 self.start.limited_ticks = self.start.limited_ticks.max((*limited_ticks).into());
                 self.worst_lateness_us = self.worst_lateness_us.max(Some(*worst_lateness_us));
             }
             Event::Done(done) => {
                 self.tick(done.ticks);
+                self.missed(done.missed);
                 self.done = Some(done.clone());
             }
             Event::Dropped { events } => self.dropped += u64::from(*events),
             Event::Panic { .. } => self.panics += 1,
             Event::State { .. } | Event::Text => {}
         }
+    }
+
+    /// So many ticks since the start.
+    fn missed(&mut self, ticks: u32) {
+        self.start.overruns = self.start.overruns.max(ticks.into());
+        self.overruns = Some(0);
     }
 
     fn tick(&mut self, tick: u32) {
@@ -210,8 +228,8 @@ impl Summary {
 
     fn total(&mut self) {
         self.ticks = self.before.ticks + self.start.ticks;
+        self.overruns = self.overruns.map(|_| self.before.overruns + self.start.overruns);
         if self.worst_lateness_us.is_some() {
-            self.overruns = Some(self.before.overruns + self.start.overruns);
             self.limited_ticks = Some(self.before.limited_ticks + self.start.limited_ticks);
             let before = (!self.before.unknown_rate).then_some(self.before.limited_s);
             self.limited_s = before.zip(self.start.limited_s()).map(|(before, now)| before + now);
