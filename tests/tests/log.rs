@@ -345,6 +345,7 @@ fn what_is_not_this_firmwares_is_refused_in_one_line() {
     write("text.elf", b"not an ELF file\n");
     write("plain.elf", &plain_elf());
     write("empty.bin", b"");
+    write("erased.bin", &[0; 100]);
     for (elf, log, expected) in [
         ("none.elf", "log.bin", "none.elf: cannot be read"),
         (".", "log.bin", "cannot be read"),
@@ -355,6 +356,7 @@ fn what_is_not_this_firmwares_is_refused_in_one_line() {
         ("fw.elf", "none.bin", "none.bin: cannot be read"),
         ("fw.elf", ".", "cannot be read"),
         ("fw.elf", "empty.bin", "empty.bin: empty"),
+        ("fw.elf", "erased.bin", "erased.bin: empty"),
     ] {
         let output = run(&folder, &[elf, log]);
         assert_eq!(code(&output), 2, "{elf} {log}");
@@ -368,6 +370,17 @@ fn what_is_not_this_firmwares_is_refused_in_one_line() {
 fn plain_elf() -> Vec<u8> {
     use object::{Architecture, BinaryFormat, Endianness, write::Object};
     Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little).write().expect("the ELF file is small")
+}
+
+#[test]
+fn a_run_of_damage_takes_two_lines() {
+    let frames = frames("rzcobs");
+    let folder = folder("rzcobs", &[&frames[..2], &vec![vec![0xff, 0]; 500], &frames[2..4]].concat().concat());
+    let output = run(&folder, &["fw.elf", "log.bin"]);
+    assert_eq!(code(&output), 1);
+    let found: Vec<&str> = text(&output.stdout).lines().filter(|line| line.contains("damaged:")).collect();
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(found[1].ends_with("damaged: and 499 bytes after it, 499 frames"), "{found:?}");
 }
 
 #[test]

@@ -8,7 +8,8 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use host_sim::bad_input;
 use host_sim::log::{
-    CSV_HEADER, Decoder, Encoding, Formats, Item, Line, Summary, TABLE_HEADER, csv_row, summary_text, table_row,
+    CSV_HEADER, Decoder, Encoding, Formats, Item, Line, Summary, TABLE_HEADER, csv_row, more_damage_csv_row,
+    more_damage_table_row, summary_text, table_row,
 };
 use serde::Serialize;
 
@@ -65,7 +66,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Err(error) => bad_input!("{}: {error:#}", arguments.elf.display()),
     };
     let source = open(&arguments.file)?;
-    let mut printer = Printer { arguments, out: io::stdout().lock(), lines: Vec::new(), damaged: Vec::new() };
+    let mut printer =
+        Printer { arguments, out: io::stdout().lock(), lines: Vec::new(), damaged: Vec::new(), run: None };
     match decode(source, formats, &mut printer) {
         // Who closes the pipe has seen enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
@@ -103,7 +105,6 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>
     let mut decoder = Decoder::new(formats);
     let mut summary = Summary::default();
     let mut buffer = [0; 1 << 13];
-    let mut empty = true;
     let mut broken = None;
     printer.start()?;
     loop {
@@ -116,7 +117,6 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>
                 break;
             }
         };
-        empty = false;
         for item in decoder.feed(&buffer[..read]) {
             summary.add(&item);
             printer.item(item)?;
@@ -127,7 +127,7 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>
         summary.add(&item);
         printer.item(item)?;
     }
-    let verdict = verdict(printer.arguments, &summary, empty);
+    let verdict = verdict(printer.arguments, &summary);
     printer.end(encoding, summary)?;
     let name = name(&printer.arguments.file);
     match broken {
@@ -137,10 +137,10 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>
 }
 
 /// What is wrong with the log.
-fn verdict(arguments: &Arguments, summary: &Summary, empty: bool) -> Result<()> {
+fn verdict(arguments: &Arguments, summary: &Summary) -> Result<()> {
     let (name, elf) = (name(&arguments.file), arguments.elf.display());
     let Summary { lines, damaged_frames, damaged_bytes, cut_off_bytes, .. } = summary;
-    if empty {
+    if *lines == 0 && summary.is_whole() {
         bad_input!("{name}: empty; expected the log of the firmware");
     }
     if *lines == 0 && *damaged_frames > 0 {
@@ -172,6 +172,8 @@ struct Printer<'a> {
     /// For `--json`, which is one object.
     lines: Vec<Line>,
     damaged: Vec<Damage>,
+    /// In a run of damaged frames: how many after its first, and their bytes. Another build's log is nothing else.
+    run: Option<(u64, u64)>,
 }
 
 impl Printer<'_> {
@@ -185,22 +187,36 @@ impl Printer<'_> {
     }
 
     fn item(&mut self, item: Item) -> io::Result<()> {
-        match (self.arguments.json, self.arguments.csv) {
-            (true, _) => {
-                match item {
-                    Item::Line(line) => self.lines.push(line),
-                    Item::Damaged { offset, bytes } => self.damaged.push(Damage { offset, bytes: Some(bytes) }),
-                    Item::Lost { offset } => self.damaged.push(Damage { offset, bytes: None }),
-                    Item::Unread { .. } | Item::CutOff { .. } => {}
-                }
-                Ok(())
+        if self.arguments.json {
+            match item {
+                Item::Line(line) => self.lines.push(line),
+                Item::Damaged { offset, bytes } => self.damaged.push(Damage { offset, bytes: Some(bytes) }),
+                Item::Lost { offset } => self.damaged.push(Damage { offset, bytes: None }),
+                Item::Unread { .. } | Item::CutOff { .. } => {}
             }
-            (_, true) => writeln!(self.out, "{}", csv_row(&item)),
-            _ => writeln!(self.out, "{}", table_row(&item)),
+            return Ok(());
         }
+        match (&item, &mut self.run) {
+            (Item::Damaged { bytes: more, .. }, Some((frames, bytes))) => {
+                *frames += 1;
+                *bytes += more;
+                return Ok(());
+            }
+            (Item::Damaged { .. }, None) => self.run = Some((0, 0)),
+            _ => self.end_run()?,
+        }
+        let row = if self.arguments.csv { csv_row(&item) } else { table_row(&item) };
+        writeln!(self.out, "{row}")
+    }
+
+    fn end_run(&mut self) -> io::Result<()> {
+        let Some((frames @ 1.., bytes)) = self.run.take() else { return Ok(()) };
+        let row = if self.arguments.csv { more_damage_csv_row } else { more_damage_table_row };
+        writeln!(self.out, "{}", row(frames, bytes))
     }
 
     fn end(&mut self, encoding: Encoding, summary: Summary) -> Result<()> {
+        self.end_run()?;
         if self.arguments.json {
             let (lines, damaged) = (std::mem::take(&mut self.lines), std::mem::take(&mut self.damaged));
             let report = Report { encoding, lines, damaged, summary };

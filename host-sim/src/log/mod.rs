@@ -35,4 +35,6 @@ pub use event::Event;
 pub use formats::{Encoding, Formats};
 pub use line::{Level, Line};
 pub use summary::{Boot, Done, Fault, LimitLines, Summary};
-pub use text::{CSV_HEADER, TABLE_HEADER, csv_row, summary_text, table_row};
+pub use text::{
+    CSV_HEADER, TABLE_HEADER, csv_row, more_damage_csv_row, more_damage_table_row, summary_text, table_row,
+};

@@ -120,6 +120,20 @@ fn limits(line: &Line) -> String {
     if names.is_empty() { " (none)".to_owned() } else { format!(" ({})", names.join(", ")) }
 }
 
+/// What stands for a run of damaged frames after its first, as a line of the table.
+pub fn more_damage_table_row(frames: u64, bytes: u64) -> String {
+    format!("{:>12}  {:<5}  {}", "-", "-", more_damage(frames, bytes))
+}
+
+/// The same as a comment of the CSV.
+pub fn more_damage_csv_row(frames: u64, bytes: u64) -> String {
+    format!("# {}", more_damage(frames, bytes))
+}
+
+fn more_damage(frames: u64, bytes: u64) -> String {
+    format!("damaged: and {bytes} bytes after it, {frames} frames")
+}
+
 fn damage(item: &Item) -> String {
     match item {
         Item::Line(_) => String::new(),
