@@ -9,6 +9,7 @@
 //! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
 //! | [`digest`] | one number for a whole run |
 //! | `last_words`, `stop` | what survives a reset; panic and hard fault |
+//! | `stack_guard` | an overflow of the stack is a fault |
 //! | `log` | every log line, in one place |
 //! | `tasks` | the control task and the housekeeping below it |
 //! | `mps2` | the emulated board |
@@ -36,6 +37,8 @@ pub mod log;
 pub mod mps2;
 #[cfg(feature = "nucleo-g474re")]
 pub mod nucleo;
+#[cfg(feature = "mcu")]
+pub mod stack_guard;
 #[cfg(feature = "mcu")]
 pub mod stop;
 #[cfg(feature = "mcu")]

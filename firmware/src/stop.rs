@@ -42,13 +42,21 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     stop(Fault::Panic, Some(info))
 }
 
-/// In the fault of a stack that ran out there is no stack to stand on: take a fresh one first. Nothing returns to the old.
+/// In the fault of a stack that ran out there is no stack to stand on: take a fresh one first. Nothing returns to the old,
+/// so the float registers that the processor still means to save there (FPCCR.LSPACT) are given up: the first float
+/// instruction would fault again.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {
     core::arch::naked_asm!(
         "ldr r0, =_stack_start",
         "mov sp, r0",
+        "ldr r0, =0xe000ef34",
+        "ldr r1, [r0]",
+        "bic r1, r1, #1",
+        "str r1, [r0]",
+        "dsb",
+        "isb",
         "b {on}",
         on = sym hard_fault_on_fresh_stack
     )

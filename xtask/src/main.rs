@@ -1,6 +1,7 @@
 //! The project's chores, one command each.
 
 mod bench;
+mod drill;
 mod elf;
 mod emulate;
 mod emulator;
@@ -49,6 +50,11 @@ enum Command {
     /// the host's, bit for bit, and no tick was missed.
     #[command(after_help = "Example:\n  cargo xtask emulate --json | jq .instructions_per_tick")]
     Emulate(emulate::Args),
+    /// Run the fault drills under QEMU
+    ///
+    /// Panic, hard fault, stack overflow, stalled task, hanging control, overrun, interlock, silent host. Exits with 1
+    /// unless the voltage goes away on the DAC's wire and the log is the approved one.
+    Drill(drill::Args),
     /// Make the MCU's images: ELF, bin and hex
     ///
     /// Prints their paths.
@@ -71,6 +77,7 @@ fn main() -> ExitCode {
         Command::Setup => setup::run(),
         Command::Test => test::run(),
         Command::Emulate(args) => emulate::run(&args),
+        Command::Drill(args) => drill::run(&args),
         Command::Image => image::run(),
         Command::Bench(args) => bench::run(&args),
     };

@@ -12,7 +12,7 @@ use firmware::mps2::instructions::Counter;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
 use firmware::mps2::{Mps2, reset_cause, semihosting};
 use firmware::script::{SETTINGS, SUPERVISION, Script};
-use firmware::tasks;
+use firmware::{stack_guard, tasks};
 
 use core::sync::atomic::Ordering;
 
@@ -40,6 +40,7 @@ fn main() -> ! {
     };
 
     if let Some(mut core) = Peripherals::take() {
+        stack_guard::set(&mut core.MPU);
         // SAFETY: before they are enabled. The smaller, the more urgent: the alarm wakes the control task, and that one
         // interrupts all else.
         unsafe {

@@ -1,6 +1,7 @@
 //! Time driver on the two CMSDK timers: one counts for ever, the other is the alarm.
 
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Waker;
 
 use critical_section::{CriticalSection, Mutex};
@@ -18,17 +19,15 @@ const TOP: u32 = (PER_US << WRAP_US_LOG2) - 1;
 const COUNT: u32 = 1;
 const INTERRUPT: u32 = 1 << 3;
 
-struct State {
-    wraps: u32,
-    queue: Queue,
-}
-
 struct Cmsdk {
-    state: Mutex<RefCell<State>>,
+    /// Not in the cell below: the log of a fault needs the time, whatever was going on before.
+    wraps: AtomicU32,
+    queue: Mutex<RefCell<Queue>>,
 }
 
 embassy_time_driver::time_driver_impl!(static DRIVER: Cmsdk = Cmsdk {
-    state: Mutex::new(RefCell::new(State { wraps: 0, queue: Queue::new() })),
+    wraps: AtomicU32::new(0),
+    queue: Mutex::new(RefCell::new(Queue::new())),
 });
 
 /// Starts the clock.
@@ -45,10 +44,9 @@ pub(super) fn init() {
 
 /// The time base starts anew.
 pub(super) fn on_wrap() {
-    critical_section::with(|cs| {
+    critical_section::with(|_| {
         TIMER_0.interrupt.write(1);
-        let mut state = DRIVER.state.borrow_ref_mut(cs);
-        state.wraps = state.wraps.wrapping_add(1);
+        DRIVER.wraps.fetch_add(1, Ordering::Relaxed);
     });
 }
 
@@ -61,9 +59,9 @@ pub(super) fn on_alarm() {
 }
 
 impl Cmsdk {
-    fn now_in(&self, cs: CriticalSection<'_>) -> u64 {
+    fn now_in(&self, _: CriticalSection<'_>) -> u64 {
         let elapsed = || TOP - TIMER_0.value.read();
-        let mut wraps = self.state.borrow_ref(cs).wraps;
+        let mut wraps = self.wraps.load(Ordering::Relaxed);
         let mut count = elapsed();
         // Wrapped, but not counted yet: the first reading may have been just before.
         if TIMER_0.interrupt.read() & 1 != 0 {
@@ -75,7 +73,7 @@ impl Cmsdk {
 
     fn wake_and_set_alarm(&self, cs: CriticalSection<'_>) {
         let now = self.now_in(cs);
-        let next = self.state.borrow_ref_mut(cs).queue.next_expiration(now);
+        let next = self.queue.borrow_ref_mut(cs).next_expiration(now);
         TIMER_1.control.write(0);
         if next == u64::MAX {
             return;
@@ -95,7 +93,7 @@ impl Driver for Cmsdk {
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
         critical_section::with(|cs| {
-            let sooner = self.state.borrow_ref_mut(cs).queue.schedule_wake(at, waker);
+            let sooner = self.queue.borrow_ref_mut(cs).schedule_wake(at, waker);
             if sooner {
                 self.wake_and_set_alarm(cs);
             }

@@ -1,0 +1,135 @@
+//! Fault drills: each mishap under QEMU, its decoded log held against the one that was read and approved.
+//!
+//! Whether the voltage went away is not taken from the log but from the DAC's wire. The approved logs are in
+//! `firmware/drills/`; what depends on the build (revision, line numbers, lateness, digest, counts) stands there as `_`.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use firmware::script::{MISHAP_TICK, Mishap};
+
+use crate::emulator::{self, Run, SAFE, Written};
+use crate::image::{self, Board, Opt};
+use crate::{setup, shell};
+
+/// Options of `cargo xtask drill`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Approve the logs as they are now
+    #[arg(long)]
+    bless: bool,
+}
+
+/// `cargo xtask drill`.
+pub(crate) fn run(args: &Args) -> Result<()> {
+    setup::emulator()?;
+    all(&image::build(Board::Mps2, Opt::S)?, args.bless)
+}
+
+/// Every drill; an error names the first that fails.
+pub(crate) fn all(elf: &Path, bless: bool) -> Result<()> {
+    for mishap in Mishap::ALL {
+        let name = mishap.name();
+        one(elf, mishap, bless).with_context(|| format!("drill {name}"))?;
+        eprintln!("drill {name}: voltage gone, log as approved");
+    }
+    Ok(())
+}
+
+fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
+    let run = emulator::play(elf, mishap.name(), emulator::SHIFT, |_| {})?;
+    ensure!(run.exit == 0, "the emulator's exit code is {}, the last line {:?}", run.exit, run.log.last());
+    voltage_goes(mishap, &run.dac)?;
+    let text = golden_text(&run);
+    let path = approved(mishap);
+    if bless {
+        return fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()));
+    }
+    let before = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    if before != text {
+        bail!("the log is not the approved one.\n--- {}\n{before}--- now\n{text}", path.display());
+    }
+    Ok(())
+}
+
+/// Ticks from the mishap until no voltage may leave any more.
+fn grace(mishap: Mishap) -> usize {
+    match mishap {
+        // Not one more code.
+        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::Interlock => 0,
+        // The tick that takes too long still ends; the next one finds it out.
+        Mishap::Overrun => 1,
+        // Nothing is written while the control task hangs; the next write is the watchdog's zero.
+        Mishap::Hang => 0,
+        // The roll call is found incomplete after 50 ms and what was on its way.
+        Mishap::Stall => 65,
+        // 500 ms of patience, then 300 V at 700 V/s.
+        Mishap::Silence => 500 + 430,
+    }
+}
+
+/// Zero before arming, voltage until the mishap, zero after it; voltage again only where somebody armed again.
+fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
+    // One zero is written before the first tick.
+    let (armed, mishap_at) = (1 + 10, 1 + MISHAP_TICK as usize);
+    let gone = mishap_at + grace(mishap);
+    let rearmed = matches!(mishap, Mishap::Interlock | Mishap::Overrun);
+    // An overrun of 20 ms leaves out that many ticks, not orders.
+    let again = if rearmed { 1 + 1300 } else { dac.len() };
+    ensure!(dac.len() > gone + 100, "the wire ends after {} writes", dac.len());
+    let zero = |from: usize, to: usize| match dac[from..to].iter().position(|written| *written != SAFE) {
+        None => Ok(()),
+        Some(index) => bail!("write {} is {:?} instead of zero", from + index, dac[from + index]),
+    };
+    zero(0, armed)?;
+    let driven = |from: usize, to: usize| dac[from..to].iter().all(|written| written.enabled && written.code > 0);
+    ensure!(driven(armed, mishap_at), "no voltage before the mishap, so that the drill shows nothing");
+    zero(gone, again)?;
+    ensure!(again == dac.len() || driven(again, dac.len()), "arming again is to work");
+    Ok(())
+}
+
+/// Log and wire, without what depends on the build.
+fn golden_text(run: &Run) -> String {
+    let mut text = String::new();
+    for line in &run.log {
+        let words = line.split(' ').map(|word| match word.split_once('=') {
+            Some((key @ ("git" | "worst_lateness_us" | "digest" | "min" | "mean" | "max"), _)) => format!("{key}=_"),
+            _ => match word.rsplit_once(".rs:") {
+                Some((file, _)) => format!("{file}.rs:_"),
+                None => word.to_owned(),
+            },
+        });
+        let _ = writeln!(text, "{}", words.collect::<Vec<_>>().join(" "));
+    }
+    for part in run.dac.chunk_by(|a, b| a.enabled == b.enabled) {
+        let what = if part[0].enabled { "enabled" } else { "off" };
+        let codes = part.iter().map(|written| written.code);
+        let (low, high) = (codes.clone().min().unwrap_or(0), codes.max().unwrap_or(0));
+        let _ = writeln!(text, "wire: {} x {what}, code {low} to {high}", part.len());
+    }
+    text
+}
+
+fn approved(mishap: Mishap) -> PathBuf {
+    shell::root().join("firmware/drills").join(mishap.name()).with_extension("log")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_code_too_many_is_found() {
+        let on = Written { code: 1755, enabled: true };
+        let wire = |driven: usize| [vec![SAFE; 11], vec![on; driven], vec![SAFE; 1200]].concat();
+        voltage_goes(Mishap::Panic, &wire(290)).unwrap();
+        assert!(voltage_goes(Mishap::Panic, &wire(291)).is_err());
+        let mut dip = wire(290);
+        dip[700].code = 1;
+        assert!(voltage_goes(Mishap::Panic, &dip).is_err());
+        assert!(voltage_goes(Mishap::Panic, &vec![SAFE; 1200]).is_err(), "never armed shows nothing");
+    }
+}
