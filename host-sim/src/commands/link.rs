@@ -23,10 +23,11 @@ Examples:
   vsj link unix:/tmp/mcu.sock watch                  the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
 
-The MCU leads the voltage down when it has not heard the host for longer than its limit (see `status`): a target lives as
-long as a command that keeps talking, --keep, watch or record. Each request is sent every 0.1 s until it is answered, for
+The MCU leads the voltage down when it has not heard the host for longer than its limit (see `status`): a target lives as \
+long as a command that keeps talking, --keep, watch or record. Each request is sent every 0.1 s until it is answered, for \
 --timeout seconds; the MCU applies it once.
-Exit codes: 0 done, 1 refused, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a stiffness
+
+Exit codes: 0 done, 1 refused, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a stiffness \
 out of reach.")]
 pub(crate) struct Arguments {
     /// A serial device, unix:PATH or tcp:HOST:PORT

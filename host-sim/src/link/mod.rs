@@ -1,4 +1,4 @@
-//! The host's side of the serial link to the MCU. The messages are those of the [`link`](::link) crate.
+//! The host's side of the serial link to the MCU. The messages are those of the `link` crate.
 //!
 //! | item | what it is |
 //! | --- | --- |

@@ -1,0 +1,275 @@
+//! The command as its users call it.
+
+use std::io::Write;
+use std::os::unix::net::UnixListener;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use host_sim::record::Record;
+use link::{Frame, Reply, Request, State, Status};
+use serde_json::Value;
+
+use crate::mcu::{Mcu, Setup};
+
+fn vsj(port: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
+    command.arg("link").arg(port).args(arguments);
+    command
+}
+
+fn run(port: &str, arguments: &[&str]) -> Output {
+    vsj(port, arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// Asserts success; what came out.
+fn good(port: &str, arguments: &[&str]) -> String {
+    let output = run(port, arguments);
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    stdout(&output)
+}
+
+fn json(port: &str, arguments: &[&str]) -> Value {
+    serde_json::from_str(&good(port, &[arguments, &["--json"]].concat())).unwrap()
+}
+
+/// Asserts an exit code and one line on stderr, nothing on stdout; that line.
+fn bad(code: i32, port: &str, arguments: &[&str]) -> String {
+    let output = run(port, arguments);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {output:?}");
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((text.lines().count(), output.stdout.len()), (1, 0), "{arguments:?}: {text}");
+    text
+}
+
+fn start(port: &str, arguments: &[&str]) -> Child {
+    vsj(port, arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+#[test]
+fn a_session_over_a_socket() {
+    a_session(&Mcu::on_socket(Setup::default()));
+}
+
+#[test]
+fn a_session_over_a_terminal() {
+    a_session(&Mcu::on_terminal(Setup::default()));
+}
+
+fn a_session(mcu: &Mcu) {
+    let port = &mcu.port;
+    let status = json(port, &["status"]);
+    assert_eq!((&status["sample"]["state"], &status["fault"]), (&"disarmed".into(), &"none".into()));
+    assert_eq!((&status["protocol"], &status["rate_hz"]), (&1.into(), &1000.into()));
+    assert_eq!((&status["firmware"], &status["silence_limit_s"]), (&"0.1.0 (0000abcd)".into(), &0.5.into()));
+    assert!(good(port, &["status"]).contains("disarmed, fault none"));
+
+    assert!(bad(1, port, &["set", "300"]).contains("refused: not armed"));
+    assert_eq!(json(port, &["arm"])["state"], "armed");
+    assert_eq!(json(port, &["set", "300"])["target_v"], 300.0);
+    let target = json(port, &["set", "1.5e9", "--unit", "pa"])["target_v"].as_f64().unwrap();
+    assert!((target - 0.199e9 / 1.069e6).abs() < 1e-3, "{target}");
+    assert!(good(port, &["set", "0.25", "--unit", "n-per-m"]).starts_with("armed, target "));
+    assert!(bad(2, port, &["set", "700.1"]).contains("out of reach: expected 0 to 700 V"));
+    assert!(bad(2, port, &["set", "-1"]).contains("out of reach"));
+    assert!(bad(2, port, &["set", "1", "--unit", "pa"]).contains("expected 1301000000 to 2049300000 Pa"));
+    assert!(mcu.with(|shared| shared.sample.target.to_f64()) > 100.0, "refused targets leave the last one");
+    assert_eq!(json(port, &["disarm"])["state"], "disarmed");
+    assert_eq!(mcu.with(|shared| shared.sample.code), 0);
+}
+
+#[test]
+fn a_target_lives_as_long_as_somebody_keeps_talking() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let begin = Instant::now();
+    good(&mcu.port, &["set", "200", "--arm", "--keep", "1.3"]);
+    assert!(begin.elapsed() > Duration::from_secs_f64(1.3));
+    assert!(mcu.wait_for(State::Armed).applied.to_f64() > 150.0);
+    // Now nobody does.
+    assert!(mcu.wait_for(State::Ramping).target.to_f64() <= 200.0);
+    assert_eq!(mcu.wait_for(State::Disarmed).code, 0);
+}
+
+#[test]
+fn an_open_interlock_and_its_fault() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let port = &mcu.port;
+    mcu.with(|shared| shared.interlock_open = true);
+    assert!(bad(1, port, &["arm"]).contains("the interlock is open"));
+    mcu.with(|shared| shared.interlock_open = false);
+    let kept = start(port, &["set", "100", "--arm", "--keep", "inf"]);
+    mcu.wait_for(State::Armed);
+    std::thread::sleep(Duration::from_millis(200));
+    mcu.with(|shared| shared.interlock_open = true);
+    let kept = kept.wait_with_output().unwrap();
+    assert_eq!(kept.status.code(), Some(1));
+    assert!(String::from_utf8(kept.stderr).unwrap().contains("no longer armed: faulted, fault interlock (4)"));
+
+    mcu.with(|shared| shared.interlock_open = false);
+    assert!(bad(1, port, &["arm"]).contains("faulted: interlock (4)"));
+    assert_eq!(json(port, &["disarm"])["state"], "faulted", "a disarm does not acknowledge");
+    assert!(bad(1, port, &["acknowledge", "panic"]).contains("another one: interlock (4)"));
+    assert_eq!(json(port, &["acknowledge", "interlock"])["state"], "disarmed");
+    assert_eq!(json(port, &["arm"])["state"], "armed");
+}
+
+#[test]
+fn a_restart_of_the_mcu_is_noticed() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let kept = start(&mcu.port, &["set", "100", "--arm", "--keep", "inf"]);
+    mcu.wait_for(State::Armed);
+    std::thread::sleep(Duration::from_millis(200));
+    mcu.with(|shared| shared.restart = true);
+    let kept = kept.wait_with_output().unwrap();
+    assert_eq!(kept.status.code(), Some(1));
+    assert!(String::from_utf8(kept.stderr).unwrap().contains("the MCU has restarted"));
+    assert_eq!(mcu.with(|shared| shared.sample.state), State::Disarmed);
+}
+
+#[test]
+fn watch_without_a_terminal_is_a_table() {
+    let mcu = Mcu::on_terminal(Setup::default());
+    let text = good(&mcu.port, &["watch", "--seconds", "0.7", "--every", "0.1"]);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines[0].contains("state") && lines[1].contains("[V]"), "{text}");
+    assert!((4..=9).contains(&lines.len()) && lines[2..].iter().all(|line| line.contains("disarmed")), "{text}");
+    let watched = json(&mcu.port, &["watch", "--seconds", "0.3"]);
+    assert!(watched["samples"].as_u64().unwrap() >= 1);
+    assert_eq!(watched["status"]["sample"]["state"], "disarmed");
+}
+
+#[test]
+fn a_recording_follows_a_schedule_and_is_a_record() {
+    let mcu = Mcu::on_terminal(Setup { sensor: true, ..Setup::default() });
+    let folder = tempfile::tempdir().unwrap();
+    let (out, input) = (folder.path().join("out.csv"), folder.path().join("in.csv"));
+    std::fs::write(&input, "time_s,voltage_v\n10,50\n10.6,150\n11.2,150\n").unwrap();
+    let (out, input) = (out.to_str().unwrap(), input.to_str().unwrap());
+    assert!(bad(1, &mcu.port, &["record", out, "--input", input]).contains("not armed"));
+    let summary = json(&mcu.port, &["record", out, "--input", input, "--arm"]);
+    let record = Record::open(Path::new(out)).unwrap();
+    assert_eq!(summary["rows"].as_u64().unwrap() as usize, record.rows.len());
+    assert_eq!((&summary["stiffness"], &summary["lost"]), (&"measured".into(), &0.into()));
+    assert!(record.rows.len() > 90, "{summary}");
+    // The controller drives past the target while the spring is on its way to it.
+    let at = |time: f64| *record.rows.iter().find(|row| row.time_s >= time).unwrap();
+    let (early, late) = (at(0.4), at(1.0));
+    assert!((51.0..200.0).contains(&early.voltage_v) && late.voltage_v > early.voltage_v + 80.0, "{early:?} {late:?}");
+    assert!(early.measured.unwrap() > 5.0 && late.measured > early.measured, "{early:?} {late:?}");
+    assert!(bad(2, &mcu.port, &["record", out]).contains("--force"));
+}
+
+#[test]
+fn a_recording_that_is_killed_keeps_whole_rows() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.csv");
+    let mut recording = start(&mcu.port, &["record", out.to_str().unwrap(), "--rate-hz", "500"]);
+    while std::fs::read_to_string(&out).map_or(0, |text| text.lines().count()) < 50 {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    recording.kill().unwrap();
+    recording.wait().unwrap();
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert!(text.ends_with('\n') && text.contains("no measurement"));
+    assert!(Record::open(&out).unwrap().rows.len() >= 48);
+}
+
+#[test]
+fn ctrl_c_ends_a_recording_with_its_summary() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.csv");
+    let recording = start(&mcu.port, &["record", out.to_str().unwrap(), "--json"]);
+    while std::fs::read_to_string(&out).map_or(0, |text| text.lines().count()) < 20 {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let interrupted = Command::new("kill").args(["-INT", &recording.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    let recording = recording.wait_with_output().unwrap();
+    assert!(recording.status.success(), "{recording:?}");
+    let summary: Value = serde_json::from_str(&stdout(&recording)).unwrap();
+    assert_eq!(summary["rows"].as_u64().unwrap() as usize, Record::open(&out).unwrap().rows.len());
+}
+
+#[test]
+fn a_lost_connection_keeps_the_rows() {
+    let mcu = Mcu::on_socket(Setup { hang_up_after: Some(1500), ..Setup::default() });
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.csv");
+    let text = bad(1, &mcu.port, &["record", out.to_str().unwrap()]);
+    let rows = Record::open(&out).unwrap().rows.len();
+    assert!(rows > 10 && text.contains(&format!("keeps {rows} rows")), "{rows}: {text}");
+}
+
+#[test]
+fn what_never_answers_is_said_in_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("deaf");
+    let listener = UnixListener::bind(&path).unwrap();
+    let port = format!("unix:{}", path.display());
+    let begin = Instant::now();
+    assert!(bad(1, &port, &["status", "--timeout", "0.3"]).contains("no answer to 3 requests"));
+    assert!(begin.elapsed() < Duration::from_secs(2));
+    drop(listener);
+    assert!(bad(2, &port, &["status"]).contains("cannot be opened"));
+}
+
+/// Answers the first request with `bytes`.
+fn fake(path: &Path, answer: impl FnOnce(&[u8]) -> Vec<u8> + Send + 'static) -> String {
+    let listener = UnixListener::bind(path).unwrap();
+    std::thread::spawn(move || {
+        use std::io::Read;
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut buffer = [0; 64];
+        let count = stream.read(&mut buffer).unwrap();
+        stream.write_all(&answer(&buffer[..count])).unwrap();
+        while stream.read(&mut buffer).is_ok_and(|count| count > 0) {}
+    });
+    format!("unix:{}", path.display())
+}
+
+#[test]
+fn another_version_and_a_wrong_baud_rate_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = fake(&folder.path().join("version"), |request| {
+        let mut receiver = link::Receiver::new();
+        let sequence = request.iter().find_map(|&byte| receiver.on_byte(byte).map(|packet| packet.sequence));
+        Frame::with_version(7, sequence.unwrap(), &Reply::Status(Status::default())).as_bytes().to_vec()
+    });
+    assert!(bad(1, &port, &["status"]).contains("the MCU speaks version 7 of the protocol, this program 1"));
+    let port = fake(&folder.path().join("baud"), |_| vec![0xf3; 90]);
+    assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no sound answer to 2 requests, but 90 bytes"));
+    // A line that echoes.
+    let port = fake(&folder.path().join("echo"), <[u8]>::to_vec);
+    assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no sound answer"));
+}
+
+#[test]
+fn bad_arguments_send_nothing() {
+    let mcu = Mcu::on_socket(Setup::default());
+    for arguments in [
+        &["set", "nan"][..],
+        &["set", "inf"],
+        &["set", "abc"],
+        &["set", "1", "--keep", "0"],
+        &["arm", "--keep", "nan"],
+        &["acknowledge", "none"],
+        &["acknowledge", "0"],
+        &["status", "--timeout", "-1"],
+        &["status", "--baud", "0"],
+        &["watch", "--every", "0"],
+        &["watch", "--seconds", "-2"],
+        &["record", "x.csv", "--rate-hz", "0"],
+        &["record", "x.csv", "--input", "/nonexistent.csv"],
+        &["jump"],
+    ] {
+        bad(2, &mcu.port, arguments);
+    }
+    bad(2, &mcu.port, &["record", "/nonexistent/x.csv"]);
+    assert!(mcu.with(|shared| shared.applied.iter().all(|request| *request == Request::Hello)));
+}

@@ -1,0 +1,6 @@
+//! `vsj link` against an MCU in the test process.
+#![cfg(unix)]
+
+mod command;
+mod damage;
+mod mcu;
