@@ -373,6 +373,21 @@ fn plain_elf() -> Vec<u8> {
 }
 
 #[test]
+fn bytes_behind_the_last_argument_make_a_frame_damaged() {
+    let raw = firmware("raw").frame(LIMIT, 1, &[U8(1), U32(2)]);
+    let read = |behind: &[u8]| {
+        let mut frame = rzcobs::encode(&[&raw, behind].concat());
+        frame.push(0);
+        lines(&decode("rzcobs", &frame)).len()
+    };
+    assert_eq!(read(&[]), 1);
+    assert_eq!(read(&[1]), 0);
+    assert_eq!(read(&[0, 0, 1]), 0);
+    // More zeros than unpacking can leave.
+    assert_eq!(read(&[0; 14]), 0);
+}
+
+#[test]
 fn a_run_of_damage_takes_two_lines() {
     let frames = frames("rzcobs");
     let folder = folder("rzcobs", &[&frames[..2], &vec![vec![0xff, 0]; 500], &frames[2..4]].concat().concat());
