@@ -14,6 +14,14 @@ impl Fault {
     /// No fault.
     pub const NONE: Self = Self(0);
 
+    /// The fault of a state.
+    pub fn of(state: supervisor::State) -> Self {
+        match state {
+            supervisor::State::Faulted(fault) => fault.into(),
+            supervisor::State::Disarmed | supervisor::State::Armed => Self::NONE,
+        }
+    }
+
     /// One word for tables and JSON.
     pub fn name(self) -> &'static str {
         match supervisor::Fault::from_code(self.0) {
@@ -27,12 +35,6 @@ impl Fault {
 impl From<supervisor::Fault> for Fault {
     fn from(fault: supervisor::Fault) -> Self {
         Self(fault.code())
-    }
-}
-
-impl From<Option<supervisor::Fault>> for Fault {
-    fn from(fault: Option<supervisor::Fault>) -> Self {
-        fault.map_or(Self::NONE, Self::from)
     }
 }
 

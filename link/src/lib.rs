@@ -17,12 +17,14 @@
 //! | [`sequence`] | which of two sequence numbers is newer |
 //! | [`order`] | from a request to what the supervisor is told |
 //! | [`session`] | the MCU's side: what to apply, what to answer, how long the host has been silent |
+//! | [`desk`] | the MCU's side, whole: between the wire and the control tick |
 #![no_std]
 #![forbid(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
+pub mod desk;
 pub mod fault;
 pub mod frame;
 pub mod order;
@@ -33,6 +35,7 @@ pub mod sequence;
 pub mod session;
 pub mod value;
 
+pub use desk::{About, Desk, Step, View};
 pub use fault::Fault;
 pub use frame::{Frame, Message, Packet, Unreadable};
 pub use order::Order;

@@ -85,6 +85,7 @@ pub struct Session {
     counters: Counters,
     silence_limit_ticks: u32,
     heard_at: Option<u64>,
+    heard: bool,
     every_ticks: u16,
     pushed_at: u64,
     pushed: Sequence,
@@ -110,13 +111,14 @@ impl Session {
             },
             silence_limit_ticks,
             heard_at: None,
+            heard: false,
             every_ticks: 0,
             pushed_at: 0,
             pushed: Sequence(0),
         }
     }
 
-    /// Takes a byte from the wire at tick `now`.
+    /// Takes a byte from the wire at tick `now`. What is to be applied must be answered before the next byte.
     pub fn on_byte(&mut self, byte: u8, now: u64) -> Option<Action<'_>> {
         let packet = self.receiver.on_byte(byte)?;
         let sequence = packet.sequence;
@@ -138,8 +140,10 @@ impl Session {
             Verdict::Again => {
                 count(&mut self.counters.repeated);
                 self.heard_at = Some(now);
+                self.heard = true;
+                self.outgoing = self.answer;
                 // Nothing to send yet means that the answer is still being worked on, and comes.
-                Some(Action::Send(self.answer.as_bytes())).filter(|_| self.answer != Frame::EMPTY)
+                Some(Action::Send(self.outgoing.as_bytes())).filter(|_| self.answer != Frame::EMPTY)
             }
             Verdict::Apply(request) => {
                 count(&mut self.counters.accepted);
@@ -148,6 +152,7 @@ impl Session {
                     self.accepted = Some(this);
                     self.answer = Frame::EMPTY;
                     self.heard_at = Some(now);
+                    self.heard = true;
                 }
                 match request {
                     Request::Hello => self.every_ticks = 0,
@@ -166,6 +171,11 @@ impl Session {
             self.answer = frame;
         }
         self.outgoing = frame;
+        self.outgoing.as_bytes()
+    }
+
+    /// The frame that went out last, or is to go out.
+    pub fn outgoing(&self) -> &[u8] {
         self.outgoing.as_bytes()
     }
 
@@ -189,6 +199,11 @@ impl Session {
     /// Ticks since the last sign of life of the host; `None` before the first one.
     pub fn silent_ticks(&self, now: u64) -> Option<u64> {
         self.heard_at.map(|at| now.saturating_sub(at))
+    }
+
+    /// True once after each sign of life of the host, for who counts its silence elsewhere.
+    pub fn take_heard(&mut self) -> bool {
+        core::mem::take(&mut self.heard)
     }
 
     /// True if the host has been silent for longer than the limit, or has never been heard.

@@ -1,4 +1,4 @@
-//! An MCU in the test process: the firmware's control loop behind [`link::Session`], on a socket or a pseudo-terminal, with
+//! An MCU in the test process: the firmware's control loop behind [`link::Desk`], on a socket or a pseudo-terminal, with
 //! a line that can be bad.
 
 use std::fs::File;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use firmware::control::{Control, Orders, Senses, Untimed};
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{Action, Fault, Order, Reason, Reply, Request, Session, State, Status, Telemetry};
+use link::{About, Desk, Fault, Order, State, Step, Telemetry, View};
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Settings, Spring, supervisor};
 use serialport::{SerialPort, TTYPort};
@@ -32,8 +32,8 @@ pub(crate) struct Setup {
 /// What the test can see and do while the MCU runs.
 #[derive(Default)]
 pub(crate) struct Shared {
-    /// Requests that were applied.
-    pub(crate) applied: Vec<Request>,
+    /// What reached the control tick.
+    pub(crate) ordered: Vec<Order>,
     /// The latest sample.
     pub(crate) sample: Telemetry,
     /// What came over the link.
@@ -154,22 +154,20 @@ impl Mcu {
             while !stop.load(Ordering::Relaxed) {
                 noise.spoil(&mut out);
                 let mut bytes = [0; 256];
-                let hung_up = setup.hang_up_after.is_some_and(|ticks| chip.tick > ticks);
+                let hung_up = setup.hang_up_after.is_some_and(|ticks| chip.view.sample.tick > ticks);
                 let count = exchange(&mut bytes, (!hung_up).then_some(&out));
                 out.clear();
                 noise.spoil(&mut bytes[..count]);
                 if std::mem::take(&mut chip.shared.lock().unwrap().restart) {
                     (chip, start) = (Chip::new(setup, chip.shared), Instant::now());
                 }
-                while u128::from(chip.tick) < start.elapsed().as_millis() {
+                while u128::from(chip.view.sample.tick) < start.elapsed().as_millis() {
                     chip.tick(Orders::default());
                 }
                 for byte in &bytes[..count] {
                     chip.hear(*byte, &mut out);
                 }
-                if chip.session.telemetry_due(chip.tick) {
-                    out.extend_from_slice(chip.session.telemetry(chip.sample, chip.tick));
-                }
+                out.extend_from_slice(chip.desk.telemetry(&chip.view).unwrap_or_default());
             }
         }));
     }
@@ -187,88 +185,58 @@ impl Drop for Mcu {
 struct Chip {
     setup: Setup,
     shared: Arc<Mutex<Shared>>,
-    session: Session,
+    desk: Desk,
     control: Control,
-    spring: Spring,
-    tick: u64,
-    sample: Telemetry,
+    view: View,
 }
 
 impl Chip {
     fn new(setup: Setup, shared: Arc<Mutex<Shared>>) -> Self {
         let control = Control::new(&Settings::PAPER, &supervisor::Settings::DEFAULT, None).unwrap();
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
-        let mut chip =
-            Self { setup, shared, session: Session::new(500), control, spring, tick: 0, sample: Telemetry::default() };
+        let about = About {
+            firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd },
+            rate_hz: 1000,
+            silence_limit_ticks: 500,
+            last_fault: Fault::NONE,
+        };
+        let view =
+            View { sample: Telemetry::default(), state: supervisor::State::Disarmed, refusal: None, overruns: 0 };
+        let mut chip = Self { setup, shared, desk: Desk::new(spring, about), control, view };
         chip.tick(Orders::default());
         chip
     }
 
     fn tick(&mut self, orders: Orders) {
-        let heard = self.session.silent_ticks(self.tick) == Some(0);
+        let heard = self.desk.take_heard();
         let interlock_closed = !self.shared.lock().unwrap().interlock_open;
         let senses = Senses { interlock_closed, ..Senses::default() };
         let tick = self.control.tick(&Orders { heard: heard || orders.heard, ..orders }, &senses, &mut Untimed);
-        self.tick += 1;
-        self.sample = Telemetry {
-            tick: self.tick,
-            state: self.control.supervisor().into(),
+        let supervisor = self.control.supervisor();
+        let sample = Telemetry {
+            tick: self.view.sample.tick + 1,
+            state: supervisor.into(),
             target: tick.output.target.into(),
             applied: tick.output.applied.into(),
             estimate: tick.output.stiffness.into(),
             measured: self.setup.sensor.then_some(tick.output.stiffness.into()),
             code: tick.drive.code().0,
-            limits: self.control.supervisor().limits(&tick.output).bits(),
+            limits: supervisor.limits(&tick.output).bits(),
         };
         let mut shared = self.shared.lock().unwrap();
-        (shared.sample, shared.counters) = (self.sample, self.session.counters());
+        (shared.sample, shared.counters) = (sample, self.desk.counters());
+        self.view = View { sample, state: supervisor.state(), refusal: supervisor.refusal(), overruns: 0 };
     }
 
     fn hear(&mut self, byte: u8, out: &mut Vec<u8>) {
-        match self.session.on_byte(byte, self.tick) {
-            Some(Action::Apply(request)) => {
-                let reply = self.apply(request);
-                out.extend_from_slice(self.session.answer(&reply));
-            }
-            Some(Action::Send(bytes)) => out.extend_from_slice(bytes),
-            None => {}
-        }
-    }
-
-    fn apply(&mut self, request: Request) -> Reply {
-        self.shared.lock().unwrap().applied.push(request);
-        if matches!(request, Request::Hello | Request::Status) {
-            return Reply::Status(self.status());
-        }
-        match Order::new(request, self.control.supervisor().state(), &self.spring) {
-            Err(reason) => Reply::Refused(reason),
-            Ok(Order { command, target }) => {
+        match self.desk.on_byte(byte, &self.view) {
+            Some(Step::Order(Order { command, target })) => {
+                self.shared.lock().unwrap().ordered.push(Order { command, target });
                 self.tick(Orders { heard: true, command, target });
-                match self.control.supervisor().refusal() {
-                    Some(refusal) => Reply::Refused(Reason::of_refusal(refusal, self.fault())),
-                    None => Reply::Ack { state: self.sample.state, target: self.sample.target },
-                }
+                out.extend_from_slice(self.desk.settle(&self.view));
             }
-        }
-    }
-
-    fn fault(&self) -> Fault {
-        match self.control.supervisor().state() {
-            supervisor::State::Faulted(fault) => fault.into(),
-            _ => Fault::NONE,
-        }
-    }
-
-    fn status(&self) -> Status {
-        Status {
-            firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd },
-            rate_hz: 1000,
-            silence_limit_ticks: self.session.silence_limit_ticks(),
-            overruns: 0,
-            fault: self.fault(),
-            last_fault: Fault::NONE,
-            sample: self.sample,
-            counters: self.session.counters(),
+            Some(Step::Send(bytes)) => out.extend_from_slice(bytes),
+            None => {}
         }
     }
 }

@@ -1,0 +1,241 @@
+//! Between the wire and the control tick: requests become orders, and what the tick made of them becomes answers.
+//!
+//! The task that owns the wire does this, and nothing else:
+//!
+//! 1. Each byte goes into [`Desk::on_byte`] with the latest [`View`]. [`Step::Send`]: send it. [`Step::Order`]: hand the
+//!    order to the control tick, wait until that tick has run, then send what [`Desk::settle`] gives for the new view. No
+//!    further byte before that.
+//! 2. Whenever [`Desk::take_heard`] is true, tell the control tick that the host was heard.
+//! 3. Once in a while, send what [`Desk::telemetry`] gives.
+//!
+//! An answer says what has happened, not what was meant to: it is made from the view after the tick.
+
+use model::Spring;
+use model::supervisor::{self, Refusal};
+
+use crate::fault::Fault;
+use crate::order::Order;
+use crate::reply::{Firmware, Reason, Reply, Status, Telemetry};
+use crate::request::Request;
+use crate::session::{Action, Counters, Session};
+
+/// What the control tick shows of itself, all of one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The sample that is sent to the host.
+    pub sample: Telemetry,
+    /// The supervisor's state.
+    pub state: supervisor::State,
+    /// Why this tick's arm command was not followed.
+    pub refusal: Option<Refusal>,
+    /// Late ticks since the start.
+    pub overruns: u32,
+}
+
+/// What a host is told about the MCU and does not change while it runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct About {
+    /// What was built in.
+    pub firmware: Firmware,
+    /// Ticks per second, in Hz.
+    pub rate_hz: u32,
+    /// Ticks of host silence until the supervisor acts on it.
+    pub silence_limit_ticks: u32,
+    /// The fault that caused the last reset.
+    pub last_fault: Fault,
+}
+
+/// What to do after a byte.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step<'a> {
+    /// Hand this to the control tick, then [`Desk::settle`].
+    Order(Order),
+    /// Send this.
+    Send(&'a [u8]),
+}
+
+/// The MCU's end of the link.
+#[derive(Clone, Debug)]
+pub struct Desk {
+    session: Session,
+    spring: Spring,
+    about: About,
+    ordered: Option<Request>,
+}
+
+impl Desk {
+    /// A desk that has heard nobody; `spring` says which stiffness is in reach.
+    pub const fn new(spring: Spring, about: About) -> Self {
+        Self { session: Session::new(about.silence_limit_ticks), spring, about, ordered: None }
+    }
+
+    /// Takes a byte from the wire.
+    pub fn on_byte(&mut self, byte: u8, view: &View) -> Option<Step<'_>> {
+        if let Action::Apply(request) = self.session.on_byte(byte, view.sample.tick)? {
+            let reply = match request {
+                Request::Hello | Request::Status => Reply::Status(self.status(view)),
+                request => match Order::new(request, view.state, &self.spring) {
+                    Err(reason) => Reply::Refused(reason),
+                    Ok(order) if order == Order::default() => done(view),
+                    Ok(order) => {
+                        self.ordered = Some(request);
+                        return Some(Step::Order(order));
+                    }
+                },
+            };
+            self.session.answer(&reply);
+        }
+        Some(Step::Send(self.session.outgoing()))
+    }
+
+    /// The answer to the request that ordered something, once the control tick has dealt with it.
+    pub fn settle(&mut self, view: &View) -> &[u8] {
+        let fault = Fault::of(view.state);
+        let refused = match (self.ordered.take(), view.state, view.refusal) {
+            (Some(Request::Arm), supervisor::State::Disarmed | supervisor::State::Faulted(_), Some(refusal)) => {
+                Some(Reason::of_refusal(refusal, fault))
+            }
+            (Some(Request::Acknowledge(_)), supervisor::State::Faulted(_), _) => Some(Reason::OtherFault(fault)),
+            // The state has changed since the order was given. A target that nobody pursues is forgotten when arming.
+            (Some(Request::Arm | Request::Set(_)), supervisor::State::Faulted(_), _) => Some(Reason::Faulted(fault)),
+            (Some(Request::Arm | Request::Set(_)), supervisor::State::Disarmed, _) => Some(Reason::NotArmed),
+            _ => None,
+        };
+        self.session.answer(&refused.map_or(done(view), Reply::Refused))
+    }
+
+    /// The next sample to push, if the host wants one now.
+    pub fn telemetry(&mut self, view: &View) -> Option<&[u8]> {
+        let now = view.sample.tick;
+        self.session.telemetry_due(now).then(|| self.session.telemetry(view.sample, now))
+    }
+
+    /// True once after each sign of life of the host.
+    pub fn take_heard(&mut self) -> bool {
+        self.session.take_heard()
+    }
+
+    /// What came over the link.
+    pub fn counters(&self) -> Counters {
+        self.session.counters()
+    }
+
+    fn status(&self, view: &View) -> Status {
+        let About { firmware, rate_hz, silence_limit_ticks, last_fault } = self.about;
+        Status {
+            firmware,
+            rate_hz,
+            silence_limit_ticks,
+            overruns: view.overruns,
+            fault: Fault::of(view.state),
+            last_fault,
+            sample: view.sample,
+            counters: self.counters(),
+        }
+    }
+}
+
+fn done(view: &View) -> Reply {
+    Reply::Ack { state: view.sample.state, target: view.sample.target }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Frame;
+    use crate::receiver::Receiver;
+    use crate::reply::State;
+    use crate::sequence::Sequence;
+    use crate::value::{Desired, WireVolts};
+    use model::stiffness::{Cantilever, YoungsModulus};
+    use model::supervisor::{Command, Fault as Cause};
+
+    const ARMED: View = view(supervisor::State::Armed, State::Armed);
+    const DISARMED: View = view(supervisor::State::Disarmed, State::Disarmed);
+    const FAULTED: View = view(supervisor::State::Faulted(Cause::Monitor), State::Faulted);
+    const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
+
+    const fn view(state: supervisor::State, shown: State) -> View {
+        let (volts, measured) = (WireVolts(7), None);
+        let (target, applied, estimate) = (volts, volts, volts);
+        let sample = Telemetry { tick: 5, state: shown, target, applied, estimate, measured, code: 9, limits: 0 };
+        View { sample, state, refusal: None, overruns: 3 }
+    }
+
+    fn reply(bytes: &[u8]) -> Reply {
+        let mut receiver = Receiver::new();
+        bytes.iter().find_map(|&byte| receiver.on_byte(byte).map(|packet| packet.read().unwrap())).unwrap()
+    }
+
+    /// What is answered if the tick turns `before` into `after`, and whether it was asked to do anything.
+    fn talk(request: Request, before: &View, after: &View) -> (Option<Order>, Reply) {
+        let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
+        let mut desk = Desk::new(spring, About { silence_limit_ticks: 500, ..About::default() });
+        let hello = Frame::new(Sequence(0), &Request::Hello);
+        let frame = Frame::new(Sequence(1), &request);
+        let (mut order, mut answer) = (None, None);
+        for &byte in hello.as_bytes().iter().chain(frame.as_bytes()) {
+            match desk.on_byte(byte, before) {
+                Some(Step::Order(ordered)) => {
+                    order = Some(ordered);
+                    answer = Some(reply(desk.settle(after)));
+                }
+                Some(Step::Send(bytes)) => answer = Some(reply(bytes)),
+                None => {}
+            }
+        }
+        assert!(desk.take_heard() && !desk.take_heard());
+        (order, answer.unwrap())
+    }
+
+    #[test]
+    fn an_answer_says_what_has_happened() {
+        let ack = |state| Reply::Ack { state, target: WireVolts(7) };
+        let monitor = Fault::from(Cause::Monitor);
+        for (request, before, after, expected) in [
+            (SET, ARMED, ARMED, ack(State::Armed)),
+            (SET, ARMED, DISARMED, Reply::Refused(Reason::NotArmed)),
+            (SET, ARMED, FAULTED, Reply::Refused(Reason::Faulted(monitor))),
+            (Request::Arm, DISARMED, ARMED, ack(State::Armed)),
+            (Request::Arm, DISARMED, FAULTED, Reply::Refused(Reason::Faulted(monitor))),
+            (
+                Request::Arm,
+                DISARMED,
+                View { refusal: Some(Refusal::InterlockOpen), ..DISARMED },
+                Reply::Refused(Reason::InterlockOpen),
+            ),
+            (Request::Disarm, ARMED, DISARMED, ack(State::Disarmed)),
+            (Request::Disarm, ARMED, FAULTED, ack(State::Faulted)),
+            (Request::Acknowledge(monitor), FAULTED, DISARMED, ack(State::Disarmed)),
+            (Request::Acknowledge(monitor), FAULTED, FAULTED, Reply::Refused(Reason::OtherFault(monitor))),
+        ] {
+            let (order, answer) = talk(request, &before, &after);
+            assert!(order.is_some());
+            assert_eq!(answer, expected, "{request:?} {:?} {:?}", before.state, after.state);
+        }
+    }
+
+    #[test]
+    fn what_orders_nothing_is_answered_at_once() {
+        for (request, view) in [
+            (Request::Heartbeat, ARMED),
+            (Request::Stream { every_ticks: 5 }, DISARMED),
+            (Request::Arm, ARMED),
+            (Request::Disarm, FAULTED),
+            (SET, DISARMED),
+            (Request::Arm, FAULTED),
+        ] {
+            assert_eq!(talk(request, &view, &view).0, None, "{request:?}");
+        }
+        let (order, Reply::Status(status)) = talk(Request::Status, &FAULTED, &FAULTED) else { panic!() };
+        assert_eq!((order, status.overruns, status.fault, status.counters.accepted), (None, 3, Fault(6), 2));
+    }
+
+    #[test]
+    fn orders_reach_the_tick() {
+        let command = |request, view| talk(request, &view, &view).0.and_then(|order| order.command);
+        assert_eq!(command(Request::Arm, DISARMED), Some(Command::Arm));
+        assert_eq!(command(Request::Disarm, ARMED), Some(Command::Disarm));
+        assert_eq!(talk(SET, &ARMED, &ARMED).0.unwrap().target.map(|volts| volts.to_f64()), Some(300.0));
+    }
+}
