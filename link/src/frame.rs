@@ -18,6 +18,7 @@ use serde::de::DeserializeOwned;
 use crate::reply::Reply;
 use crate::request::Request;
 use crate::sequence::Sequence;
+use crate::stuffing;
 
 /// Ends a frame, and starts it.
 pub const DELIMITER: u8 = 0;
@@ -29,6 +30,9 @@ pub const MAX_ENCODED: usize = MAX_FRAME - 2;
 pub const MAX_PACKET: usize = MAX_ENCODED - 1;
 /// Longest postcard message in bytes.
 pub const MAX_MESSAGE: usize = MAX_PACKET - HEADER - CHECKSUM;
+
+// The short form of COBS.
+const _: () = assert!(MAX_PACKET < 254);
 
 const HEADER: usize = 4;
 const CHECKSUM: usize = 4;
@@ -86,7 +90,7 @@ impl Frame {
         let end = HEADER + postcard::to_slice(message, room).ok()?.len();
         let checksum = CRC.checksum(packet.get(..end)?);
         packet.get_mut(end..end + CHECKSUM)?.copy_from_slice(&checksum.to_le_bytes());
-        let encoded = cobs::try_encode(packet.get(..end + CHECKSUM)?, self.bytes.get_mut(1..=MAX_ENCODED)?).ok()?;
+        let encoded = stuffing::encode(packet.get(..end + CHECKSUM)?, self.bytes.get_mut(1..=MAX_ENCODED)?)?;
         *self.bytes.get_mut(1 + encoded)? = DELIMITER;
         Some(encoded + 2)
     }
@@ -121,7 +125,7 @@ pub enum Unreadable {
 impl<'a> Packet<'a> {
     /// Decodes what lay between two delimiters, in place. `None` if it is damaged.
     pub(crate) fn open(encoded: &'a mut [u8]) -> Option<Self> {
-        let length = cobs::decode_in_place(encoded).ok()?;
+        let length = stuffing::decode_in_place(encoded)?;
         let packet = encoded.get(..length)?;
         let (checked, checksum) = packet.split_last_chunk::<CHECKSUM>()?;
         let (&[version, kind, low, high], message) = checked.split_first_chunk::<HEADER>()?;

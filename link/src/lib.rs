@@ -33,6 +33,7 @@ pub mod reply;
 pub mod request;
 pub mod sequence;
 pub mod session;
+mod stuffing;
 pub mod value;
 
 pub use desk::{About, Desk, Step, View};
