@@ -1,7 +1,7 @@
 //! What an image is made of.
 
 use anyhow::{Context, Result, bail};
-use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC, SHT_NOBITS};
+use object::elf::{FileHeader32, PT_LOAD, SHF_ALLOC};
 use object::read::elf::{FileHeader, ProgramHeader, SectionHeader};
 use object::{Endianness, Object, ObjectSection, ObjectSymbol};
 
@@ -50,9 +50,6 @@ pub(crate) fn ram(elf: &[u8]) -> Result<u32> {
         if in_ram && section.sh_flags(endian) & SHF_ALLOC != 0 {
             total += section.sh_size(endian);
         }
-        debug_assert!(
-            !in_ram || section.sh_type(endian) == SHT_NOBITS || section.sh_size(endian) > 0 || total < 1 << 20
-        );
     }
     Ok(total)
 }
@@ -87,8 +84,24 @@ pub(crate) fn symbol(elf: &[u8], name: &str) -> Result<u32> {
     Ok(symbol.with_context(|| format!("no symbol {name}"))?.address() as u32)
 }
 
-/// A section's contents.
-pub(crate) fn section<'a>(elf: &'a [u8], name: &str) -> Result<&'a [u8]> {
+/// First address of a section and the one behind its last.
+pub(crate) fn range(elf: &[u8], name: &str) -> Result<(u32, u32)> {
     let file = object::File::parse(elf)?;
-    Ok(file.section_by_name(name).with_context(|| format!("no section {name}"))?.data()?)
+    let section = file.section_by_name(name).with_context(|| format!("no section {name}"))?;
+    Ok((section.address() as u32, (section.address() + section.size()) as u32))
+}
+
+/// Where data (true) and code begin within the code, sorted: ARM's mapping symbols.
+pub(crate) fn marks(elf: &[u8]) -> Result<Vec<(u32, bool)>> {
+    let file = object::File::parse(elf)?;
+    let mut marks: Vec<(u32, bool)> = file
+        .symbols()
+        .filter_map(|symbol| match symbol.name().ok()?.get(..2)? {
+            "$d" => Some((symbol.address() as u32, true)),
+            "$t" => Some((symbol.address() as u32, false)),
+            _ => None,
+        })
+        .collect();
+    marks.sort_unstable();
+    Ok(marks)
 }

@@ -1,14 +1,20 @@
 //! The project's chores, one command each.
 
+mod audit;
 mod bench;
 mod drill;
 mod elf;
 mod emulate;
 mod emulator;
+mod flash;
 mod image;
+mod proof;
 mod setup;
 mod shell;
+mod size;
+mod stack;
 mod test;
+mod thumb;
 
 use std::process::ExitCode;
 
@@ -50,11 +56,22 @@ enum Command {
     /// the host's, bit for bit, and no tick was missed.
     #[command(after_help = "Example:\n  cargo xtask emulate --json | jq .instructions_per_tick")]
     Emulate(emulate::Args),
+    /// Everything that the emulated firmware must show
+    ///
+    /// Bit for bit the host's on the stair and on random commands at opt-levels s and 3, instructions per tick, no panic
+    /// in the tick, no heap, every fault drill. A part of `test`.
+    Proof,
     /// Run the fault drills under QEMU
     ///
     /// Panic, hard fault, stack overflow, stalled task, hanging control, overrun, interlock, silent host. Exits with 1
     /// unless the voltage goes away on the DAC's wire and the log is the approved one.
     Drill(drill::Args),
+    /// Write the image to the real board and show its log (probe-rs)
+    Flash,
+    /// Flash, RAM and worst stack of each image
+    ///
+    /// Exits with 1 unless flash stays below 64 KB, RAM below 16 KB and the stack in its place.
+    Size(size::Args),
     /// Make the MCU's images: ELF, bin and hex
     ///
     /// Prints their paths.
@@ -77,7 +94,10 @@ fn main() -> ExitCode {
         Command::Setup => setup::run(),
         Command::Test => test::run(),
         Command::Emulate(args) => emulate::run(&args),
+        Command::Proof => setup::emulator().and_then(|()| proof::run()),
         Command::Drill(args) => drill::run(&args),
+        Command::Flash => flash::run(),
+        Command::Size(args) => size::run(&args),
         Command::Image => image::run(),
         Command::Bench(args) => bench::run(&args),
     };

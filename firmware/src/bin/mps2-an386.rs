@@ -64,7 +64,7 @@ fn main() -> ! {
 #[embassy_executor::task]
 async fn run(mut board: Mps2, mut control: Control, script: Script) {
     let mut actor = Actor::new(script);
-    let mut counter = Counter::start();
+    let mut counter = Counter::begin();
     let (ticks, missed) = tasks::control(&mut board, &mut control, &mut actor, &mut counter).await;
     let (digest, instructions) = (actor.digest(), counter.instructions());
     log::queue(Event::Done(Done { ticks, missed, digest, instructions }));

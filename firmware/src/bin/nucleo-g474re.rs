@@ -1,70 +1,84 @@
-//! The controller on the amplifier's MCU (STM32G474RE): one tick of the model every millisecond, its code to the
-//! amplifier's input through DAC1 channel 1 (pin PA4).
-//!
-//! Nothing arms the output yet: until the supervisor exists, the target stays zero.
+//! The image of the real board.
 
 #![no_std]
 #![no_main]
-#![forbid(unsafe_code)]
 
 use core::future::pending;
 
-use defmt::{error, info};
+use cortex_m::peripheral::Peripherals;
 use defmt_rtt as _;
-use embassy_executor::Spawner;
-use embassy_stm32::dac::{DacChannel, Value};
-use embassy_stm32::rcc::{Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
-use embassy_time::{Duration, Ticker};
-use model::{Input, OutOfRange, Settings, State, Volts};
-use panic_probe as _;
+use embassy_executor::InterruptExecutor;
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use firmware::control::{Control, Orders, Untimed};
+use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
+use firmware::script::{SETTINGS, SUPERVISION};
+use firmware::tasks::{self, Source};
+use firmware::{log, stack_guard};
+use model::supervisor::Fault;
 
-/// Ticks per second.
-const RATE_HZ: u32 = 1000;
+/// Runs the control task, on the interrupt of a peripheral that is not used.
+static HIGH: InterruptExecutor = InterruptExecutor::new();
+/// Runs everything else, likewise.
+static LOW: InterruptExecutor = InterruptExecutor::new();
 
-/// The MCU at its full 170 MHz, from the internal oscillator: the board needs no crystal.
-fn clocks() -> embassy_stm32::Config {
-    let mut config = embassy_stm32::Config::default();
-    config.rcc.pll = Some(Pll {
-        source: PllSource::HSI,
-        prediv: PllPreDiv::DIV4,
-        mul: PllMul::MUL85,
-        divp: None,
-        divq: None,
-        divr: Some(PllRDiv::DIV2),
-    });
-    config.rcc.sys = Sysclk::PLL1_R;
-    // Needed above 150 MHz.
-    config.rcc.boost = true;
-    config
+#[interrupt]
+unsafe fn CORDIC() {
+    // SAFETY: the interrupt is enabled by `HIGH.start`.
+    unsafe { HIGH.on_interrupt() }
 }
 
-#[embassy_executor::main]
-async fn main(_spawner: Spawner) {
-    let p = embassy_stm32::init(clocks());
-    // First of all zero volts; a pin that is not driven would float.
-    let mut dac = DacChannel::new_blocking(p.DAC1, p.PA4);
-    dac.set(Value::Bit12Right(0));
+#[interrupt]
+unsafe fn FMAC() {
+    // SAFETY: the interrupt is enabled by `LOW.start`.
+    unsafe { LOW.on_interrupt() }
+}
 
-    let config = match (Settings { rate_hz: f64::from(RATE_HZ), ..Settings::PAPER }).check() {
-        Ok(config) => config,
-        Err(OutOfRange { field, value, lowest, highest, unit }) => {
-            error!("{} = {} is not allowed: expected {} to {} {}", field, value, lowest, highest, unit);
-            // Returning would drop the DAC, and the pin would float.
-            pending().await
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    kill();
+    let (reset, last_fault) = reset_cause();
+    let board = Nucleo::init(embassy_stm32::init(clocks::config()));
+    log::boot(reset, last_fault.map_or(0, Fault::code));
+    if let Some(mut core) = Peripherals::take() {
+        stack_guard::set(&mut core.MPU);
+    }
+    interrupt::CORDIC.set_priority(Priority::P4);
+    interrupt::FMAC.set_priority(Priority::P12);
+    let low = LOW.start(interrupt::FMAC);
+    let high = HIGH.start(interrupt::CORDIC);
+    match Control::new(&SETTINGS, &SUPERVISION, last_fault) {
+        Ok(control) => {
+            if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control)) {
+                low.spawn(housekeeping);
+                high.spawn(control);
+            }
         }
-    };
-    info!("up, {} ticks per second, not armed", RATE_HZ);
-
-    let mut state = State::default();
-    let mut ticker = Ticker::every(Duration::from_hz(u64::from(RATE_HZ)));
-    let mut ticks: u32 = 0;
+        // Nothing feeds the watchdog: the chip resets and says it again, its output at zero.
+        Err(error) => log::refused(error.field),
+    }
     loop {
-        ticker.next().await;
-        let output = config.tick(&mut state, Input { target: Volts::ZERO });
-        dac.set(Value::Bit12Right(output.code.0));
-        ticks = ticks.wrapping_add(1);
-        if ticks.is_multiple_of(RATE_HZ) {
-            info!("{} s, code {}", ticks / RATE_HZ, output.code.0);
-        }
+        cortex_m::asm::wfi();
+    }
+}
+
+#[embassy_executor::task]
+async fn run(mut board: Nucleo, mut control: Control) {
+    tasks::control(&mut board, &mut control, &mut Nobody, &mut Untimed).await;
+    // Returning would drop the DAC, and the pin would float.
+    pending().await
+}
+
+#[embassy_executor::task]
+async fn housekeeping() {
+    tasks::housekeeping(|_| ()).await
+}
+
+/// No host: nothing is ever armed.
+struct Nobody;
+
+impl Source for Nobody {
+    fn orders(&mut self, _tick: u32) -> Option<Orders> {
+        Some(Orders::default())
     }
 }

@@ -4,8 +4,6 @@
 //! an instruction is longer than a count, so that the count tells the number of instructions exactly; below, it is rounded
 //! to 40 ns / 2^N instructions. The scale is not told but measured at the start, on a thousand instructions that do nothing.
 
-use model::Output;
-
 use super::registers::{SYSTICK_CONTROL, SYSTICK_RELOAD, SYSTICK_VALUE};
 use crate::control::Stopwatch;
 use crate::log::Instructions;
@@ -13,11 +11,12 @@ use crate::log::Instructions;
 const TOP: u32 = 0xff_ffff;
 const KNOWN: u32 = 1000;
 
-/// Fewest, most and sum over all ticks.
+/// Fewest, most and sum over all ticks, in counts.
 #[derive(Debug)]
 pub struct Counter {
     counts_of_known: u32,
     counts_of_nothing: u32,
+    started: u32,
     min: u32,
     max: u32,
     sum: u64,
@@ -26,16 +25,19 @@ pub struct Counter {
 
 impl Counter {
     /// Starts SysTick and measures its scale.
-    pub fn start() -> Self {
+    pub fn begin() -> Self {
         SYSTICK_RELOAD.write(TOP);
         SYSTICK_VALUE.write(0);
         SYSTICK_CONTROL.write(0b101);
-        let counts_of_nothing = counts(|| ());
-        let counts_of_known = counts(|| {
-            // SAFETY: does nothing.
-            unsafe { core::arch::asm!(".rept 1000", "nop", ".endr", options(nomem, nostack)) }
-        }) - counts_of_nothing;
-        Self { counts_of_known, counts_of_nothing, min: u32::MAX, max: 0, sum: 0, ticks: 0 }
+        let mut counter =
+            Self { counts_of_known: 1, counts_of_nothing: 0, started: 0, min: u32::MAX, max: 0, sum: 0, ticks: 0 };
+        counter.start();
+        counter.counts_of_nothing = counter.passed();
+        counter.start();
+        // SAFETY: does nothing.
+        unsafe { core::arch::asm!(".rept 1000", "nop", ".endr", options(nostack)) }
+        counter.counts_of_known = counter.passed() - counter.counts_of_nothing;
+        counter
     }
 
     /// Of all ticks so far.
@@ -43,34 +45,39 @@ impl Counter {
         if self.ticks == 0 {
             return Instructions::default();
         }
+        let scale = |counts: u64| {
+            let known = u64::from(self.counts_of_known);
+            ((counts * u64::from(KNOWN) + known / 2) / known) as u32
+        };
         let ticks = u64::from(self.ticks);
-        Instructions { min: self.min, mean: ((self.sum + ticks / 2) / ticks) as u32, max: self.max }
+        let mean = (scale(self.sum * 10 / ticks) + 5) / 10;
+        Instructions { min: scale(u64::from(self.min)), mean, max: scale(u64::from(self.max)) }
+    }
+
+    /// Counts since the start, and interrupts again.
+    #[inline(always)]
+    fn passed(&self) -> u32 {
+        let now = SYSTICK_VALUE.read();
+        // SAFETY: `start` kept them out, and nobody else had.
+        unsafe { cortex_m::interrupt::enable() };
+        self.started.wrapping_sub(now) & TOP
     }
 }
 
 impl Stopwatch for Counter {
-    fn time(&mut self, tick: impl FnOnce() -> Output) -> Output {
-        let mut output = None;
-        let counts = counts(|| output = Some(tick())).saturating_sub(self.counts_of_nothing);
-        let instructions = (counts * KNOWN + self.counts_of_known / 2) / self.counts_of_known;
-        self.min = self.min.min(instructions);
-        self.max = self.max.max(instructions);
-        self.sum += u64::from(instructions);
-        self.ticks += 1;
-        match output {
-            Some(output) => output,
-            // `counts` has called it.
-            None => unreachable!(),
-        }
+    /// Keeps interrupts out, which are not the tick's.
+    #[inline(always)]
+    fn start(&mut self) {
+        cortex_m::interrupt::disable();
+        self.started = SYSTICK_VALUE.read();
     }
-}
 
-/// What SysTick counts while `work` is done, interrupts kept out.
-#[inline(always)]
-fn counts(work: impl FnOnce()) -> u32 {
-    critical_section::with(|_| {
-        let before = SYSTICK_VALUE.read();
-        work();
-        before.wrapping_sub(SYSTICK_VALUE.read()) & TOP
-    })
+    #[inline(always)]
+    fn stop(&mut self) {
+        let counts = self.passed().saturating_sub(self.counts_of_nothing);
+        self.min = self.min.min(counts);
+        self.max = self.max.max(counts);
+        self.sum = self.sum.wrapping_add(u64::from(counts));
+        self.ticks = self.ticks.wrapping_add(1);
+    }
 }

@@ -1,1 +1,75 @@
-//! stub
+//! The real board: NUCLEO-G474RE, an STM32G474RE at 170 MHz.
+//!
+//! | pin | what it is |
+//! | --- | --- |
+//! | PA4 | DAC1 channel 1, the amplifier's input: 0 to 3.3 V for 0 V to its full scale |
+//! | PB5 | amplifier's enable, high is on; a pull-down on the amplifier's side keeps it off while the chip is in reset |
+//! | PB10 | interlock, high is closed; pulled down, so that a broken wire reads as open |
+//! | PA0, PA1 | ADC1, the amplifier's voltage and current monitors |
+//! | PA5 | LED, on while voltages may leave |
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`clocks`] | 170 MHz without a crystal |
+//! | [`amplifier`] | DAC, enable, monitors |
+//! | [`reset`] | why the chip was reset |
+
+pub mod amplifier;
+pub mod clocks;
+pub mod reset;
+
+use embassy_stm32::Peripherals;
+use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+use embassy_stm32::peripherals::IWDG;
+use embassy_stm32::wdg::IndependentWatchdog;
+
+use crate::board::Board;
+
+pub use amplifier::kill;
+pub use reset::reset_cause;
+
+/// Without food for this long the chip is reset, in us.
+const WATCHDOG_US: u32 = 100_000;
+
+/// The board.
+pub struct Nucleo {
+    amplifier: amplifier::Amplifier,
+    interlock: Input<'static>,
+    watchdog: IndependentWatchdog<'static, IWDG>,
+    led: Output<'static>,
+}
+
+impl Nucleo {
+    /// Sets everything up, voltage first.
+    pub fn init(p: Peripherals) -> Self {
+        let amplifier = amplifier::Amplifier::new(p.DAC1, p.PA4, p.PB5, p.ADC1, p.PA0, p.PA1);
+        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+        watchdog.unleash();
+        Self {
+            amplifier,
+            interlock: Input::new(p.PB10, Pull::Down),
+            watchdog,
+            led: Output::new(p.PA5, Level::Low, Speed::Low),
+        }
+    }
+}
+
+impl Board for Nucleo {
+    type Amplifier = amplifier::Amplifier;
+
+    fn amplifier(&mut self) -> &mut amplifier::Amplifier {
+        &mut self.amplifier
+    }
+
+    fn interlock_closed(&mut self) -> bool {
+        self.interlock.is_high()
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
+
+    fn show_armed(&mut self, armed: bool) {
+        self.led.set_level(armed.into());
+    }
+}

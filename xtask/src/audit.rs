@@ -1,0 +1,65 @@
+//! What must not be in an image, looked up in the image itself.
+//!
+//! - From the control tick no call leads to a panic, directly or through others, and none goes to an unknown place.
+//! - No allocator.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::elf::{self, Function};
+use crate::thumb::Code;
+
+/// The function that must not panic, as its demangled name begins and ends.
+const TICK: (&str, &str) = ("firmware::control::Control", "tick");
+
+/// Both checks; returns how many functions the tick consists of.
+pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
+    let functions = elf::functions(bytes)?;
+    if let Some(found) = functions.iter().find(|f| is_heap(&f.name)) {
+        bail!("`{}` is an allocator's", found.name);
+    }
+    // A search that finds nothing because names look different would pass everything.
+    ensure!(functions.iter().any(|f| is_panic(&f.name)), "the image has no panic at all: have names changed?");
+    let code = Code::new(bytes)?;
+    let by_address: BTreeMap<u32, &Function> = functions.iter().map(|f| (f.address, f)).collect();
+    let is_tick =
+        |f: &&Function| f.name.trim_start_matches('<').starts_with(TICK.0) && plain(&f.name).ends_with(TICK.1);
+    let ticks: Vec<&Function> = functions.iter().filter(is_tick).collect();
+    ensure!(!ticks.is_empty(), "no function `{}::{}` in the image", TICK.0, TICK.1);
+
+    let mut seen = BTreeSet::new();
+    let mut open: Vec<(&Function, String)> = ticks.iter().map(|f| (*f, f.name.clone())).collect();
+    while let Some((function, path)) = open.pop() {
+        if !seen.insert(function.address) {
+            continue;
+        }
+        if is_panic(&function.name) {
+            bail!("a way into a panic: {path}");
+        }
+        let shape = code.shape(function).with_context(|| format!("in {}", function.name))?;
+        ensure!(!shape.calls_by_register, "{path} calls through a register: that may lead anywhere");
+        for target in shape.calls {
+            let callee = by_address.get(&target).with_context(|| format!("{path} calls {target:#x}, no function"))?;
+            open.push((callee, format!("{path} -> {}", callee.name)));
+        }
+    }
+    Ok(seen.len())
+}
+
+/// Without generic arguments at the end.
+fn plain(name: &str) -> &str {
+    name.split_once("::<").map_or(name, |(name, _)| name)
+}
+
+fn is_panic(name: &str) -> bool {
+    ["core::panicking", "panic_fmt", "rust_begin_unwind", "unwrap_failed", "expect_failed", "slice_index_fail"]
+        .iter()
+        .any(|part| name.contains(part))
+}
+
+fn is_heap(name: &str) -> bool {
+    ["__rust_alloc", "__rustc::__rust_alloc", "__rg_alloc", "malloc", "realloc", "alloc::alloc::"]
+        .iter()
+        .any(|start| name.starts_with(start))
+}

@@ -1,0 +1,45 @@
+//! What the emulated firmware must show, as a step of `cargo xtask test`.
+
+use anyhow::{Context, Result, ensure};
+
+use crate::emulate::Comparison;
+use crate::image::{self, Board, Opt};
+use crate::{audit, drill, emulator};
+
+/// Most instructions that one tick of the model may take.
+const MOST_INSTRUCTIONS: u32 = 150;
+/// Runs that must be the host's, bit for bit.
+const RUNS: [&str; 3] = ["stair", "random 1", "random 20261121"];
+
+/// Everything; each line of the result on stderr.
+pub(crate) fn run() -> Result<()> {
+    for opt in Opt::ALL {
+        let elf = image::build(Board::Mps2, opt)?;
+        let name = opt.name();
+        let functions = audit::run(&image::read(&elf)?)?;
+        eprintln!("opt-level {name}: no way into a panic from the control tick ({functions} functions), no heap");
+        for script in RUNS {
+            bit_for_bit(&elf, script).with_context(|| format!("opt-level {name}, {script}"))?;
+        }
+        if opt == Opt::S {
+            drill::all(&elf, false)?;
+        }
+    }
+    audit::run(&image::read(&image::build(Board::Nucleo, Opt::S)?)?).context("nucleo-g474re")?;
+    Ok(())
+}
+
+fn bit_for_bit(elf: &std::path::Path, script: &str) -> Result<()> {
+    let run = emulator::play(elf, script, emulator::SHIFT, |_| {})?;
+    let comparison = Comparison::new(script, &run)?;
+    comparison.check()?;
+    let [min, mean, max] = comparison.instructions;
+    ensure!(max <= MOST_INSTRUCTIONS, "{max} instructions in a tick, expected at most {MOST_INSTRUCTIONS}");
+    eprintln!(
+        "{script}: {} ticks in {:.1} s, none missed, {} as on the host, {min} to {max} instructions a tick, mean {mean}",
+        comparison.ticks,
+        run.took.as_secs_f64(),
+        comparison.target_digest,
+    );
+    Ok(())
+}

@@ -1,0 +1,93 @@
+//! How deep the stack can get, from the image itself: the frame of every function, and the deepest chain of calls.
+//!
+//! Interrupts nest, so the deepest handler of each level comes on top of the thread, each with the registers that the
+//! processor saves. A call through a register (an executor polls a task, a task wakes another) may lead to any function
+//! that nobody calls by name; that such calls are nested at most [`NESTED`] deep is an assumption, the rest is counted.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Result, bail};
+
+use crate::elf::{self, Function};
+use crate::thumb::{Code, Shape};
+
+/// Bytes at the lower end that must not be touched, see the firmware's `stack_guard`.
+pub(crate) const GUARD: u32 = 256;
+/// Executor to task, task to waker.
+const NESTED: usize = 2;
+/// What the processor saves at an interrupt, float registers and alignment included.
+const SAVED: u32 = 104 + 4;
+/// Recursive on purpose: the drill that uses the stack up.
+const DRILL: &str = "deeper";
+/// Interrupt levels that can nest, deepest handlers first: alarm, control, housekeeping, NMI.
+const LEVELS: usize = 4;
+
+/// The most that thread and handlers take together.
+pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
+    let code = Code::new(elf)?;
+    let functions = elf::functions(elf)?;
+    let shapes: BTreeMap<u32, Shape> =
+        functions.iter().map(|f| Ok((f.address, code.shape(f)?))).collect::<Result<_>>()?;
+    let called: BTreeSet<u32> = shapes.values().flat_map(|shape| shape.calls.iter().copied()).collect();
+    let vectors = vectors(elf, &code)?;
+    // What can stand behind a register: nobody calls it by name, and the processor does not start it.
+    let free: Vec<u32> = functions
+        .iter()
+        .map(|f| f.address)
+        .filter(|address| !called.contains(address) && !vectors.contains(address))
+        .collect();
+    let mut behind_register = 0;
+    for _ in 0..NESTED {
+        let depths = Depths { shapes: &shapes, functions: &functions, behind_register };
+        let deepest = free.iter().map(|address| depths.of(*address, &mut Vec::new()));
+        behind_register = deepest.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0);
+    }
+    let depths = Depths { shapes: &shapes, functions: &functions, behind_register };
+    let reset = code.word(elf::symbol(elf, "__RESET_VECTOR")?)? & !1;
+    let thread = depths.of(reset, &mut Vec::new())?;
+    let mut handlers = vectors
+        .iter()
+        .filter(|address| **address != reset && shapes.contains_key(address))
+        .map(|address| depths.of(*address, &mut Vec::new()))
+        .collect::<Result<Vec<_>>>()?;
+    handlers.sort_unstable_by(|a, b| b.cmp(a));
+    Ok(thread + handlers.iter().take(LEVELS).map(|depth| depth + SAVED).sum::<u32>())
+}
+
+/// Everything that the processor may start.
+fn vectors(elf: &[u8], code: &Code) -> Result<BTreeSet<u32>> {
+    let (start, end) = elf::range(elf, ".vector_table")?;
+    (start + 4..end).step_by(4).map(|at| Ok(code.word(at)? & !1)).collect()
+}
+
+struct Depths<'a> {
+    shapes: &'a BTreeMap<u32, Shape>,
+    functions: &'a [Function],
+    behind_register: u32,
+}
+
+impl Depths<'_> {
+    fn of(&self, address: u32, path: &mut Vec<u32>) -> Result<u32> {
+        // Not a function with a size: a few lines of assembly without a frame.
+        let Some(shape) = self.shapes.get(&address) else { return Ok(0) };
+        if path.contains(&address) {
+            let name = self.name(address);
+            if name.contains(DRILL) {
+                return Ok(0);
+            }
+            let names: Vec<&str> = path.iter().map(|address| self.name(*address)).collect();
+            bail!("recursion: {} -> {name}", names.join(" -> "));
+        }
+        path.push(address);
+        let mut below = if shape.calls_by_register { self.behind_register } else { 0 };
+        for call in &shape.calls {
+            below = below.max(self.of(*call, path)?);
+        }
+        path.pop();
+        Ok(shape.frame + below)
+    }
+
+    fn name(&self, address: u32) -> &str {
+        self.functions.iter().find(|f| f.address == address).map_or("?", |f| &f.name)
+    }
+}
