@@ -15,6 +15,7 @@
 pub mod bad_input;
 pub mod bound;
 pub mod experiment;
+mod leap;
 pub mod misprint;
 pub mod output;
 pub mod plant_file;
