@@ -5,8 +5,10 @@
 //! `p'' = A^2 p + A g r + g r'`. Even and odd samples then do not wait for each other, and a processor works on both, and
 //! on their outputs, at once (scattered look-ahead).
 
+use wide::f64x2;
+
 /// Two samples side by side.
-pub(crate) type Pair = [f64; 2];
+pub(crate) type Pair = f64x2;
 
 /// The double transition of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,17 +47,15 @@ impl Leap {
         };
         let first = once([0, 1].map(|i| states[i] - self.later[i] * targets[0]), targets[0]);
         let second = once(first, targets[1]);
-        [[first[0], second[0]], [first[1], second[1]]]
+        [Pair::new([first[0], second[0]]), Pair::new([first[1], second[1]])]
     }
 
-    /// Two samples later; `targets` are those of the samples in `p` and of the one after.
+    /// Two samples later; `now` are the targets of the samples in `p`, `next` those of the samples after each.
     #[inline(always)]
-    pub(crate) fn next(&self, p: [Pair; 2], targets: [f64; 3]) -> [Pair; 2] {
+    pub(crate) fn next(&self, p: [Pair; 2], now: Pair, next: Pair) -> [Pair; 2] {
         [0, 1].map(|i| {
-            [0, 1].map(|lane| {
-                let input = self.before[i] * targets[lane] + self.now[i] * targets[lane + 1];
-                (self.twice[i][0] * p[0][lane] + self.twice[i][1] * p[1][lane]) + input
-            })
+            let input = now * self.before[i] + next * self.now[i];
+            (p[0] * self.twice[i][0] + p[1] * self.twice[i][1]) + input
         })
     }
 
@@ -67,10 +67,10 @@ impl Leap {
 }
 
 impl Output {
-    /// At both samples.
+    /// At both samples, with their targets.
     #[inline(always)]
-    pub(crate) fn at(&self, p: [Pair; 2], targets: [f64; 3]) -> Pair {
+    pub(crate) fn at(&self, p: [Pair; 2], targets: Pair) -> Pair {
         let [by_w, by_z, by_target] = self.0;
-        [0, 1].map(|lane| by_w * p[0][lane] + by_z * p[1][lane] + by_target * targets[lane])
+        (p[0] * by_w + p[1] * by_z) + targets * by_target
     }
 }

@@ -15,7 +15,7 @@
 
 use nalgebra::Matrix4;
 
-use crate::leap::Leap;
+use crate::leap::{Leap, Pair};
 
 /// The loop to be solved, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,7 +132,7 @@ impl Solution {
     /// As many pairs of samples as pass before a limit acts; returns the number of samples.
     fn run_free(&mut self, targets: &[f64], moments: &mut [Moment]) -> usize {
         let ([first, second, ..], true) = (targets, self.free) else { return 0 };
-        let (lowest, highest) = self.system.range_v;
+        let (lowest, highest) = (Pair::splat(self.system.range_v.0), Pair::splat(self.system.range_v.1));
         let (leap, share, [by_w, by_z, by_target]) = (self.leap, self.system.share, self.law);
         let voltage = leap.output([by_w, by_z], by_target);
         let stiffness = leap.output([1.0 - share + share * by_w, share * by_z], share * by_target);
@@ -140,15 +140,16 @@ impl Solution {
         let mut pair = leap.start([self.w, self.z], [*first, *second]);
         let mut samples = 0;
         for (targets, moments) in targets[1..].windows(3).step_by(2).zip(moments.chunks_exact_mut(2)) {
-            let targets = [targets[0], targets[1], targets[2]];
-            let (stiffness, voltage) = (stiffness.at(pair, targets), voltage.at(pair, targets));
-            if voltage[0].min(voltage[1]) < lowest || voltage[0].max(voltage[1]) > highest {
+            let (now, next) = (Pair::new([targets[0], targets[1]]), Pair::new([targets[1], targets[2]]));
+            let (stiffness, voltage) = (stiffness.at(pair, now), voltage.at(pair, now));
+            if (voltage.simd_lt(lowest) | voltage.simd_gt(highest)).any() {
                 break;
             }
-            moments[0] = Moment { stiffness: stiffness[0], voltage: voltage[0] };
-            moments[1] = Moment { stiffness: stiffness[1], voltage: voltage[1] };
+            let ([stiffness, later_stiffness], [voltage, later_voltage]) = (stiffness.to_array(), voltage.to_array());
+            moments[0] = Moment { stiffness, voltage };
+            moments[1] = Moment { stiffness: later_stiffness, voltage: later_voltage };
             samples += 2;
-            pair = leap.next(pair, targets);
+            pair = leap.next(pair, now, next);
         }
         if samples > 0 {
             self.rejoin(moments[samples - 1], targets[samples]);
