@@ -3,7 +3,7 @@
 //! | module | what it is |
 //! | --- | --- |
 //! | [`schedule`], [`record`] | what voltage is asked for: the report's stair, or a file |
-//! | [`reference`] | the loop in continuous time, solved exactly in double precision |
+//! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
 //! | [`experiment`] | fixed point and reference side by side over a schedule |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the fastest any controller could be |
