@@ -1,6 +1,7 @@
 //! The stair experiment, end to end: what it must show beside the report's Table 3.
 
 use std::fs;
+use std::path::Path;
 
 use end_to_end::{json, text, vsj};
 use serde_json::Value;
@@ -195,4 +196,28 @@ fn help_shows_examples() {
     let help = vsj(folder.path(), &["stair", "--help"]);
     assert!(help.status.success() && text(&help.stdout).contains("Examples:"));
     assert!(vsj(folder.path(), &["--version"]).status.success());
+}
+
+/// The pictures and figures that the README shows are those of today.
+#[test]
+fn the_documentation_shows_what_the_command_prints() {
+    let folder = tempdir().unwrap();
+    let output = vsj(folder.path(), &["stair", "--out", "stair", "--every", "0.1"]);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    for name in ["stair.csv", "stiffness.svg", "voltage.svg"] {
+        let committed = fs::read(root.join("docs/stair").join(name)).unwrap();
+        let made = fs::read(folder.path().join("stair").join(name)).unwrap();
+        assert!(
+            committed == made,
+            "docs/stair/{name} is old: cargo run --release -- stair --out docs/stair --every 0.1"
+        );
+    }
+    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let stdout = text(&output.stdout);
+    let shown = stdout
+        .lines()
+        .filter(|line| line.contains(" -> ") || line.contains("agree to the last digit") || line.contains("stays"));
+    for line in shown {
+        assert!(readme.contains(line), "the README lacks: {line}");
+    }
 }
