@@ -7,6 +7,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use host_sim::experiment::continuous;
+use host_sim::reference::Moment;
 use host_sim::schedule::Schedule;
 use model::{Amplifier, Input, Settings, State, Volts};
 
@@ -36,17 +37,13 @@ fn closed_loop(criterion: &mut Criterion) {
     });
 
     let system = continuous(&Settings::PAPER);
-    let mut responses = vec![(0.0, 0.0); SAMPLES];
+    let mut moments = vec![Moment::default(); SAMPLES];
     group.bench_function("reference_f64", |bencher| {
         let solution = system.at_rest(1e-3);
         bencher.iter(|| {
             let mut solution = black_box(&solution).clone();
-            let targets = black_box(&targets);
-            for (response, pair) in responses.iter_mut().zip(targets.windows(2)) {
-                let stiffness = solution.step(pair[0], pair[1]);
-                *response = (stiffness, solution.voltage());
-            }
-            black_box(&responses);
+            solution.run(black_box(&targets), &mut moments);
+            black_box(&moments);
         });
     });
     group.finish();

@@ -3,12 +3,12 @@
 //! Both with the pre-compensator and without it, so that each run shows what the controller is worth.
 
 use anyhow::Result;
-use model::{DacCode, Input, Limits, ScaledStiffness, Settings, Spring, Volts};
+use model::{Config, DacCode, Input, Limits, Output, ScaledStiffness, Settings, Spring, State, Volts};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
-use crate::reference::{Loop, Solution};
-use crate::schedule::{Reader, Schedule};
+use crate::reference::{Loop, Moment};
+use crate::schedule::Schedule;
 
 /// More ticks than this are refused: a run keeps 48 bytes of each.
 const MOST_TICKS: f64 = 10e6;
@@ -59,8 +59,9 @@ impl Experiment {
     /// [`BadInput`] for settings that the model refuses and schedules beyond the amplifier's range.
     pub fn run(&self, mut progress: impl FnMut(usize, usize)) -> Result<Run> {
         let rate_hz = self.settings.rate_hz;
-        let mut with = Both::new(&self.settings)?;
-        let mut without = Both::new(&Settings { gains: None, ..self.settings })?;
+        let uncontrolled = Settings { gains: None, ..self.settings };
+        let controlled = self.settings.check().map_err(|error| BadInput(error.to_string()))?;
+        let alone = uncontrolled.check().map_err(|error| BadInput(error.to_string()))?;
         let (lowest, highest) = (self.settings.amplifier.min_v, self.settings.amplifier.max_v);
         self.schedule.check_range(&self.name, lowest, highest)?;
 
@@ -70,20 +71,14 @@ impl Experiment {
             bad_input!("{} takes {last} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}", self.name);
         }
         let ticks = last as usize + 1;
-        let mut run = Run { start_s, rate_hz, with: Vec::with_capacity(ticks), without: Vec::with_capacity(ticks) };
         let mut reader = self.schedule.reader();
-        for tick in 0..ticks {
-            if tick % 8192 == 0 {
-                progress(tick, ticks);
-            }
-            let (now, next) = (run.time_s(tick), run.time_s(tick + 1));
-            let target = reader.at(now);
-            run.with.push(with.sample(target)?);
-            run.without.push(without.sample(target)?);
-            with.advance(reader.clone(), now, next);
-            without.advance(reader.clone(), now, next);
+        let targets: Vec<f64> = (0..ticks).map(|tick| reader.at(start_s + tick as f64 / rate_hz)).collect();
+        let mut run = Run { start_s, rate_hz, with: Vec::new(), without: Vec::new() };
+        run.with = one_loop(&controlled, &targets, |done| progress(done, 2 * ticks))?;
+        run.without = one_loop(&alone, &targets, |done| progress(ticks + done, 2 * ticks))?;
+        for (settings, samples) in [(&self.settings, &mut run.with), (&uncontrolled, &mut run.without)] {
+            reference_at_ticks(continuous(settings), &self.schedule, rate_hz, &targets, samples);
         }
-        progress(ticks, ticks);
         Ok(run)
     }
 }
@@ -124,42 +119,48 @@ pub fn paper_spring() -> Result<Spring> {
     Ok(Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 1000.0)?)
 }
 
-/// One loop in fixed point and its reference.
-struct Both {
-    config: model::Config,
-    state: model::State,
-    reference: Solution,
+/// The fixed-point loop over one target a tick; its reference is not known yet.
+fn one_loop(config: &Config, targets: &[f64], mut progress: impl FnMut(usize)) -> Result<Vec<Sample>> {
+    let mut state = State::default();
+    let mut samples = Vec::with_capacity(targets.len());
+    for (tick, &target) in targets.iter().enumerate() {
+        if tick % 8192 == 0 {
+            progress(tick);
+        }
+        let target = Volts::new(target).map_err(|error| BadInput(error.to_string()))?;
+        let Output { code, applied, stiffness, limits, .. } = config.tick(&mut state, Input { target });
+        samples.push(Sample { code, applied, stiffness, limits, reference: 0.0 });
+    }
+    Ok(samples)
 }
 
-impl Both {
-    fn new(settings: &Settings) -> Result<Self> {
-        let config = settings.check().map_err(|error| BadInput(error.to_string()))?;
-        let reference = continuous(settings).at_rest(1.0 / settings.rate_hz);
-        Ok(Self { config, state: model::State::default(), reference })
-    }
-
-    fn sample(&mut self, target_v: f64) -> Result<Sample> {
-        let target = Volts::new(target_v).map_err(|error| BadInput(error.to_string()))?;
-        let output = self.config.tick(&mut self.state, Input { target });
-        self.reference.jump(target_v);
-        Ok(Sample {
-            code: output.code,
-            applied: output.applied,
-            stiffness: output.stiffness,
-            limits: output.limits,
-            reference: self.reference.stiffness(),
-        })
-    }
-
-    /// The reference goes on from one tick to the next.
-    fn advance(&mut self, reader: Reader<'_>, now: f64, next: f64) {
-        for stretch in reader.stretches(now, next) {
-            if stretch.duration_s == next - now {
-                self.reference.step(stretch.from_v, stretch.to_v());
-            } else {
-                self.reference.advance(stretch.from_v, stretch.slope, stretch.duration_s);
-            }
+/// Adds the exact solution to the samples of a loop.
+fn reference_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f64], samples: &mut [Sample]) {
+    let mut solution = system.at_rest(1.0 / rate_hz);
+    let time = |tick: usize| schedule.start_s() + tick as f64 / rate_hz;
+    // Where the target goes straight from tick to tick, and does not jump at the next, whole runs of ticks are one call.
+    let mut reader = schedule.reader();
+    let mut straight = |tick: usize| {
+        reader.at(time(tick));
+        let mut stretches = reader.clone().stretches(time(tick), time(tick + 1));
+        let first = stretches.next();
+        stretches.next().is_none() && first.is_some_and(|first| (first.to_v() - targets[tick + 1]).abs() < 1e-9)
+    };
+    let mut moments = vec![Moment::default(); targets.len()];
+    let mut tick = 0;
+    while tick < targets.len() {
+        solution.jump(targets[tick]);
+        samples[tick].reference = solution.moment().stiffness;
+        let end = (tick..targets.len() - 1).find(|&tick| !straight(tick)).unwrap_or(targets.len() - 1);
+        solution.run(&targets[tick..=end], &mut moments[tick..end]);
+        for at in tick..end {
+            samples[at + 1].reference = moments[at].stiffness;
         }
+        let reader = schedule.reader();
+        for stretch in reader.stretches(time(end), time(end + 1)) {
+            solution.advance(stretch.from_v, stretch.slope, stretch.duration_s);
+        }
+        tick = end + 1;
     }
 }
 
@@ -175,7 +176,7 @@ pub fn reference_at(system: Loop, schedule: &Schedule, times_s: impl IntoIterato
         }
         now = next;
         solution.jump(reader.at(next));
-        solution.stiffness()
+        solution.moment().stiffness
     };
     times_s.into_iter().map(at).collect()
 }

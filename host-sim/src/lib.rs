@@ -17,6 +17,7 @@
 pub mod bad_input;
 pub mod bound;
 pub mod experiment;
+mod leap;
 pub mod link;
 pub mod log;
 pub mod misprint;

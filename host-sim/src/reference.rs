@@ -15,6 +15,8 @@
 
 use nalgebra::Matrix4;
 
+use crate::leap::{Leap, Pair};
+
 /// The loop to be solved, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loop {
@@ -41,12 +43,14 @@ pub struct Solution {
     sample_s: f64,
     /// What one whole sample with `u = c` makes of `w`, `z`, the target and its slope: rows for `w` and `z`.
     whole: [[f64; 4]; 2],
+    /// The same for many samples.
+    leap: Leap,
     w: f64,
     z: f64,
     u: f64,
     /// Target at the end of the last sample.
     target: f64,
-    /// True if the whole-sample step may be tried: nothing limits and nothing has jumped.
+    /// True if the law is followed: nothing limits.
     free: bool,
 }
 
@@ -79,6 +83,7 @@ impl Loop {
             reset_per_s,
             sample_s,
             whole: [[0.0; 4]; 2],
+            leap: Leap::new([[0.0; 2]; 2], [0.0; 2], [0.0; 2]),
             w: 0.0,
             z: 0.0,
             u: 0.0,
@@ -86,27 +91,82 @@ impl Loop {
             free: self.range_v.0 <= 0.0 && self.slew_v_per_s.is_infinite(),
         };
         solution.whole = solution.transition(sample_s);
+        let columns = |a: usize, b: usize| solution.whole.map(|row| [row[a], row[b]]);
+        let later = solution.whole.map(|row| row[3] / sample_s);
+        let now = [0, 1].map(|state| solution.whole[state][2] - later[state]);
+        solution.leap = Leap::new(columns(0, 1), now, later);
         solution
     }
 }
 
+/// The loop at one moment, in V.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moment {
+    /// Scaled stiffness.
+    pub stiffness: f64,
+    /// Voltage across the spring.
+    pub voltage: f64,
+}
+
 impl Solution {
-    /// One sample passes, the target going straight from `from_v` to `to_v`; returns the stiffness at its end.
+    /// Whole samples pass, the target going straight from each of `targets` to the next; `moments` are the loop at all
+    /// targets but the first.
     ///
-    /// `from_v` may differ from the last sample's end: the target has jumped.
-    #[inline]
-    pub fn step(&mut self, from_v: f64, to_v: f64) -> f64 {
-        let slope = (to_v - from_v) / self.sample_s;
-        if self.free && from_v == self.target {
-            let [w, z] = self.moved(&self.whole, from_v, slope);
-            let u = self.law_at(w, z, to_v);
-            if u >= self.system.range_v.0 && u <= self.system.range_v.1 {
-                (self.w, self.z, self.u, self.target) = (w, z, u, to_v);
-                return self.stiffness();
+    /// The first may differ from where the target was: it has jumped.
+    pub fn run(&mut self, targets: &[f64], moments: &mut [Moment]) {
+        if let Some(&first) = targets.first() {
+            self.jump(first);
+        }
+        let mut done = 0;
+        while done + 1 < targets.len() {
+            done += self.run_free(&targets[done..], &mut moments[done..]);
+            // Here a limit acts, or too few samples are left: one the long way.
+            if let [from_v, to_v, ..] = targets[done..] {
+                self.advance(from_v, (to_v - from_v) / self.sample_s, self.sample_s);
+                moments[done] = self.moment();
+                done += 1;
             }
         }
-        self.advance(from_v, slope, self.sample_s);
-        self.stiffness()
+    }
+
+    /// As many pairs of samples as pass before a limit acts; returns the number of samples.
+    fn run_free(&mut self, targets: &[f64], moments: &mut [Moment]) -> usize {
+        let ([first, second, ..], true) = (targets, self.free) else { return 0 };
+        let (lowest, highest) = (Pair::splat(self.system.range_v.0), Pair::splat(self.system.range_v.1));
+        let (leap, share, [by_w, by_z, by_target]) = (self.leap, self.system.share, self.law);
+        let voltage = leap.output([by_w, by_z], by_target);
+        let stiffness = leap.output([1.0 - share + share * by_w, share * by_z], share * by_target);
+
+        let mut pair = leap.start([self.w, self.z], [*first, *second]);
+        let mut samples = 0;
+        for (targets, moments) in targets[1..].windows(3).step_by(2).zip(moments.chunks_exact_mut(2)) {
+            let (now, next) = (Pair::new([targets[0], targets[1]]), Pair::new([targets[1], targets[2]]));
+            let (stiffness, voltage) = (stiffness.at(pair, now), voltage.at(pair, now));
+            if (voltage.simd_lt(lowest) | voltage.simd_gt(highest)).any() {
+                break;
+            }
+            let ([stiffness, later_stiffness], [voltage, later_voltage]) = (stiffness.to_array(), voltage.to_array());
+            moments[0] = Moment { stiffness, voltage };
+            moments[1] = Moment { stiffness: later_stiffness, voltage: later_voltage };
+            samples += 2;
+            pair = leap.next(pair, now, next);
+        }
+        if samples > 0 {
+            self.rejoin(moments[samples - 1], targets[samples]);
+        }
+        samples
+    }
+
+    /// Takes up the states that a moment of the free loop came from.
+    fn rejoin(&mut self, moment: Moment, target: f64) {
+        let Moment { stiffness, voltage } = moment;
+        let [by_w, by_z, by_target] = self.law;
+        self.w = (stiffness - self.system.share * voltage) / (1.0 - self.system.share);
+        // Without a controller there is no integrator.
+        if by_z != 0.0 {
+            self.z = (voltage - by_w * self.w - by_target * target) / by_z;
+        }
+        (self.u, self.target) = (voltage, target);
     }
 
     /// Any stretch of time passes, the target starting at `from_v` with a `slope` in V/s.
@@ -147,15 +207,9 @@ impl Solution {
         self.free = self.system.slew_v_per_s.is_infinite() && (lowest..=highest).contains(&wanted);
     }
 
-    /// Scaled stiffness now, in V.
-    #[inline]
-    pub fn stiffness(&self) -> f64 {
-        self.w + self.system.share * (self.u - self.w)
-    }
-
-    /// Voltage across the spring now, in V.
-    pub fn voltage(&self) -> f64 {
-        self.u
+    /// The loop now.
+    pub fn moment(&self) -> Moment {
+        Moment { stiffness: self.w + self.system.share * (self.u - self.w), voltage: self.u }
     }
 
     #[inline]
@@ -300,12 +354,11 @@ mod tests {
     }
 
     fn solve(system: Loop, target: impl Fn(f64) -> f64, sample_s: f64, end_s: f64) -> f64 {
-        let mut solution = system.at_rest(sample_s);
-        for sample in 0..(end_s / sample_s).round() as usize {
-            let t = sample as f64 * sample_s;
-            solution.step(target(t), target(t + sample_s));
-        }
-        solution.stiffness()
+        let samples = (end_s / sample_s).round() as usize;
+        let targets: Vec<f64> = (0..=samples).map(|sample| target(sample as f64 * sample_s)).collect();
+        let mut moments = vec![Moment::default(); samples];
+        system.at_rest(sample_s).run(&targets, &mut moments);
+        moments[samples - 1].stiffness
     }
 
     #[test]
@@ -317,6 +370,19 @@ mod tests {
                 let (got, expected) = (solve(system, ramp, 0.01, end), runge_kutta(&system, ramp, end));
                 assert!((got - expected).abs() < 2e-4, "limit {limit}, {end} s: {got} {expected}");
             }
+        }
+    }
+
+    /// Slow, quick or oscillating: many samples at once are as exact as one long stretch.
+    #[test]
+    fn many_samples_are_one_long_stretch() {
+        let ramp = |t: f64| 100.0 * (t / 0.5).clamp(0.0, 1.0);
+        for gains in [Some((4.0, 1.35)), Some((4.0, 0.0)), Some((1.0, 0.4)), Some((4.0, 40.0)), None] {
+            let system = Loop { gains, ..PAPER };
+            let (got, mut long) = (solve(system, ramp, 0.001, 3.0), system.at_rest(1.0));
+            long.advance(0.0, 200.0, 0.5);
+            long.advance(100.0, 0.0, 2.5);
+            assert!((got - long.moment().stiffness).abs() < 1e-8, "{gains:?}: {got} {:?}", long.moment());
         }
     }
 
@@ -336,24 +402,18 @@ mod tests {
         let system = Loop { slew_v_per_s: 100.0, ..PAPER };
         let mut solution = system.at_rest(0.01);
         solution.jump(100.0);
-        for _ in 0..100 {
-            solution.step(100.0, 100.0);
-        }
-        assert!((solution.voltage() - 100.0).abs() < 1e-6, "one second at 100 V/s: {}", solution.voltage());
-        for _ in 0..5000 {
-            solution.step(100.0, 100.0);
-        }
-        assert!((solution.stiffness() - 100.0).abs() < 1e-3, "{}", solution.stiffness());
+        solution.advance(100.0, 0.0, 1.0);
+        assert!((solution.moment().voltage - 100.0).abs() < 1e-6, "one second at 100 V/s: {:?}", solution.moment());
+        solution.advance(100.0, 0.0, 50.0);
+        assert!((solution.moment().stiffness - 100.0).abs() < 1e-3, "{:?}", solution.moment());
     }
 
     #[test]
     fn without_a_controller_it_is_the_plain_exponential() {
         let mut solution = Loop { gains: None, ..PAPER }.at_rest(0.1);
         solution.jump(100.0);
-        assert!((solution.stiffness() - 100.0 / 11.0).abs() < 1e-12);
-        for _ in 0..55 {
-            solution.step(100.0, 100.0);
-        }
-        assert!((solution.stiffness() - (100.0 - 1000.0 / 11.0 * (-1f64).exp())).abs() < 1e-9);
+        assert!((solution.moment().stiffness - 100.0 / 11.0).abs() < 1e-12);
+        solution.advance(100.0, 0.0, 5.5);
+        assert!((solution.moment().stiffness - (100.0 - 1000.0 / 11.0 * (-1f64).exp())).abs() < 1e-9);
     }
 }

@@ -1,8 +1,10 @@
 //! The program under test.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 use std::sync::OnceLock;
+
+use serde_json::Value;
 
 /// `vsj` as its users call it, in the tests' folder. Built when first asked for: cargo builds no binary of another package.
 pub fn vsj() -> Command {
@@ -10,22 +12,36 @@ pub fn vsj() -> Command {
     let program = BUILT.get_or_init(|| {
         // TARGET/PROFILE/deps/this-test
         let test = std::env::current_exe().expect("a test has a path");
-        let profile = test.ancestors().nth(2).expect("a test lies below its profile's folder");
-        let release = profile.ends_with("release");
+        let target = test.ancestors().nth(3).expect("a test lies below the target folder");
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let built = Command::new(cargo)
-            .args(["build", "--quiet", "--package", "host-sim", "--bin", "vsj"])
-            .args(release.then_some("--release"))
-            .arg("--target-dir")
-            .arg(profile.parent().expect("a profile's folder lies in the target folder"))
+            .args(["build", "--quiet", "--release", "--package", "host-sim", "--bin", "vsj", "--target-dir"])
+            .arg(target)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .status();
         assert!(built.is_ok_and(|status| status.success()), "vsj does not build");
-        profile.join(format!("vsj{}", std::env::consts::EXE_SUFFIX))
+        target.join("release").join(format!("vsj{}", std::env::consts::EXE_SUFFIX))
     });
     let mut command = Command::new(program);
     command.current_dir(env!("CARGO_MANIFEST_DIR"));
     command
+}
+
+/// Runs it with `arguments` in a folder of its own.
+pub fn run(folder: &Path, arguments: &[&str]) -> Output {
+    vsj().args(arguments).current_dir(folder).output().expect("vsj starts")
+}
+
+/// What it then prints as JSON, nothing else being on stdout.
+pub fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let output = run(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("one JSON object on stdout")
+}
+
+/// Bytes as text.
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// Compares with a file below `golden/`; with `GOLDEN=write` in the environment, writes it instead.

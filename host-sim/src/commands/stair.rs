@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::print;
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::bad_input;
@@ -148,14 +149,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         None => Vec::new(),
     };
     if arguments.json {
-        println!("{}", serde_json::to_string(&report)?);
+        print(&format!("{}\n", serde_json::to_string(&report)?))
     } else {
-        print!("{}", terminal::text(&report));
-        for path in paths {
-            println!("wrote {}", path.display());
-        }
+        let wrote: String = paths.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+        print(&(terminal::text(&report) + &wrote))
     }
-    Ok(())
 }
 
 /// True if Table 3's simulated columns should come out.

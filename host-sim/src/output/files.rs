@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use model::Spring;
 use tempfile::NamedTempFile;
 
@@ -47,8 +47,14 @@ impl Files {
     /// Moves every file to its place and tells their paths.
     ///
     /// # Errors
-    /// If the folder has become read-only meanwhile.
+    /// If one of them cannot be; then none is moved.
     pub fn finish(self) -> Result<Vec<PathBuf>> {
+        // What could go wrong in a folder that was just written to is known before the first file is moved.
+        for (_, path) in &self.written {
+            if path.exists() && !path.is_file() {
+                bail!("{} cannot be written: it is not a file", path.display());
+            }
+        }
         let mut paths = Vec::new();
         for (file, path) in self.written {
             let kept = file.persist(&path).with_context(|| format!("{} cannot be written", path.display()))?;

@@ -5,8 +5,8 @@ use kuva::prelude::*;
 use crate::experiment::{Experiment, Run, Sample};
 use crate::stair::Report;
 
-/// Points that a line is drawn with; more cannot be seen.
-const MOST_POINTS: usize = 4000;
+/// Stretches of time that a line is drawn by, each with its lowest and highest point; more cannot be seen.
+const STRETCHES: usize = 500;
 
 const TARGET: &str = "#888888";
 const WITH: &str = "#0072b2";
@@ -40,15 +40,26 @@ pub fn voltage(experiment: &Experiment, run: &Run, samples: &[Sample]) -> String
 
 fn target(experiment: &Experiment, run: &Run) -> Vec<(f64, f64)> {
     let mut reader = experiment.schedule.reader();
-    (0..run.with.len()).step_by(stride(run)).map(|tick| (run.time_s(tick), reader.at(run.time_s(tick)))).collect()
+    thinned((0..run.with.len()).map(|tick| (run.time_s(tick), reader.at(run.time_s(tick)))).collect())
 }
 
 fn points(run: &Run, samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<(f64, f64)> {
-    (0..samples.len()).step_by(stride(run)).map(|tick| (run.time_s(tick), value(&samples[tick]))).collect()
+    thinned(samples.iter().enumerate().map(|(tick, sample)| (run.time_s(tick), value(sample))).collect())
 }
 
-fn stride(run: &Run) -> usize {
-    run.with.len().div_ceil(MOST_POINTS)
+/// The lowest and the highest point of each stretch, and the last of all: peaks stay.
+fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    let last = points.last().copied();
+    let stretches = points.chunks(points.len().div_ceil(STRETCHES));
+    let extremes = stretches.flat_map(|stretch| {
+        let height = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let mut pair = [stretch.iter().min_by(height), stretch.iter().max_by(height)];
+        pair.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+        pair.into_iter().flatten().copied()
+    });
+    let mut kept: Vec<(f64, f64)> = extremes.chain(last).collect();
+    kept.dedup();
+    kept
 }
 
 fn line(data: Vec<(f64, f64)>, colour: &str, name: &str) -> LinePlot {

@@ -1,0 +1,141 @@
+//! The whole tick over long runs, limits and changes of its configuration. Built with overflow checks: a wrap panics.
+
+use model::{Amplifier, Config, Gains, Input, Limits, Output, Plant, Settings, State, Volts};
+use proptest::prelude::*;
+
+fn run(config: &Config, state: &mut State, target_v: f64, ticks: u32) -> Output {
+    let input = Input { target: Volts::new(target_v).unwrap() };
+    let mut output = config.tick(state, input);
+    for _ in 1..ticks {
+        output = config.tick(state, input);
+    }
+    output
+}
+
+/// Ten million ticks at rest on a voltage between two codes: no drift, no wrap, no hunting over more than one code.
+#[test]
+fn ten_million_ticks_stay_within_one_code() {
+    let settings = Settings { rate_hz: 10_000.0, ..Settings::PAPER };
+    let config = settings.check().unwrap();
+    let mut state = State::default();
+    let target = 333.3;
+    run(&config, &mut state, target, 1_000_000);
+    let input = Input { target: Volts::new(target).unwrap() };
+    let (mut lowest, mut highest, mut sum) = (u16::MAX, 0, 0.0);
+    for _ in 0..10_000_000 {
+        let output = config.tick(&mut state, input);
+        (lowest, highest) = (lowest.min(output.code.0), highest.max(output.code.0));
+        let off = output.stiffness.to_f64() - target;
+        assert!(off.abs() < 0.03, "{off}");
+        sum += off;
+        assert_eq!(output.limits, Limits::NONE);
+    }
+    assert!(highest - lowest <= 1, "codes {lowest} to {highest}");
+    // The loop balances its error with the voltage before rounding: share times half a code may stay.
+    let allowed = settings.plant.share * 0.5 * settings.amplifier.volts_per_code();
+    assert!((sum / 1e7).abs() < allowed, "mean error {} of {allowed}", sum / 1e7);
+}
+
+/// Held at a limit for a minute, then asked for less: the answer is that of a loop that was never limited. A wound-up
+/// integrator would keep the voltage at the limit for long.
+#[test]
+fn the_integrator_does_not_wind_up() {
+    for slew_v_per_s in [None, Some(200.0)] {
+        let answer = |max_v, first| {
+            let amplifier = Amplifier { max_v, slew_v_per_s, ..Amplifier::PAPER };
+            let config = Settings { amplifier, ..Settings::PAPER }.check().unwrap();
+            let mut state = State::default();
+            let held = run(&config, &mut state, first, 60_000);
+            assert!((held.stiffness.to_f64() - 500.0).abs() < 0.2);
+            assert_eq!(held.limits.any_of(Limits::TARGET), first > max_v, "a target beyond the range is reported");
+            [100, 500, 1000, 3500].map(|ticks| run(&config, &mut state, 300.0, ticks).stiffness.to_f64())
+        };
+        let (limited, free) = (answer(500.0, 700.0), answer(700.0, 500.0));
+        for (limited, free) in limited.into_iter().zip(free) {
+            assert!((limited - free).abs() < 0.3, "{limited} {free}");
+        }
+    }
+}
+
+#[test]
+fn new_gains_limits_and_plant_come_without_a_bump() {
+    let settings = Settings::PAPER;
+    let before = settings.check().unwrap();
+    let others = [
+        Settings { gains: Some(Gains { proportional: 12.0, integral_per_s: 0.3 }), ..settings },
+        Settings { gains: Some(Gains { proportional: 0.5, integral_per_s: 5.0 }), ..settings },
+        Settings { plant: Plant { share: 0.3, time_constant_s: 2.0 }, ..settings },
+        Settings { amplifier: Amplifier { max_v: 600.0, ..settings.amplifier }, ..settings },
+        Settings { amplifier: Amplifier { min_v: 100.0, ..settings.amplifier }, ..settings },
+        Settings { rate_hz: 5000.0, ..settings },
+    ];
+    for other in others {
+        let after = other.check().unwrap();
+        let mut state = State::default();
+        // In the middle of a transient, where the error is large.
+        let last = run(&before, &mut state, 150.0, 700);
+        let mut unprepared = state;
+        after.adopt(&mut state, Volts::new(150.0).unwrap());
+        let next = run(&after, &mut state, 150.0, 1);
+        let bump = (next.voltage.to_f64() - last.voltage.to_f64()).abs();
+        assert!(bump < 1e-5, "{other:?}: {bump} V");
+        if other.gains != settings.gains {
+            let unprepared = run(&after, &mut unprepared, 150.0, 1);
+            assert!((unprepared.voltage.to_f64() - last.voltage.to_f64()).abs() > 1.0, "the test sees no bump at all");
+        }
+    }
+}
+
+#[test]
+fn a_range_that_shrinks_below_the_voltage_acts_at_once() {
+    let wide = Settings::PAPER.check().unwrap();
+    let amplifier = Amplifier { max_v: 250.0, slew_v_per_s: Some(10.0), ..Amplifier::PAPER };
+    let narrow = Settings { amplifier, ..Settings::PAPER }.check().unwrap();
+    let mut state = State::default();
+    run(&wide, &mut state, 400.0, 10_000);
+    narrow.adopt(&mut state, Volts::new(400.0).unwrap());
+    let output = run(&narrow, &mut state, 400.0, 1);
+    assert!(output.applied.to_f64() <= 250.0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Whatever the settings, the targets and the changes of settings: the output stays inside the range.
+    #[test]
+    fn nothing_gets_out_of_the_range(
+        rate in 2.0..=4.0f64,
+        share in 0.0..=0.9f64,
+        time_constant in -2.0..4.0f64,
+        gains in prop::collection::vec((-3.0..2.0f64, -4.0..5.0f64), 2..5),
+        (full_scale_v, part, dac_bits) in (50.0..=1000.0f64, 0.3..=1.0f64, 8u32..=16),
+        slew in prop::option::of(0.0..9.0f64),
+        targets in prop::collection::vec(-2000.0..2000.0f64, 1..30),
+    ) {
+        let mut state = State::default();
+        for (proportional, integral) in gains {
+            let gains = Gains { proportional: 10f64.powf(proportional), integral_per_s: 10f64.powf(integral) };
+            let settings = Settings {
+                rate_hz: 10f64.powf(rate),
+                plant: Plant { share, time_constant_s: 10f64.powf(time_constant) },
+                gains: Some(gains),
+                amplifier: Amplifier {
+                    max_v: (part * full_scale_v).max(10.0),
+                    slew_v_per_s: slew.map(|decades| 10f64.powf(decades)),
+                    dac_bits,
+                    ..Amplifier::up_to(full_scale_v)
+                },
+            };
+            let Ok(config) = settings.check() else { continue };
+            let (lowest, highest) = config.range();
+            config.adopt(&mut state, Volts::new(targets[0]).unwrap());
+            for &target in &targets {
+                let output = run(&config, &mut state, target, 50);
+                prop_assert!(output.applied >= lowest && output.applied <= highest);
+                prop_assert!(output.voltage >= lowest && output.voltage <= highest);
+                let (stiffness, most) = (output.stiffness.to_f64(), highest.to_f64());
+                prop_assert!((-1e-5..most + 1e-5).contains(&stiffness), "{stiffness}");
+            }
+        }
+    }
+}
