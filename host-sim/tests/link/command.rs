@@ -173,6 +173,10 @@ fn a_recording_follows_a_schedule_and_is_a_record() {
     std::fs::write(&input, "time_s,voltage_v\n10,50\n10.6,150\n11.2,150\n").unwrap();
     let (out, input) = (out.to_str().unwrap(), input.to_str().unwrap());
     assert!(bad(1, &mcu.port, &["record", out, "--input", input]).contains("not armed"));
+    let beyond = folder.path().join("beyond.csv");
+    std::fs::write(&beyond, "time_s,voltage_v\n0,50\n1,701\n2,701\n").unwrap();
+    let text = bad(2, &mcu.port, &["record", out, "--input", beyond.to_str().unwrap(), "--arm"]);
+    assert!(text.contains("701") && !Path::new(out).exists() && mcu.with(|shared| shared.ordered.is_empty()), "{text}");
     let summary = json(&mcu.port, &["record", out, "--input", input, "--arm"]);
     let record = Record::open(Path::new(out)).unwrap();
     assert_eq!(summary["rows"].as_u64().unwrap() as usize, record.rows.len());
