@@ -18,6 +18,7 @@ use crate::order::Order;
 use crate::reply::{Firmware, Reason, Reply, Status, Telemetry};
 use crate::request::Request;
 use crate::session::{Action, Counters, Session};
+use crate::value::WireVolts;
 
 /// What the control tick shows of itself, all of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +123,10 @@ impl Desk {
 
     fn status(&self, view: &View) -> Status {
         let About { firmware, rate_hz, silence_limit_ticks, last_fault } = self.about;
+        let (lowest, highest) = self.spring.reach_v();
         Status {
+            lowest: WireVolts::from_f64(lowest),
+            highest: WireVolts::from_f64(highest),
             firmware,
             rate_hz,
             silence_limit_ticks,
@@ -146,7 +150,7 @@ mod tests {
     use crate::receiver::Receiver;
     use crate::reply::State;
     use crate::sequence::Sequence;
-    use crate::value::{Desired, WireVolts};
+    use crate::value::Desired;
     use model::stiffness::{Cantilever, YoungsModulus};
     use model::supervisor::{Command, Fault as Cause};
 
@@ -228,6 +232,7 @@ mod tests {
             assert_eq!(talk(request, &view, &view).0, None, "{request:?}");
         }
         let (order, Reply::Status(status)) = talk(Request::Status, &FAULTED, &FAULTED) else { panic!() };
+        assert_eq!((status.lowest.to_f64(), status.highest.to_f64()), (0.0, 700.0));
         assert_eq!((order, status.overruns, status.fault, status.counters.accepted), (None, 3, Fault(6), 2));
     }
 

@@ -88,6 +88,10 @@ pub struct Status {
     pub rate_hz: u32,
     /// Ticks of host silence until the MCU acts on it.
     pub silence_limit_ticks: u32,
+    /// Lowest scaled stiffness in reach.
+    pub lowest: WireVolts,
+    /// Highest scaled stiffness in reach.
+    pub highest: WireVolts,
     /// Late ticks since the start.
     pub overruns: u32,
     /// The fault that is present or, if none is, [`Fault::NONE`].

@@ -13,6 +13,12 @@ impl WireVolts {
     pub fn to_f64(self) -> f64 {
         Signal::from_bits(self.0).to_num()
     }
+
+    /// The one at `volts` or next to it towards zero; beyond the range, its end.
+    pub fn from_f64(volts: f64) -> Self {
+        // A cast, and not the fixed-point type's own way: it cannot panic.
+        Self((volts * f64::from(1 << 20)) as i32)
+    }
 }
 
 impl From<Volts> for WireVolts {
@@ -69,6 +75,13 @@ mod tests {
         for volts in [0.0, 1e-6, 512.25, 700.0, -3.5] {
             let volts = Volts::new(volts).unwrap();
             assert_eq!(WireVolts::from(volts).to_f64(), volts.to_f64());
+        }
+    }
+
+    #[test]
+    fn what_cannot_travel_is_moved_to_the_end() {
+        for (volts, expected) in [(700.0, 700 << 20), (1e9, i32::MAX), (-1e9, i32::MIN), (f64::NAN, 0)] {
+            assert_eq!(WireVolts::from_f64(volts).0, expected);
         }
     }
 

@@ -51,6 +51,8 @@ fn replies() {
         firmware: Firmware { major: 1, minor: 2, patch: 3, revision: 0x1234_5678 },
         rate_hz: 1000,
         silence_limit_ticks: 500,
+        lowest: WireVolts(5),
+        highest: WireVolts(6),
         overruns: 4,
         fault: Fault(1),
         last_fault: Fault(5),
@@ -81,7 +83,7 @@ fn replies() {
         (Reply::Refused(Reason::InterlockOpen), "0108"),
         (Reply::Refused(Reason::OtherFault(Fault(1))), "010901"),
         (Reply::Refused(Reason::HostSilent), "010a"),
-        (Reply::Status(status), "02010203f8acd19101e807f403040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
+        (Reply::Status(status), "02010203f8acd19101e807f4030a0c040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
         (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f09"),
         (Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }), "03f0a20401808080ac0201040106ff1f09"),
     ] {

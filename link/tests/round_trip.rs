@@ -69,6 +69,8 @@ fn the_largest_message_fits_a_frame() {
         firmware: Firmware { major: 255, minor: 255, patch: 255, revision: most },
         rate_hz: most,
         silence_limit_ticks: most,
+        lowest: volts,
+        highest: volts,
         overruns: most,
         fault: Fault(255),
         last_fault: Fault(255),
@@ -83,8 +85,8 @@ fn the_largest_message_fits_a_frame() {
             unknown: most,
         },
     };
-    const { assert!(108 <= MAX_FRAME) };
+    const { assert!(118 <= MAX_FRAME) };
     let length = |reply| Frame::new(Sequence(u16::MAX), &reply).as_bytes().len();
-    assert_eq!(length(Reply::Status(status)), 108);
+    assert_eq!(length(Reply::Status(status)), 118);
     assert_eq!(length(Reply::Telemetry(sample)), 48);
 }

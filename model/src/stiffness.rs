@@ -84,6 +84,11 @@ impl Spring {
         Ok(Self { youngs_modulus, beam, min_v, max_v })
     }
 
+    /// Lowest and highest scaled stiffness that can be asked for, in V.
+    pub const fn reach_v(&self) -> (f64, f64) {
+        (self.min_v, self.max_v)
+    }
+
     /// Young's modulus in Pa at a scaled stiffness in volts.
     pub fn youngs_modulus_pa(&self, scaled_v: f64) -> f64 {
         self.youngs_modulus.at_zero_pa + self.youngs_modulus.per_volt_pa * scaled_v

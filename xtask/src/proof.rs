@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::emulate::Comparison;
 use crate::image::{self, Board, Opt};
-use crate::{audit, drill, emulator};
+use crate::{audit, drill, emulator, size};
 
 /// Most instructions that one tick of the model may take.
 const MOST_INSTRUCTIONS: u32 = 150;
@@ -24,6 +24,9 @@ pub(crate) fn run() -> Result<()> {
         if opt == Opt::S {
             drill::all(&elf, false)?;
         }
+    }
+    for board in Board::ALL {
+        size::check(&size::measure(board)?)?;
     }
     audit::run(&image::read(&image::build(Board::Nucleo, Opt::S)?)?).context("nucleo-g474re")?;
     Ok(())

@@ -19,6 +19,8 @@ const NESTED: usize = 2;
 const SAVED: u32 = 104 + 4;
 /// Recursive on purpose: the drill that uses the stack up.
 const DRILL: &str = "deeper";
+/// What every panic goes through.
+const PANIC: &str = "core::panicking";
 /// Interrupt levels that can nest, deepest handlers first: alarm, control, housekeeping, NMI.
 const LEVELS: usize = 4;
 
@@ -51,7 +53,9 @@ pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
         .map(|address| depths.of(*address, &mut Vec::new()))
         .collect::<Result<Vec<_>>>()?;
     handlers.sort_unstable_by(|a, b| b.cmp(a));
-    Ok(thread + handlers.iter().take(LEVELS).map(|depth| depth + SAVED).sum::<u32>())
+    let again = functions.iter().filter(|f| f.name.contains(PANIC)).map(|f| depths.of(f.address, &mut Vec::new()));
+    let again = again.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0);
+    Ok(thread + again + handlers.iter().take(LEVELS).map(|depth| depth + SAVED).sum::<u32>())
 }
 
 /// Everything that the processor may start.
@@ -72,7 +76,9 @@ impl Depths<'_> {
         let Some(shape) = self.shapes.get(&address) else { return Ok(0) };
         if path.contains(&address) {
             let name = self.name(address);
-            if name.contains(DRILL) {
+            // A panic while panicking: `worst` counts it, and it only resets.
+            let panicking = path.iter().any(|address| self.name(*address).contains(PANIC));
+            if name.contains(DRILL) || panicking {
                 return Ok(0);
             }
             let names: Vec<&str> = path.iter().map(|address| self.name(*address)).collect();

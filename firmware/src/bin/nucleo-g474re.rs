@@ -14,7 +14,7 @@ use firmware::control::{Control, Orders, Untimed};
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
 use firmware::script::{SETTINGS, SUPERVISION};
 use firmware::tasks::{self, Source};
-use firmware::{log, stack_guard};
+use firmware::{last_words, log, stack_guard};
 use model::supervisor::Fault;
 
 /// Runs the control task, on the interrupt of a peripheral that is not used.
@@ -55,7 +55,10 @@ fn main() -> ! {
             }
         }
         // Nothing feeds the watchdog: the chip resets and says it again, its output at zero.
-        Err(error) => log::refused(error.field),
+        Err(error) => {
+            last_words::leave(Fault::Config, 0);
+            log::refused(error.field);
+        }
     }
     loop {
         cortex_m::asm::wfi();

@@ -39,6 +39,10 @@ pub struct StatusReport {
     pub rate_hz: u32,
     /// Host silence that is allowed, in s.
     pub silence_limit_s: f64,
+    /// Lowest scaled stiffness in reach, in V.
+    pub lowest_v: f64,
+    /// Highest scaled stiffness in reach, in V.
+    pub highest_v: f64,
     /// Late ticks.
     pub overruns: u32,
     /// The fault that is present.
@@ -106,6 +110,8 @@ impl StatusReport {
             firmware: format!("{}.{}.{}{revision}", firmware.major, firmware.minor, firmware.patch),
             rate_hz: status.rate_hz,
             silence_limit_s: f64::from(status.silence_limit_ticks) / f64::from(status.rate_hz.max(1)),
+            lowest_v: status.lowest.to_f64(),
+            highest_v: status.highest.to_f64(),
             overruns: status.overruns,
             fault: status.fault.name(),
             fault_code: status.fault.0,
@@ -118,11 +124,12 @@ impl StatusReport {
     /// A few lines of text.
     pub fn text(&self) -> String {
         let Self { firmware, protocol, rate_hz, silence_limit_s, overruns, fault, last_fault, sample, link, .. } = self;
+        let Self { lowest_v, highest_v, .. } = self;
         let measured = sample.measured_v.map_or_else(|| "no sensor".to_owned(), |volts| format!("{volts:.3} V"));
         let limits = if sample.limits.is_empty() { "none".to_owned() } else { sample.limits.join(", ") };
         format!(
             "state      {}, fault {fault}, last reset's {last_fault}\n\
-             target     {:.3} V\n\
+             target     {:.3} V, in reach {lowest_v} to {highest_v} V\n\
              applied    {:.3} V, DAC code {}\n\
              stiffness  {:.3} V estimated; measured: {measured}\n\
              limits     {limits}\n\

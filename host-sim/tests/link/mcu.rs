@@ -19,7 +19,7 @@ use model::{Settings, Spring, supervisor};
 use serialport::{SerialPort, TTYPort};
 
 /// What goes wrong, and what it is.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Setup {
     /// One in so many bytes arrives with a flipped bit, in both directions.
     pub(crate) damage_one_in: Option<u32>,
@@ -27,6 +27,15 @@ pub(crate) struct Setup {
     pub(crate) sensor: bool,
     /// It hangs up after so many ticks.
     pub(crate) hang_up_after: Option<u64>,
+    /// How long the host may be silent, in ms.
+    pub(crate) silence_ms: u32,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        // Longer than a busy machine takes to start one command after the other.
+        Self { damage_one_in: None, sensor: false, hang_up_after: None, silence_ms: 5000 }
+    }
 }
 
 /// What the test can see and do while the MCU runs.
@@ -192,12 +201,14 @@ struct Chip {
 
 impl Chip {
     fn new(setup: Setup, shared: Arc<Mutex<Shared>>) -> Self {
-        let control = Control::new(&Settings::PAPER, &supervisor::Settings::DEFAULT, None).unwrap();
+        let host_timeout_s = f64::from(setup.silence_ms) / 1000.0;
+        let supervision = supervisor::Settings { host_timeout_s, ..supervisor::Settings::DEFAULT };
+        let control = Control::new(&Settings::PAPER, &supervision, None).unwrap();
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
         let about = About {
             firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd },
             rate_hz: 1000,
-            silence_limit_ticks: 500,
+            silence_limit_ticks: setup.silence_ms,
             last_fault: Fault::NONE,
         };
         let view =

@@ -69,14 +69,16 @@ fn telemetry() -> impl Strategy<Value = Telemetry> {
 }
 
 fn status() -> impl Strategy<Value = Status> {
-    (any::<[u8; 3]>(), any::<[u32; 4]>(), fault(), fault(), telemetry(), any::<[u32; 7]>()).prop_map(
-        |([major, minor, patch], numbers, fault, last_fault, sample, counts)| {
+    (any::<[u8; 3]>(), any::<[u32; 4]>(), volts(), volts(), fault(), fault(), telemetry(), any::<[u32; 7]>()).prop_map(
+        |([major, minor, patch], numbers, lowest, highest, fault, last_fault, sample, counts)| {
             let [revision, rate_hz, silence_limit_ticks, overruns] = numbers;
             let [accepted, repeated, damaged, oversize, bad_version, out_of_order, unknown] = counts;
             Status {
                 firmware: Firmware { major, minor, patch, revision },
                 rate_hz,
                 silence_limit_ticks,
+                lowest,
+                highest,
                 overruns,
                 fault,
                 last_fault,

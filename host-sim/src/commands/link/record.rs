@@ -68,6 +68,10 @@ pub(super) fn run(talk: &mut Talk, arguments: &Arguments) -> Result<()> {
     if schedule.is_some() && !arguments.arm && talk.status.sample.state != State::Armed {
         bail!("{}: not armed ({}); expected --arm with --input", talk.client.name(), talk.status.sample.state);
     }
+    if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {
+        // Before anything is armed or written, not in the middle of an experiment.
+        schedule.check_range(name, talk.status.lowest.to_f64(), talk.status.highest.to_f64())?;
+    }
     let length = schedule.as_ref().map(|schedule| Duration::from_secs_f64(schedule.end_s() - schedule.start_s()));
     let whole = arguments.time()?.or(length);
     let ticks = f64::from(talk.status.rate_hz) / arguments.rate_hz;
