@@ -43,7 +43,8 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("vsj: {error:#}");
+            // What a file says may break lines; an error is one.
+            eprintln!("vsj: {}", format!("{error:#}").replace(['\n', '\r'], " "));
             ExitCode::from(if error.is::<BadInput>() { 2 } else { 1 })
         }
     }

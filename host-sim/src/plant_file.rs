@@ -11,23 +11,24 @@
 use std::path::Path;
 
 use anyhow::Result;
-use model::Plant;
+use model::{Plant, SampleTime, estimator};
 use serde::Deserialize;
+use toml::Spanned;
 
 use crate::bad_input;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlantFile {
-    schema: u32,
+    schema: Spanned<u32>,
     relaxation: Relaxation,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Relaxation {
-    share: f64,
-    tau_s: f64,
+    share: Spanned<f64>,
+    tau_s: Spanned<f64>,
 }
 
 /// `paper`, or the path of a file.
@@ -45,20 +46,29 @@ pub fn load(plant: &str) -> Result<Plant> {
 }
 
 fn parse(name: &str, text: &str) -> Result<Plant> {
-    let file: PlantFile = match toml::from_str(text) {
+    let place = |start: usize| {
+        let before = &text[..start.min(text.len())];
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+        format!("{name}, line {line}, column {column}")
+    };
+    let PlantFile { schema, relaxation: Relaxation { share, tau_s } } = match toml::from_str(text) {
         Ok(file) => file,
         Err(error) => {
-            let before = &text[..error.span().map_or(0, |span| span.start).min(text.len())];
-            let line = before.matches('\n').count() + 1;
-            let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
-            let what = error.message().replace('\n', ", ");
-            bad_input!("{name}, line {line}, column {column}: {what}; expected schema, [relaxation] share and tau_s");
+            let (at, what) = (place(error.span().map_or(0, |span| span.start)), error.message().replace('\n', ", "));
+            bad_input!("{at}: {what}; expected schema, [relaxation] share and tau_s");
         }
     };
-    if file.schema != 1 {
-        bad_input!("{name}: schema = {} is not known; expected 1", file.schema);
+    if *schema.get_ref() != 1 {
+        bad_input!("{}: schema = {} is not known; expected 1", place(schema.span().start), schema.get_ref());
     }
-    Ok(Plant { share: file.relaxation.share, time_constant_s: file.relaxation.tau_s })
+    let plant = Plant { share: *share.get_ref(), time_constant_s: *tau_s.get_ref() };
+    // At the fastest rate; a slower one may refuse a short time constant later.
+    if let Err(error) = estimator::Config::new(&plant, SampleTime::from_rate(10_000.0)?) {
+        let at = if error.field == "share" { share.span() } else { tau_s.span() };
+        bad_input!("{}: {error}", place(at.start));
+    }
+    Ok(plant)
 }
 
 #[cfg(test)]
@@ -80,7 +90,12 @@ mod tests {
                 "schema = 1\n[relaxation]\nshare = 0.2\ntau_s = 3.0\nta = 1.0\n",
                 "p, line 5, column 1: unknown field `ta`",
             ),
-            ("schema = 2\n[relaxation]\nshare = 0.2\ntau_s = 3.0\n", "schema = 2 is not known; expected 1"),
+            (
+                "schema = 2\n[relaxation]\nshare = 0.2\ntau_s = 3.0\n",
+                "p, line 1, column 10: schema = 2 is not known; expected 1",
+            ),
+            ("schema = 1\n[relaxation]\nshare = -1.0\ntau_s = 3.0\n", "p, line 3, column 9: share = -1 is not allowed"),
+            ("schema = 1\n[relaxation]\nshare = 0.1\ntau_s = nan\n", "p, line 4, column 9: time_constant_s = NaN"),
             ("schema = ", "p, line 1"),
         ] {
             let got = parse("p", text).unwrap_err().to_string();

@@ -12,6 +12,8 @@ use crate::bad_input::BadInput;
 /// One row of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
+    /// Line of the file, from 1.
+    pub line: usize,
     /// In s, increasing.
     pub time_s: f64,
     /// Commanded voltage in V.
@@ -33,14 +35,28 @@ pub struct Record {
 pub const MEASURED: &str = "stiffness";
 
 impl Record {
-    /// Reads a file.
+    /// Checks that an amplifier can put out every voltage of the record.
+    ///
+    /// # Errors
+    /// [`BadInput`] with file, line and column of the first voltage outside of `lowest_v` to `highest_v`.
+    pub fn check_range(&self, lowest_v: f64, highest_v: f64) -> Result<()> {
+        match self.rows.iter().find(|row| !(lowest_v..=highest_v).contains(&row.voltage_v)) {
+            None => Ok(()),
+            Some(Row { line, voltage_v, .. }) => bad_input!(
+                "{}, line {line}, column voltage_v: {voltage_v} V; expected {lowest_v} to {highest_v} V, the amplifier's range",
+                self.name
+            ),
+        }
+    }
+
+    /// Reads a file; `measured` names the column of the measured stiffness, [`MEASURED`] unless the user says another.
     ///
     /// # Errors
     /// [`BadInput`] with file, line, column and what was expected.
-    pub fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path, measured: &str) -> Result<Self> {
         let name = path.display().to_string();
         match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&name, &text),
+            Ok(text) => Self::parse(&name, &text, measured),
             Err(error) => bad_input!("{name}: cannot be read: {error}"),
         }
     }
@@ -49,7 +65,7 @@ impl Record {
     ///
     /// # Errors
     /// As [`Record::open`].
-    pub fn parse(name: &str, text: &str) -> Result<Self> {
+    pub fn parse(name: &str, text: &str, measured: &str) -> Result<Self> {
         let place = Place { name, text };
         let mut reader =
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
@@ -59,14 +75,18 @@ impl Record {
             column(wanted).ok_or_else(|| {
                 let found = header.iter().collect::<Vec<_>>().join(",");
                 let at = place.of(header.position());
+                let also = if measured == MEASURED { String::new() } else { format!(", {measured}") };
                 BadInput(format!(
-                    "{at}: no column `{wanted}`; expected a header with time_s and voltage_v, found `{found}`"
+                    "{at}: no column `{wanted}`; expected a header with time_s, voltage_v{also}, found `{found}`"
                 ))
             })
         };
-        let (time, voltage, measured) = (required("time_s")?, required("voltage_v")?, column(MEASURED));
+        let (time, voltage) = (required("time_s")?, required("voltage_v")?);
+        // The usual column may be absent, one that was asked for must not.
+        let measured = if measured == MEASURED { column(measured) } else { Some(required(measured)?) };
 
         let mut rows: Vec<Row> = Vec::new();
+        let mut lines = Lines { text, byte: 0, line: 1 };
         for record in reader.records() {
             let record = record.map_err(|error| place.unreadable(&error))?;
             let number = |index: usize| match record[index].parse::<f64>() {
@@ -76,8 +96,12 @@ impl Record {
                     Err(BadInput(format!("{at}, column {column}: `{}` is not a finite number", &record[index])))
                 }
             };
-            let row =
-                Row { time_s: number(time)?, voltage_v: number(voltage)?, measured: measured.map(number).transpose()? };
+            let row = Row {
+                line: lines.at(record.position()),
+                time_s: number(time)?,
+                voltage_v: number(voltage)?,
+                measured: measured.map(number).transpose()?,
+            };
             if let Some(last) = rows.last()
                 && row.time_s <= last.time_s
             {
@@ -93,6 +117,24 @@ impl Record {
     }
 }
 
+/// Finds the lines of records, in order.
+struct Lines<'a> {
+    text: &'a str,
+    byte: usize,
+    line: usize,
+}
+
+impl Lines<'_> {
+    /// The line of a record. Its position is where the reader stood before comments and blank lines.
+    fn at(&mut self, position: Option<&csv::Position>) -> usize {
+        let start = position.map_or(0, |at| at.byte() as usize).clamp(self.byte, self.text.len());
+        self.line += self.text[self.byte..start].matches('\n').count();
+        self.byte = start;
+        let skipped = self.text[start..].lines().take_while(|line| line.trim().is_empty() || line.starts_with('#'));
+        self.line + skipped.count()
+    }
+}
+
 /// Names places of a text.
 struct Place<'a> {
     name: &'a str,
@@ -100,13 +142,9 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// File and line of a record. Its position is where the reader stood before comments and blank lines.
+    /// File and line of a record.
     fn of(&self, position: Option<&csv::Position>) -> String {
-        let start = position.map_or(0, |at| at.byte() as usize).min(self.text.len());
-        let skipped =
-            self.text[start..].lines().take_while(|line| line.trim().is_empty() || line.starts_with('#')).count();
-        let line = 1 + self.text[..start].matches('\n').count() + skipped;
-        format!("{}, line {line}", self.name)
+        format!("{}, line {}", self.name, Lines { text: self.text, byte: 0, line: 1 }.at(position))
     }
 
     fn unreadable(&self, error: &csv::Error) -> BadInput {
@@ -125,15 +163,24 @@ mod tests {
     use super::*;
 
     fn message(text: &str) -> String {
-        let error = Record::parse("data.csv", text).unwrap_err();
+        let error = Record::parse("data.csv", text, MEASURED).unwrap_err();
         error.downcast_ref::<BadInput>().expect("the caller's to mend").0.clone()
     }
 
     #[test]
     fn columns_come_in_any_order_with_comments_between() {
         let text = "# a\r\nstiffness,voltage_v,time_s\r\n0,100,1\r\n# b\r\n5, 200 ,2";
-        let record = Record::parse("r", text).unwrap();
-        assert_eq!(record.rows[1], Row { time_s: 2.0, voltage_v: 200.0, measured: Some(5.0) });
+        let record = Record::parse("r", text, MEASURED).unwrap();
+        assert_eq!(record.rows[1], Row { line: 5, time_s: 2.0, voltage_v: 200.0, measured: Some(5.0) });
+    }
+
+    #[test]
+    fn another_column_may_be_the_measured_one_if_it_is_there() {
+        let text = "time_s,voltage_v,gauge\n0,0,7\n1,0,8\n";
+        assert_eq!(Record::parse("r", text, "gauge").unwrap().rows[1].measured, Some(8.0));
+        assert_eq!(Record::parse("r", text, MEASURED).unwrap().rows[1].measured, None);
+        let error = Record::parse("r", text, "scale").unwrap_err().to_string();
+        assert!(error.contains("no column `scale`; expected a header with time_s, voltage_v, scale"), "{error}");
     }
 
     #[test]

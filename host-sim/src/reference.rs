@@ -65,6 +65,8 @@ enum Mode {
 
 /// How far beyond a limit still counts as at it, in V.
 const TOLERANCE_V: f64 = 1e-9;
+/// The shortest time that a mode lasts, in s: so the solution always gets on.
+const SHORTEST_S: f64 = 1e-9;
 
 impl Loop {
     /// A spring at rest without voltage, to be solved in steps of `sample_s`.
@@ -170,12 +172,14 @@ impl Solution {
     }
 
     /// Any stretch of time passes, the target starting at `from_v` with a `slope` in V/s.
+    ///
+    /// Limits are looked for at the end of each sample: one that is touched and left again within a sample is not seen.
     pub fn advance(&mut self, from_v: f64, slope: f64, duration_s: f64) {
         let mut passed = 0.0;
         while passed < duration_s {
             let target = from_v + slope * passed;
             let mode = self.mode(target, slope);
-            let rest = duration_s - passed;
+            let rest = (duration_s - passed).min(self.sample_s);
             let mut lasts = rest;
             if self.after(mode, target, slope, rest).broken(mode, target + slope * rest, slope) {
                 // The mode ends within: find where, but always get on.
@@ -188,7 +192,7 @@ impl Solution {
                         good = middle;
                     }
                 }
-                lasts = bad.max(1e-9).min(rest);
+                lasts = bad.max(SHORTEST_S).min(rest);
             }
             *self = self.after(mode, target, slope, lasts);
             passed += lasts;
@@ -197,10 +201,14 @@ impl Solution {
     }
 
     /// The target jumps to `target_v` now. Without a slew limit the voltage, and part of the stiffness, follow at once.
+    ///
+    /// A voltage outside of the range is brought to its end, whatever the slew.
     pub fn jump(&mut self, target_v: f64) {
         let (lowest, highest) = self.system.range_v;
         let wanted = self.law_at(self.w, self.z, target_v);
-        if self.system.slew_v_per_s.is_infinite() {
+        // The range wins over the slew.
+        self.u = self.u.clamp(lowest, highest);
+        if self.system.slew_v_per_s.is_infinite() || (wanted - self.u).abs() <= self.system.slew_v_per_s * SHORTEST_S {
             self.u = wanted.clamp(lowest, highest);
         }
         self.target = target_v;
@@ -397,11 +405,45 @@ mod tests {
         }
     }
 
+    /// A loop that swings in and out of its limits: long stretches see as many limits as single samples.
+    #[test]
+    fn limits_within_a_long_stretch_are_seen() {
+        for (range_v, slew_v_per_s) in [
+            ((0.0, 120.0), f64::INFINITY),
+            ((95.0, 700.0), f64::INFINITY),
+            ((0.0, 700.0), 60.0),
+            ((20.0, 130.0), 100.0),
+        ] {
+            let system = Loop { gains: Some((1.0, 5.0)), range_v, slew_v_per_s, ..PAPER };
+            let mut long = system.at_rest(1e-3);
+            long.advance(100.0, 0.0, 10.0);
+            let mut moments = vec![Moment::default(); 10_000];
+            system.at_rest(1e-3).run(&[100.0; 10_001], &mut moments);
+            let last = moments[9_999];
+            assert!((last.stiffness - long.moment().stiffness).abs() < 1e-6, "{range_v:?} {slew_v_per_s} {last:?}");
+            for Moment { voltage, .. } in moments {
+                assert!((range_v.0 - 1e-6..=range_v.1 + 1e-6).contains(&voltage), "{voltage} outside of {range_v:?}");
+            }
+        }
+    }
+
+    /// Ten decades of slew take no time to solve, and a fast one is no limit.
+    #[test]
+    fn a_very_fast_slew_is_like_none() {
+        let at = |slew_v_per_s| {
+            let mut solution = Loop { slew_v_per_s, range_v: (50.0, 700.0), ..PAPER }.at_rest(1e-3);
+            solution.advance(100.0, 0.0, 3.0);
+            solution.moment().stiffness
+        };
+        for slew in [1e5, 1e7, 1e9] {
+            assert!((at(slew) - at(f64::INFINITY)).abs() < 0.1, "{slew}: {} {}", at(slew), at(f64::INFINITY));
+        }
+    }
+
     #[test]
     fn a_slew_limits_the_voltage_and_is_left_again() {
         let system = Loop { slew_v_per_s: 100.0, ..PAPER };
         let mut solution = system.at_rest(0.01);
-        solution.jump(100.0);
         solution.advance(100.0, 0.0, 1.0);
         assert!((solution.moment().voltage - 100.0).abs() < 1e-6, "one second at 100 V/s: {:?}", solution.moment());
         solution.advance(100.0, 0.0, 50.0);

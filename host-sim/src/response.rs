@@ -61,3 +61,53 @@ pub fn measure(run: &Run, samples: &[Sample], change: &Change, system: &Loop) ->
         bound_t97_s: shortest_time(system, from_v, to_v, 0.97),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use model::{DacCode, Limits, ScaledStiffness, Volts};
+
+    use super::*;
+
+    const SYSTEM: Loop =
+        Loop { share: 0.1, time_constant_s: 5.0, gains: None, range_v: (0.0, 700.0), slew_v_per_s: f64::INFINITY };
+
+    /// A run whose stiffness and voltage are given functions of time.
+    fn run(rate_hz: f64, ticks: usize, stiffness: impl Fn(f64) -> f64, voltage: impl Fn(f64) -> f64) -> Run {
+        let sample = |tick: usize| {
+            let time = 2.0 + tick as f64 / rate_hz;
+            Sample {
+                code: DacCode(0),
+                applied: Volts::new(voltage(time)).unwrap(),
+                stiffness: ScaledStiffness(Volts::new(stiffness(time)).unwrap().0),
+                limits: Limits::NONE,
+                reference: 0.0,
+            }
+        };
+        Run { start_s: 2.0, rate_hz, with: (0..ticks).map(sample).collect(), without: Vec::new() }
+    }
+
+    /// Straight lines at a rate that no time falls on: the crossings lie between ticks.
+    #[test]
+    fn crossings_lie_between_ticks() {
+        let run = run(333.0, 3330, |t| (50.0 * (t - 3.0)).clamp(0.0, 110.0), |t| if t < 4.0 { 300.0 } else { 100.0 });
+        let change = Change { start_s: 3.0, end_s: 8.0, from_v: 0.0, to_v: 100.0 };
+        let got = measure(&run, &run.with, &change, &SYSTEM);
+        for (got, expected) in [(got.t50_s, 1.0), (got.t90_s, 1.8), (got.t97_s, 1.94)] {
+            assert!((got.unwrap() - expected).abs() < 1e-5, "{got:?} {expected}");
+        }
+        assert!((got.overshoot_percent - 10.0).abs() < 1e-3);
+        assert_eq!(got.peak_v, 300.0);
+    }
+
+    /// Downwards, never complete, and the next change right behind: its first tick does not count.
+    #[test]
+    fn a_step_down_has_its_peak_below() {
+        let stiffness = |t: f64| if t < 5.0 { 300.0 - 30.0 * (t - 3.0).max(0.0) } else { 0.0 };
+        let run = run(100.0, 600, stiffness, |t| if t < 4.0 { 50.0 } else { 250.0 });
+        let change = Change { start_s: 3.0, end_s: 5.0, from_v: 300.0, to_v: 200.0 };
+        let got = measure(&run, &run.with, &change, &SYSTEM);
+        assert!((got.t50_s.unwrap() - 5.0 / 3.0).abs() < 1e-5);
+        assert_eq!((got.t90_s, got.t97_s, got.overshoot_percent, got.peak_v), (None, None, 0.0, 50.0));
+        assert!(got.bound_t97_s.is_some());
+    }
+}

@@ -22,6 +22,8 @@ pub struct Piece {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     pieces: Vec<Piece>,
+    /// Voltage from the last moment on, in V.
+    end_v: f64,
 }
 
 /// A change from one plateau to the next.
@@ -73,12 +75,17 @@ impl Schedule {
             points.extend([(start, level), (start + ramp_s, level + STAIR_STEP_V)]);
         }
         points.push((STAIR_END_S, STAIR_STEP_V * STAIR_STARTS_S.len() as f64));
-        Self { pieces: pieces(points, Between::Linear) }
+        Self::new(points, Between::Linear)
     }
 
     /// The schedule that a record commanded.
     pub fn from_record(record: &Record, between: Between) -> Self {
-        Self { pieces: pieces(record.rows.iter().map(|row| (row.time_s, row.voltage_v)), between) }
+        Self::new(record.rows.iter().map(|row| (row.time_s, row.voltage_v)).collect(), between)
+    }
+
+    fn new(points: Vec<(f64, f64)>, between: Between) -> Self {
+        let end_v = points.last().map_or(0.0, |last| last.1);
+        Self { pieces: pieces(points, between), end_v }
     }
 
     /// First moment, in s.
@@ -123,13 +130,12 @@ impl Schedule {
     /// # Errors
     /// [`crate::bad_input::BadInput`] with the first voltage outside of `lowest_v` to `highest_v`.
     pub fn check_range(&self, name: &str, lowest_v: f64, highest_v: f64) -> Result<()> {
-        for piece in &self.pieces {
-            for (time, volts) in [(piece.start_s, piece.from_v), (piece.end_s, piece.to_v)] {
-                if !(lowest_v..=highest_v).contains(&volts) {
-                    bad_input!(
-                        "{name} asks for {volts} V at {time} s; expected {lowest_v} to {highest_v} V, the amplifier's range"
-                    );
-                }
+        let ends = self.pieces.iter().flat_map(|piece| [(piece.start_s, piece.from_v), (piece.end_s, piece.to_v)]);
+        for (time, volts) in ends.chain([(self.end_s(), self.end_v)]) {
+            if !(lowest_v..=highest_v).contains(&volts) {
+                bad_input!(
+                    "{name} asks for {volts} V at {time} s; expected {lowest_v} to {highest_v} V, the amplifier's range"
+                );
             }
         }
         Ok(())
@@ -137,24 +143,25 @@ impl Schedule {
 
     /// The voltage at increasing moments, each call O(1).
     pub fn reader(&self) -> Reader<'_> {
-        Reader { pieces: &self.pieces, index: 0 }
+        Reader { schedule: self, index: 0 }
     }
 }
 
 /// Reads a schedule in order of time.
 #[derive(Clone, Debug)]
 pub struct Reader<'a> {
-    pieces: &'a [Piece],
+    schedule: &'a Schedule,
     index: usize,
 }
 
 impl Reader<'_> {
     /// The voltage just after `time_s`, in V; later calls must not ask for earlier times.
     pub fn at(&mut self, time_s: f64) -> f64 {
-        while self.index + 1 < self.pieces.len() && self.pieces[self.index].end_s <= time_s {
+        let pieces = &self.schedule.pieces;
+        while self.index + 1 < pieces.len() && pieces[self.index].end_s <= time_s {
             self.index += 1;
         }
-        self.piece().at(time_s)
+        if time_s >= self.schedule.end_s() { self.schedule.end_v } else { self.piece().at(time_s) }
     }
 
     /// The straight stretches from `from_s`, not before the last moment read, to `until_s`.
@@ -165,15 +172,15 @@ impl Reader<'_> {
             (start < until_s).then(|| {
                 let from_v = self.at(start);
                 let piece = self.piece();
-                // The last piece goes on for ever.
-                time = if piece.end_s > start { piece.end_s.min(until_s) } else { until_s };
-                Stretch { from_v, slope: piece.slope(), duration_s: time - start }
+                let over = piece.end_s <= start;
+                time = if over { until_s } else { piece.end_s.min(until_s) };
+                Stretch { from_v, slope: if over { 0.0 } else { piece.slope() }, duration_s: time - start }
             })
         })
     }
 
     fn piece(&self) -> Piece {
-        self.pieces[self.index]
+        self.schedule.pieces[self.index]
     }
 }
 
@@ -236,6 +243,7 @@ fn merged_plateaus(pieces: &[Piece]) -> Vec<Piece> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::MEASURED;
 
     #[test]
     fn the_stair_is_the_reports() {
@@ -254,9 +262,13 @@ mod tests {
     #[test]
     fn a_file_is_held_or_straight_between_its_rows() {
         let text = "time_s,voltage_v\n0,0\n2,100\n4,100\n6,50\n9,50\n";
-        let record = Record::parse("f", text).unwrap();
+        let record = Record::parse("f", text, MEASURED).unwrap();
         let held = Schedule::from_record(&record, Between::Hold);
         assert_eq!([1.9, 2.0, 5.9, 6.0].map(|time| held.reader().at(time)), [0.0, 100.0, 100.0, 50.0]);
+        let high_end = Record::parse("f", "time_s,voltage_v\n0,0\n2,900\n", MEASURED).unwrap();
+        let high_end = Schedule::from_record(&high_end, Between::Hold);
+        assert!(high_end.check_range("f", 0.0, 700.0).is_err(), "the last row counts too");
+        assert_eq!([1.9, 2.0].map(|time| high_end.reader().at(time)), [0.0, 900.0]);
         assert_eq!(held.changes().len(), 2);
         let straight = Schedule::from_record(&record, Between::Linear);
         assert_eq!([1.0, 3.0, 5.0].map(|time| straight.reader().at(time)), [50.0, 100.0, 75.0]);

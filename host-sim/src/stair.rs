@@ -1,9 +1,10 @@
 //! What a run says, laid beside what the report printed and measured.
 
 use anyhow::Result;
+use model::Limits;
 use serde::Serialize;
 
-use crate::experiment::{Experiment, Run, continuous, reference_at};
+use crate::experiment::{Experiment, Run, Sample, continuous, max_fixed_point_error, reference_at};
 use crate::misprint::Pair;
 use crate::record::Record;
 use crate::reference::Loop;
@@ -17,12 +18,34 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// One a change of the target.
     pub steps: Vec<Response>,
-    /// Largest difference between fixed point and reference over every tick, with and without controller, in V.
+    /// Largest difference between fixed point and reference over every tick of the controlled loop, in V.
     pub max_fixed_point_error: f64,
+    /// The same of the spring left alone: nothing there corrects the rounding of the DAC.
+    pub max_fixed_point_error_without: f64,
+    /// In how many ticks of the shown loop a limit acted.
+    pub limited_ticks: LimitedTicks,
     /// How many printed numbers were compared, and how many of them the reference reproduces to the last digit.
     pub printed_compared: usize,
     /// See `printed_compared`.
     pub printed_agree: usize,
+}
+
+/// Ticks in which a limit acted, by limit.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LimitedTicks {
+    /// The upper end of the amplifier's range.
+    pub upper: usize,
+    /// Its lower end.
+    pub lower: usize,
+    /// Its slew.
+    pub slew: usize,
+}
+
+impl LimitedTicks {
+    fn of(samples: &[Sample]) -> Self {
+        let count = |limit| samples.iter().filter(|sample| sample.limits.any_of(limit)).count();
+        Self { upper: count(Limits::UPPER), lower: count(Limits::LOWER), slew: count(Limits::SLEW) }
+    }
 }
 
 /// One moment of the experiment. Stiffness on the scale of volts.
@@ -73,8 +96,15 @@ impl Report {
         let samples = if controlled { &run.with } else { &run.without };
         let system = continuous(&experiment.settings);
         let steps = experiment.schedule.changes().iter().map(|change| measure(run, samples, change, &system)).collect();
-        let max_fixed_point_error = run.max_fixed_point_error();
-        Ok(Self { rows, steps, max_fixed_point_error, printed_compared, printed_agree })
+        Ok(Self {
+            rows,
+            steps,
+            max_fixed_point_error: max_fixed_point_error(&run.with),
+            max_fixed_point_error_without: max_fixed_point_error(&run.without),
+            limited_ticks: LimitedTicks::of(samples),
+            printed_compared,
+            printed_agree,
+        })
     }
 }
 

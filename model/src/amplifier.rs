@@ -47,6 +47,8 @@ impl Amplifier {
 pub struct Config {
     lowest: Signal,
     highest: Signal,
+    /// False where a tick is long enough for any change.
+    slews: bool,
     step: Accumulator,
     codes_per_volt: I12F20,
     volts_per_code: I3F29,
@@ -114,18 +116,13 @@ impl Config {
         OutOfRange::check("dac_bits", f64::from(dac_bits), 8.0..=16.0, "bits")?;
         let lowest = OutOfRange::check("min_v", min_v, 0.0..=full_scale - 10.0, "V")?;
         let highest = OutOfRange::check("max_v", max_v, lowest + 10.0..=full_scale, "V")?;
-        let step = match slew_v_per_s {
-            // A step of the full scale never limits.
-            None => full_scale,
-            Some(slew) => {
-                let slew = OutOfRange::check("slew_v_per_s", slew, 1.0..=1e9, "V/s")?;
-                (slew * sample_time.seconds()).min(full_scale)
-            }
-        };
+        let slew = OutOfRange::check("slew_v_per_s", slew_v_per_s.unwrap_or(1e9), 1.0..=1e9, "V/s")?;
+        let step = (slew * sample_time.seconds()).min(full_scale);
         let unit = amplifier.volts_per_code();
         let mut config = Self {
             lowest: Signal::ZERO,
             highest: Signal::ZERO,
+            slews: step < full_scale,
             step: Accumulator::from_num(step),
             codes_per_volt: I12F20::from_num(1.0 / unit),
             // Rounded down: the highest code never stands for more than the full scale.
@@ -153,7 +150,7 @@ impl Config {
             code,
             applied: self.volts(code),
             limits: Limits::NONE
-                .with(Limits::SLEW, slewed != wanted.0)
+                .with(Limits::SLEW, self.slews & (slewed != wanted.0))
                 .with(Limits::UPPER, slewed > self.highest)
                 .with(Limits::LOWER, slewed < self.lowest),
         }
@@ -237,6 +234,7 @@ mod tests {
             prop_assert!((out.to_f64() - ideal).abs() <= 0.503 * unit + 2e-6);
             prop_assert_eq!(drive.limits.any_of(Limits::UPPER), volts(wanted) > highest);
             prop_assert_eq!(drive.limits.any_of(Limits::LOWER), volts(wanted) < lowest);
+            prop_assert!(!drive.limits.any_of(Limits::SLEW), "there is no limit of the slew");
         }
 
         #[test]

@@ -120,7 +120,8 @@ impl Config {
 
     /// Takes over a running `state` without a bump: with the same `target`, the next voltage is the last one.
     ///
-    /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once.
+    /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once, and
+    /// without a pre-compensator the voltage goes to the target.
     pub fn adopt(&self, state: &mut State, target: Volts) {
         if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
             let (target, _) = self.amplifier.reachable(target);

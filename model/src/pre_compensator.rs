@@ -27,7 +27,7 @@ const ENOUGH_V: f64 = 1024.0;
 pub struct Gains {
     /// Volts per volt of error, 0.001 to 100, and no more than what brings the spring to its target in one tick.
     pub proportional: f64,
-    /// Volts per volt of error and second, 0 to `proportional` / two sample times.
+    /// Volts per volt of error and second, 0 to `proportional` / ten sample times.
     pub integral_per_s: f64,
 }
 
@@ -69,7 +69,8 @@ impl ProportionalIntegral {
         let deadbeat = if a > share { (1.0 - a) / (a - share) } else { f64::INFINITY };
         let highest = deadbeat.min(100.0);
         let proportional = OutOfRange::check("proportional_gain", gains.proportional, 0.001..=highest, "V/V")?;
-        let fastest = proportional / (2.0 * seconds);
+        // A reset within a few ticks makes the loop hunt over DAC codes.
+        let fastest = proportional / (10.0 * seconds);
         let integral = OutOfRange::check("integral_gain_per_s", gains.integral_per_s, 0.0..=fastest, "1/s")?;
         let g = 1.0 / (1.0 + proportional * share);
         Ok(Self {
@@ -77,8 +78,7 @@ impl ProportionalIntegral {
             largest_error: Signal::from_num((ENOUGH_V / (proportional * g)).min(ENOUGH_V)),
             relaxed_gain: Gain::new(1.0 - g),
             integrator_gain: Gain::new(g),
-            // The slowest check above allows exactly 1/2, which a rate cannot hold.
-            reset: Rate::new((seconds * integral / proportional).min(0.499_999_999)),
+            reset: Rate::new(seconds * integral / proportional),
         })
     }
 
@@ -125,8 +125,8 @@ mod tests {
         assert_eq!(named(f64::NAN, 1.35), "proportional_gain");
         assert_eq!(named(4.0, -1.35), "integral_gain_per_s");
         assert_eq!(named(4.0, f64::NAN), "integral_gain_per_s");
-        // A reset faster than two ticks cannot be sampled.
-        assert_eq!(named(4.0, 2001.0), "integral_gain_per_s");
+        // A reset faster than ten ticks is not sampled well.
+        assert_eq!(named(4.0, 401.0), "integral_gain_per_s");
         // The spring would be past its target after one tick, back after two, and so on.
         let slow = SampleTime::from_rate(100.0).unwrap();
         let quick = Plant { share: 0.0, time_constant_s: 0.1 };

@@ -10,7 +10,7 @@ use host_sim::experiment::{Experiment, Run, paper_spring};
 use host_sim::output::files::{Files, write_csv};
 use host_sim::output::{plots, terminal};
 use host_sim::plant_file;
-use host_sim::record::Record;
+use host_sim::record::{MEASURED, Record};
 use host_sim::schedule::{Between, Schedule};
 use host_sim::stair::{Report, Rows};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -39,6 +39,9 @@ pub(crate) struct Arguments {
     /// What the voltage does between two rows of an input file
     #[arg(long, value_enum, default_value_t)]
     between: Between,
+    /// Column of an input file with the measured stiffness
+    #[arg(long, default_value = MEASURED, value_name = "NAME")]
+    column: String,
     /// Highest voltage of the amplifier, in V
     #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
     limit_v: f64,
@@ -64,7 +67,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Time between two rows of the CSV, in s; without it, every tick
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, requires = "out")]
     every: Option<f64>,
     /// One JSON object on stdout
     #[arg(long)]
@@ -125,11 +128,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         "stair" => ("the stair".to_owned(), Schedule::stair()),
         "step" => ("the stair of ideal steps".to_owned(), Schedule::ideal_stair()),
         file => {
-            let read = record.insert(Record::open(Path::new(file))?);
+            let read = record.insert(Record::open(Path::new(file), &arguments.column)?);
+            read.check_range(arguments.min_v, arguments.limit_v)?;
             (file.to_owned(), Schedule::from_record(read, arguments.between))
         }
     };
     let experiment = Experiment { name, schedule, settings: arguments.settings(plant) };
+    if let Err(error) = experiment.settings.check() {
+        bad_input!("{}{error}", option(error.field));
+    }
 
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
     let run = experiment.run(|done, all| {
@@ -153,6 +160,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     } else {
         let wrote: String = paths.iter().map(|path| format!("wrote {}\n", path.display())).collect();
         print(&(terminal::text(&report) + &wrote))
+    }
+}
+
+/// The option that sets a field of the settings.
+fn option(field: &str) -> &'static str {
+    match field {
+        "rate_hz" => "--rate-hz: ",
+        "full_scale_v" | "max_v" => "--limit-v: ",
+        "min_v" => "--min-v: ",
+        "slew_v_per_s" => "--slew-v-per-s: ",
+        "dac_bits" => "--dac-bits: ",
+        "proportional_gain" => "--kp: ",
+        "integral_gain_per_s" => "--ki: ",
+        "share" | "time_constant_s" => "--plant: ",
+        _ => "",
     }
 }
 

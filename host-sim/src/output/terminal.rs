@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::response::Response;
-use crate::stair::{Report, Row};
+use crate::stair::{LimitedTicks, Report, Row};
 
 /// The rows beside what was printed and measured, what does not agree and why, and the steps.
 pub fn text(report: &Report) -> String {
@@ -21,10 +21,22 @@ pub fn text(report: &Report) -> String {
             }
         }
     }
+    let Report { max_fixed_point_error, max_fixed_point_error_without, limited_ticks, .. } = report;
     line(
         &mut text,
-        &format!("Fixed point stays within {:.4} V of the reference at every tick.\n", report.max_fixed_point_error),
+        &format!(
+            "Fixed point stays within {max_fixed_point_error:.4} V of the reference at every tick \
+             (without controller {max_fixed_point_error_without:.4} V)."
+        ),
     );
+    let LimitedTicks { upper, lower, slew } = limited_ticks;
+    if upper + lower + slew > 0 {
+        line(
+            &mut text,
+            &format!("Limits acted: range {upper} ticks at its upper end, {lower} at its lower; slew {slew} ticks."),
+        );
+    }
+    text.push('\n');
     steps(&mut text, &report.steps);
     text
 }
@@ -42,8 +54,8 @@ fn rows(text: &mut String, rows: &[Row]) {
             text,
             &format!(
                 "{:5} {:8} | {:>8} {:9.3} {:9.3} | {:>8} {:9.3} {:9.3} | {:>8}{mark}",
-                row.time_s,
-                row.voltage_v,
+                tidy(row.time_s),
+                tidy(row.voltage_v),
                 optional(row.printed_with, 2),
                 row.with,
                 row.with_fixed,
@@ -71,8 +83,8 @@ fn steps(text: &mut String, steps: &[Response]) {
             text,
             &format!(
                 "{:4} -> {:3} | {:>7} {:>7} {:>7} | {:9.2} {:8.1} | {:>21}",
-                step.from_v,
-                step.to_v,
+                tidy(step.from_v),
+                tidy(step.to_v),
                 optional(step.t50_s, 3),
                 optional(step.t90_s, 3),
                 optional(step.t97_s, 3),
@@ -82,6 +94,12 @@ fn steps(text: &mut String, steps: &[Response]) {
             ),
         );
     }
+    line(text, "Shortest possible: any controller within range and slew, from a spring settled at the old value.");
+}
+
+/// At most six decimals, none that are zero.
+fn tidy(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
 }
 
 fn optional(value: Option<f64>, decimals: usize) -> String {
