@@ -8,13 +8,16 @@ fn main() {
     revision();
 
     let has = |feature| env::var_os(feature).is_some();
-    let memory = match (has("CARGO_FEATURE_NUCLEO_G474RE"), has("CARGO_FEATURE_MPS2_AN386")) {
+    let flash = match (has("CARGO_FEATURE_NUCLEO_G474RE"), has("CARGO_FEATURE_MPS2_AN386")) {
         (false, false) => return,
         (true, true) => panic!("one board at a time: nucleo-g474re or mps2-an386"),
-        (true, false) => package.join("src/nucleo/memory.x"),
-        (false, true) => package.join("src/mps2/memory.x"),
+        // Both banks in one piece. Dual-bank is how the chip is delivered (option bit DBANK = 1).
+        (true, false) => "0x08000000",
+        (false, true) => "0x00000000",
     };
-    // link.x includes `memory.x` by its bare name, and the linker looks at the top of the work tree first: none may lie there.
+    fs::write(out.join("flash.x"), format!("MEMORY {{ FLASH : ORIGIN = {flash}, LENGTH = 512K }}\n")).unwrap();
+    // link.x includes the work tree's memory.x by its bare name.
+    let memory = package.join("../memory.x");
     fs::copy(&memory, out.join("memory.x")).unwrap_or_else(|e| panic!("cannot copy {}: {e}", memory.display()));
     if has("CARGO_FEATURE_MPS2_AN386") {
         // No peripheral crate for this board: its interrupt names are in mps2/vectors.rs.
