@@ -47,8 +47,8 @@ impl Amplifier {
 pub struct Config {
     lowest: Signal,
     highest: Signal,
-    /// False where a tick is long enough for any change.
-    slews: bool,
+    /// What to report of a change that was held back: nothing where a tick is long enough for any change.
+    slew: Limits,
     step: Accumulator,
     codes_per_volt: I12F20,
     volts_per_code: I3F29,
@@ -122,7 +122,7 @@ impl Config {
         let mut config = Self {
             lowest: Signal::ZERO,
             highest: Signal::ZERO,
-            slews: step < full_scale,
+            slew: Limits::NONE.with(Limits::SLEW, step < full_scale),
             step: Accumulator::from_num(step),
             codes_per_volt: I12F20::from_num(1.0 / unit),
             // Rounded down: the highest code never stands for more than the full scale.
@@ -150,7 +150,7 @@ impl Config {
             code,
             applied: self.volts(code),
             limits: Limits::NONE
-                .with(Limits::SLEW, self.slews & (slewed != wanted.0))
+                .with(self.slew, slewed != wanted.0)
                 .with(Limits::UPPER, slewed > self.highest)
                 .with(Limits::LOWER, slewed < self.lowest),
         }
