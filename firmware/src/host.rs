@@ -3,6 +3,7 @@
 use core::cell::Cell;
 use core::future::Future;
 
+use cortex_m::singleton;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -49,7 +50,7 @@ pub trait Line {
 }
 
 /// Between the host and the control task, for ever.
-pub async fn talk(line: &mut impl Line, mut desk: Desk) -> ! {
+pub async fn talk(line: &mut impl Line, desk: &mut Desk) -> ! {
     ROLL_CALL.enrol(Member::Link);
     let mut buffer = [0; 32];
     loop {
@@ -95,11 +96,13 @@ async fn hand_over(letter: Letter, heard: bool) -> View {
     DONE.wait().await
 }
 
-/// A desk for the settings of [`crate::script`].
+/// The desk, for the settings of [`crate::script`]; `None` if somebody has it already. Not inlined: what it needs on the
+/// stack is not to stay there.
 ///
 /// # Errors
 /// [`OutOfRange`] names the setting.
-pub fn desk(last_fault: Option<Fault>) -> Result<Desk, OutOfRange> {
+#[inline(never)]
+pub fn desk(last_fault: Option<Fault>) -> Result<Option<&'static mut Desk>, OutOfRange> {
     let amplifier = SETTINGS.amplifier;
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, amplifier.min_v, amplifier.max_v)?;
     let part = |text: &str| text.parse().unwrap_or(0);
@@ -116,7 +119,7 @@ pub fn desk(last_fault: Option<Fault>) -> Result<Desk, OutOfRange> {
         silence_limit_ticks: (SUPERVISION.host_timeout_s * f64::from(RATE_HZ)) as u32,
         last_fault: last_fault.map_or(link::Fault::NONE, link::Fault::from),
     };
-    Ok(Desk::new(spring, about))
+    Ok(singleton!(: Desk = Desk::new(spring, about)))
 }
 
 /// The host, as the control task sees it.

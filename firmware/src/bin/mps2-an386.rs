@@ -80,7 +80,7 @@ fn main() -> ! {
         }
         Mode::Link => {
             INTERLOCK_CLOSED.store(true, Ordering::Relaxed);
-            if let (Ok(talk), Ok(control)) = (talk(desk), obey(board, control)) {
+            if let (Some(Ok(talk)), Ok(control)) = (desk.map(talk), obey(board, control)) {
                 low.spawn(talk);
                 high.spawn(control);
             }
@@ -110,7 +110,7 @@ async fn obey(mut board: Mps2, mut control: Control) {
 }
 
 #[embassy_executor::task]
-async fn talk(desk: Desk) {
+async fn talk(desk: &'static mut Desk) {
     host::talk(&mut Uart::init(), desk).await
 }
 

@@ -59,7 +59,7 @@ fn main() -> ! {
                 high.spawn(control);
             }
             // Without a line nobody can arm.
-            if let Some(talk) = line.and_then(|line| talk(line, desk).ok()) {
+            if let Some(talk) = line.zip(desk).and_then(|(line, desk)| talk(line, desk).ok()) {
                 low.spawn(talk);
             }
         }
@@ -83,7 +83,7 @@ async fn run(mut board: Nucleo, mut control: Control) {
 }
 
 #[embassy_executor::task]
-async fn talk(mut line: Uart, desk: Desk) {
+async fn talk(mut line: Uart, desk: &'static mut Desk) {
     host::talk(&mut line, desk).await
 }
 

@@ -17,8 +17,8 @@ bind_interrupts!(struct Interrupts {
     LPUART1 => usart::BufferedInterruptHandler<LPUART1>;
 });
 
-/// Bytes of each buffer.
-const SIZE: usize = 2 * MAX_FRAME;
+/// Bytes that may wait for this task: it may be waiting itself until a frame has left.
+const RECEIVED: usize = 2 * MAX_FRAME;
 /// How often to look whether there is room to send: the driver's `write` does not wake who waits for it.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -28,8 +28,8 @@ pub struct Uart(BufferedUart<'static>);
 impl Uart {
     /// Sets it up, 115 200 bit/s; `None` if it is in use already.
     pub fn new(uart: Peri<'static, LPUART1>, rx: Peri<'static, PA3>, tx: Peri<'static, PA2>) -> Option<Self> {
-        let to_send = singleton!(: [u8; SIZE] = [0; SIZE])?;
-        let received = singleton!(: [u8; SIZE] = [0; SIZE])?;
+        let to_send = singleton!(: [u8; MAX_FRAME] = [0; MAX_FRAME])?;
+        let received = singleton!(: [u8; RECEIVED] = [0; RECEIVED])?;
         BufferedUart::new(uart, rx, tx, to_send, received, Interrupts, Config::default()).ok().map(Self)
     }
 }
