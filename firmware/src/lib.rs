@@ -5,6 +5,7 @@
 //! | [`board`] | what a board must be able to do |
 //! | [`control`] | one control tick: supervisor, model, supervisor |
 //! | [`pace`] | when the next tick is due, and how many were missed |
+//! | [`post`] | between the host's task and the tick: an order made before a fault never acknowledges it |
 //! | [`roll_call`] | the watchdog is fed only when every task has checked in |
 //! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
 //! | [`digest`] | one number for a whole run |
@@ -12,6 +13,7 @@
 //! | `stack_guard` | an overflow of the stack is a fault |
 //! | `log` | every log line, in one place |
 //! | `tasks` | the control task and the housekeeping below it |
+//! | `host` | the host's task, and its orders as the control task sees them |
 //! | `mps2` | the emulated board |
 //! | `nucleo` | the real board |
 //!
@@ -26,9 +28,12 @@ pub mod board;
 pub mod control;
 pub mod digest;
 pub mod pace;
+pub mod post;
 pub mod roll_call;
 pub mod script;
 
+#[cfg(feature = "mcu")]
+pub mod host;
 #[cfg(feature = "mcu")]
 pub mod last_words;
 #[cfg(feature = "mcu")]

@@ -24,8 +24,8 @@ pub trait Source {
     /// What came in since the last tick; `None` ends the task.
     fn orders(&mut self, tick: u32) -> Option<Orders>;
 
-    /// What was done about it.
-    fn done(&mut self, _tick: &Tick) {}
+    /// What was done about it, and the ticks missed so far.
+    fn done(&mut self, _tick: &Tick, _control: &Control, _overruns: u32) {}
 }
 
 /// Ticks until `source` ends. Returns ticks run and ticks missed.
@@ -53,11 +53,11 @@ pub async fn control<B: Board>(
         let tick = control.tick(&orders, &senses, stopwatch);
         board.amplifier().put(tick.drive);
         board.show_armed(tick.drive.enabled());
-        source.done(&tick);
+        report.overruns = report.overruns.saturating_add(arrival.missed_ticks);
+        source.done(&tick, control, report.overruns);
 
         ticks = ticks.wrapping_add(1);
         stop::TICK.store(ticks, Ordering::Relaxed);
-        report.overruns = report.overruns.saturating_add(arrival.missed_ticks);
         report.worst_lateness_us = report.worst_lateness_us.max(arrival.lateness_us);
         report.tick(ticks, control, &tick);
 

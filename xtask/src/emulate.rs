@@ -1,4 +1,6 @@
-//! The stair under QEMU, held against the same code on this machine.
+//! The stair under QEMU, held against the same code on this machine; or a board that a host commands.
+
+use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use firmware::script::{self, Script};
@@ -14,6 +16,9 @@ pub(crate) struct Args {
     /// Print the result as JSON; the log goes to stderr
     #[arg(long)]
     json: bool,
+    /// Play nothing: wait for `vsj link unix:PATH` on this socket until Ctrl-C
+    #[arg(long, value_name = "PATH", conflicts_with = "json")]
+    link: Option<PathBuf>,
     /// What the optimiser aims at
     #[arg(long, value_enum, default_value = "s")]
     opt: Opt,
@@ -23,6 +28,11 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
     let elf = image::build(Board::Mps2, args.opt)?;
+    if let Some(socket) = &args.link {
+        let socket = std::path::absolute(socket)?;
+        eprintln!("talk to it with: vsj link unix:{} status", socket.display());
+        return emulator::serve(&elf, &socket, |line| println!("{line}"));
+    }
     let show = |line: &str| if args.json { eprintln!("{line}") } else { println!("{line}") };
     let run = emulator::play(&elf, "stair", emulator::SHIFT, show)?;
     let comparison = Comparison::new("stair", &run)?;

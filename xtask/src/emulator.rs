@@ -7,7 +7,7 @@
 use std::fs;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Child, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -21,6 +21,8 @@ use crate::{image, shell};
 pub(crate) const QEMU: &str = "qemu-system-arm";
 /// See the module.
 pub(crate) const SHIFT: u32 = 6;
+/// Name of the run that a host commands.
+const LINK: &str = "link";
 /// No run takes longer on a slow machine.
 const TIMEOUT: Duration = Duration::from_secs(120);
 
@@ -63,16 +65,12 @@ impl Run {
     }
 }
 
-/// Plays `script`; `show` hears of every line of the log as it comes.
-pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&str) + Send) -> Result<Run> {
-    let bytes = image::read(elf)?;
-    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
-    let wire = elf.with_file_name(format!("dac-{}-{}", std::process::id(), script.replace(' ', "-")));
-    let start = Instant::now();
-    let mut child = shell::command(QEMU)
-        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"])
+/// QEMU on an image: `host` is the chardev of the host's line, `clock` the rest of `-icount`.
+fn start(elf: &Path, script: &str, host: &str, wire: &Path, clock: &str) -> Result<Child> {
+    shell::command(QEMU)
+        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", host])
         .args(["-serial", &format!("file:{}", wire.display())])
-        .args(["-icount", &format!("shift={shift},sleep=off")])
+        .args(["-icount", clock])
         .args(["-semihosting-config", &format!("enable=on,target=native,arg={script}")])
         .arg("-kernel")
         .arg(elf)
@@ -82,7 +80,58 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&s
         .map_err(|error| match error.kind() {
             ErrorKind::NotFound => anyhow::anyhow!("`{QEMU}` is not installed: run cargo xtask setup"),
             _ => anyhow::anyhow!("cannot start `{QEMU}`: {error}"),
-        })?;
+        })
+}
+
+/// Lets a host command the board over the unix socket `socket` while `work` runs; `show` hears of every line of the log.
+/// Here the board is held back to our clock, because a host keeps to it. An instruction takes 64 ns as ever, so that a slow
+/// machine makes the board late, but makes it miss nothing.
+pub(crate) fn obey<T>(
+    elf: &Path,
+    socket: &Path,
+    show: impl FnMut(&str) + Send,
+    work: impl FnOnce() -> Result<T>,
+) -> Result<(T, Run)> {
+    let bytes = image::read(elf)?;
+    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
+    let wire = elf.with_file_name(format!("dac-{}-link", std::process::id()));
+    let begin = Instant::now();
+    let host = format!("unix:{},server=on,wait=off", socket.display());
+    let mut child = start(elf, LINK, &host, &wire, &format!("shift={SHIFT},align=on"))?;
+    let mut output = child.stdout.take().context("the emulator has no output")?;
+    let (result, log) = thread::scope(|scope| {
+        let reader = scope.spawn(|| decode(&table, &mut output, show));
+        let result = work();
+        child.kill()?;
+        let log = reader.join().map_err(|_| anyhow::anyhow!("the log's reader stopped"))?;
+        anyhow::Ok((result, log?))
+    })?;
+    child.wait()?;
+    let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
+    let _ = (fs::remove_file(&wire), fs::remove_file(socket));
+    // Ended by us: it has no exit code of its own.
+    Ok((result?, Run { exit: 0, log, dac: written(&dac?), took: begin.elapsed() }))
+}
+
+/// As [`obey`], until the emulator ends, and with every line of the log.
+pub(crate) fn serve(elf: &Path, socket: &Path, show: impl FnMut(&str)) -> Result<()> {
+    let bytes = image::read(elf)?;
+    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
+    let host = format!("unix:{},server=on,wait=off", socket.display());
+    let mut child = start(elf, LINK, &host, Path::new("/dev/null"), &format!("shift={SHIFT},align=on"))?;
+    let mut output = child.stdout.take().context("the emulator has no output")?;
+    let ended = decode(&table, &mut output, show);
+    child.wait()?;
+    ended.map(|_| ())
+}
+
+/// Plays `script`; `show` hears of every line of the log as it comes.
+pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&str) + Send) -> Result<Run> {
+    let bytes = image::read(elf)?;
+    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
+    let wire = elf.with_file_name(format!("dac-{}-{}", std::process::id(), script.replace(' ', "-")));
+    let begin = Instant::now();
+    let mut child = start(elf, script, "null", &wire, &format!("shift={shift},sleep=off"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let over = AtomicBool::new(false);
     let (log, status) = thread::scope(|scope| {
@@ -91,7 +140,7 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&s
             over.store(true, Ordering::Relaxed);
             log
         });
-        while !over.load(Ordering::Relaxed) && start.elapsed() < TIMEOUT {
+        while !over.load(Ordering::Relaxed) && begin.elapsed() < TIMEOUT {
             thread::sleep(Duration::from_millis(5));
         }
         if !over.load(Ordering::Relaxed) {
@@ -100,7 +149,7 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&s
         let log = reader.join().map_err(|_| anyhow::anyhow!("the log's reader stopped"))?;
         anyhow::Ok((log?, child.wait()?))
     })?;
-    let took = start.elapsed();
+    let took = begin.elapsed();
     let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
     let _ = fs::remove_file(&wire);
     if took >= TIMEOUT {

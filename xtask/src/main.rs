@@ -13,6 +13,7 @@ mod setup;
 mod shell;
 mod size;
 mod stack;
+mod talk;
 mod test;
 mod thumb;
 
@@ -54,7 +55,12 @@ enum Command {
     ///
     /// 70 s at 1 kHz, in seconds. Shows the decoded log, and exits with 1 unless every DAC code and every estimate is
     /// the host's, bit for bit, and no tick was missed.
-    #[command(after_help = "Example:\n  cargo xtask emulate --json | jq .instructions_per_tick")]
+    ///
+    /// With --link it plays nothing and obeys `vsj link`, in real time, its interlock closed.
+    #[command(after_help = "\
+Examples:
+  cargo xtask emulate --json | jq .instructions_per_tick
+  cargo xtask emulate --link /tmp/mcu.sock             then: vsj link unix:/tmp/mcu.sock status")]
     Emulate(emulate::Args),
     /// Everything that the emulated firmware must show
     ///
@@ -66,6 +72,11 @@ enum Command {
     /// Panic, hard fault, stack overflow, stalled task, hanging control, overrun, interlock, silent host. Exits with 1
     /// unless the voltage goes away on the DAC's wire and the log is the approved one.
     Drill(drill::Args),
+    /// Let a host talk to the emulated firmware
+    ///
+    /// Arms it, sets a stiffness, falls silent; then 10 000 damaged, random, late and foreign frames while armed. Exits with
+    /// 1 if one of them is followed or a tick is missed. A part of `test`.
+    Talk,
     /// Write the image to the real board and show its log (probe-rs)
     Flash,
     /// Flash, RAM and worst stack of each image
@@ -96,6 +107,7 @@ fn main() -> ExitCode {
         Command::Emulate(args) => emulate::run(&args),
         Command::Proof => setup::emulator().and_then(|()| proof::run()),
         Command::Drill(args) => drill::run(&args),
+        Command::Talk => talk::command(),
         Command::Flash => flash::run(),
         Command::Size(args) => size::run(&args),
         Command::Image => image::run(),

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::emulate::Comparison;
 use crate::image::{self, Board, Opt};
-use crate::{audit, drill, emulator, size};
+use crate::{audit, drill, emulator, size, talk};
 
 /// Most instructions that one tick of the model may take.
 const MOST_INSTRUCTIONS: u32 = 150;
@@ -23,6 +23,7 @@ pub(crate) fn run() -> Result<()> {
         }
         if opt == Opt::S {
             drill::all(&elf, false)?;
+            eprintln!("link: {}", talk::run(&elf).context("the host's link")?);
         }
     }
     for board in Board::ALL {

@@ -2,7 +2,8 @@
 //!
 //! Interrupts nest, so the deepest handler of each level comes on top of the thread, each with the registers that the
 //! processor saves. A call through a register (an executor polls a task, a task wakes another) may lead to any function
-//! that nobody calls by name; that such calls are nested at most [`NESTED`] deep is an assumption, the rest is counted.
+//! that nobody calls by name; that such calls are nested at most two deep, a task and below it anything but a task (an
+//! executor polls one after the other), is an assumption, the rest is counted.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,16 +14,16 @@ use crate::thumb::{Code, Shape};
 
 /// Bytes at the lower end that must not be touched, see the firmware's `stack_guard`.
 pub(crate) const GUARD: u32 = 256;
-/// Executor to task, task to waker.
-const NESTED: usize = 2;
+/// A task, as its executor calls it.
+const POLL: &str = "TaskStorage<F>::poll";
 /// What the processor saves at an interrupt, float registers and alignment included.
 const SAVED: u32 = 104 + 4;
 /// Recursive on purpose: the drill that uses the stack up.
 const DRILL: &str = "deeper";
 /// What every panic goes through.
 const PANIC: &str = "core::panicking";
-/// Interrupt levels that can nest, deepest handlers first: alarm, control, housekeeping, NMI.
-const LEVELS: usize = 4;
+/// Interrupt levels that can nest, deepest handlers first: alarm, control, line, tasks below, NMI.
+const LEVELS: usize = 5;
 
 /// The most that thread and handlers take together.
 pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
@@ -38,11 +39,13 @@ pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
         .map(|f| f.address)
         .filter(|address| !called.contains(address) && !vectors.contains(address))
         .collect();
+    let (polls, others): (Vec<u32>, Vec<u32>) =
+        free.into_iter().partition(|address| name(&functions, *address).contains(POLL));
     let mut behind_register = 0;
-    for _ in 0..NESTED {
+    for candidates in [others, polls] {
         let depths = Depths { shapes: &shapes, functions: &functions, behind_register };
-        let deepest = free.iter().map(|address| depths.of(*address, &mut Vec::new()));
-        behind_register = deepest.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0);
+        let deepest = candidates.iter().map(|address| depths.of(*address, &mut Vec::new()));
+        behind_register = behind_register.max(deepest.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0));
     }
     let depths = Depths { shapes: &shapes, functions: &functions, behind_register };
     let reset = code.word(elf::symbol(elf, "__RESET_VECTOR")?)? & !1;
@@ -94,6 +97,10 @@ impl Depths<'_> {
     }
 
     fn name(&self, address: u32) -> &str {
-        self.functions.iter().find(|f| f.address == address).map_or("?", |f| &f.name)
+        name(self.functions, address)
     }
+}
+
+fn name(functions: &[Function], address: u32) -> &str {
+    functions.iter().find(|f| f.address == address).map_or("?", |f| &f.name)
 }

@@ -1,23 +1,35 @@
-//! The image of the emulated board: plays the script that the emulator's command line names, then ends the emulator.
+//! The image of the emulated board: plays the script that the emulator's command line names, then ends the emulator. Named
+//! `link` instead, it obeys a host on its UART until the emulator is ended, its interlock closed.
 
 #![no_std]
 #![no_main]
 
 use cortex_m::peripheral::Peripherals;
 use defmt_semihosting as _;
-use firmware::control::Control;
+use firmware::control::{Control, Untimed};
+use firmware::host::{self, Host};
 use firmware::log::{self, Done, Event};
 use firmware::mps2::actor::{self, Actor};
 use firmware::mps2::instructions::Counter;
+use firmware::mps2::uart::Uart;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
-use firmware::mps2::{Mps2, reset_cause, semihosting};
+use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
 use firmware::script::{SETTINGS, SUPERVISION, Script};
 use firmware::{stack_guard, tasks};
+use link::Desk;
 
 use core::sync::atomic::Ordering;
 
 /// The emulator was not told a script.
 const EXIT_NO_SCRIPT: u32 = 2;
+/// Name of the run that a host commands.
+const LINK: &str = "link";
+
+/// Who commands.
+enum Mode {
+    Play(Script),
+    Link,
+}
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -26,13 +38,16 @@ fn main() -> ! {
     log::boot(reset, last_fault.map_or(0, |fault| fault.code()));
 
     let mut buffer = [0; 64];
-    let script = match (last_fault, Script::parse(semihosting::command_line(&mut buffer))) {
-        (Some(_), _) => Script::Aftermath,
-        (None, Some(script)) => script,
+    let name = semihosting::command_line(&mut buffer);
+    let mode = match (last_fault, Script::parse(name)) {
+        _ if name.trim() == LINK => Mode::Link,
+        (Some(_), _) => Mode::Play(Script::Aftermath),
+        (None, Some(script)) => Mode::Play(script),
         (None, None) => semihosting::exit(EXIT_NO_SCRIPT),
     };
-    let control = match Control::new(&SETTINGS, &SUPERVISION, last_fault) {
-        Ok(control) => control,
+    let control = Control::new(&SETTINGS, &SUPERVISION, last_fault);
+    let (control, desk) = match control.and_then(|control| Ok((control, host::desk(last_fault)?))) {
+        Ok(both) => both,
         Err(error) => {
             log::refused(error.field);
             semihosting::exit(1)
@@ -47,14 +62,32 @@ fn main() -> ! {
             core.NVIC.set_priority(Line::Timer0, 0x20);
             core.NVIC.set_priority(Line::Timer1, 0x20);
             core.NVIC.set_priority(Line::High, 0x40);
+            core.NVIC.set_priority(Line::Received, 0x80);
+            core.NVIC.set_priority(Line::Sent, 0x80);
             core.NVIC.set_priority(Line::Low, 0xc0);
         }
     }
     let low = LOW.start(Line::Low);
     let high = HIGH.start(Line::High);
-    if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control, script)) {
+    if let Ok(housekeeping) = housekeeping() {
         low.spawn(housekeeping);
-        high.spawn(control);
+    }
+    match mode {
+        Mode::Play(script) => {
+            if let Ok(control) = play(board, control, script) {
+                high.spawn(control);
+            }
+        }
+        Mode::Link => {
+            INTERLOCK_CLOSED.store(true, Ordering::Relaxed);
+            if let (Some(Ok(talk)), Ok(control)) = (desk.map(talk), obey(board, control)) {
+                low.spawn(talk);
+                high.spawn(control);
+            }
+            // Never asleep: while the processor sleeps the emulator's clock may jump with ours, over ticks; while it runs,
+            // instructions alone make the time.
+            actor::hang()
+        }
     }
     loop {
         cortex_m::asm::wfi();
@@ -62,12 +95,23 @@ fn main() -> ! {
 }
 
 #[embassy_executor::task]
-async fn run(mut board: Mps2, mut control: Control, script: Script) {
+async fn play(mut board: Mps2, mut control: Control, script: Script) {
     let mut actor = Actor::new(script);
     let mut counter = Counter::begin();
     let (ticks, missed) = tasks::control(&mut board, &mut control, &mut actor, &mut counter).await;
     let (digest, instructions) = (actor.digest(), counter.instructions());
     log::queue(Event::Done(Done { ticks, missed, digest, instructions }));
+}
+
+#[embassy_executor::task]
+async fn obey(mut board: Mps2, mut control: Control) {
+    let mut host = Host::new(&control);
+    tasks::control(&mut board, &mut control, &mut host, &mut Untimed).await;
+}
+
+#[embassy_executor::task]
+async fn talk(desk: &'static mut Desk) {
+    host::talk(&mut Uart::init(), desk).await
 }
 
 #[embassy_executor::task]

@@ -10,11 +10,14 @@ use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use firmware::control::{Control, Orders, Untimed};
+use firmware::control::{Control, Untimed};
+use firmware::host::{self, Host};
+use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
 use firmware::script::{SETTINGS, SUPERVISION};
-use firmware::tasks::{self, Source};
+use firmware::tasks;
 use firmware::{last_words, log, stack_guard};
+use link::Desk;
 use model::supervisor::Fault;
 
 /// Runs the control task, on the interrupt of a peripheral that is not used.
@@ -38,20 +41,26 @@ unsafe fn FMAC() {
 fn main() -> ! {
     kill();
     let (reset, last_fault) = reset_cause();
-    let board = Nucleo::init(embassy_stm32::init(clocks::config()));
+    let (board, line) = Nucleo::init(embassy_stm32::init(clocks::config()));
     log::boot(reset, last_fault.map_or(0, Fault::code));
     if let Some(mut core) = Peripherals::take() {
         stack_guard::set(&mut core.MPU);
     }
     interrupt::CORDIC.set_priority(Priority::P4);
+    interrupt::LPUART1.set_priority(Priority::P8);
     interrupt::FMAC.set_priority(Priority::P12);
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
-    match Control::new(&SETTINGS, &SUPERVISION, last_fault) {
-        Ok(control) => {
+    let control = Control::new(&SETTINGS, &SUPERVISION, last_fault);
+    match control.and_then(|control| Ok((control, host::desk(last_fault)?))) {
+        Ok((control, desk)) => {
             if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control)) {
                 low.spawn(housekeeping);
                 high.spawn(control);
+            }
+            // Without a line nobody can arm.
+            if let Some(talk) = line.zip(desk).and_then(|(line, desk)| talk(line, desk).ok()) {
+                low.spawn(talk);
             }
         }
         // Nothing feeds the watchdog: the chip resets and says it again, its output at zero.
@@ -67,21 +76,18 @@ fn main() -> ! {
 
 #[embassy_executor::task]
 async fn run(mut board: Nucleo, mut control: Control) {
-    tasks::control(&mut board, &mut control, &mut Nobody, &mut Untimed).await;
+    let mut host = Host::new(&control);
+    tasks::control(&mut board, &mut control, &mut host, &mut Untimed).await;
     // Returning would drop the DAC, and the pin would float.
     pending().await
 }
 
 #[embassy_executor::task]
-async fn housekeeping() {
-    tasks::housekeeping(|_| ()).await
+async fn talk(mut line: Uart, desk: &'static mut Desk) {
+    host::talk(&mut line, desk).await
 }
 
-/// No host: nothing is ever armed.
-struct Nobody;
-
-impl Source for Nobody {
-    fn orders(&mut self, _tick: u32) -> Option<Orders> {
-        Some(Orders::default())
-    }
+#[embassy_executor::task]
+async fn housekeeping() {
+    tasks::housekeeping(|_| ()).await
 }

@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_time::Instant;
 
 use super::INTERLOCK_CLOSED;
-use crate::control::{Orders, Tick};
+use crate::control::{Control, Orders, Tick};
 use crate::digest::Digest;
 use crate::script::{Mishap, Script};
 use crate::tasks::Source;
@@ -42,7 +42,7 @@ impl Source for Actor {
         Some(step.orders)
     }
 
-    fn done(&mut self, tick: &Tick) {
+    fn done(&mut self, tick: &Tick, _control: &Control, _overruns: u32) {
         self.digest.add(tick);
     }
 }

@@ -6,6 +6,7 @@
 //! | [`vectors`] | the interrupts in use |
 //! | [`time`] | time driver on the two CMSDK timers |
 //! | [`dac`] | amplifier port: every code goes out through a UART, so that the host sees each of them |
+//! | [`uart`] | the host's line |
 //! | [`watchdog`] | the CMSDK watchdog: interrupt, then reset |
 //! | [`instructions`] | SysTick as a counter of instructions |
 //! | [`actor`] | plays a script: orders, interlock, mishaps |
@@ -19,6 +20,7 @@ pub mod instructions;
 pub mod registers;
 pub mod semihosting;
 pub mod time;
+pub mod uart;
 pub mod vectors;
 pub mod watchdog;
 
@@ -31,7 +33,7 @@ use model::supervisor::Fault;
 pub use dac::kill;
 
 /// What the script does to the safety circuit; open until it says otherwise.
-static INTERLOCK_CLOSED: AtomicBool = AtomicBool::new(false);
+pub static INTERLOCK_CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// The board.
 #[derive(Debug)]

@@ -52,6 +52,17 @@ pub const TIMER_0: Timer = Timer::at(0x4000_0000);
 /// Alarm.
 pub const TIMER_1: Timer = Timer::at(0x4000_1000);
 
+/// UART 0, the host's line: a byte to send, or one that came.
+pub const UART_0_DATA: Register = Register(0x4000_4000);
+/// Bit 0: the last byte to send is still here. Bit 1: a byte has come.
+pub const UART_0_STATE: Register = Register(0x4000_4004);
+/// Bit 0 sends, bit 1 receives, bits 2 and 3 interrupt after it.
+pub const UART_0_CONTROL: Register = Register(0x4000_4008);
+/// Bit 0 sent, bit 1 received; cleared by writing ones.
+pub const UART_0_INTERRUPT: Register = Register(0x4000_400c);
+/// Clock cycles a bit, at least 16.
+pub const UART_0_DIVIDER: Register = Register(0x4000_4010);
+
 /// UART 1, the amplifier's wire: a byte to send.
 pub const UART_1_DATA: Register = Register(0x4000_5000);
 /// Bit 0 sends.

@@ -2,7 +2,7 @@
 
 use cortex_m::interrupt::InterruptNumber;
 
-use super::time;
+use super::{time, uart};
 use crate::stop;
 use embassy_executor::InterruptExecutor;
 use model::supervisor::Fault;
@@ -16,6 +16,10 @@ pub static LOW: InterruptExecutor = InterruptExecutor::new();
 #[derive(Clone, Copy, Debug)]
 #[repr(u16)]
 pub enum Line {
+    /// The host's line has a byte.
+    Received = 0,
+    /// The host's line takes another byte.
+    Sent = 1,
     /// Time base at its end.
     Timer0 = 8,
     /// Alarm.
@@ -47,6 +51,14 @@ unsafe extern "C" fn timer_1() {
     time::on_alarm();
 }
 
+unsafe extern "C" fn received() {
+    uart::on_received();
+}
+
+unsafe extern "C" fn sent() {
+    uart::on_sent();
+}
+
 unsafe extern "C" fn high() {
     // SAFETY: the line is enabled by `HIGH.start`.
     unsafe { HIGH.on_interrupt() }
@@ -68,6 +80,8 @@ extern "C" fn NonMaskableInt() {
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [Handler; 32] = {
     let mut table: [Handler; 32] = [DefaultHandler; 32];
+    table[Line::Received as usize] = received;
+    table[Line::Sent as usize] = sent;
     table[Line::Timer0 as usize] = timer_0;
     table[Line::Timer1 as usize] = timer_1;
     table[Line::High as usize] = high;

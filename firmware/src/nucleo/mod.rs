@@ -7,16 +7,19 @@
 //! | PB10 | interlock, high is closed; pulled down, so that a broken wire reads as open |
 //! | PA0, PA1 | ADC1, the amplifier's voltage and current monitors |
 //! | PA5 | LED, on while voltages may leave |
+//! | PA2, PA3 | LPUART1, the host's line, 115 200 bit/s: the debugger's USB port |
 //!
 //! | module | what it is |
 //! | --- | --- |
 //! | [`clocks`] | 170 MHz without a crystal |
 //! | [`amplifier`] | DAC, enable, monitors |
+//! | [`uart`] | the host's line |
 //! | [`reset`] | why the chip was reset |
 
 pub mod amplifier;
 pub mod clocks;
 pub mod reset;
+pub mod uart;
 
 use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
@@ -40,17 +43,18 @@ pub struct Nucleo {
 }
 
 impl Nucleo {
-    /// Sets everything up, voltage first.
-    pub fn init(p: Peripherals) -> Self {
+    /// Sets everything up, voltage first; the host's line apart, because another task owns it. `None` without one.
+    pub fn init(p: Peripherals) -> (Self, Option<uart::Uart>) {
         let amplifier = amplifier::Amplifier::new(p.DAC1, p.PA4, p.PB5, p.ADC1, p.PA0, p.PA1);
         let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
         watchdog.unleash();
-        Self {
+        let board = Self {
             amplifier,
             interlock: Input::new(p.PB10, Pull::Down),
             watchdog,
             led: Output::new(p.PA5, Level::Low, Speed::Low),
-        }
+        };
+        (board, uart::Uart::new(p.LPUART1, p.PA3, p.PA2))
     }
 }
 

@@ -134,7 +134,7 @@ impl Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Record;
+    use crate::record::{MEASURED, Record};
     use link::WireVolts;
 
     fn status(measured: bool) -> Status {
@@ -161,7 +161,7 @@ mod tests {
             recording.add(&sample(tick)).unwrap();
         }
         recording.add(&Telemetry { measured: None, ..sample(5070) }).unwrap();
-        let read = Record::open(&path).unwrap();
+        let read = Record::open(&path, MEASURED).unwrap();
         let times: Vec<f64> = read.rows.iter().map(|row| row.time_s).collect();
         assert_eq!(times, [0.0, 0.01, 0.05, 0.061]);
         assert_eq!((read.rows[1].voltage_v, read.rows[1].measured), (100.0, Some(8.0)));
@@ -176,7 +176,7 @@ mod tests {
         recording.add(&sample(1)).unwrap();
         recording.add(&sample(11)).unwrap();
         assert!(std::fs::read_to_string(&path).unwrap().contains("no measurement"));
-        assert_eq!(Record::open(&path).unwrap().rows[0].measured, Some(9.0));
+        assert_eq!(Record::open(&path, MEASURED).unwrap().rows[0].measured, Some(9.0));
     }
 
     #[test]
@@ -186,7 +186,7 @@ mod tests {
         recording.add(&sample(500)).unwrap();
         recording.add(&sample(510)).unwrap();
         assert!(recording.add(&sample(3)).unwrap_err().to_string().contains("restarted after 2 rows"));
-        assert_eq!(Record::open(&path).unwrap().rows.len(), 2);
+        assert_eq!(Record::open(&path, MEASURED).unwrap().rows.len(), 2);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use host_sim::record::Record;
+use host_sim::record::{MEASURED, Record};
 use link::{Frame, Reply, State, Status};
 use serde_json::Value;
 use serialport::{SerialPort, TTYPort};
@@ -178,7 +178,7 @@ fn a_recording_follows_a_schedule_and_is_a_record() {
     let text = bad(2, &mcu.port, &["record", out, "--input", beyond.to_str().unwrap(), "--arm"]);
     assert!(text.contains("701") && !Path::new(out).exists() && mcu.with(|shared| shared.ordered.is_empty()), "{text}");
     let summary = json(&mcu.port, &["record", out, "--input", input, "--arm"]);
-    let record = Record::open(Path::new(out)).unwrap();
+    let record = Record::open(Path::new(out), MEASURED).unwrap();
     assert_eq!(summary["rows"].as_u64().unwrap() as usize, record.rows.len());
     assert_eq!(summary["stiffness"], "measured");
     // A busy machine may keep the MCU's thread from some; they are counted then.
@@ -205,7 +205,7 @@ fn a_recording_that_is_killed_keeps_whole_rows() {
     recording.wait().unwrap();
     let text = std::fs::read_to_string(&out).unwrap();
     assert!(text.ends_with('\n') && text.contains("no measurement"));
-    assert!(Record::open(&out).unwrap().rows.len() >= 48);
+    assert!(Record::open(&out, MEASURED).unwrap().rows.len() >= 48);
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn ctrl_c_ends_a_recording_with_its_summary() {
     let recording = recording.wait_with_output().unwrap();
     assert!(recording.status.success(), "{recording:?}");
     let summary: Value = serde_json::from_str(&stdout(&recording)).unwrap();
-    assert_eq!(summary["rows"].as_u64().unwrap() as usize, Record::open(&out).unwrap().rows.len());
+    assert_eq!(summary["rows"].as_u64().unwrap() as usize, Record::open(&out, MEASURED).unwrap().rows.len());
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn a_lost_connection_keeps_the_rows() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.csv");
     let text = bad(1, &mcu.port, &["record", out.to_str().unwrap()]);
-    let rows = Record::open(&out).unwrap().rows.len();
+    let rows = Record::open(&out, MEASURED).unwrap().rows.len();
     assert!(rows > 10 && text.contains(&format!("keeps {rows} rows")), "{rows}: {text}");
 }
 

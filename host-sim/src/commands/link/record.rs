@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use host_sim::bad_input;
 use host_sim::link::Recording;
-use host_sim::record::Record;
+use host_sim::record::{MEASURED, Record};
 use host_sim::schedule::{Between, Schedule};
 use indicatif::{ProgressBar, ProgressStyle};
 use link::{Desired, Request, State};
@@ -58,7 +58,7 @@ impl Arguments {
             None => None,
             Some("stair") => Some(Schedule::stair()),
             Some("step") => Some(Schedule::ideal_stair()),
-            Some(file) => Some(Schedule::from_record(&Record::open(Path::new(file))?, self.between)),
+            Some(file) => Some(Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between)),
         })
     }
 }
