@@ -77,8 +77,8 @@ Examples:
     Drill(drill::Args),
     /// Let a host talk to the emulated firmware
     ///
-    /// Arms it, sets a stiffness, falls silent; then 10 000 damaged, random, late and foreign frames while armed. Exits with
-    /// 1 if one of them is followed or a tick is missed. A part of `test`.
+    /// Arms it, sets a stiffness, falls silent; then up to 10 000 damaged, random, late and foreign frames while armed, for
+    /// at most 20 s. Exits with 1 if one of them is followed or a tick is missed. A part of `test`.
     Talk,
     /// Write the image to the real board and show its log (probe-rs)
     Flash,
