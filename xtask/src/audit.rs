@@ -23,10 +23,7 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
     ensure!(functions.iter().any(|f| is_panic(&f.name)), "the image has no panic at all: have names changed?");
     let code = Code::new(bytes)?;
     let by_address: BTreeMap<u32, &Function> = functions.iter().map(|f| (f.address, f)).collect();
-    let is_tick =
-        |f: &&Function| f.name.trim_start_matches('<').starts_with(TICK.0) && plain(&f.name).ends_with(TICK.1);
-    let ticks: Vec<&Function> = functions.iter().filter(is_tick).collect();
-    ensure!(!ticks.is_empty(), "no function `{}::{}` in the image", TICK.0, TICK.1);
+    let ticks = ticks(&functions)?;
 
     let mut seen = BTreeSet::new();
     let mut open: Vec<(&Function, String)> = ticks.iter().map(|f| (*f, f.name.clone())).collect();
@@ -45,6 +42,15 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
         }
     }
     Ok(seen.len())
+}
+
+/// The control tick, as often as it was compiled.
+pub(crate) fn ticks(functions: &[Function]) -> Result<Vec<&Function>> {
+    let is_tick =
+        |f: &&Function| f.name.trim_start_matches('<').starts_with(TICK.0) && plain(&f.name).ends_with(TICK.1);
+    let ticks: Vec<&Function> = functions.iter().filter(is_tick).collect();
+    ensure!(!ticks.is_empty(), "no function `{}::{}` in the image", TICK.0, TICK.1);
+    Ok(ticks)
 }
 
 /// Without generic arguments at the end.

@@ -1,13 +1,13 @@
 //! ns per sample of the closed loop, beside what Python users have.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 
-use crate::shell;
+use crate::{python, shell};
 
 /// Samples in one run of a contender: 70 s at 1 kHz and the one at 0 s, as in `rivals.py` and the Rust bench.
 const SAMPLES: u32 = 70_001;
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let metadata = shell::metadata()?;
     find_bench(&metadata)?;
     let target = Path::new(metadata["target_directory"].as_str().context("cargo metadata names no target directory")?);
-    let python = python(target)?;
+    let python = python::with(target, "bench")?;
     shell::run(cargo_bench().arg("--no-run"))?;
 
     let mut rounds = Vec::new();
@@ -157,26 +157,6 @@ fn find_bench(metadata: &Value) -> Result<()> {
         bail!("host-sim has no bench `{BENCH}`: expected host-sim/benches/{BENCH}.rs");
     }
     Ok(())
-}
-
-/// Python with the rivals' packages, in a venv of its own under the target directory.
-fn python(target: &Path) -> Result<PathBuf> {
-    let venv = target.join("bench-venv");
-    let python = venv.join("bin/python");
-    let requirements = shell::root().join("xtask/bench/requirements.txt");
-    let installed = venv.join("requirements.txt");
-    let wanted = fs::read(&requirements).with_context(|| format!("cannot read {}", requirements.display()))?;
-    if python.exists() && fs::read(&installed).is_ok_and(|there| there == wanted) {
-        eprintln!("bench: {} is up to date", venv.display());
-        return Ok(python);
-    }
-    eprintln!("bench: installing scipy and numba into {}", venv.display());
-    shell::run(shell::command("python3").args(["-m", "venv", "--clear"]).arg(&venv))
-        .context("python3 with its module venv is needed (Debian, Ubuntu: apt-get install python3-venv)")?;
-    shell::run(shell::command(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&requirements))?;
-    // Last: its presence says that the rest succeeded.
-    fs::write(&installed, wanted).with_context(|| format!("cannot write {}", installed.display()))?;
-    Ok(python)
 }
 
 #[cfg(test)]

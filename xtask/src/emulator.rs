@@ -159,7 +159,7 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&s
 }
 
 /// Frames to lines.
-fn decode(table: &Table, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Vec<String>> {
+pub(crate) fn decode(table: &Table, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Vec<String>> {
     let mut decoder = table.new_stream_decoder();
     let mut log = Vec::new();
     let mut buffer = [0; 4096];

@@ -2,6 +2,7 @@
 
 mod audit;
 mod bench;
+mod boot;
 mod drill;
 mod elf;
 mod emulate;
@@ -9,6 +10,7 @@ mod emulator;
 mod flash;
 mod image;
 mod proof;
+mod python;
 mod setup;
 mod shell;
 mod size;
@@ -32,6 +34,7 @@ Examples:
   cargo xtask test             everything that must pass before a change goes in
   cargo xtask emulate          the firmware on the report's stair, under QEMU
   cargo xtask image            the MCU's images: ELF, bin, hex
+  cargo xtask boot             that image on register models: safe at boot and after a fault?
   cargo xtask bench --json     speed beside Python, as JSON
 
 Exit codes: 0 success, 1 the work failed, 2 bad arguments."
@@ -74,8 +77,8 @@ Examples:
     Drill(drill::Args),
     /// Let a host talk to the emulated firmware
     ///
-    /// Arms it, sets a stiffness, falls silent; then 10 000 damaged, random, late and foreign frames while armed. Exits with
-    /// 1 if one of them is followed or a tick is missed. A part of `test`.
+    /// Arms it, sets a stiffness, falls silent; then up to 10 000 damaged, random, late and foreign frames while armed, for
+    /// at most 20 s. Exits with 1 if one of them is followed or a tick is missed. A part of `test`.
     Talk,
     /// Write the image to the real board and show its log (probe-rs)
     Flash,
@@ -87,11 +90,19 @@ Examples:
     ///
     /// Prints their paths.
     Image,
+    /// Run the very image that is flashed, on models of the STM32G474's registers
+    ///
+    /// Boot, 1.2 s without a host, then a panic, a hard fault and a hang while voltage is out. Exits with 1 unless the
+    /// output is safe each time; says what this cannot show. Installs Unicorn into a venv under the target directory.
+    Boot,
     /// Compare the host's speed with Python's
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Exits with 1 if Rust is slower
     /// than its bounds allow.
-    #[command(after_help = "Example:\n  cargo xtask bench --json | jq .within_bounds")]
+    #[command(
+        after_help = "Example:\n  cargo xtask boot             that image on register models: safe at boot and after a fault?
+  cargo xtask bench --json | jq .within_bounds"
+    )]
     Bench(bench::Args),
 }
 
@@ -111,6 +122,7 @@ fn main() -> ExitCode {
         Command::Flash => flash::run(),
         Command::Size(args) => size::run(&args),
         Command::Image => image::run(),
+        Command::Boot => boot::run(),
         Command::Bench(args) => bench::run(&args),
     };
     match result {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 
-use crate::{proof, setup, shell};
+use crate::{boot, proof, setup, shell};
 
 /// One call of cargo.
 struct Step {
@@ -36,21 +36,23 @@ pub(crate) fn help() -> String {
         let env = env.map(|(key, value)| format!("{key}={value} ")).unwrap_or_default();
         let _ = writeln!(help, "  {name:<10} {env}cargo {}", args.join(" "));
     }
-    help + "  firmware   cargo xtask proof\n"
+    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot\n"
 }
 
 /// `cargo xtask test`.
 pub(crate) fn run() -> Result<()> {
     let start = Instant::now();
-    let total = STEPS.len() + 2;
+    let total = STEPS.len() + 3;
     eprintln!("[1/{total}] setup");
     setup::run()?;
     for (number, Step { name, args, env }) in (2..).zip(STEPS) {
         eprintln!("[{number}/{total}] {name}");
         shell::run(shell::cargo().args(*args).envs(*env))?;
     }
-    eprintln!("[{total}/{total}] firmware");
+    eprintln!("[{}/{total}] firmware", total - 1);
     proof::run()?;
+    eprintln!("[{total}/{total}] boot");
+    boot::run()?;
     eprintln!("all {total} steps passed in {} s", start.elapsed().as_secs());
     Ok(())
 }

@@ -1,0 +1,72 @@
+"""Boots an image and does it harm: boot.py IMAGE TICK PANIC RTT prints what happened outside of the chip, as JSON.
+
+TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's.
+"""
+
+import json
+import struct
+import sys
+
+from unicorn.arm_const import UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
+
+from board import FLASH, RAM, Board
+
+POWER_ON = 1 << 27 | 1 << 26
+MISHAP_TICK = 300
+CODE = 1755  # 300 V of 700 V
+UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
+
+
+def panic(board):
+    """A call of `panic("injected")` at `injected.rs:7`, its words at the stack's very end."""
+    text = b"injected.rs\0injected"
+    board.uc.mem_write(RAM + 0x40, text)
+    board.uc.mem_write(RAM + 0x20, struct.pack("<4I", RAM + 0x40, 11, 7, 1))
+    for reg, value in ((UC_ARM_REG_R0, RAM + 0x4C), (UC_ARM_REG_R1, 8), (UC_ARM_REG_R2, RAM + 0x20)):
+        board.uc.reg_write(reg, value)
+    board.pc = PANIC
+
+
+def broken(code):
+    """The tick's first instruction turns into another one."""
+
+    def mishap(board):
+        board.uc.mem_write(TICK, code)
+        board.uc.ctl_remove_cache(TICK, TICK + 4)
+
+    return mishap
+
+
+def play(mishap, until_us):
+    """Voltage is put out just before the mishap; after the reset the flash is sound again, the memory as it was."""
+    board = Board(IMAGE, RTT)
+    ticks = 0
+
+    def tick(board):
+        nonlocal ticks
+        ticks += 1
+        if mishap and ticks == MISHAP_TICK:
+            board.traps.clear()
+            board.put_voltage(CODE)
+            board.note("mishap", ticks)
+            mishap(board)
+
+    board.traps[TICK] = tick
+    board.reset(POWER_ON)
+    while (cause := board.run(until_us)) is not None:
+        board.uc.mem_write(FLASH, IMAGE)
+        board.uc.ctl_remove_cache(FLASH, FLASH + len(IMAGE))
+        board.reset(cause)
+    return board.log
+
+
+if __name__ == "__main__":
+    with open(sys.argv[1], "rb") as file:
+        IMAGE = file.read()
+    TICK, PANIC, RTT = (int(word, 0) for word in sys.argv[2:])
+    print(json.dumps({
+        "quiet": play(None, 1_200_000),
+        "panic": play(panic, 400_000),
+        "hard fault": play(broken(UNDEFINED), 400_000),
+        "hang": play(broken(HANG), 500_000),
+    }))
