@@ -26,7 +26,7 @@ prop_compose! {
         full_scale_v in 50.0..=1000.0f64,
         (low, high) in (0.0..0.4f64, 0.5..=1.0f64),
         starts_at_zero: bool,
-        slew in prop::option::of(0.0..7.0f64),
+        slew in prop::option::of(0.0..=9.0f64),
         dac_bits in 8u32..=16,
     ) -> Amplifier {
         let (min_v, max_v) = (if starts_at_zero { 0.0 } else { low * (full_scale_v - 25.0) }, high * full_scale_v);
@@ -39,9 +39,9 @@ prop_compose! {
     fn case()(
         rate in 2.0..=4.0f64,
         share in 0.0..=0.9f64,
-        time_constant in -1.0..3.0f64,
+        time_constant in -3.7..=4.0f64,
         proportional in -3.0..=2.0f64,
-        reset_ticks in 1.0..6.0f64,
+        reset_ticks in 1.0..8.0f64,
         amplifier in amplifier(),
         stair in prop::collection::vec((-0.1..1.1f64, 1u32..4000), 1..8),
     ) -> Case {
