@@ -154,6 +154,8 @@ fn reference_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: 
         stretches.next().is_none() && first.is_some_and(|first| (first.to_v() - targets[tick + 1]).abs() < 1e-9)
     };
     let mut moments = vec![Moment::default(); targets.len()];
+    // Goes along, like the other: found from the start each time, a long file would take the square of its rows.
+    let mut behind = schedule.reader();
     let mut tick = 0;
     while tick < targets.len() {
         solution.jump(targets[tick]);
@@ -163,8 +165,8 @@ fn reference_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: 
         for at in tick..end {
             samples[at + 1].reference = moments[at].stiffness;
         }
-        let reader = schedule.reader();
-        for stretch in reader.stretches(time(end), time(end + 1)) {
+        behind.at(time(end));
+        for stretch in behind.clone().stretches(time(end), time(end + 1)) {
             solution.advance(stretch.from_v, stretch.slope, stretch.duration_s);
         }
         tick = end + 1;
