@@ -16,6 +16,7 @@
 
 pub mod bad_input;
 pub mod bound;
+pub mod diagnose;
 pub mod experiment;
 mod leap;
 pub mod link;

@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Write};
 
 use anyhow::Result;
 
+pub(crate) mod diagnose;
 pub(crate) mod link;
 pub(crate) mod log;
 pub(crate) mod stair;
