@@ -4,10 +4,10 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::detectable;
 use super::score::Outcome;
 use super::seam::Diagnose;
 use super::summary::quantile;
+use super::{apart, detectable};
 use crate::hidden::noise::Noise;
 use crate::hidden::record::Recipe;
 use crate::hidden::{Cause, Hidden};
@@ -28,6 +28,8 @@ pub struct Climb {
     pub records: usize,
     /// Median detectable size, in the unit of the cause.
     pub detectable: f64,
+    /// The size from which 95 % of the records could be told from another cause at best, in units of the detectable size.
+    pub told_apart: f64,
     /// Share of the records that were named, rung by rung, up to the first that is enough.
     pub named: Vec<f64>,
     /// The rung that was enough; none if none was.
@@ -61,6 +63,7 @@ pub fn climb(
         let sizes = records.iter().map(|(hidden, size)| hidden.effects[0].at((factor * size).min(1.0)).magnitude());
         quantile(&sizes.collect::<Vec<_>>(), 0.5)
     };
+    let factors: Vec<f64> = records.par_iter().map(|(hidden, size)| apart::factor(hidden, *size)).collect();
     let mut named = Vec::new();
     let mut ratio = None;
     for rung in RUNGS {
@@ -81,6 +84,7 @@ pub fn climb(
         noise_percent,
         records: records.len(),
         detectable: median(1.0).unwrap_or(f64::NAN),
+        told_apart: quantile(&factors, ENOUGH).unwrap_or(f64::NAN),
         named,
         ratio,
         size: ratio.and_then(median),

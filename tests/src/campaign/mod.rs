@@ -5,12 +5,13 @@
 //! | [`seam`] | the one place that calls the diagnosis |
 //! | [`part`] | which records a part of the campaign is made of |
 //! | [`score`], [`summary`] | what became of one record, and of many |
-//! | [`detectable`], [`ladder`] | the smallest effect that can be seen, and the smallest that is named |
+//! | [`detectable`], [`apart`], [`ladder`] | the smallest effect that can be seen, told from others, and that is named |
 //! | [`aim`] | what is asked for, and whether it came out |
 //! | [`tables`] | all of it as Markdown |
 //! | [`rivals`] | what other tools make of the same records |
 
 pub mod aim;
+pub mod apart;
 pub mod detectable;
 pub mod ladder;
 pub mod part;

@@ -94,7 +94,7 @@ pub fn confusion(outcomes: &[Outcome]) -> String {
 /// How often each cause is named at the rungs of the ladder.
 pub fn ladder(climbs: &[Climb]) -> String {
     let rungs: Vec<String> = RUNGS.iter().map(|rung| format!("x {rung}")).collect();
-    let mut header = vec!["cause", "records", "detectable"];
+    let mut header = vec!["cause", "records", "detectable", "told apart from"];
     header.extend(rungs.iter().map(String::as_str));
     header.push("named from");
     let row = |climb: &Climb| {
@@ -102,6 +102,11 @@ pub fn ladder(climbs: &[Climb]) -> String {
             climb.cause.to_string(),
             climb.records.to_string(),
             format!("{} {}", significant(climb.detectable), climb.unit),
+            if climb.told_apart > 100.0 {
+                "x > 100".to_owned()
+            } else {
+                format!("x {}", significant(climb.told_apart))
+            },
         ];
         cells.extend((0..RUNGS.len()).map(|i| climb.named.get(i).map_or(String::new(), |&named| percent(named))));
         cells.push(climb.ratio.map_or_else(|| "never".to_owned(), |ratio| format!("x {ratio}")));
