@@ -5,8 +5,9 @@
 //! picks the right one in 95 % of the records if that is at least 2 x 1.645 standard deviations of the noise.
 //!
 //! It is a lower bound: e has the few shapes (time constants, frequencies, stretches) that are drawn, and there may be more
-//! than one other cause at work. It holds while effects are small: a delay and a slew of less than a row are one and the same on
-//! equal steps, whatever the noise; not so when they last longer. Quantisation, outliers and saturation move no small expected reading, and imitate nothing.
+//! than one other cause at work. It holds while effects are small: a delay and a slew of less than a row are one and the
+//! same on equal steps, whatever the noise; not so when they last longer. Quantisation, outliers and saturation move no
+//! small expected reading, and imitate nothing.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

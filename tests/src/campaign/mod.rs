@@ -5,6 +5,7 @@
 //! | [`seam`] | the one place that calls the diagnosis |
 //! | [`part`] | which records a part of the campaign is made of |
 //! | [`score`], [`summary`] | what became of one record, and of many |
+//! | [`bound`] | how near a parameter can come at best |
 //! | [`detectable`], [`apart`], [`ladder`] | the smallest effect that can be seen, told from others, and that is named |
 //! | [`aim`] | what is asked for, and whether it came out |
 //! | [`tables`] | all of it as Markdown |
@@ -12,6 +13,7 @@
 
 pub mod aim;
 pub mod apart;
+pub mod bound;
 pub mod detectable;
 pub mod ladder;
 pub mod part;

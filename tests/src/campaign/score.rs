@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
+use super::bound;
 use super::seam::Diagnose;
 use crate::hidden::{Cause, Hidden};
 
@@ -75,6 +76,8 @@ pub struct Estimate {
     pub error: f64,
     /// The truth lies within the finding's 95 % bounds.
     pub covered: bool,
+    /// The least median of the error that is possible in this record, where there is such a bound.
+    pub at_best: Option<f64>,
 }
 
 impl Outcome {
@@ -144,7 +147,8 @@ fn estimates(hidden: &Hidden, finding: &Finding) -> Vec<Estimate> {
                 found.low.is_some_and(|low| low <= truth) && found.high.is_some_and(|high| truth <= high)
             });
             let error = value.map_or(f64::INFINITY, |value| ((value - truth) / scale).abs());
-            Some(Estimate { cause, name: name.to_owned(), truth, value, error, covered })
+            let at_best = bound::median_error(hidden, cause, name);
+            Some(Estimate { cause, name: name.to_owned(), truth, value, error, covered, at_best })
         })
         .collect()
 }

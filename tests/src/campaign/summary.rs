@@ -45,6 +45,8 @@ pub struct Accuracy {
     pub estimates: usize,
     /// Median of the relative error.
     pub median_error: f64,
+    /// The least that was possible: median over the records, of those that have a bound.
+    pub at_best: Option<f64>,
     /// How often the 95 % bounds held the truth, in parts of 1.
     pub covered: f64,
 }
@@ -99,6 +101,7 @@ fn accuracies(outcomes: &[&Outcome]) -> Vec<Accuracy> {
             name,
             estimates: estimates.len(),
             median_error: quantile(&errors, 0.5).unwrap_or(f64::NAN),
+            at_best: quantile(&estimates.iter().filter_map(|estimate| estimate.at_best).collect::<Vec<_>>(), 0.5),
             covered: share(&estimates, |estimate| estimate.covered),
         }
     };

@@ -64,11 +64,13 @@ pub fn named(what: &str, jobs: &[Job], outcomes: &[Outcome]) -> String {
 /// How near the parameters come and how often their bounds hold.
 pub fn accuracy(outcomes: &[Outcome]) -> String {
     let row = |a: Accuracy| {
-        vec![a.cause.to_owned(), a.name, a.estimates.to_string(), percent(a.median_error), percent(a.covered)]
+        let error = |part: f64| format!("{} %", significant(100.0 * part));
+        let at_best = a.at_best.map_or_else(|| "-".to_owned(), error);
+        vec![a.cause.to_owned(), a.name, a.estimates.to_string(), error(a.median_error), at_best, percent(a.covered)]
     };
     let summary = Summary::of("all", &outcomes.iter().collect::<Vec<_>>());
     table(
-        &["cause", "parameter", "estimates", "median error", "95 % bounds hold"],
+        &["cause", "parameter", "estimates", "median error", "at best", "95 % bounds hold"],
         summary.parameters.into_iter().map(row),
     )
 }
