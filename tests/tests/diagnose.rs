@@ -6,7 +6,7 @@ use end_to_end::campaign::score::Outcome;
 use end_to_end::campaign::seam::diagnose;
 use end_to_end::campaign::summary::Summary;
 use end_to_end::campaign::tables;
-use end_to_end::campaign::{detectable, ladder};
+use end_to_end::campaign::{apart, detectable, ladder};
 use end_to_end::hidden::Cause;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -47,7 +47,7 @@ fn an_effect_in_another_form_keeps_its_name() {
     assert!(summary.all_named >= 0.9, "{}\n{wrong}", summary.all_named);
 }
 
-/// 120 records. 1 % is the aim; 2 of 120 happen by chance to one that has it in every eighth run, 4 never.
+/// 120 records. 1 % is the aim; a diagnosis that just meets it gets more than 3 of 120 wrong in 3 % of all such draws.
 #[test]
 #[ignore = "vsj diagnose is to come"]
 fn a_spring_as_in_the_paper_gets_no_finding() {
@@ -73,19 +73,22 @@ fn three_effects_are_all_named() {
     assert!(summary.nothing_extra >= 0.9, "{}\n{wrong}", summary.nothing_extra);
 }
 
-/// 72 records, twice as large as a test that is told the structure needs.
+/// 72 records, half as large again as is needed to tell each effect from every other cause by one who has only two to
+/// choose from.
 #[test]
 #[ignore = "vsj diagnose is to come"]
-fn an_effect_of_twice_the_detectable_size_is_named() {
+fn an_effect_is_named_soon_after_it_can_be_told_apart() {
     let jobs: Vec<Job> = part::singles(FIRST + 1, 4);
     let one = |job: &Job| {
         let hidden = job.recipe.draw(job.seed);
         let size = detectable::size(&hidden).expect("plain effects can be detected");
-        Outcome::of(&hidden.at((2.0 * size).min(1.0)), &diagnose)
+        Outcome::of(&hidden.at((1.5 * apart::factor(&hidden, size) * size).min(1.0)), &diagnose)
     };
     let outcomes: Vec<Outcome> = jobs.par_iter().map(one).collect();
     let named = outcomes.iter().filter(|outcome| outcome.all_named()).count();
-    assert!(named >= 62, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
+    println!("{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
+    // 95 % is the aim, the bound 87 %.
+    assert!(named >= 63, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
 }
 
 /// The campaign itself, on a diagnosis that knows the answer: it counts what it is told.

@@ -68,7 +68,8 @@ pub fn run(first: u64, diagnose: &Diagnose<'_>, progress: &ProgressBar) -> Resul
         let answers: Value = serde_json::from_slice(&output.stdout).context("identification.py prints JSON")?;
         let of = |tool: &str| serde_json::from_value::<Answer>(answers["record"][tool].clone());
         let start = Instant::now();
-        let report = diagnose(&hidden);
+        let report =
+            diagnose(&hidden).inspect_err(|error| progress.println(format!("{cause}: no diagnosis: {error:#}")));
         let vsj = Answer {
             rmse: report.ok().and_then(|report| report["extended"]["held_out_rmse"].as_f64()),
             seconds: start.elapsed().as_secs_f64(),

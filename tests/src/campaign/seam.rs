@@ -12,6 +12,8 @@ pub type Diagnose<'a> = dyn Fn(&Hidden) -> Result<Value> + Sync + 'a;
 
 /// The report of `vsj diagnose` on a record, from the program that the environment's `VSJ` names.
 ///
+/// Nothing else knows how the diagnosis is called: to call a library's function instead, hand it [`Hidden::record`] here.
+///
 /// # Errors
 /// No such program, or it failed.
 pub fn diagnose(hidden: &Hidden) -> Result<Value> {
