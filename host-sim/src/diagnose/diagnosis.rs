@@ -25,6 +25,8 @@ const MOST_RIVALS: usize = 3;
 const MATERIAL: f64 = 0.1;
 /// A step of the readings this many of the noise's scales wide is worth naming.
 const COARSE_STEP: f64 = 0.5;
+/// A reading this many of the noise's scales off is an outlier, once there are outliers.
+const FAR: f64 = 4.0;
 /// 97.5 % of the standard normal.
 const Z: f64 = 1.96;
 /// Lags of the residual's correlations.
@@ -60,8 +62,8 @@ pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, pro
     }
     let readings = reading_findings(&data, observed, &best.fit);
     let left = leftover::test(engine, &best.fit).filter(|left| left.significant);
-    let quality_before = quality(engine, &baseline);
-    let quality_after = quality(engine, &best.fit);
+    let quality_before = quality(engine, &baseline, false);
+    let quality_after = quality(engine, &best.fit, true);
     let mut findings: Vec<Finding> =
         weights.iter().map(|(effect, without)| finding(engine, &best, *effect, without)).collect();
     findings.extend(readings);
@@ -131,7 +133,7 @@ fn informative(engine: &mut Engine) -> bool {
 }
 
 fn insufficient(data: &Data, baseline: &Fit, engine: &mut Engine) -> Report {
-    let quality = quality(engine, baseline);
+    let quality = quality(engine, baseline, false);
     Report {
         schema: SCHEMA,
         rows: data.rows(),
@@ -219,12 +221,13 @@ fn next_experiment(
 fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding> {
     let mut findings = Vec::new();
     let raw = scale_of_squares(&fit.residual);
+    let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
     let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
     let single = |name: &str, value: f64, low: f64, high: f64, unit| {
         BTreeMap::from([(name.to_owned(), Parameter { value, low, high, unit })])
     };
     if let Some(step) = observed.step
-        && step > COARSE_STEP * raw
+        && step > COARSE_STEP * stopped_raw
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data
@@ -245,28 +248,28 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
     for (bound, upper) in [(observed.upper, true), (observed.lower, false)] {
         let Some(bound) = bound else { continue };
         let stopped = data.reading.iter().filter(|&&reading| reading == bound).count();
-        let beyond = |value: f64| if upper { value.min(bound) } else { value.max(bound) };
-        let after: Vec<f64> = data.reading.iter().zip(&predicted).map(|(r, p)| r - beyond(*p)).collect();
         findings.push(Finding {
             cause: "sensor-saturation",
             probability: 1.0,
             parameters: single("limit", bound, bound - 1e-6 * bound.abs(), bound + 1e-6 * bound.abs(), "V"),
             rmse_before: raw,
-            rmse_after: scale_of_squares(&after).min(raw),
+            rmse_after: stopped_raw,
             evidence: format!("{stopped} readings are exactly {bound}, the {} of all", if upper { "highest" } else { "lowest" }),
         });
     }
-    if let Some((fraction, wide)) = fit.noise.wide {
-        let white = fit.noise.whitened(&fit.residual);
-        let far: Vec<usize> =
-            (0..white.len()).filter(|&row| white[row].abs() > 4.0 * fit.noise.sigma).collect();
-        let kept: Vec<f64> = (0..white.len()).filter(|row| !far.contains(row)).map(|row| fit.residual[row]).collect();
+    if let Some((_, wide)) = fit.noise.wide {
+        let errors = observed.errors(&fit.residual);
+        let white = fit.noise.whitened(&errors);
+        let (far, kept): (Vec<usize>, Vec<usize>) =
+            (0..white.len()).partition(|&row| white[row].abs() > FAR * fit.noise.sigma);
+        let kept: Vec<f64> = kept.into_iter().map(|row| errors[row]).collect();
+        let fraction = far.len() as f64 / white.len() as f64;
         let spread = (fraction * (1.0 - fraction) / white.len() as f64).sqrt();
         findings.push(Finding {
             cause: "outliers",
             probability: 1.0,
             parameters: single("fraction", fraction, (fraction - Z * spread).max(0.0), fraction + Z * spread, ""),
-            rmse_before: raw,
+            rmse_before: stopped_raw,
             rmse_after: scale_of_squares(&kept),
             evidence: format!(
                 "{} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
@@ -280,7 +283,7 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
 
 fn finding(engine: &mut Engine, best: &Scored, effect: usize, without: &Scored) -> Finding {
     let odds = best.score - without.score;
-    let (before, after) = (scale_of_squares(&without.fit.residual), scale_of_squares(&best.fit.residual));
+    let (before, after) = (rms(engine, &without.fit), rms(engine, &best.fit));
     let others: Vec<&str> = effects(&without.fit.model).into_iter().map(|other| EFFECTS[other].cause()).collect();
     let against = if others.is_empty() { "the simulation as it was".to_owned() } else { others.join(" and ") };
     Finding {
@@ -294,6 +297,10 @@ fn finding(engine: &mut Engine, best: &Scored, effect: usize, without: &Scored) 
             EFFECTS[effect].meaning()
         ),
     }
+}
+
+fn rms(engine: &Engine, fit: &Fit) -> f64 {
+    scale_of_squares(&engine.observed.errors(&fit.residual))
 }
 
 /// Inverse of the information on the fitted coordinates.
@@ -364,16 +371,19 @@ fn interval(value: f64, error: f64, unit: &'static str) -> Parameter {
     Parameter { value, low, high, unit }
 }
 
-fn quality(engine: &mut Engine, fit: &Fit) -> Quality {
-    let rmse = scale_of_squares(&fit.residual);
+/// `stops` if the simulation knows of bounds at which readings stop.
+fn quality(engine: &mut Engine, fit: &Fit, stops: bool) -> Quality {
+    let observed = engine.observed;
+    let error = |residual: &[f64]| scale_of_squares(&if stops { observed.errors(residual) } else { residual.into() });
+    let rmse = error(&fit.residual);
     let reading = &engine.data.reading;
     let mean = reading.iter().sum::<f64>() / reading.len() as f64;
     let spread = scale_of_squares(&reading.iter().map(|value| value - mean).collect::<Vec<_>>());
     Quality {
         rmse,
         fit_percent: 100.0 * (1.0 - rmse / spread.max(1e-12)),
-        held_out_rmse: scale_of_squares(&engine.held_out(fit).residual),
-        one_step_rmse: scale_of_squares(&fit.noise.whitened(&fit.residual)),
+        held_out_rmse: error(&engine.held_out(fit).residual),
+        one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
     }
 }
 

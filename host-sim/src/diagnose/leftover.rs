@@ -75,12 +75,13 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
         rms: (share.max(0.0)).sqrt() * fit.noise.marginal,
         significant: quantile(gain / variance, count as f64) > RARE,
     };
-    Some(line(data, fit, leftover))
+    Some(line(engine, fit, leftover))
 }
 
 /// A strong line in the spectrum is structure too, whatever was commanded.
-fn line(data: &Data, fit: &Fit, found: Leftover) -> Leftover {
-    let white = fit.noise.whitened(&fit.residual);
+fn line(engine: &Engine, fit: &Fit, found: Leftover) -> Leftover {
+    let data = engine.data;
+    let white = fit.noise.whitened(&engine.observed.errors(&fit.residual));
     let bound = 6.0 * fit.noise.sigma;
     let clipped: Vec<f64> = white.iter().map(|value| value.clamp(-bound, bound)).collect();
     let Some(peak) = spectrum::peaks(&clipped, data, 1).into_iter().next() else { return found };

@@ -73,7 +73,8 @@ impl Noise {
 
     /// The law that suits what a model leaves.
     pub fn fitted(residual: &[f64], observed: &Observed) -> Self {
-        let mut noise = Self::robust(residual);
+        let residual = &*observed.errors(residual);
+        let mut noise = Self::robust(&exact(residual, observed));
         if let Some(step) = observed.step
             && step >= COARSE * rest_of(scale_of_squares(residual), step)
         {
@@ -87,12 +88,13 @@ impl Noise {
         noise.ar = memory(residual, noise.sigma);
         let innovations: Vec<f64> = exact(&noise.whitened(residual), observed);
         noise.fit_tail(&innovations);
-        noise.marginal = scale_of_squares(residual).max(noise.sigma);
+        noise.marginal = scale_of_squares(&exact(residual, observed)).max(noise.sigma);
         noise
     }
 
     /// The same law with the scale that suits a residual.
     pub fn rescaled(&self, residual: &[f64], observed: &Observed) -> Self {
+        let residual = &*observed.errors(residual);
         let mut noise = self.clone();
         if noise.cell > 0.0 {
             noise.rescale_cells(residual, observed);
@@ -166,7 +168,7 @@ impl Noise {
 
     /// Log-likelihood of each row.
     pub fn logs<'a>(&'a self, residual: &'a [f64], observed: &'a Observed) -> impl Iterator<Item = f64> + 'a {
-        let white = self.whitened(residual);
+        let white = self.whitened(&observed.errors(residual));
         (0..residual.len()).map(move |row| self.term(observed.kinds[row], residual[row], white[row]).log)
     }
 

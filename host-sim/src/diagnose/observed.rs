@@ -3,6 +3,8 @@
 //! Continuous noise never gives the same number twice. So readings that all lie on one lattice were rounded to it, and
 //! readings that pile up exactly at the extreme stopped there. Both are seen in the readings themselves, before any model.
 
+use std::borrow::Cow;
+
 use super::data::Data;
 
 /// One row's reading.
@@ -72,6 +74,19 @@ impl Observed {
             }
         });
         Self { kinds: kinds.collect(), step, upper, lower }
+    }
+
+    /// What rows are off by at least: one that stopped at a bound is not off while the prediction is beyond it.
+    pub fn errors<'r>(&self, residual: &'r [f64]) -> Cow<'r, [f64]> {
+        if self.all_exact() {
+            return Cow::Borrowed(residual);
+        }
+        let error = |(&r, kind): (&f64, &Kind)| match kind {
+            Kind::Exact => r,
+            Kind::AtLeast => r.max(0.0),
+            Kind::AtMost => r.min(0.0),
+        };
+        residual.iter().zip(&self.kinds).map(error).collect()
     }
 
     /// True if no reading stopped at a bound.

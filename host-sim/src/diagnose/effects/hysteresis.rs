@@ -66,14 +66,15 @@ impl Bank {
 
     /// Largest distance along the voltage axis between the branches of a slow loop from 0 to `top` and back, in V.
     fn width(mut self, top: f64) -> f64 {
-        const STEPS: usize = 200;
+        const STEPS: usize = 400;
         let voltage = |step: usize| top * step as f64 / STEPS as f64;
         // Once around first, so that the loop closes.
         for step in (0..=STEPS).chain((0..STEPS).rev()) {
             self.at(voltage(step));
         }
         let up: Vec<f64> = (0..=STEPS).map(|step| self.at(voltage(step))).collect();
-        let down: Vec<f64> = (0..=STEPS).rev().map(|step| self.at(voltage(step))).rev().collect();
+        let mut down: Vec<f64> = (0..=STEPS).rev().map(|step| self.at(voltage(step))).collect();
+        down.reverse();
         // Both rise with the voltage: the voltage of the branch up at the same stiffness, by interpolation.
         let mut at = 0;
         let mut widest = 0.0f64;
