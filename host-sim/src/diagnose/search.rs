@@ -45,6 +45,8 @@ pub struct Search<'e, 'a> {
     seen: HashMap<Vec<Block>, Scored>,
     /// Extensions of each structure, best first.
     extended: HashMap<Vec<Block>, Vec<Scored>>,
+    /// What prices are multiplied by: noise whose memory is longer than its law can say makes chance finds look better.
+    caution: f64,
 }
 
 /// A block that could be added, from one start.
@@ -64,7 +66,7 @@ pub fn price(block: &Block, engine: &Engine) -> f64 {
 impl<'e, 'a> Search<'e, 'a> {
     /// With an engine for one record.
     pub fn new(engine: &'e mut Engine<'a>) -> Self {
-        Self { engine, seen: HashMap::new(), extended: HashMap::new() }
+        Self { engine, seen: HashMap::new(), extended: HashMap::new(), caution: 1.0 }
     }
 
     /// Everything that was judged.
@@ -74,6 +76,26 @@ impl<'e, 'a> Search<'e, 'a> {
 
     /// The best structure; `progress` hears of each structure that becomes the best.
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
+        loop {
+            let best = self.pass(&mut progress);
+            let caution = best.fit.noise.long_memory(&self.engine.observed.errors(&best.fit.residual));
+            if caution <= self.caution || best.fit.model.blocks.is_empty() {
+                return best;
+            }
+            self.caution = caution;
+            self.extended.clear();
+            let keys: Vec<Vec<Block>> = self.seen.keys().cloned().collect();
+            for key in keys {
+                let score = self.seen[&key].held_out - self.prices(&self.seen[&key].fit.model);
+                if let Some(scored) = self.seen.get_mut(&key) {
+                    scored.score = score;
+                }
+            }
+        }
+    }
+
+    /// One search at the present caution.
+    fn pass(&mut self, progress: &mut impl FnMut(&Scored)) -> Scored {
         let root = self.engine.at(Model::default());
         let root = self.judged(root);
         let mut best = root.clone();
@@ -265,7 +287,7 @@ impl<'e, 'a> Search<'e, 'a> {
     }
 
     fn prices(&self, model: &Model) -> f64 {
-        model.blocks.iter().map(|(block, _)| price(block, self.engine)).sum()
+        self.caution * model.blocks.iter().map(|(block, _)| price(block, self.engine)).sum::<f64>()
     }
 }
 
