@@ -12,9 +12,7 @@ use super::leftover::{self, Leftover};
 use super::model::Model;
 use super::noise::{Noise, scale_of_squares};
 use super::observed::Observed;
-use super::report::{
-    Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict,
-};
+use super::report::{Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict};
 use super::search::{Scored, Search, effects};
 
 /// Odds under which a rival set counts as possible, in nats.
@@ -46,7 +44,12 @@ pub struct Diagnosis {
 }
 
 /// Runs the search and says what it found.
-pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, progress: impl FnMut(&Scored)) -> Diagnosis {
+pub(super) fn diagnose(
+    data: Data,
+    observed: &Observed,
+    engine: &mut Engine,
+    progress: impl FnMut(&Scored),
+) -> Diagnosis {
     let baseline = engine.at(Model::default());
     if !informative(engine) {
         let report = insufficient(&data, &baseline, engine);
@@ -126,7 +129,7 @@ fn informative(engine: &mut Engine) -> bool {
     // The noise as it is at best, the information as it is where the search starts.
     let best = engine.fit(probe.clone(), &Noise::first_look());
     let residual = engine.residual(&probe);
-    let start = Fit { model: probe, residual, noise: best.noise, log_likelihood: 0.0 };
+    let start = Fit { model: probe, residual, noise: best.noise, ..best };
     let Some(covariance) = covariance(engine, &start) else { return false };
     // Half of the gain, or a factor of e in the time constant, is no knowledge.
     covariance[(0, 0)].sqrt() < 0.5 && covariance[(1, 1)].sqrt() < 1.0
@@ -177,9 +180,10 @@ fn twin(findings: &[Finding]) -> Option<Vec<&'static str>> {
         _ => None,
     };
     let causes: Vec<&'static str> = findings.iter().map(|finding| finding.cause).collect();
-    causes.iter().any(|cause| swapped(*cause).is_some()).then(|| {
-        causes.iter().map(|&cause| swapped(cause).unwrap_or(cause)).collect()
-    })
+    causes
+        .iter()
+        .any(|cause| swapped(*cause).is_some())
+        .then(|| causes.iter().map(|&cause| swapped(cause).unwrap_or(cause)).collect())
 }
 
 /// True if the voltage never turns back by more than a fiftieth of its range.
@@ -210,9 +214,10 @@ fn next_experiment(
             let experiment = EFFECTS[index_of(cause)?].experiment();
             Some(format!("run {experiment}"))
         }
-        Verdict::Unexplained => {
-            Some(format!("repeat the record and look {}: what comes back there is a cause that has no name here yet", left?.place))
-        }
+        Verdict::Unexplained => Some(format!(
+            "repeat the record and look {}: what comes back there is a cause that has no name here yet",
+            left?.place
+        )),
         _ => None,
     }
 }
@@ -242,7 +247,10 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
             parameters: single("step", step, step * (1.0 - 1e-6), step * (1.0 + 1e-6), "V"),
             rmse_before: raw.max(step / 12f64.sqrt()),
             rmse_after: scale_of_squares(&after).min(raw),
-            evidence: format!("every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left", step / raw),
+            evidence: format!(
+                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left",
+                step / raw
+            ),
         });
     }
     for (bound, upper) in [(observed.upper, true), (observed.lower, false)] {
@@ -254,7 +262,10 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
             parameters: single("limit", bound, bound - 1e-6 * bound.abs(), bound + 1e-6 * bound.abs(), "V"),
             rmse_before: raw,
             rmse_after: stopped_raw,
-            evidence: format!("{stopped} readings are exactly {bound}, the {} of all", if upper { "highest" } else { "lowest" }),
+            evidence: format!(
+                "{stopped} readings are exactly {bound}, the {} of all",
+                if upper { "highest" } else { "lowest" }
+            ),
         });
     }
     if let Some((_, wide)) = fit.noise.wide {
@@ -388,17 +399,14 @@ fn quality(engine: &mut Engine, fit: &Fit, stops: bool) -> Quality {
 }
 
 fn noise_report(noise: &Noise) -> NoiseReport {
-    NoiseReport {
-        sigma: noise.sigma,
-        tail: noise.nu.is_finite().then_some(noise.nu),
-        memory_rows: noise.ar.len(),
-    }
+    NoiseReport { sigma: noise.sigma, tail: noise.nu.is_finite().then_some(noise.nu), memory_rows: noise.ar.len() }
 }
 
 fn residual_report(data: &Data, fit: &Fit) -> ResidualReport {
     let white = fit.noise.whitened(&fit.residual);
-    let changes: Vec<f64> =
-        (0..data.rows()).map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] }).collect();
+    let changes: Vec<f64> = (0..data.rows())
+        .map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] })
+        .collect();
     let correlation = |a: &[f64], b: &[f64], lag: usize| {
         let lag = lag.min(a.len());
         let product: f64 = a[lag..].iter().zip(b).map(|(a, b)| a * b).sum();

@@ -28,7 +28,10 @@ impl Effect for AmplifierLimit {
     }
 
     fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
-        (1..20).map(|part| vec![data.full_scale_v * (1.0 - 0.04 * f64::from(part))]).chain([vec![0.985 * data.full_scale_v]]).collect()
+        (1..20)
+            .map(|part| vec![data.full_scale_v * (1.0 - 0.04 * f64::from(part))])
+            .chain([vec![0.985 * data.full_scale_v]])
+            .collect()
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
