@@ -122,7 +122,9 @@ impl Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let stride = arguments.stride()?;
-    let plant = plant_file::load(&arguments.plant)?;
+    let Some(plant) = plant_file::load(&arguments.plant)?.plain() else {
+        bad_input!("{}: the extended spring cannot be run yet", arguments.plant);
+    };
     let mut record = None;
     let (name, schedule) = match arguments.input.as_str() {
         "stair" => ("the stair".to_owned(), Schedule::stair()),
