@@ -182,20 +182,6 @@ impl From<Plant> for PlantFile {
 }
 
 impl PlantFile {
-    /// The plain spring, if nothing in the file asks for more, its amplifier's limits included.
-    pub fn plain(&self) -> Option<Plant> {
-        let Self { memory: None, law: None, leakage: None, relaxation, .. } = self else { return None };
-        let limited = self.amplifier.as_ref().is_some_and(|amplifier| amplifier.limit_v.is_some());
-        match relaxation {
-            Relaxation { share, tau_s, weights, tau_high_s: None } if weights.is_empty() && !limited => match tau_s[..]
-            {
-                [time_constant_s] => Some(Plant { share: *share, time_constant_s }),
-                _ => None,
-            },
-            _ => None,
-        }
-    }
-
     /// The spring as the estimator's extended tick takes it.
     pub fn extended(&self) -> ExtendedPlant<'_> {
         ExtendedPlant {
@@ -228,7 +214,7 @@ impl PlantFile {
             return refused("schema", f64::from(self.schema), 1.0, 1.0, "as version of the format");
         }
         let sample_time = SampleTime::from_rate(10_000.0)?;
-        match self.plain() {
+        match self.extended().plain() {
             Some(plant) => plant.scaled(sample_time).map(drop).map_err(|error| match error.field {
                 "share" => OutOfRange { field: "relaxation.share", ..error },
                 _ => OutOfRange { field: "relaxation.tau_s", ..error },

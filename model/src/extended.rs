@@ -24,7 +24,7 @@ pub use leakage::Leakage;
 pub use memory::Memory;
 
 use crate::error::OutOfRange;
-use crate::estimator::{Estimator, Model, Pivot, Promptness};
+use crate::estimator::{Estimator, Model, Pivot, Plant, Promptness};
 use crate::units::{SampleTime, ScaledStiffness, Signal, Volts};
 
 /// The lowest stiffness that the pre-compensator is shown, so that its error fits in a signal.
@@ -61,6 +61,19 @@ pub struct State {
     memory: memory::State,
     leakage: leakage::State,
     lags: lags::State,
+}
+
+impl ExtendedPlant<'_> {
+    /// The plain spring that this is, if nothing is extended.
+    pub fn plain(&self) -> Option<Plant> {
+        let Self { memory: None, law: None, leakage: None, relaxation } = *self else { return None };
+        match relaxation {
+            Relaxation { share, time_constants_s: &[time_constant_s], weights: [], time_constant_high_s: None } => {
+                Some(Plant { share, time_constant_s })
+            }
+            _ => None,
+        }
+    }
 }
 
 impl Model for ExtendedPlant<'_> {

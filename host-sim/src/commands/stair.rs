@@ -6,15 +6,15 @@ use super::print;
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::bad_input;
-use host_sim::experiment::{Experiment, Run, paper_spring};
+use host_sim::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
 use host_sim::output::files::{Files, write_csv};
 use host_sim::output::{plots, terminal};
-use host_sim::plant_file;
+use host_sim::plant_file::{self, PlantFile};
 use host_sim::record::{MEASURED, Record};
 use host_sim::schedule::{Between, Schedule};
 use host_sim::stair::{Report, Rows};
 use indicatif::{ProgressBar, ProgressStyle};
-use model::{Amplifier, Gains, Plant, Settings};
+use model::{Amplifier, ExtendedPlant, Gains, Plant, Settings};
 
 /// Run the stair experiment in closed loop on the fixed-point controller, beside the report's Table 3
 #[derive(Args, Debug)]
@@ -95,14 +95,18 @@ impl Arguments {
         Defaults::parse_from(["vsj", "--out", "out/stair"]).arguments
     }
 
-    fn settings(&self, plant: Plant) -> Settings {
+    /// The settings of a plant file's spring, behind the stricter of its amplifier and the options'.
+    fn settings<'a>(&self, file: &'a PlantFile) -> Settings<ExtendedPlant<'a>> {
+        let recorded = file.amplifier.clone().unwrap_or_default();
+        let slews = [self.slew_v_per_s, recorded.slew_v_per_s];
         Settings {
             rate_hz: self.rate_hz,
-            plant,
+            plant: file.extended(),
             gains: Some(Gains { proportional: self.kp, integral_per_s: self.ki }),
             amplifier: Amplifier {
                 min_v: self.min_v,
-                slew_v_per_s: self.slew_v_per_s,
+                max_v: recorded.limit_v.map_or(self.limit_v, |limit| limit.min(self.limit_v)),
+                slew_v_per_s: slews.into_iter().flatten().reduce(f64::min),
                 dac_bits: self.dac_bits,
                 ..Amplifier::up_to(self.limit_v)
             },
@@ -121,10 +125,26 @@ impl Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let file = plant_file::load(&arguments.plant)?;
+    let left_out = file.left_out();
+    if !left_out.is_empty() {
+        eprintln!("vsj: {}: not simulated: {}", arguments.plant, left_out.join(", "));
+    }
+    let settings = arguments.settings(&file);
+    // Where the range ends below what may be asked for, only the sampled reference takes the target at its end.
+    match settings.plant.plain().filter(|_| settings.amplifier.max_v == arguments.limit_v) {
+        Some(plant) => run_plant(arguments, with_plant(&settings, plant), is_the_reports),
+        None => run_plant(arguments, settings, |_| false),
+    }
+}
+
+/// Runs the command for one kind of spring; `is_the_reports` says whether Table 3's simulated columns should come out.
+fn run_plant<P: Judged>(
+    arguments: &Arguments,
+    settings: Settings<P>,
+    is_the_reports: impl Fn(&Settings<P>) -> bool,
+) -> Result<()> {
     let stride = arguments.stride()?;
-    let Some(plant) = plant_file::load(&arguments.plant)?.plain() else {
-        bad_input!("{}: the extended spring cannot be run yet", arguments.plant);
-    };
     let mut record = None;
     let (name, schedule) = match arguments.input.as_str() {
         "stair" => ("the stair".to_owned(), Schedule::stair()),
@@ -135,7 +155,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             (file.to_owned(), Schedule::from_record(read, arguments.between))
         }
     };
-    let experiment = Experiment { name, schedule, settings: arguments.settings(plant) };
+    let experiment = Experiment { name, schedule, settings };
     if let Err(error) = experiment.settings.check() {
         bad_input!("{}{error}", option(error.field));
     }
@@ -175,7 +195,7 @@ fn option(field: &str) -> &'static str {
         "dac_bits" => "--dac-bits: ",
         "proportional_gain" => "--kp: ",
         "integral_gain_per_s" => "--ki: ",
-        "share" | "time_constant_s" => "--plant: ",
+        field if field == "share" || field == "time_constant_s" || field.contains('.') => "--plant: ",
         _ => "",
     }
 }
@@ -189,9 +209,9 @@ fn is_the_reports(settings: &Settings) -> bool {
         && settings.amplifier.max_v >= 700.0
 }
 
-fn write(
+fn write<P>(
     folder: &Path,
-    experiment: &Experiment,
+    experiment: &Experiment<P>,
     run: &Run,
     report: &Report,
     controlled: bool,

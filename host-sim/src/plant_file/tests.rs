@@ -29,10 +29,10 @@ remarks = [\"two\", \"of them\"]
 #[test]
 fn a_file_gives_its_numbers() {
     let file = parse("p", "schema = 1\n[relaxation]\nshare = 0.2\ntau_s = 3\n").unwrap();
-    assert_eq!(file.plain(), Some(Plant { share: 0.2, time_constant_s: 3.0 }));
+    assert_eq!(file.extended().plain(), Some(Plant { share: 0.2, time_constant_s: 3.0 }));
     assert_eq!(file, Plant { share: 0.2, time_constant_s: 3.0 }.into());
     let whole = parse("p", WHOLE).unwrap();
-    assert_eq!(whole.plain(), None);
+    assert_eq!(whole.extended().plain(), None);
     assert_eq!(whole.left_out(), ["amplifier.delay_s", "drift", "remarks"]);
     let plant = whole.extended();
     assert_eq!(plant.memory.unwrap().thresholds_v, [10.0, 25.0]);
