@@ -10,7 +10,7 @@
 //!
 //! Signals saturate at the ends of their format, +-2048 V. The tick is exact for a held voltage up to rounding, with two
 //! exceptions whose bounds are stated where they are made: the lags see the mean of a leaking input ([`leakage`]), and
-//! a time constant that depends on the voltage is interpolated ([`varying_rate`]).
+//! the rate of a time constant that depends on the voltage is approximated ([`varying_rate`]).
 
 pub mod lags;
 pub mod law;

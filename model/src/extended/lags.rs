@@ -104,7 +104,7 @@ impl Config {
             let lowest = (4.0 * sample_time.seconds()).max(0.1 * low_s);
             OutOfRange::check("relaxation.tau_high_s", high_s, lowest..=(10.0 * low_s).min(1e4), "s")?;
             let time_constant = TimeConstant { low_s, high_s };
-            config.varying = Some(VaryingRate::new(|volts| relaxed_in(time_constant.at(volts), sample_time)));
+            config.varying = Some(VaryingRate::new(&time_constant, sample_time));
         }
         Ok(config)
     }
