@@ -4,7 +4,7 @@
 //!   of 100 nor a share of 0.09 loses precision, and no shift is needed.
 //! - [`Rate`] turns a lag into what an accumulator gains in one tick. A relaxation of 5.5 s moves by 1.8e-5 of its lag
 //!   in a 10 kHz tick; 32 fraction bits would put its time constant off by parts in 1e5, so it has 64.
-//! - [`Weight`] is a factor of a sum of products: the products are added 64 bits wide and [`saturated`] once.
+//! - [`Weight`] is a factor of a sum of products: the products are added 64 bits wide and saturated once.
 
 use fixed::types::{I0F32, I5F27, I17F47};
 

@@ -98,3 +98,59 @@ impl Config {
         saturated(Sum::from_bits(i64::from(line.value.to_bits()) << Weight::FRACTION_BITS) + line.slope.of(along))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn at(law: &Law<'_>, input: f64) -> f64 {
+        Config::new(law).unwrap().at(Signal::from_num(input)).to_num()
+    }
+
+    proptest! {
+        /// Another way to the same curve: a sum of kinks.
+        #[test]
+        fn it_goes_straight_through_its_points(
+            lines in prop::collection::vec((1.0..100.0f64, -2.0..2.0f64), 1..=8),
+            input in -500.0..1000.0f64,
+        ) {
+            let (mut voltage_v, mut stiffness) = (Vec::from([0.0]), Vec::from([0.0]));
+            let (mut expected, mut before) = (0.0, 0.0);
+            for (line, (width, slope)) in lines.into_iter().enumerate() {
+                let start = voltage_v[line];
+                let beyond = if line == 0 { input } else { (input - start).max(0.0) };
+                expected += (slope - before) * beyond;
+                before = slope;
+                voltage_v.push(start + width);
+                stiffness.push(stiffness[line] + slope * width);
+            }
+            let got = at(&Law { voltage_v: &voltage_v, stiffness: &stiffness }, input);
+            let expected = expected.clamp(-2048.0, 2048.0);
+            prop_assert!((got - expected).abs() < 1e-4, "{got} {expected}");
+        }
+    }
+
+    #[test]
+    fn too_steep_an_end_saturates() {
+        let steep = Law { voltage_v: &[0.0, 100.0], stiffness: &[0.0, 900.0] };
+        assert_eq!(at(&steep, 2000.0), Signal::MAX.to_num::<f64>());
+        assert_eq!(at(&steep, -2000.0), Signal::MIN.to_num::<f64>());
+        assert!((at(&steep, -100.0) + 900.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_wrong_law_is_named() {
+        let named =
+            |voltage_v: &[f64], stiffness: &[f64]| Config::new(&Law { voltage_v, stiffness }).unwrap_err().field;
+        assert_eq!(named(&[0.0], &[0.0]), "law.voltage_v");
+        assert_eq!(named(&[0.0; 10], &[0.0; 10]), "law.voltage_v");
+        assert_eq!(named(&[0.0, 1.0], &[0.0]), "law.stiffness");
+        assert_eq!(named(&[0.0, 0.0], &[0.0, 1.0]), "law.voltage_v");
+        assert_eq!(named(&[0.0, f64::NAN], &[0.0, 1.0]), "law.voltage_v");
+        assert_eq!(named(&[0.0, 1.0], &[1.0, 2.0]), "law.stiffness");
+        assert_eq!(named(&[0.0, 1.0], &[0.0, 11.0]), "law.stiffness");
+        assert_eq!(named(&[0.0, 1.0], &[0.0, f64::NAN]), "law.stiffness");
+    }
+}

@@ -64,3 +64,39 @@ impl Config {
         charge.saturating_sub(saturated(self.until_mean.of(lag)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is left at a tick, and its mean until the next, are those of the exponential.
+    #[test]
+    fn it_falls_back_exponentially() {
+        for rate_hz in [100.0, 1000.0, 10_000.0] {
+            let sample_time = SampleTime::from_rate(rate_hz).unwrap();
+            let leakage = Leakage { share: 0.4, time_constant_s: 2.0 };
+            let (config, mut state) = (Config::new(&leakage, sample_time).unwrap(), State::default());
+            let input = Signal::from_num(500);
+            for tick in 0..(4.0 * rate_hz) as u32 {
+                let (from, to) = (f64::from(tick) / rate_hz, f64::from(tick + 1) / rate_hz);
+                let charge = config.charge(&state, input);
+                let mean = config.advance(&mut state, input, charge).to_num::<f64>();
+                let lost = |time: f64| (-time / 2.0).exp();
+                let exact = 300.0 + 200.0 * lost(from);
+                let exact_mean = 300.0 + 200.0 * 2.0 * (lost(from) - lost(to)) * rate_hz;
+                assert!((charge.to_num::<f64>() - exact).abs() < 1e-5, "{rate_hz} Hz, {from} s: {charge} {exact}");
+                assert!((mean - exact_mean).abs() < 1e-5, "{rate_hz} Hz, {from} s: {mean} {exact_mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_leakage_is_named() {
+        let sample_time = SampleTime::from_rate(1000.0).unwrap();
+        let named =
+            |share, time_constant_s| Config::new(&Leakage { share, time_constant_s }, sample_time).unwrap_err().field;
+        assert_eq!(named(1.1, 5.0), "leakage.share");
+        assert_eq!(named(f64::NAN, 5.0), "leakage.share");
+        assert_eq!(named(0.1, 0.05), "leakage.tau_s");
+    }
+}

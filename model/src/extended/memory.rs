@@ -83,3 +83,54 @@ impl Config {
         saturated(sum)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const BANK: Memory<'_> = Memory { direct: 0.5, thresholds_v: &[10.0, 40.0], weights: &[0.3, 0.2] };
+
+    fn walk(memory: &Memory<'_>, voltages: &[f64]) -> f64 {
+        let (config, mut state) = (Config::new(memory).unwrap(), State::default());
+        let outputs = voltages.iter().map(|&voltage| config.run(&mut state, Signal::from_num(voltage)).to_num());
+        outputs.last().unwrap_or(0.0)
+    }
+
+    #[test]
+    fn up_and_back_by_hand() {
+        for (voltages, expected) in [
+            (&[100.0][..], 50.0 + 0.3 * 90.0 + 0.2 * 60.0),
+            // Within twice the threshold a play stays.
+            (&[100.0, 85.0], 42.5 + 0.3 * 90.0 + 0.2 * 60.0),
+            (&[100.0, 50.0], 25.0 + 0.3 * 60.0 + 0.2 * 60.0),
+            (&[100.0, 0.0], 0.3 * 10.0 + 0.2 * 40.0),
+        ] {
+            let got = walk(&BANK, voltages);
+            assert!((got - expected).abs() < 1e-5, "{voltages:?}: {got} {expected}");
+        }
+    }
+
+    proptest! {
+        /// A minor loop that is passed again leaves no trace, and speed does not matter: only the turns are remembered.
+        #[test]
+        fn closed_loops_are_forgotten(peak in 200.0..900.0f64, low in 0.0..150.0f64, inner in 150.0..200.0f64) {
+            let straight = walk(&BANK, &[peak, low, peak]);
+            let detour = walk(&BANK, &[peak / 3.0, peak, low, inner, low, 0.5 * (low + inner), peak]);
+            prop_assert!((straight - detour).abs() < 1e-5, "{straight} {detour}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_bank_is_named() {
+        let named = |direct, thresholds_v: &[f64], weights: &[f64]| {
+            Config::new(&Memory { direct, thresholds_v, weights }).unwrap_err().field
+        };
+        assert_eq!(named(f64::NAN, &[], &[]), "memory.direct");
+        assert_eq!(named(1.0, &[-1.0], &[0.1]), "memory.thresholds_v");
+        assert_eq!(named(1.0, &[1.0; 9], &[0.1; 9]), "memory.thresholds_v");
+        assert_eq!(named(1.0, &[1.0], &[]), "memory.weights");
+        // Each is allowed, but not all of them.
+        assert_eq!(named(4.0, &[1.0, 2.0], &[4.0, -4.0]), "memory.weights");
+    }
+}

@@ -1,7 +1,7 @@
 //! A relaxation whose time constant depends on the voltage.
 //!
 //! ```text
-//! tau(v) = low + (high - low) v / 500 V     for v >= 0; beyond 500 V it goes on, but not below half of the shorter one
+//! tau(v) = low + (high - low) v / 500 V     for v >= 0; on up to 1000 V, but not below half of the shorter one
 //! ```
 //!
 //! What part `r` of its distance a lag makes in a tick is curved in `tau`, but `1 / r` is almost straight:
@@ -92,12 +92,52 @@ impl VaryingRate {
     pub(crate) fn step(&self, voltage: Signal, lag: Signal) -> Accumulator {
         let voltage = voltage.max(Signal::ZERO).min(self.end);
         let more = (i64::from(voltage.to_bits()) * i64::from(self.per_volt)) >> (Signal::FRAC_NBITS + MORE_BITS);
-        // 25.6 to 31 bits, so that the guess of its inverse has at least 15 and the rate below at most 30.4.
+        // 25.3 to 31 bits, so that its guessed inverse is good to 2^-10 and the rate has at most 31.
         let inverse = self.at_zero + more as i32;
         let guess = (1u32 << 31).checked_div(inverse as u32 >> 15).unwrap_or(0);
         let missing = (1 << 46) - i64::from(inverse) * i64::from(guess);
         let rate = (i64::from(guess) << 10) + ((i64::from(guess) * (missing >> 20)) >> 16);
         // 2^56 / inverse, times the lag in 2^-20: scaled back to 2^-52.
         Accumulator::from_bits((i64::from(lag.to_bits()) * i64::from(rate as i32)) >> self.shift)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// Over all that is accepted.
+        #[test]
+        fn the_rate_is_as_exact_as_promised(
+            rate in 2.0..=4.0f64,
+            ticks in 0.61..6.0f64,
+            ratio in -1.0..=1.0f64,
+            volts in -100.0..=1000.0f64,
+            lag in -2000.0..2000.0f64,
+        ) {
+            let rate_hz = libm::pow(10.0, rate);
+            let low_s = libm::pow(10.0, ticks) / rate_hz;
+            let tau = TimeConstant { low_s, high_s: (low_s * libm::pow(10.0, ratio)).max(4.0 / rate_hz) };
+            let sample_time = SampleTime::from_rate(rate_hz).unwrap();
+            let lag = Signal::from_num(lag);
+            let got = VaryingRate::new(&tau, sample_time).step(Signal::from_num(volts), lag).to_num::<f64>();
+            let x = sample_time.seconds() / tau.at(volts);
+            let exact = -libm::expm1(-x) * lag.to_num::<f64>();
+            let shortest = sample_time.seconds() / tau.shortest_s();
+            let allowed = exact.abs() * (shortest * shortest / 12.0 + 1.5e-6) + 1e-12;
+            prop_assert!((got - exact).abs() < allowed, "{tau:?}: {got} {exact}");
+        }
+    }
+
+    #[test]
+    fn it_goes_on_beyond_500_v_down_to_half_of_the_shorter() {
+        let rising = TimeConstant { low_s: 5.5, high_s: 8.0 };
+        assert_eq!([-10.0, 0.0, 500.0, 700.0].map(|volts| rising.at(volts)), [5.5, 5.5, 8.0, 9.0]);
+        let falling = TimeConstant { low_s: 8.0, high_s: 4.0 };
+        assert_eq!([0.0, 500.0, 625.0, 1000.0].map(|volts| falling.at(volts)), [8.0, 4.0, 3.0, 2.0]);
     }
 }
