@@ -1,37 +1,10 @@
-//! The spring as a TOML file, for `--plant FILE.toml`. Only `schema` and `[relaxation]` are needed:
+//! The spring as a TOML file, for `--plant FILE.toml`. Only `schema` and `[relaxation]` are needed; this is all of it:
 //!
-//! ```toml
-//! schema = 1
-//!
-//! [memory]                 # hysteresis: a bank of up to 8 play operators
-//! direct = 0.8             # weight of the voltage itself
-//! thresholds_v = [10.0, 25.0]
-//! weights = [0.15, 0.05]
-//!
-//! [law]                    # sensitivity over the voltage: up to 9 points, the first (0, 0)
-//! voltage_v = [0, 100, 200, 300, 400, 500]
-//! stiffness = [0, 90, 190, 300, 410, 500]
-//!
-//! [leakage]                # part of the stiffness that is lost while the voltage stays
-//! share = 0.1
-//! tau_s = 40.0
-//!
-//! [relaxation]
-//! share = 0.0909           # part of a change that comes at once
-//! tau_s = 5.5              # time constant of the rest, or up to four of them: [5.5, 40.0]
-//! # weights = [0.8, 0.109] # what each of a list brings
-//! # tau_high_s = 8.0       # the first time constant at 500 V, if it changes with the voltage; tau_s is that at 0 V
-//!
-//! [amplifier]              # what the record's amplifier did
-//! limit_v = 450.0
-//! slew_v_per_s = 200.0
-//! delay_s = 0.02
-//!
-//! [unmodelled]             # anything: effects that the tick does not run
-//! ```
+#![doc = concat!("```toml\n", include_str!("../../docs/plant.toml"), "```")]
 //!
 //! The equations are those of [`model::extended`].
 
+mod one_or_more;
 mod place;
 
 use std::path::Path;
@@ -39,7 +12,7 @@ use std::path::Path;
 use anyhow::Result;
 use model::estimator::Model;
 use model::{ExtendedPlant, OutOfRange, Plant, SampleTime, extended};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
@@ -108,7 +81,7 @@ pub struct Relaxation {
     /// Part of a change that comes at once.
     pub share: f64,
     /// Time constants, in s; in the file a single one without weight is a number.
-    #[serde(deserialize_with = "one_or_more", serialize_with = "one_if_alone")]
+    #[serde(with = "one_or_more")]
     pub tau_s: Vec<f64>,
     /// What each time constant brings; none for a single one that brings `1 - share`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -131,42 +104,6 @@ pub struct Amplifier {
     /// How late it answered, in s, 0 to 60.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
-}
-
-/// A number or a list of them.
-fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
-    struct Visitor;
-    impl<'de> serde::de::Visitor<'de> for Visitor {
-        type Value = Vec<f64>;
-
-        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-            f.write_str("a number or a list of numbers")
-        }
-
-        fn visit_f64<E>(self, value: f64) -> Result<Vec<f64>, E> {
-            Ok(vec![value])
-        }
-
-        fn visit_i64<E>(self, value: i64) -> Result<Vec<f64>, E> {
-            Ok(vec![value as f64])
-        }
-
-        fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut list: A) -> Result<Vec<f64>, A::Error> {
-            let mut values = Vec::new();
-            while let Some(value) = list.next_element()? {
-                values.push(value);
-            }
-            Ok(values)
-        }
-    }
-    from.deserialize_any(Visitor)
-}
-
-fn one_if_alone<S: Serializer>(values: &[f64], to: S) -> Result<S::Ok, S::Error> {
-    match values {
-        [only] => only.serialize(to),
-        _ => values.serialize(to),
-    }
 }
 
 impl From<Plant> for PlantFile {

@@ -24,12 +24,14 @@ Examples:
   vsj stair --out out/stair                   with CSV and plots
   vsj stair --controller none --input step    the spring left alone, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7    another amplifier, other gains
+  vsj stair --plant spring.toml               another spring: hysteresis, leakage, several relaxations ...
   vsj stair --input schedule.csv --json       any schedule with columns time_s,voltage_v")]
 pub(crate) struct Arguments {
     /// Whose steps, CSV and voltage are shown: the spring left alone, or the report's controller
     #[arg(long, value_enum, default_value_t = Controller::Paper)]
     controller: Controller,
-    /// The spring: `paper`, or a plant file
+    /// The spring: `paper`, or a plant file; the limit and slew that it records act where they are stricter than the
+    /// options'
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns

@@ -1,30 +1,7 @@
 use super::*;
 
 /// Every table and field.
-pub(crate) const WHOLE: &str = "schema = 1
-[memory]
-direct = 0.8
-thresholds_v = [10.0, 25.0]
-weights = [0.15, 0.05]
-[law]
-voltage_v = [0, 100, 200, 300, 400, 500]
-stiffness = [0, 90, 190, 300, 410, 500]
-[leakage]
-share = 0.1
-tau_s = 40.0
-[relaxation]
-share = 0.0909
-tau_s = [5.5, 40.0]
-weights = [0.8, 0.109]
-tau_high_s = 8.0
-[amplifier]
-limit_v = 450.0
-slew_v_per_s = 200.0
-delay_s = 0.02
-[unmodelled]
-drift = { per_s = 1e-4 }
-remarks = [\"two\", \"of them\"]
-";
+const WHOLE: &str = include_str!("../../../docs/plant.toml");
 
 #[test]
 fn a_file_gives_its_numbers() {
@@ -70,22 +47,22 @@ fn faults_are_one_line_with_their_place() {
         (plain.replace("3.0", "nan"), "p, line 4, column 9: tau_s = NaN"),
         (plain.replace("3.0", "\"slow\""), "p, line 4, column 9: invalid type: string \"slow\", expected a number or"),
         ("schema = ".into(), "p, line 1"),
-        (changed("[10.0, 25.0]", "[10.0, 2500]"), "p, line 4, column 23: thresholds_v = 2500 is not allowed"),
-        (changed("[10.0, 25.0]", "[10.0]"), "p, line 5, column 11: weights = 2 is not allowed: expected 1 weights"),
-        (changed("[0, 100, 200", "[0, 300, 200"), "p, line 7, column 22: voltage_v = 200 is not allowed"),
+        (changed("[10.0, 25.0]", "[10.0, 2500]"), "p, line 5, column 23: thresholds_v = 2500 is not allowed"),
+        (changed("[10.0, 25.0]", "[10.0]"), "p, line 6, column 11: weights = 2 is not allowed: expected 1 weights"),
+        (changed("[0, 100, 200", "[0, 300, 200"), "p, line 9, column 22: voltage_v = 200 is not allowed"),
         (
             changed("[0, 100, 200", "[5, 100, 200"),
-            "p, line 7, column 14: voltage_v = 5 is not allowed: expected 0 V, where the law starts",
+            "p, line 9, column 14: voltage_v = 5 is not allowed: expected 0 V, where the law starts",
         ),
         (
             changed("[0, 90", "[0, 9000"),
-            "p, line 8, column 17: stiffness = 9000 is not allowed: expected -1000 to 1000",
+            "p, line 10, column 17: stiffness = 9000 is not allowed: expected -1000 to 1000",
         ),
-        (changed("share = 0.1\n", "share = 1.5\n"), "p, line 10, column 9: share = 1.5 is not allowed"),
+        (changed("share = 0.1\n", "share = 1.5\n"), "p, line 13, column 9: share = 1.5 is not allowed"),
         (changed("weights = [0.8, 0.109]\n", ""), "weights = 0 is not allowed: expected 2 weights"),
-        (changed("tau_high_s = 8.0", "tau_high_s = 80"), "p, line 16, column 14: tau_high_s = 80 is not allowed"),
-        (changed("450.0", "4"), "p, line 18, column 11: limit_v = 4 is not allowed: expected 10 to 1000 V"),
-        (changed("limit_v = 450.0", "limit = 450.0"), "p, line 18, column 1: unknown field `limit`"),
+        (changed("tau_high_s = 8.0", "tau_high_s = 80"), "p, line 20, column 14: tau_high_s = 80 is not allowed"),
+        (changed("650.0", "4"), "p, line 23, column 11: limit_v = 4 is not allowed: expected 10 to 1000 V"),
+        (changed("limit_v = 650.0", "limit = 650.0"), "p, line 23, column 1: unknown field `limit`"),
     ] {
         let got = parse("p", &text).unwrap_err().to_string();
         assert!(got.contains(expected) && !got.contains('\n'), "{text:?}: {got}");

@@ -160,29 +160,16 @@ mod tests {
     use crate::plant_file::parse;
     use crate::sampled::simulate;
 
-    const WHOLE: &str = "schema = 1
-[memory]
-direct = 0.8
-thresholds_v = [10.0, 25.0]
-weights = [0.15, 0.05]
-[law]
-voltage_v = [0, 100, 200, 300, 400, 500]
-stiffness = [0, 90, 190, 300, 410, 500]
-[leakage]
-share = 0.1
-tau_s = 7.0
-[relaxation]
-share = 0.0909
-tau_s = [5.5, 7.0]
-weights = [0.8, 0.109]
-tau_high_s = 8.0
-";
+    /// The example, its leakage and its second lag just as fast.
+    fn example() -> Spring {
+        let text = include_str!("../../../docs/plant.toml").replace("40.0", "7.0");
+        Spring::from(parse("docs/plant.toml", &text).unwrap().extended())
+    }
 
     /// One hold of seconds is the same as very many small steps by Euler's method, and as two shorter holds.
     #[test]
     fn a_hold_is_exact() {
-        let file = parse("whole", WHOLE).unwrap();
-        let spring = Spring::from(file.extended());
+        let spring = example();
         let mut state = spring.at_rest();
         spring.apply(&mut state, 400.0);
         spring.hold(&mut state, 2.0);
@@ -208,8 +195,7 @@ tau_high_s = 8.0
     /// Numbers by hand: up to 300 V, back to 290 V, and the law between and beyond its points.
     #[test]
     fn memory_and_law_by_hand() {
-        let file = parse("whole", WHOLE).unwrap();
-        let spring = Spring::from(file.extended());
+        let spring = example();
         let mut state = spring.at_rest();
         spring.apply(&mut state, 300.0);
         // 0.8 * 300 + 0.15 * 290 + 0.05 * 275 = 297.25, on the line from (200, 190) to (300, 300)
