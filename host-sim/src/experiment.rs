@@ -9,7 +9,7 @@ use model::{Config, DacCode, Input, Limits, Output, Plant, ScaledStiffness, Sett
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
-pub use crate::judged::{Judged, continuous, with_plant};
+pub use crate::judged::{Judged, continuous, reference_at, with_plant};
 use crate::schedule::Schedule;
 
 /// More ticks than this are refused: a run keeps 48 bytes of each.

@@ -42,7 +42,7 @@ impl Judged for Plant {
     }
 
     fn reference_at(settings: &Settings, schedule: &Schedule, _: &Run, _: &[Sample], times_s: &[f64]) -> Vec<f64> {
-        exact_at(continuous(settings), schedule, times_s)
+        reference_at(continuous(settings), schedule, times_s.iter().copied())
     }
 
     fn exact(settings: &Settings) -> Option<Loop> {
@@ -146,11 +146,11 @@ fn exact_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f6
 }
 
 /// The stiffness of the exact solution at increasing moments of a schedule, in V.
-fn exact_at(system: Loop, schedule: &Schedule, times_s: &[f64]) -> Vec<f64> {
+pub fn reference_at(system: Loop, schedule: &Schedule, times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut solution = system.at_rest(1e-3);
     let mut now = schedule.start_s();
     let mut reader = schedule.reader();
-    let at = |&time: &f64| {
+    let at = |time: f64| {
         let next = time.clamp(now, schedule.end_s());
         for stretch in reader.clone().stretches(now, next) {
             solution.advance(stretch.from_v, stretch.slope, stretch.duration_s);
@@ -159,5 +159,5 @@ fn exact_at(system: Loop, schedule: &Schedule, times_s: &[f64]) -> Vec<f64> {
         solution.jump(reader.at(next));
         solution.moment().stiffness
     };
-    times_s.iter().map(at).collect()
+    times_s.into_iter().map(at).collect()
 }

@@ -201,6 +201,17 @@ pub fn load(plant: &str) -> Result<PlantFile> {
     }
 }
 
+/// The same where only the plain spring will do.
+///
+/// # Errors
+/// As [`load`], and for a file with more than that.
+pub fn load_plain(plant: &str) -> Result<Plant> {
+    match load(plant)?.extended().plain() {
+        Some(plain) => Ok(plain),
+        None => bad_input!("{plant}: an extended spring; expected [relaxation] with one share and tau_s only"),
+    }
+}
+
 /// The plant file `text`, called `name` in messages.
 ///
 /// # Errors

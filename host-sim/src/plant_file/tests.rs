@@ -18,6 +18,14 @@ fn a_file_gives_its_numbers() {
 }
 
 #[test]
+fn the_plain_spring_can_be_asked_for() {
+    assert_eq!(load_plain("paper").unwrap(), Plant::PAPER);
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/plant.toml");
+    assert!(load_plain(example).unwrap_err().to_string().contains("expected [relaxation] with one share and tau_s"));
+    assert!(load(example).is_ok());
+}
+
+#[test]
 fn what_is_written_is_read_again() {
     let whole = parse("p", WHOLE).unwrap();
     let mut slim = whole.clone();
