@@ -5,7 +5,8 @@
 //! | [`schedule`], [`record`] | what voltage is asked for: the report's stair, or a file |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
-//! | [`experiment`] | fixed point and reference side by side over a schedule |
+//! | [`experiment`], [`judged`] | fixed point and reference side by side over a schedule |
+//! | [`open_loop`] | the fixed-point spring alone over a record |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the fastest any controller could be |
 //! | [`stair`] | what a run says |
 //! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
@@ -18,10 +19,12 @@ pub mod bad_input;
 pub mod bound;
 pub mod diagnose;
 pub mod experiment;
+pub mod judged;
 mod leap;
 pub mod link;
 pub mod log;
 pub mod misprint;
+pub mod open_loop;
 pub mod output;
 pub mod plant_file;
 pub mod record;
