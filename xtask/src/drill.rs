@@ -40,7 +40,12 @@ pub(crate) fn all(elf: &Path, bless: bool) -> Result<()> {
 
 fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
     let run = emulator::play(elf, mishap.name(), emulator::SHIFT, |_| {})?;
-    ensure!(run.exit == 0, "the emulator's exit code is {}, the last line {:?}", run.exit, run.log.last());
+    ensure!(
+        run.exit == 0,
+        "the emulator's exit code is {}, the last line {:?}",
+        run.exit,
+        run.log.last().map(emulator::text)
+    );
     voltage_goes(mishap, &run.dac)?;
     let text = golden_text(mishap, &run);
     let path = approved(mishap);
@@ -96,7 +101,7 @@ fn golden_text(mishap: Mishap, run: &Run) -> String {
     // When a task is missed depends on where it was in its own 10 ms.
     let any_tick = mishap == Mishap::Stall;
     let mut text = String::new();
-    for line in &run.log {
+    for line in run.log.iter().map(emulator::text) {
         let words = line.split(' ').map(|word| match word.split_once('=') {
             Some((key @ ("git" | "worst_lateness_us" | "digest" | "min" | "mean" | "max"), _)) => format!("{key}=_"),
             Some(("tick", number)) if any_tick && number.len() > 2 => "tick=_".into(),
