@@ -2,6 +2,8 @@
 //!
 //! What happened is judged by what left the chip (DAC's register, enable's wire, log), not by what the log says of it.
 
+mod host;
+
 use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -22,7 +24,7 @@ const KILL_US: f64 = 5.0;
 
 const CANNOT_SHOW: &str = "\
 not shown: real time (an instruction is one cycle here; no wait states, no conversion times), analogue behaviour (DAC, monitors,
-  the amplifier's pull-down), the memory protection unit, silicon errata, a chip that differs from its manual, the host's link";
+  the amplifier's pull-down), the memory protection unit, silicon errata, a chip that differs from its manual";
 
 /// Something that happened outside of the core.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -83,16 +85,17 @@ pub(crate) fn run() -> Result<()> {
         shell::command(python)
             .args(["-B", "xtask/image/boot.py"])
             .arg(&bin)
-            .args([ticks[0].address, panic.address, rtt].map(|address| format!("{address:#x}"))),
+            .args([ticks[0].address, panic.address, rtt].map(|address| format!("{address:#x}")))
+            .arg(host::frames().to_string()),
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
     println!("{}", quiet(&events("quiet")?, &bytes).context("without a mishap")?);
+    println!("host: {}", host::check(&events("host")?).context("with a host")?);
     for (name, log) in [("panic", "panic at injected.rs:7"), ("hard fault", "name=hard-fault")] {
         println!("{name}: {}", stopped(&events(name)?, &bytes, log).context(name)?);
     }
     println!("hang: {}", hang(&events("hang")?, &bytes).context("hang")?);
-    println!("voltage before each mishap: put into the registers from outside, because no host arms the image here");
     println!("{CANNOT_SHOW}");
     Ok(())
 }
