@@ -11,7 +11,7 @@ use crate::control::{Control, Orders, Senses, Stopwatch, Tick};
 use crate::log::{self, EVENTS, Event, Summary, queue};
 use crate::pace::Pace;
 use crate::roll_call::{Member, RollCall};
-use crate::{RATE_HZ, last_words, stop};
+use crate::{RATE_HZ, hang_guard, last_words, stop};
 
 /// Who must be alive.
 pub static ROLL_CALL: RollCall = RollCall::new();
@@ -61,6 +61,7 @@ pub async fn control<B: Board>(
         report.worst_lateness_us = report.worst_lateness_us.max(arrival.lateness_us);
         report.tick(ticks, control, &tick);
 
+        hang_guard::feed();
         ROLL_CALL.check_in(Member::Control);
         if ROLL_CALL.complete() {
             absent = 0;
@@ -73,6 +74,7 @@ pub async fn control<B: Board>(
             }
         }
     }
+    hang_guard::rest();
     (ticks, report.overruns)
 }
 

@@ -12,7 +12,7 @@ from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn import UC_HOOK_BLOCK, UC_HOOK_CODE, UC_HOOK_INTR, UC_HOOK_MEM_WRITE
 from unicorn.arm_const import *
 
-from peripherals import Timer, Uart
+from peripherals import SysTick, Timer, Uart
 
 HZ = 170_000_000
 FLASH, RAM, RAM_SIZE = 0x0800_0000, 0x2000_0000, 128 * 1024
@@ -25,6 +25,8 @@ RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0
 GPIO = 0x4800_0000
 TIM15, TIM15_IRQ = 0x4001_4000, 24  # The time driver's.
 LPUART1_IRQ = 91
+SCS = 0xE000_E000
+SYSTICK_IRQ = -1  # Exception 15.
 BAUD = 115_200  # The host's.
 ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
 
@@ -66,8 +68,9 @@ class Board:
         self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF}
         self.timer = Timer()
         self.timer.at = self.now
+        self.systick = SysTick()
         self.uart = Uart(self.incoming, self.byte_of_host, lambda byte: self.note("sent", byte))
-        self.enabled, self.pending, self.priority, self.active = set(), set(), {}, []
+        self.enabled, self.pending, self.priority, self.active = {SYSTICK_IRQ}, set(), {}, []
         self.candidate = None
         self.watchdog = None
         self.outside, self.read_to = None, 0
@@ -225,6 +228,8 @@ class Board:
         """Brings timer and interrupts to `now`."""
         self.timer.run(self.now)
         self.uart.run(self.now)
+        if self.systick.run(self.now):
+            self.pending.add(SYSTICK_IRQ)
         self._settle()
 
     def _settle(self):
@@ -234,7 +239,7 @@ class Board:
                 self.pending.add(irq)
         self._choose()
         wait = self.timer.next()
-        times = self.timer.at + wait if wait else None, self.uart.next(), self.watchdog
+        times = self.timer.at + wait if wait else None, self.uart.next(), self.systick.zero_at, self.watchdog
         self.deadline = min(at for at in (self.end, *times) if at is not None)
 
     # --- Registers ---
@@ -274,6 +279,8 @@ class Board:
         if at & ~0x1FFF == GPIO and at & 0x3FF == 0x10:
             port = at - GPIO >> 10
             return self.regs.get(at + 4, 0) | (1 << INTERLOCK[1] if port == INTERLOCK[0] else 0)
+        if at in (SCS + 0x10, SCS + 0x14):
+            return self.systick.regs.get(at - SCS, 0)
         if 0xE000_E100 <= at < 0xE000_E300:
             of = self.enabled if at < 0xE000_E200 else self.pending
             first = (at & 0x7F) * 8
@@ -302,6 +309,9 @@ class Board:
         if at & ~0x3FF == LPUART1:
             self.uart.run(self.now)
             self.uart.write(at - LPUART1, value, self.now)
+            return self._settle()
+        if at in (SCS + 0x10, SCS + 0x14, SCS + 0x18):
+            self.systick.write(at - SCS, value, self.now)
             return self._settle()
         if 0xE000_E100 <= at < 0xE000_E300:
             of = self.enabled if at < 0xE000_E200 else self.pending

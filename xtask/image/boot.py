@@ -8,7 +8,7 @@ import json
 import struct
 import sys
 
-from unicorn.arm_const import UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
+from unicorn.arm_const import UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
 
 from board import FLASH, RAM, Board
 
@@ -35,6 +35,12 @@ def broken(code):
         board.uc.ctl_remove_cache(TICK, TICK + 4)
 
     return mishap
+
+
+def deaf(board):
+    """Hangs with interrupts off."""
+    board.uc.reg_write(UC_ARM_REG_PRIMASK, 1)
+    broken(HANG)(board)
 
 
 def play(host, mishap, until_us):
@@ -70,4 +76,5 @@ if __name__ == "__main__":
         "panic": play(HOST, panic, 400_000),
         "hard fault": play(HOST, broken(UNDEFINED), 400_000),
         "hang": play(HOST, broken(HANG), 500_000),
+        "deaf": play(HOST, deaf, 500_000),
     }))

@@ -43,6 +43,27 @@ class Timer:
                 self.fraction = 0
 
 
+class SysTick:
+    """Counts down at the core's clock and interrupts at zero."""
+
+    def __init__(self):
+        self.regs, self.zero_at = {}, None
+
+    def run(self, now):
+        """True if it passed zero, and interrupts."""
+        if self.zero_at is None or now < self.zero_at:
+            return False
+        period = self.regs.get(0x14, 0) + 1
+        self.zero_at += ((now - self.zero_at) // period + 1) * period
+        return bool(self.regs[0x10] & 2)
+
+    def write(self, offset, value, now):
+        self.regs[offset] = value
+        running = self.regs.get(0x10, 0) & 1
+        if offset in (0x10, 0x18):
+            self.zero_at = now + self.regs.get(0x14, 0) + 1 if running else None
+
+
 class Uart:
     """LPUART1 as the driver uses it: eight bytes of FIFO each way, ten bits a byte.
 

@@ -96,7 +96,7 @@ Examples:
     /// Run the very image that is flashed, on models of the STM32G474's registers
     ///
     /// Boot, 1.2 s without a host; a host that arms it over LPUART1 and sets targets, every code the host model's; then a
-    /// panic, a hard fault and a hang while voltage is out. Exits with 1 unless the output is as it must be each time; says
+    /// panic, a hard fault and two hangs while voltage is out. Exits with 1 unless the output is as it must be each time; says
     /// what this cannot show. Installs Unicorn into a venv under the target directory.
     Boot,
     /// Compare the host's speed with Python's

@@ -59,8 +59,12 @@ fn act(mishap: Mishap) {
         }
         Mishap::Stall => STALL.store(true, Ordering::Relaxed),
         Mishap::Hang => hang(),
+        Mishap::Deaf => {
+            cortex_m::interrupt::disable();
+            hang()
+        }
         Mishap::Overrun => {
-            let until = Instant::now().as_micros() + 20_000;
+            let until = Instant::now().as_micros() + 8_000;
             while Instant::now().as_micros() < until {}
         }
         // The script itself opens the interlock and silences the host.
