@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `stair` | the report's stair: 70 s, from 20 s on every 10 s up by 100 V in 0.1 s |
 //! | `random SEED` | 100 000 ticks of arming, disarming, target jumps, an interlock that opens, a host that falls silent |
-//! | `panic`, `hard-fault`, `stack-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `silence` | fault drills |
+//! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `silence` | fault drills |
 //! | (after a reset by a fault) | the aftermath: nothing may leave until the fault is acknowledged |
 
 use model::supervisor::Command;
@@ -36,6 +36,8 @@ pub enum Mishap {
     HardFault,
     /// The control task uses up its stack.
     StackOverflow,
+    /// The same with float registers in use, which the processor means to save on that stack.
+    FloatOverflow,
     /// The housekeeping task stops for ever.
     Stall,
     /// The control task itself stops for ever.
@@ -52,10 +54,11 @@ pub enum Mishap {
 
 impl Mishap {
     /// Every drill.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Panic,
         Self::HardFault,
         Self::StackOverflow,
+        Self::FloatOverflow,
         Self::Stall,
         Self::Hang,
         Self::Deaf,
@@ -70,6 +73,7 @@ impl Mishap {
             Self::Panic => "panic",
             Self::HardFault => "hard-fault",
             Self::StackOverflow => "stack-overflow",
+            Self::FloatOverflow => "float-overflow",
             Self::Stall => "stall",
             Self::Hang => "hang",
             Self::Deaf => "deaf",

@@ -68,7 +68,7 @@ fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
 fn grace(mishap: Mishap) -> usize {
     match mishap {
         // Not one more code.
-        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::Interlock => 0,
+        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow | Mishap::Interlock => 0,
         // The tick that takes too long still ends; the next one finds it out.
         Mishap::Overrun => 1,
         // Nothing is written while the control task hangs; the next write is the zero of who finds it.

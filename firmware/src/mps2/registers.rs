@@ -81,3 +81,6 @@ pub const WATCHDOG_FEED: Register = Register(0x4000_800c);
 pub const SYSTICK_RELOAD: Register = Register(0xe000_e014);
 /// Counts down.
 pub const SYSTICK_VALUE: Register = Register(0xe000_e018);
+
+/// Why the last fault came (CFSR).
+pub const FAULT_STATUS: Register = Register(0xe000_ed28);
