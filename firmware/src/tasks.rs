@@ -58,7 +58,7 @@ pub async fn control<B: Board>(
 
         ticks = ticks.wrapping_add(1);
         stop::TICK.store(ticks, Ordering::Relaxed);
-        report.worst_lateness_us = report.worst_lateness_us.max(arrival.lateness_us);
+        report.late(arrival.lateness_us);
         report.tick(ticks, control, &tick);
 
         hang_guard::feed();
@@ -86,10 +86,16 @@ struct Report {
     limits: Limits,
     overruns: u32,
     worst_lateness_us: u32,
+    squared_lateness_us2: u32,
     limited_ticks: u32,
 }
 
 impl Report {
+    fn late(&mut self, us: u32) {
+        self.worst_lateness_us = self.worst_lateness_us.max(us);
+        self.squared_lateness_us2 = self.squared_lateness_us2.saturating_add(us.saturating_mul(us));
+    }
+
     fn tick(&mut self, number: u32, control: &Control, tick: &Tick) {
         let supervisor = control.supervisor();
         let state = supervisor.label();
@@ -116,6 +122,7 @@ impl Report {
                 tick: number,
                 overruns: self.overruns,
                 worst_lateness_us: self.worst_lateness_us,
+                squared_lateness_us2: core::mem::take(&mut self.squared_lateness_us2),
                 limited_ticks: self.limited_ticks,
                 state,
                 target: tick.output.target,

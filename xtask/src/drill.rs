@@ -130,7 +130,9 @@ fn golden_text(mishap: Mishap, run: &Run) -> String {
     let mut text = String::new();
     for line in run.log.iter().map(emulator::text) {
         let words = line.split(' ').map(|word| match word.split_once('=') {
-            Some((key @ ("git" | "worst_lateness_us" | "digest" | "min" | "mean" | "max"), _)) => format!("{key}=_"),
+            Some((key @ ("git" | "worst_lateness_us" | "rms_lateness_us" | "digest" | "min" | "mean" | "max"), _)) => {
+                format!("{key}=_")
+            }
             Some(("tick", number)) if any_tick && number.len() > 2 => "tick=_".into(),
             _ => match word.rsplit_once(".rs:") {
                 Some((file, _)) => format!("{file}.rs:_"),
