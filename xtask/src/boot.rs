@@ -61,7 +61,7 @@ impl Events {
                 bytes.push(u8::from_str_radix(hex.get(at..at + 2).context("half a byte")?, 16)?);
             }
         }
-        let lines = emulator::decode(Formats::parse(image)?, &mut bytes.as_slice(), |_| {})?;
+        let lines = emulator::decode(Formats::parse(image)?, &mut bytes.as_slice(), |_| {})?.whole()?;
         Ok(lines.into_iter().map(|line| line.message).collect())
     }
 }

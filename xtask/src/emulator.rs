@@ -107,8 +107,9 @@ pub(crate) fn obey<T>(
     child.wait()?;
     let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
     let _ = (fs::remove_file(&wire), fs::remove_file(socket));
-    // Ended by us: it has no exit code of its own.
-    Ok((result?, Run { exit: 0, log, dac: written(&dac?), took: begin.elapsed() }))
+    // Ended by us: it has no exit code of its own. When it cannot keep up with our clock it says so in the midst of the log,
+    // which costs a line.
+    Ok((result?, Run { exit: 0, log: log.lines, dac: written(&dac?), took: begin.elapsed() }))
 }
 
 /// As [`obey`], until the emulator ends, and with every line of the log.
@@ -149,15 +150,33 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, show: impl FnMut(&str) 
     let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
     let _ = fs::remove_file(&wire);
     if took >= TIMEOUT {
-        bail!("the emulator was stopped after {} s; the log's last line is {:?}", took.as_secs(), log.last().map(text));
+        let last = log.lines.last().map(text);
+        bail!("the emulator was stopped after {} s; the log's last line is {last:?}", took.as_secs());
     }
-    Ok(Run { exit: status.code().unwrap_or(-1), log, dac: written(&dac?), took })
+    Ok(Run { exit: status.code().unwrap_or(-1), log: log.whole()?, dac: written(&dac?), took })
+}
+
+/// What came of a log.
+pub(crate) struct Log {
+    lines: Vec<Line>,
+    /// The first stretch that is no frame.
+    damage: Option<String>,
+}
+
+impl Log {
+    /// The lines, if nothing is damaged.
+    pub(crate) fn whole(self) -> Result<Vec<Line>> {
+        match self.damage {
+            None => Ok(self.lines),
+            Some(damage) => bail!("the log is {damage}"),
+        }
+    }
 }
 
 /// Bytes to lines; `show` hears of each as `vsj log` prints it. What the end cuts off was being written when it came.
-pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Vec<Line>> {
+pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Log> {
     let mut decoder = Decoder::new(formats);
-    let mut log = Vec::new();
+    let mut log = Log { lines: Vec::new(), damage: None };
     let mut buffer = [0; 4096];
     loop {
         let length = source.read(&mut buffer)?;
@@ -168,8 +187,8 @@ pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl Fn
             let row = table_row(&item);
             show(&row);
             match item {
-                Item::Line(line) => log.push(line),
-                _ => bail!("the log is {}", row.trim_start_matches([' ', '-'])),
+                Item::Line(line) => log.lines.push(line),
+                _ => _ = log.damage.get_or_insert(row.trim_start_matches([' ', '-']).into()),
             }
         }
     }
