@@ -105,7 +105,7 @@ class Board:
             elif self.fault is not None:
                 self._hard_fault(self.fault)
             self._advance()
-            while self.sleeping and self.candidate is None and self.now < min(self.end, self.watchdog or self.end):
+            while self.sleeping and not self._ready() and self.now < min(self.end, self.watchdog or self.end):
                 self.now = self.deadline
                 self._advance()
             self.sleeping = False
