@@ -15,6 +15,7 @@
 //! | [`output`] | terminal, JSON, CSV, plots |
 
 pub mod bad_input;
+pub mod beam;
 pub mod bound;
 pub mod experiment;
 mod leap;
