@@ -24,6 +24,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Beam(commands::beam::Arguments),
     Link(commands::link::Arguments),
     Log(commands::log::Arguments),
     Stair(commands::stair::Arguments),
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
         Err(error) => return usage(&error),
     };
     let done = match cli.command {
+        Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
         Some(Command::Link(arguments)) => commands::link::run(&arguments),
         Some(Command::Log(arguments)) => commands::log::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),

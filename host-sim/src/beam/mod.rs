@@ -10,16 +10,15 @@
 //! | [`stack`] | the layers of the spring |
 //! | [`layered`] | the stack by finite elements, with slip between its layers |
 //! | [`slip`] | how much slip the measured stiffness says there is |
-//! | [`report`], [`plots`] | what `vsj beam` says and draws |
+//! | [`report`] | what `vsj beam` says and draws |
 
 pub mod cantilever;
 pub mod droop;
 pub mod elastica;
 pub mod experiment;
 pub mod layered;
-//pub mod plots;
 pub mod regression;
-//pub mod report;
+pub mod report;
 pub mod slip;
 pub mod stack;
 

@@ -118,6 +118,12 @@ pub struct Predicted {
 }
 
 impl Identified {
+    /// Interlayer stiffness at a voltage, growing with it, in Pa/m.
+    pub fn interlayer_pa_per_m(&self, voltage_v: f64) -> f64 {
+        let growth = (self.at_highest_pa_per_m - self.at_zero_pa_per_m) / self.highest_v;
+        (self.at_zero_pa_per_m + growth * voltage_v).max(0.0)
+    }
+
     /// Identifies slip on an experiment.
     ///
     /// # Errors

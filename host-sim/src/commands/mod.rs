@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Write};
 
 use anyhow::Result;
 
+pub(crate) mod beam;
 pub(crate) mod link;
 pub(crate) mod log;
 pub(crate) mod stair;
