@@ -17,7 +17,9 @@
 pub mod bad_input;
 pub mod beam;
 pub mod bound;
+pub mod dynamics;
 pub mod experiment;
+pub mod joint;
 mod leap;
 pub mod link;
 pub mod log;

@@ -25,6 +25,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Beam(commands::beam::Arguments),
+    Dynamics(commands::dynamics::Arguments),
+    Joint(commands::joint::Arguments),
     Link(commands::link::Arguments),
     Log(commands::log::Arguments),
     Stair(commands::stair::Arguments),
@@ -37,6 +39,8 @@ fn main() -> ExitCode {
     };
     let done = match cli.command {
         Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
+        Some(Command::Dynamics(arguments)) => commands::dynamics::run(&arguments),
+        Some(Command::Joint(arguments)) => commands::joint::run(&arguments),
         Some(Command::Link(arguments)) => commands::link::run(&arguments),
         Some(Command::Log(arguments)) => commands::log::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),

@@ -5,6 +5,8 @@ use std::io::{ErrorKind, Write};
 use anyhow::Result;
 
 pub(crate) mod beam;
+pub(crate) mod dynamics;
+pub(crate) mod joint;
 pub(crate) mod link;
 pub(crate) mod log;
 pub(crate) mod stair;
