@@ -28,6 +28,7 @@ pub mod output;
 pub mod plant_file;
 pub mod record;
 pub mod reference;
+pub mod reproduce;
 pub mod response;
 pub mod sampled;
 pub mod schedule;

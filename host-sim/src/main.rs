@@ -29,6 +29,7 @@ enum Command {
     Joint(commands::joint::Arguments),
     Link(commands::link::Arguments),
     Log(commands::log::Arguments),
+    Reproduce(commands::reproduce::Arguments),
     Stair(commands::stair::Arguments),
 }
 
@@ -43,6 +44,7 @@ fn main() -> ExitCode {
         Some(Command::Joint(arguments)) => commands::joint::run(&arguments),
         Some(Command::Link(arguments)) => commands::link::run(&arguments),
         Some(Command::Log(arguments)) => commands::log::run(&arguments),
+        Some(Command::Reproduce(arguments)) => commands::reproduce::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),
     };

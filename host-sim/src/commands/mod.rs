@@ -9,6 +9,7 @@ pub(crate) mod dynamics;
 pub(crate) mod joint;
 pub(crate) mod link;
 pub(crate) mod log;
+pub(crate) mod reproduce;
 pub(crate) mod stair;
 
 /// Prints to stdout; that nobody reads on, as in `vsj stair | head`, is no failure.
