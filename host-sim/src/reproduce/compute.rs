@@ -19,6 +19,8 @@ pub struct Outcome {
     pub value: f64,
     /// For a measured number: where other measured numbers say that it lies.
     pub expected: Option<(f64, f64)>,
+    /// For a fitted number: its standard error.
+    pub standard_error: Option<f64>,
     /// What else the computation knows, for the explanation.
     pub evidence: Option<String>,
 }
@@ -26,7 +28,7 @@ pub struct Outcome {
 impl Outcome {
     /// A number that follows from others.
     pub fn exact(value: f64) -> Self {
-        Self { value, expected: None, evidence: None }
+        Self { value, expected: None, standard_error: None, evidence: None }
     }
 }
 
@@ -70,7 +72,7 @@ pub fn compute(of: &str, inputs: &Inputs<'_>) -> Result<Outcome> {
     let sum = |terms: Vec<f64>| terms.iter().sum::<f64>();
     Ok(match of {
         "same" => Outcome {
-            evidence: Some(format!("{} prints {}", inputs.word("place")?, inputs.number("value")?)),
+            evidence: Some(format!("{} prints {}", inputs.word("place")?, super::short(inputs.number("value")?))),
             ..Outcome::exact(inputs.number("value")?)
         },
         "sum" => Outcome::exact(inputs.number("factor").unwrap_or(1.0) * sum(inputs.numbers("terms")?)),

@@ -2,14 +2,16 @@
 //!
 //! Printed numbers live in `data/` ([`source`]), with their place, and with the name and the inputs of the computation that
 //! gives them ([`compute`], [`models`], [`readings`]). Whether one agrees is judged by its own digits ([`printed`]); why it
-//! does not is asked of general explanations ([`explain`]). No number is known to this code.
+//! does not is asked of general explanations (`explain`, `slips`, `inputs`). No number is known to this code.
 
 pub mod compute;
-pub mod explain;
+mod explain;
+mod inputs;
 pub mod models;
 pub mod page;
 pub mod printed;
 pub mod readings;
+mod slips;
 pub mod source;
 
 use anyhow::{Context, Result};
@@ -125,4 +127,19 @@ fn find_rules(judged: &mut [Judged]) -> Vec<String> {
         }
     }
     groups
+}
+
+/// A number with six digits.
+pub(crate) fn short(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+        let decimals = (5 - value.abs().max(1e-3).log10().floor() as i32).clamp(0, 8) as usize;
+        let text = format!("{value:.decimals$}");
+        return if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text };
+    }
+    let text = format!("{value:.5e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => format!("{}e{exponent}", digits.trim_end_matches('0').trim_end_matches('.')),
+        // Not finite.
+        None => text,
+    }
 }

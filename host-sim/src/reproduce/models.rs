@@ -23,7 +23,7 @@ pub(crate) fn whole_beam(inputs: &Inputs<'_>) -> Result<Beam> {
         width_m: 1e-3 * inputs.number("width_mm")?,
         thickness_m: 1e-6 * inputs.number("thickness_um")?,
         youngs_modulus_pa: 1e9 * or("youngs_modulus_gpa", 1e-9),
-        density_kg_per_m3: or("density", 0.0),
+        density_kg_per_m3: or("density_kg_per_m3", 0.0),
     };
     beam.checked()
 }
@@ -31,7 +31,7 @@ pub(crate) fn whole_beam(inputs: &Inputs<'_>) -> Result<Beam> {
 /// Tip of a beam under force and weight, upwards, by the linear theory.
 pub(crate) fn beam_tip_mm(inputs: &Inputs<'_>) -> Result<f64> {
     let beam = whole_beam(inputs)?;
-    let load = Load { tip_n: 1e-6 * inputs.number("force_un")?, gravity_m_per_s2: inputs.number("gravity")? };
+    let load = Load { tip_n: 1e-6 * inputs.number("force_un")?, gravity_m_per_s2: inputs.number("gravity_m_per_s2")? };
     Ok(1e3 * beam.linear_m(&load, beam.length_m))
 }
 

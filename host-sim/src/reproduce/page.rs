@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::source::BearsOn;
-use super::{Item, Report};
+use super::{Item, Report, short};
 
 /// How important a disagreement is: what rests on the number, then how far it is off.
 fn by_importance(report: &Report) -> Vec<&Item> {
@@ -29,18 +29,7 @@ fn heading(bears_on: BearsOn) -> &'static str {
 
 /// A computed number with six digits.
 fn computed(item: &Item) -> String {
-    let value = item.computed;
-    if !value.is_finite() {
-        return "never".to_owned();
-    }
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if (1e-3..1e6).contains(&value.abs()) {
-        let decimals = (5 - value.abs().log10().floor() as i32).clamp(0, 8) as usize;
-        return format!("{value:.decimals$}");
-    }
-    format!("{value:.5e}")
+    if item.computed.is_finite() { short(item.computed) } else { "never".to_owned() }
 }
 
 impl Report {

@@ -24,7 +24,7 @@ pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
     let of_voltage: Vec<Reading> = readings()?.into_iter().filter(|r| r.voltage_v == voltage).collect();
     let fit = lines(&of_voltage, &[voltage])?;
     let error = 1.0 / fit.standard_errors_from(0, fit.coefficients[0] + 1.0);
-    let mut evidence = format!("standard error of the slope {error:.2}");
+    let mut evidence = format!("the readings give {:.2} with a standard error of {error:.2}", fit.coefficients[0]);
     for (index, reading) in of_voltage.iter().enumerate() {
         let mut others = of_voltage.clone();
         others.remove(index);
@@ -33,7 +33,7 @@ pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
             evidence += &format!("; {without:.2} without the reading at {} mm", reading.displacement_mm);
         }
     }
-    Ok(Outcome { evidence: Some(evidence), ..Outcome::exact(fit.coefficients[0]) })
+    Ok(Outcome { standard_error: Some(error), evidence: Some(evidence), ..Outcome::exact(fit.coefficients[0]) })
 }
 
 /// A reading of Table 1, expected from all others: lines through the origin with one scatter.
@@ -54,11 +54,12 @@ pub(crate) fn table1(inputs: &Inputs<'_>) -> Result<Outcome> {
         expected.value,
         1.0 / fit.readings[index].chance
     );
-    Ok(Outcome {
-        value: expected.value,
-        expected: Some((expected.value - half, expected.value + half)),
-        evidence: Some(evidence),
-    })
+    Ok(near(expected.value, half, evidence))
+}
+
+/// A measured number that should lie within `half` of `value`.
+fn near(value: f64, half: f64, evidence: String) -> Outcome {
+    Outcome { expected: Some((value - half, value + half)), evidence: Some(evidence), ..Outcome::exact(value) }
 }
 
 /// How much wider than one number's 95 % interval that of `numbers` numbers is.
@@ -85,7 +86,7 @@ pub(crate) fn tip_by_table1_mm(inputs: &Inputs<'_>) -> Result<Outcome> {
     let value = force / slope;
     let evidence =
         format!("{force} uN by the slope of Table 1 at {voltage} V, {slope:.2} uN/mm: {value:.3} +- {half:.3} mm");
-    Ok(Outcome { value, expected: Some((value - half, value + half)), evidence: Some(evidence) })
+    Ok(near(value, half, evidence))
 }
 
 /// A reading of Table 3, expected from the one before: the simulation without controller, shifted to go through that.
@@ -111,7 +112,7 @@ pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
     let evidence = format!(
         "from the reading before ({} at {} s) the spring's relaxation leads to {value:.0} +- {half:.0}; the jump of {:+.0} is \
          {:.1} times the usual scatter ({deviation:.0}) between neighbours. The {run} readings before lie {} the simulation, \
-         the last by {:.0}; this one lies {:.0} {} it: the two stretches do not share a zero",
+         the last by {:.0}; this one lies {:.0} {} it: what was measured shifted between the two",
         rows[index - 1].measured,
         rows[index - 1].time_s,
         jumps[index - 1],
@@ -121,7 +122,7 @@ pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
         off[index].abs(),
         if off[index] < 0.0 { "below" } else { "above" },
     );
-    Ok(Outcome { value, expected: Some((value - half, value + half)), evidence: Some(evidence) })
+    Ok(near(value, half, evidence))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
