@@ -81,8 +81,9 @@ pub struct Layers {
     pub bonded_mm: f64,
     /// The same with layers that slide freely.
     pub sliding_mm: f64,
+    /// Name and points, in mm, of the shapes to be drawn.
     #[serde(skip)]
-    shape: Vec<(f64, f64)>,
+    shapes: Vec<(&'static str, Vec<(f64, f64)>)>,
 }
 
 impl Report {
@@ -117,6 +118,11 @@ impl Report {
         let stiffened = stack.with_modulus(ACTIVE, active_modulus_pa(*voltage_v)?)?;
         let bent = bend(&stiffened, interlayer, load.tip_n, *elements)?;
         let mm = |n_per_m: f64| 1e3 * load.tip_n / n_per_m;
+        let mut shapes = Vec::new();
+        for (name, interlayer) in [("with slip", interlayer), ("bonded", 1e14), ("sliding", 0.0)] {
+            let nodes = bend(&stiffened, interlayer, load.tip_n, *elements)?.nodes;
+            shapes.push((name, nodes.iter().map(|&(x, w)| (1e3 * x, 1e3 * w)).collect()));
+        }
         let layers = Layers {
             bonded_by_measured: identified.lines.first().map_or(f64::NAN, |line| line.bonded / line.measured),
             identified,
@@ -125,7 +131,7 @@ impl Report {
             tip_mm: 1e3 * bent.tip_m(),
             bonded_mm: mm(bonded_n_per_m(&stiffened)),
             sliding_mm: mm(sliding_n_per_m(&stiffened)),
-            shape: bent.nodes.iter().map(|&(x, w)| (1e3 * x, 1e3 * w)).collect(),
+            shapes,
         };
         Ok(Self { experiment, deflection, layers })
     }
@@ -277,11 +283,10 @@ impl Report {
         let beam = Figure::new("Beam under load", "distance from the clamp [mm]", "displacement [mm]")
             .curve("large deflection", shape.iter().map(|[_, _, x, y]| (*x, *y)), false)
             .curve("linear", shape.iter().map(|[x, y, _, _]| (*x, *y)), true);
-        let stack = Figure::new("Stack under load", "distance from the clamp [mm]", "displacement [mm]").curve(
-            "with slip",
-            self.layers.shape.iter().copied(),
-            false,
-        );
+        let mut stack = Figure::new("Stack under load", "distance from the clamp [mm]", "displacement [mm]");
+        for (name, shape) in &self.layers.shapes {
+            stack = stack.curve(name, shape.iter().copied(), *name != "with slip");
+        }
         vec![("experiment.svg", experiment.svg()), ("beam.svg", beam.svg()), ("stack.svg", stack.svg())]
     }
 }

@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     /// Finite elements along the stack
     #[arg(long, default_value_t = ELEMENTS, value_name = "N")]
     elements: usize,
-    /// Write beam.json, experiment.svg, beam.svg and stack.svg to this folder
+    /// Write beam.txt, experiment.svg, beam.svg and stack.svg to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON object on stdout
@@ -79,17 +79,17 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let question = question(arguments)?;
     let report = Report::new(&question).map_err(named)?;
-    let json = format!("{}\n", serde_json::to_string(&report)?);
+    let text = report.text();
     let mut wrote = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
-        files.add("beam.json", |out| out.write_all(json.as_bytes()))?;
+        files.add("beam.txt", |out| out.write_all(text.as_bytes()))?;
         for (name, svg) in report.figures(&question.readings) {
             files.add(name, |out| out.write_all(svg.as_bytes()))?;
         }
         wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
     }
-    print(&if arguments.json { json } else { report.text() + &wrote })
+    if arguments.json { print(&format!("{}\n", serde_json::to_string(&report)?)) } else { print(&(text + &wrote)) }
 }
 
 fn question(arguments: &Arguments) -> Result<Question> {

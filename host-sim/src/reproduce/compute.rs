@@ -81,21 +81,13 @@ pub fn compute(of: &str, inputs: &Inputs<'_>) -> Result<Outcome> {
         "root_sum_square" => {
             Outcome::exact(inputs.numbers("terms")?.iter().map(|term| term * term).sum::<f64>().sqrt())
         }
-        "proportional" => Outcome {
-            evidence: Some(
-                "the study is linear (large displacement off), so displacement is proportional to force".into(),
-            ),
-            ..Outcome::exact(inputs.number("value")? * inputs.number("to")? / inputs.number("at")?)
-        },
+        "proportional" => {
+            Outcome::exact(inputs.number("value_mm")? * inputs.number("to_un")? / inputs.number("at_un")?)
+        }
         "on_line" => {
             let (x, y, at) = (inputs.numbers("x")?, inputs.numbers("y")?, inputs.number("at")?);
             let (&[x0, x1], &[y0, y1]) = (&x[..], &y[..]) else { bail!("a line takes two points") };
-            Outcome {
-                evidence: Some(
-                    "the model is linear in the force, so equal steps of force make equal steps of displacement".into(),
-                ),
-                ..Outcome::exact(y0 + (y1 - y0) * (at - x0) / (x1 - x0))
-            }
+            Outcome::exact(y0 + (y1 - y0) * (at - x0) / (x1 - x0))
         }
         "line" => {
             let fit = Fit::new(&straight_line(&inputs.numbers("x")?), &inputs.numbers("y")?)?;
@@ -122,10 +114,7 @@ pub fn compute(of: &str, inputs: &Inputs<'_>) -> Result<Outcome> {
         "beam_tip_down_mm" => Outcome::exact(-models::beam_tip_mm(inputs)?),
         "bonded_tip_mm" => Outcome::exact(models::bonded_tip_mm(inputs)?),
         "table3" => Outcome::exact(models::stair_at(inputs)?),
-        "plant_gain" => Outcome {
-            evidence: Some("fitted to the column without controller of Table 3".into()),
-            ..Outcome::exact(models::plant_gain(inputs)?)
-        },
+        "plant_gain" => Outcome::exact(models::plant_gain(inputs)?),
         "time_to" => Outcome::exact(models::time_to(inputs.word("controller")?, inputs)?),
         "settled_after" => Outcome::exact(models::settled_after_s(inputs.number("part")?)),
         "part_after" => Outcome::exact(models::part_after_percent(inputs)?),

@@ -14,7 +14,8 @@ use super::{Judged, short};
 
 /// The likeliest explanation of a disagreement, with its evidence.
 pub(crate) fn explain(number: &Judged, all: &[Judged]) -> Result<String> {
-    let mut said: Vec<String> = number.outcome.evidence.clone().into_iter().collect();
+    let mut said: Vec<String> =
+        [&number.entry.because, &number.outcome.evidence].into_iter().flatten().cloned().collect();
     said.extend(in_standard_errors(number));
     said.extend(first_explanation(number, all)?);
     said.extend(with_its_likes(number, all));
@@ -93,7 +94,9 @@ pub(super) fn off(number: &Judged) -> String {
     if !(0.1..10.0).contains(&ratio) {
         return format!("printed is {} times what is computed", short(ratio));
     }
-    format!("printed is {:+.1} % off what is computed", 1e2 * (ratio - 1.0))
+    let percent = 1e2 * (ratio - 1.0);
+    let decimals = if percent.abs() < 1.0 { 3 } else { 1 };
+    format!("printed is {percent:+.decimals$} % off what is computed")
 }
 
 /// Other numbers of the table with the same inputs but one, and how far they are off.
@@ -143,6 +146,7 @@ mod tests {
             of: of.to_owned(),
             inputs,
             also: toml::from_str(also).unwrap(),
+            because: None,
             bears_on: BearsOn::Result,
             group: "here".to_owned(),
             of_table: false,

@@ -7,7 +7,6 @@ use toml::Value;
 
 use super::compute::{Inputs, compute, number as as_number};
 use super::explain::off;
-use super::printed::Relation;
 use super::{Judged, short};
 
 /// Another input, printed in the report for the same quantity or meant by the same words.

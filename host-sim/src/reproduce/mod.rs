@@ -48,7 +48,7 @@ pub struct Item {
 /// The whole answer of `vsj reproduce --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Every number, in the order of the report.
+    /// Every number, those of tables first.
     pub items: Vec<Item>,
     /// How many agree.
     pub agree: usize,

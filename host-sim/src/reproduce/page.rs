@@ -90,7 +90,8 @@ impl Report {
         let mut last = None;
         for (index, item) in by_importance(self).into_iter().enumerate() {
             if last != Some(item.bears_on) {
-                writeln!(out, "### {}\n", heading(item.bears_on))?;
+                let space = if last.is_some() { "\n" } else { "" };
+                writeln!(out, "{space}### {}\n", heading(item.bears_on))?;
                 last = Some(item.bears_on);
             }
             let kind = if item.measured { "expected" } else { "computed" };

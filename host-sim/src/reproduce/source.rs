@@ -49,6 +49,8 @@ pub struct Entry {
     pub inputs: BTreeMap<String, Value>,
     /// Other inputs that the text may mean.
     pub also: BTreeMap<String, Vec<Value>>,
+    /// Why the computation applies, where that is not plain.
+    pub because: Option<String>,
     /// What rests on it.
     pub bears_on: BearsOn,
     /// Numbers printed in the same way.
@@ -77,6 +79,7 @@ struct Number {
     from: BTreeMap<String, Value>,
     #[serde(default)]
     also: BTreeMap<String, Vec<Value>>,
+    because: Option<String>,
     #[serde(default)]
     bears_on: BearsOn,
     group: Option<String>,
@@ -102,7 +105,7 @@ struct Column {
     skip: usize,
 }
 
-/// Every number, sorted by section as in the file.
+/// Every number: tables first, then as in the file.
 ///
 /// # Errors
 /// If a file that was built in is damaged.
@@ -121,6 +124,7 @@ pub fn entries() -> Result<Vec<Entry>> {
         of: number.of,
         inputs: number.from,
         also: number.also,
+        because: number.because,
         bears_on: number.bears_on,
         of_table: false,
     }));
@@ -150,6 +154,7 @@ fn rows(column: &Column) -> Result<Vec<Entry>> {
             of: column.of.clone(),
             inputs,
             also: BTreeMap::new(),
+            because: None,
             bears_on: column.bears_on,
             group: column.group.clone().unwrap_or_else(|| before_comma(&place)),
             place,
