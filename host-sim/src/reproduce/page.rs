@@ -86,7 +86,13 @@ impl Report {
              lies where the other measurements put it (5 % false alarms a table).\n",
             if self.truncated_groups.is_empty() { "none".to_owned() } else { self.truncated_groups.join(", ") }
         )?;
-        writeln!(out, "## What does not come out, most important first\n")?;
+        writeln!(out, "| | numbers | do not come out |\n| --- | ---: | ---: |")?;
+        for bears_on in [BearsOn::Conclusion, BearsOn::Model, BearsOn::Result, BearsOn::Detail] {
+            let of_kind = || self.items.iter().filter(|item| item.bears_on == bears_on);
+            let wrong = of_kind().filter(|item| !item.agrees).count();
+            writeln!(out, "| {} | {} | {wrong} |", heading(bears_on), of_kind().count())?;
+        }
+        writeln!(out, "\n## What does not come out, most important first\n")?;
         let mut last = None;
         for (index, item) in by_importance(self).into_iter().enumerate() {
             if last != Some(item.bears_on) {
