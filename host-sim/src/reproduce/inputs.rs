@@ -34,7 +34,7 @@ pub(super) fn other_reading(number: &Judged, all: &[Judged]) -> Result<Option<St
     let miss = (number.outcome.value / number.printed.value).ln().abs();
     // Ten times nearer, and near.
     Ok(nearest
-        .filter(|(least, _)| *least < 0.1 && 10.0 * least < miss || miss.is_nan() && *least < 0.1)
+        .filter(|(least, _)| *least < 0.1 && (miss.is_nan() || 10.0 * least < miss))
         .map(|(least, said)| format!("{}; nearest is {said}, {:.1} % off", off(number), 1e2 * least.exp_m1())))
 }
 
