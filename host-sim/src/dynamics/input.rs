@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::bad_input;
+use crate::beam::check;
 use crate::record::{MEASURED, Record};
 use crate::schedule::{Between, Schedule};
 
@@ -87,6 +88,34 @@ impl Input {
             from: piece.from_v,
             to: piece.to_v,
         })
+    }
+
+    /// Checks that a model whose fastest change takes `shortest_s` can be followed, a row every `every_s`.
+    ///
+    /// # Errors
+    /// [`crate::BadInput`] for more than a million rows, or a change faster than a hundred thousandth of the input.
+    pub fn check_pace(&self, every_s: f64, shortest_s: f64) -> Result<()> {
+        check("every_s", every_s, 1e-6..=1e6, "s")?;
+        let duration = self.schedule.end_s() - self.schedule.start_s();
+        if duration / every_s > 1e6 {
+            bad_input!(
+                "every_s = {every_s} is not allowed: expected at least a millionth of the {duration} s of {}",
+                self.name
+            );
+        }
+        if duration / shortest_s > 1e5 {
+            bad_input!(
+                "the model's time constant of {shortest_s} s is too short for {}, which takes {duration} s: expected at least \
+                 a hundred thousandth",
+                self.name
+            );
+        }
+        Ok(())
+    }
+
+    /// The highest level.
+    pub fn highest(&self) -> f64 {
+        self.pieces().flat_map(|piece| [piece.from, piece.to]).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Checks that every level can be a stiffness.

@@ -72,8 +72,9 @@ pub fn plant_of(zener: &Zener) -> PlantGains {
 /// [`crate::BadInput`] for a ratio that is not positive.
 pub fn stand_in_error(zener: &Zener, ratio: f64) -> Result<f64> {
     check("ratio", ratio, 1e-3..=1e3, "")?;
-    let both = Zener { changes: Changes::Both, ..*zener };
-    let Plant { share, time_constant_s: tau } = plant_of(zener).plant();
+    // Only ratios matter: with the damper as strong as its spring, times are in time constants.
+    let both = Zener { changes: Changes::Both, damper_n_s_per_m: zener.k2_n_per_m, ..*zener };
+    let Plant { share, time_constant_s: tau } = plant_of(&both).plant();
     let end_s = 8.0 * tau * ratio.recip().max(1.0);
     let input = Input::held(&[(0.0, 1.0), (tau, ratio), (tau + end_s, ratio)])?;
     let samples = both.response(&input, Start::Settled, tau / 200.0)?;

@@ -36,13 +36,13 @@ impl SpringDamper {
         check("damper_n_s_per_m", damper, 1e-9..=1e12, "N s/m")?;
         check("length_m", length, 0.0..=1e12, "m")?;
         check("force_n", force, 1e-12..=1e12, "N")?;
-        check("every_s", every_s, 1e-6..=1e6, "s")?;
         input.check_positive()?;
+        input.check_pace(every_s, damper / (k_n_per_m * input.highest()))?;
         let first = input.pieces().next().map_or(1.0, |piece| piece.from);
         let x = if start == Start::Settled { length - force / (first * k_n_per_m) } else { length };
         let states = follow(input, every_s, x, |piece, t, x, h| {
             let fastest = k_n_per_m * piece.from.max(piece.to) / damper;
-            let parts = (h * fastest / 0.02).ceil().clamp(1.0, 1e7);
+            let parts = (h * fastest / 0.02).ceil().max(1.0);
             let h = h / parts;
             let slope = |t: f64, x: f64| (k_n_per_m * piece.at(t) * (length - x) - force) / damper;
             (0..parts as usize).fold(x, |x, part| runge_kutta(slope, t + h * part as f64, x, h))

@@ -95,13 +95,13 @@ impl Zener {
     pub fn response(&self, input: &Input, start: Start, every_s: f64) -> Result<Vec<Sample>> {
         let Self { damper_n_s_per_m: damper, force_n: force, .. } = self.checked()?;
         input.check_positive()?;
-        check("every_s", every_s, 1e-6..=1e6, "s")?;
+        input.check_pace(every_s, damper / self.springs_at(input.highest())[1])?;
         let first = input.pieces().next().map_or(1.0, |piece| piece.from);
         let y = if start == Start::Settled { force / self.springs_at(first)[1] } else { 0.0 };
         let states = follow(input, every_s, y, |piece, t, y, h| {
             // Short against the fastest time constant of the piece.
             let fastest = self.springs_at(piece.from.max(piece.to))[1] / damper;
-            let parts = (h * fastest / 0.02).ceil().clamp(1.0, 1e7);
+            let parts = (h * fastest / 0.02).ceil().max(1.0);
             let h = h / parts;
             let slope = |t: f64, y: f64| (force - self.springs_at(piece.at(t))[1] * y) / damper;
             (0..parts as usize).fold(y, |y, part| runge_kutta(slope, t + h * part as f64, y, h))

@@ -113,6 +113,7 @@ pub fn compute(of: &str, inputs: &Inputs<'_>) -> Result<Outcome> {
         "beam_tip_up_mm" => Outcome::exact(models::beam_tip_mm(inputs)?),
         "beam_tip_down_mm" => Outcome::exact(-models::beam_tip_mm(inputs)?),
         "bonded_tip_mm" => Outcome::exact(models::bonded_tip_mm(inputs)?),
+        "stair_voltage" => Outcome::exact(models::stair_voltage(inputs)?),
         "table3" => Outcome::exact(models::stair_at(inputs)?),
         "plant_gain" => Outcome::exact(models::plant_gain(inputs)?),
         "time_to" => Outcome::exact(models::time_to(inputs.word("controller")?, inputs)?),

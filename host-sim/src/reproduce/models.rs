@@ -67,6 +67,11 @@ pub(crate) fn stair_at(inputs: &Inputs<'_>) -> Result<f64> {
     found.first().copied().context("one moment")
 }
 
+/// The voltage of Appendix 8.1.2 at a moment, straight between its samples.
+pub(crate) fn stair_voltage(inputs: &Inputs<'_>) -> Result<f64> {
+    Ok(Schedule::stair().reader().at(inputs.number("time_s")?))
+}
+
 /// A step of the stair, counted from 1.
 fn step(inputs: &Inputs<'_>) -> Result<Change> {
     let number = inputs.number("step")? as usize;
