@@ -10,6 +10,8 @@
 //! | [`stair`] | what a run says |
 //! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
 //! | [`plant_file`] | the spring as a file |
+//! | [`beam`], [`dynamics`], [`mod@joint`] | the report's models: leaf spring, how its stiffness changes, springs in a joint |
+//! | [`mod@reproduce`] | every printed number of the report, computed again |
 //! | [`log`] | the log that the firmware writes, decoded |
 //! | [`mod@link`] | the serial link to the MCU |
 //! | [`output`] | terminal, JSON, CSV, plots |
