@@ -39,9 +39,8 @@ pub fn response(zener: &Zener, input: &Input, start: Start, every_s: f64) -> Res
         let mut circuit = Circuit::new(components, vec![0.0, volt * series(t), 0.0, charge]);
         let fastest = zener.springs_at(piece.from.max(piece.to))[1] / zener.damper_n_s_per_m;
         let parts = (h * fastest * 100.0).ceil().max(STEPS as f64);
-        // A first step of vanishing length finds the currents.
         let part = h / parts;
-        let mut done = circuit.step(t, 1e-9 * part, true);
+        let mut done = circuit.find_currents(t, 1e-5 * part);
         for number in 1..=parts as usize {
             done = done.and_then(|()| circuit.step(t + part * number as f64, part, false));
         }

@@ -27,7 +27,7 @@ pub struct Circuit<'a> {
 }
 
 impl<'a> Circuit<'a> {
-    /// Starts with the charges given, one a component; the first step is made without knowing the currents.
+    /// Starts with the charges given, one a component; [`Circuit::find_currents`] before the first step.
     pub fn new(components: Vec<Component<'a>>, charge: Vec<f64>) -> Self {
         let ends = |component: &Component<'_>| match *component {
             Component::Resistor(a, b, _) | Component::Capacitor(a, b, _) | Component::Source(a, b, _) => a.max(b),
@@ -45,6 +45,17 @@ impl<'a> Circuit<'a> {
     /// Current through a component from its first to its second node, in A.
     pub fn current(&self, component: usize) -> f64 {
         self.current[component]
+    }
+
+    /// Finds the currents that flow at a moment, by a trial step of `h` seconds that is taken back.
+    ///
+    /// # Errors
+    /// If the circuit has no unique solution.
+    pub fn find_currents(&mut self, time_s: f64, h: f64) -> Result<()> {
+        let charge = self.charge.clone();
+        self.step(time_s, h, true)?;
+        self.charge = charge;
+        Ok(())
     }
 
     /// One step of `h` seconds that ends at `time_s`; `implicit` only (backward Euler) after a jump, trapezoidal otherwise.
@@ -136,8 +147,7 @@ mod tests {
                 vec![Component::Source(1, 0, 1.0), Component::Resistor(1, 2, 2.0), Component::Capacitor(2, 0, &farad)];
             let mut circuit = Circuit::new(parts, vec![0.0; 3]);
             let h = 6.0 / steps as f64;
-            // A first step of vanishing length finds the current.
-            circuit.step(0.0, 1e-12, true).unwrap();
+            circuit.find_currents(0.0, 1e-6).unwrap();
             for step in 1..=steps {
                 circuit.step(h * step as f64, h, false).unwrap();
             }
