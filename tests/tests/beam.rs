@@ -62,7 +62,7 @@ fn layers_that_slip() {
     let found = beam(&["--force-un", "500", "--voltage-v", "700"]);
     let lines = found.pointer("/layers/identified/lines").unwrap().as_array().unwrap();
     assert_eq!(lines.iter().map(|line| line["used"] == true).collect::<Vec<_>>(), [true, false, true]);
-    assert!((number(&lines[1], "/linear") / number(&lines[1], "/measured") - 1.0).abs() < 0.01, "{}", lines[1]);
+    assert!((number(&lines[1], "/linear") / number(&lines[1], "/measured") - 1.0).abs() < 0.002, "{}", lines[1]);
     assert!(number(&found, "/layers/bonded_by_measured") > 5.0);
     for tip in found.pointer("/layers/identified/tips").unwrap().as_array().unwrap() {
         if number(tip, "/voltage_v") == 700.0 {
@@ -89,7 +89,7 @@ fn layers_and_readings_of_the_users() {
     let arguments = ["beam", "--json", "--layers", "l.csv", "--stack", "steel,PVdF,steel", "--experiment", "r.csv"];
     let found = json(folder.path(), &arguments);
     assert!((number(&found, "/experiment/lines/1/un_per_mm/value") - 25_000.0).abs() < 1.0);
-    assert!(number(&found, "/layers/identified/at_zero_pa_per_m") > 0.0);
+    assert!(number(&found, "/layers/identified/at_lowest_pa_per_m/low") > 0.0);
 }
 
 #[test]

@@ -229,11 +229,13 @@ impl Report {
                 if line.used { "identified here" } else { "check" }
             )?;
         }
-        let Identified { at_zero_pa_per_m, at_highest_pa_per_m, highest_v, active_alone_pa, .. } = &layers.identified;
+        let Identified { at_lowest_pa_per_m, lowest_v, at_highest_pa_per_m, highest_v, active_alone_pa, .. } =
+            &layers.identified;
         writeln!(
             out,
-            "Interlayer stiffness {at_zero_pa_per_m:.3e} Pa/m without voltage, {at_highest_pa_per_m:.3e} Pa/m at \
-             {highest_v} V. Bonded layers are {:.1} times too stiff.",
+            "Interlayer stiffness {} Pa/m at {lowest_v} V, {} Pa/m at {highest_v} V. Bonded layers are {:.1} times too stiff.",
+            span(at_lowest_pa_per_m),
+            span(at_highest_pa_per_m),
             layers.bonded_by_measured
         )?;
         match active_alone_pa {
@@ -293,6 +295,10 @@ impl Report {
 
 fn plus_minus(interval: &Interval, decimals: usize) -> String {
     format!("{:.decimals$} +- {:.decimals$}", interval.value, interval.high - interval.value)
+}
+
+fn span(interval: &Interval) -> String {
+    format!("{:.3e} ({:.3e} to {:.3e})", interval.value, interval.low, interval.high)
 }
 
 /// Elements unless another number is asked for.

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::experiment::Experiment;
 use super::layered::{ELEMENTS, bonded_n_per_m, sliding_n_per_m, spring_constant_n_per_m};
+use super::regression::Interval;
 use super::stack::{ACTIVE, Stack, active_modulus_pa};
 use crate::bad_input;
 
@@ -70,10 +71,12 @@ pub fn identify_pa_per_m(stack: &Stack, spring_constant_n_per_m_: f64) -> Result
 /// The identified spring.
 #[derive(Clone, Debug, Serialize)]
 pub struct Identified {
-    /// Interlayer stiffness without voltage, in Pa/m, by the line at the lowest voltage.
-    pub at_zero_pa_per_m: f64,
-    /// At the highest voltage, in Pa/m, by the line there.
-    pub at_highest_pa_per_m: f64,
+    /// Interlayer stiffness at the lowest voltage, in Pa/m, by the line there and its 95 % interval.
+    pub at_lowest_pa_per_m: Interval,
+    /// The lowest voltage, in V.
+    pub lowest_v: f64,
+    /// Interlayer stiffness at the highest voltage, in Pa/m.
+    pub at_highest_pa_per_m: Interval,
     /// The highest voltage, in V.
     pub highest_v: f64,
     /// Spring constants in uN/mm, one row a voltage of the experiment.
@@ -120,8 +123,14 @@ pub struct Predicted {
 impl Identified {
     /// Interlayer stiffness at a voltage, growing with it, in Pa/m.
     pub fn interlayer_pa_per_m(&self, voltage_v: f64) -> f64 {
-        let growth = (self.at_highest_pa_per_m - self.at_zero_pa_per_m) / self.highest_v;
-        (self.at_zero_pa_per_m + growth * voltage_v).max(0.0)
+        self.growing(voltage_v, 1)
+    }
+
+    /// The same, growing with a power of the voltage.
+    fn growing(&self, voltage_v: f64, power: i32) -> f64 {
+        let [lowest, highest, here] = [self.lowest_v, self.highest_v, voltage_v].map(|volts| volts.powi(power));
+        let (low, high) = (self.at_lowest_pa_per_m.value, self.at_highest_pa_per_m.value);
+        (low + (high - low) * (here - lowest) / (highest - lowest)).max(0.0)
     }
 
     /// Identifies slip on an experiment.
@@ -132,15 +141,23 @@ impl Identified {
         let at = |voltage_v: f64| stack.with_modulus(ACTIVE, active_modulus_pa(voltage_v)?);
         let (lowest, highest) =
             (experiment.lines.first().context("a line")?, experiment.lines.last().context("a line")?);
-        let constant = |line: &super::experiment::Line| 1e-3 * line.un_per_mm.value;
-        let low = identify_pa_per_m(&at(lowest.voltage_v)?, constant(lowest))?;
-        let high = identify_pa_per_m(&at(highest.voltage_v)?, constant(highest))?;
-        let slip = |voltage_v: f64, power: i32| {
-            let part = (voltage_v.powi(power) - lowest.voltage_v.powi(power))
-                / (highest.voltage_v.powi(power) - lowest.voltage_v.powi(power));
-            (low + (high - low) * part).max(0.0)
+        let identify = |line: &super::experiment::Line| {
+            let stack = at(line.voltage_v)?;
+            let slip = |un_per_mm: f64| identify_pa_per_m(&stack, 1e-3 * un_per_mm);
+            let Interval { value, low, high } = line.un_per_mm;
+            Ok::<_, anyhow::Error>(Interval { value: slip(value)?, low: slip(low)?, high: slip(high)? })
         };
-
+        let mut identified = Self {
+            at_lowest_pa_per_m: identify(lowest)?,
+            lowest_v: lowest.voltage_v,
+            at_highest_pa_per_m: identify(highest)?,
+            highest_v: highest.voltage_v,
+            lines: Vec::new(),
+            tips: Vec::new(),
+            active_alone_pa: None,
+        };
+        let low = identified.at_lowest_pa_per_m.value;
+        let slip = |voltage_v: f64, power: i32| identified.growing(voltage_v, power);
         let lines = experiment.lines.iter().map(|line| {
             let stack = at(line.voltage_v)?;
             Ok(Line {
@@ -164,14 +181,10 @@ impl Identified {
                 slip_mm: mm(spring_constant_n_per_m(&stack, slip(printed.voltage_v, 1), ELEMENTS)?),
             })
         });
-        Ok(Self {
-            at_zero_pa_per_m: slip(0.0, 1),
-            at_highest_pa_per_m: high,
-            highest_v: highest.voltage_v,
-            lines: lines.collect::<Result<_>>()?,
-            tips: tips.collect::<Result<_>>()?,
-            active_alone_pa: active_alone(stack, low, constant(highest))?,
-        })
+        let (lines, tips) = (lines.collect::<Result<_>>()?, tips.collect::<Result<_>>()?);
+        (identified.lines, identified.tips) = (lines, tips);
+        identified.active_alone_pa = active_alone(stack, low, 1e-3 * highest.un_per_mm.value)?;
+        Ok(identified)
     }
 }
 
