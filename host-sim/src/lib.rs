@@ -19,6 +19,7 @@
 pub mod bad_input;
 pub mod beam;
 pub mod bound;
+pub mod diagnose;
 pub mod dynamics;
 pub mod experiment;
 pub mod joint;

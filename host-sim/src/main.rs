@@ -25,6 +25,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Beam(commands::beam::Arguments),
+    Diagnose(commands::diagnose::Arguments),
     Dynamics(commands::dynamics::Arguments),
     Joint(commands::joint::Arguments),
     Link(commands::link::Arguments),
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
     };
     let done = match cli.command {
         Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
+        Some(Command::Diagnose(arguments)) => commands::diagnose::run(&arguments),
         Some(Command::Dynamics(arguments)) => commands::dynamics::run(&arguments),
         Some(Command::Joint(arguments)) => commands::joint::run(&arguments),
         Some(Command::Link(arguments)) => commands::link::run(&arguments),

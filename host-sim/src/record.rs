@@ -49,6 +49,17 @@ impl Record {
         }
     }
 
+    /// Checks that the measured column is there.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the name of the column that is missing.
+    pub fn require_measured(&self, column: &str) -> Result<()> {
+        if self.rows.iter().all(|row| row.measured.is_some()) {
+            return Ok(());
+        }
+        bad_input!("{}: no column `{column}`; expected time_s, voltage_v and {column}", self.name)
+    }
+
     /// Reads a file; `measured` names the column of the measured stiffness, [`MEASURED`] unless the user says another.
     ///
     /// # Errors

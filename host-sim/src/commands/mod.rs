@@ -5,6 +5,7 @@ use std::io::{ErrorKind, Write};
 use anyhow::Result;
 
 pub(crate) mod beam;
+pub(crate) mod diagnose;
 pub(crate) mod dynamics;
 pub(crate) mod joint;
 pub(crate) mod link;

@@ -1,0 +1,60 @@
+//! `vsj diagnose`: what the simulation gets wrong on measured data.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::diagnose::{Input, Options, examine, relaxation::Relaxation, text};
+use host_sim::plant_file;
+use host_sim::record::{MEASURED, Record};
+use indicatif::ProgressBar;
+
+use super::print;
+
+/// Show what the simulation gets wrong on measured data, name the cause, measure the gain of the cure
+///
+/// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (volts of equivalent static voltage).
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj diagnose record.csv                        three sentences and a table
+  vsj diagnose record.csv --out out/diagnosis    with report.html, plots and the extended model
+  vsj diagnose record.csv --json | jq .findings  for scripts
+  vsj diagnose data/table3_stair.csv --column measured --input stair
+
+Verdicts: consistent (nothing is wrong), explained, ambiguous (rival causes explain it as well), unexplained (no known
+cause does), insufficient (the record cannot tell). All of them exit with 0.")]
+pub(crate) struct Arguments {
+    /// The record
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// The simulation to be judged: `paper`, or a plant file
+    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
+    plant: String,
+    /// What the voltage did between the rows
+    #[arg(long, value_enum, default_value_t)]
+    input: Input,
+    /// Column with the measured stiffness
+    #[arg(long, default_value = MEASURED, value_name = "NAME")]
+    column: String,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let plant = plant_file::load(&arguments.plant)?;
+    let record = Record::open(&arguments.data, &arguments.column)?;
+    record.require_measured(&arguments.column)?;
+    let options = Options { input: arguments.input, base: Relaxation::plain(plant.share, plant.time_constant_s) };
+    let bar = ProgressBar::new_spinner();
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    let diagnosis = examine(&record, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
+    bar.finish_and_clear();
+    if arguments.json {
+        print(&format!("{}\n", serde_json::to_string(&diagnosis.report)?))
+    } else {
+        print(&text::text(&record.name, &diagnosis.report))
+    }
+}

@@ -1,0 +1,140 @@
+//! What an effect is: a physical block along the chain from command to reading.
+//!
+//! ```text
+//! command -> amplifier -> static law and memory -> relaxation -> response -> reading
+//! ```
+//!
+//! An effect acts at one place of the chain (it overrides one of the hooks below), by parameters that a fit may move. It
+//! may come in several *forms*: the same cause, another law. A new effect is one file in `effects/` and its line there.
+
+use super::data::Data;
+use super::relaxation::Relaxation;
+use super::signal::Signal;
+
+/// Where in the chain an effect acts. Two effects of one stage are harder to tell apart than two of different stages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Between the command and the spring's electrodes.
+    Amplifier,
+    /// Static law and memory.
+    Static,
+    /// How the stiffness follows in time.
+    Relaxation,
+    /// How it is read.
+    Reading,
+}
+
+/// A number that the fit moves. Coordinates are chosen so that a fit is well behaved: logarithms where only size counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Smallest value allowed.
+    pub lowest: f64,
+    /// Largest value allowed.
+    pub highest: f64,
+    /// False for what is found by search alone, such as the rows of a run.
+    pub fitted: bool,
+}
+
+impl Coordinate {
+    /// One that the fit moves between two bounds.
+    pub fn new(lowest: f64, highest: f64) -> Self {
+        Self { lowest, highest, fitted: true }
+    }
+
+    /// The logarithm of a quantity between two bounds.
+    pub fn log(lowest: f64, highest: f64) -> Self {
+        Self::new(lowest.ln(), highest.ln())
+    }
+
+    /// One that only [`Effect::polish`] moves.
+    pub fn searched(lowest: f64, highest: f64) -> Self {
+        Self { lowest, highest, fitted: false }
+    }
+}
+
+/// A parameter as the user reads it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantity {
+    /// Its name in the report.
+    pub name: String,
+    /// SI unit, or "" for a ratio.
+    pub unit: &'static str,
+    /// Its value.
+    pub value: f64,
+}
+
+impl Quantity {
+    /// A named value.
+    pub fn new(name: impl Into<String>, unit: &'static str, value: f64) -> Self {
+        Self { name: name.into(), unit, value }
+    }
+}
+
+/// What a search for starting points sees.
+pub struct Scene<'a> {
+    /// The record.
+    pub data: &'a Data,
+    /// What the model without the effect leaves, in V.
+    pub residual: &'a [f64],
+    /// The noise's scale, in V.
+    pub sigma: f64,
+}
+
+/// A cause, as a block of the chain.
+pub trait Effect: Sync {
+    /// Its name in reports.
+    fn cause(&self) -> &'static str;
+
+    /// Where it acts.
+    fn stage(&self) -> Stage;
+
+    /// What it does, in words that follow "because".
+    fn meaning(&self) -> &'static str;
+
+    /// The experiment that shows it and nothing else, in words that follow "run".
+    fn experiment(&self) -> &'static str;
+
+    /// Number of forms that it comes in.
+    fn forms(&self) -> usize {
+        1
+    }
+
+    /// The coordinates of a form.
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate>;
+
+    /// Points from which a fit may find it, for a form.
+    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>>;
+
+    /// The user's parameters at a point.
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity>;
+
+    /// Causes that contain this one: with one of them in the model, it has nothing to add.
+    fn special_case_of(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// How many places a search for it looks at, as a natural logarithm: what a find by chance is discounted by.
+    fn places(&self, _data: &Data) -> f64 {
+        0.0
+    }
+
+    /// Moves the searched coordinates to where `residual`, which is without the effect, wants them.
+    fn polish(&self, _form: usize, _point: &mut [f64], _scene: &Scene) {}
+
+    /// Lowest and highest of the user's parameters that a search alone has found; others are left to the fit.
+    fn searched_range(&self, _form: usize, _point: &[f64], _scene: &Scene) -> Vec<(String, f64, f64)> {
+        Vec::new()
+    }
+
+    /// Acts on the voltage before it reaches the relaxation, in V.
+    fn drive(&self, _form: usize, _point: &[f64], _data: &Data, _signal: &mut Signal) {}
+
+    /// Changes the relaxation's parameters.
+    fn relax(&self, _form: usize, _point: &[f64], _relaxation: &mut Relaxation) {}
+
+    /// Acts on the stiffness, in V.
+    fn respond(&self, _form: usize, _point: &[f64], _data: &Data, _signal: &mut Signal) {}
+
+    /// Acts on the readings at each row, in V.
+    fn read(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}
+}

@@ -1,0 +1,56 @@
+//! The response starts late: `u(t) = command(t - delay)`.
+
+use crate::diagnose::data::Data;
+use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::signal::Signal;
+
+pub(super) struct Delay;
+
+fn longest(data: &Data) -> f64 {
+    (0.1 * data.duration_s()).max(2.0 * data.sample_s)
+}
+
+impl Effect for Delay {
+    fn cause(&self) -> &'static str {
+        "delay"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Amplifier
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the response starts late"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "single steps of very different heights: a delay is the same for all"
+    }
+
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        vec![Coordinate::new(1e-3 * data.sample_s, longest(data))]
+    }
+
+    /// Between whole samples: a delay across one makes the prediction jump, and no fit gets over it.
+    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+        let mut samples = 0.5;
+        let mut starts = Vec::new();
+        while samples * data.sample_s < longest(data) {
+            starts.push(vec![samples * data.sample_s]);
+            samples += f64::max(1.0, (0.08 * samples).floor());
+        }
+        starts
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("delay_s", "s", point[0])]
+    }
+
+    fn places(&self, data: &Data) -> f64 {
+        (longest(data) / data.sample_s).clamp(1.0, 5.0).ln()
+    }
+
+    fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
+        *signal = signal.delayed(point[0]);
+    }
+}

@@ -1,0 +1,61 @@
+//! A periodic disturbance rides on the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
+
+use std::f64::consts::TAU;
+
+use crate::diagnose::data::Data;
+use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::spectrum;
+
+pub(super) struct Hum;
+
+/// Peaks of the spectrum that are tried.
+const PEAKS: usize = 3;
+
+impl Effect for Hum {
+    fn cause(&self) -> &'static str {
+        "hum"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Reading
+    }
+
+    fn meaning(&self) -> &'static str {
+        "a periodic disturbance rides on the readings"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "readings at constant voltage, at another sample time: a line that is an alias moves"
+    }
+
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        let most = 2.0 * data.full_scale_v.max(1.0);
+        let frequency = Coordinate::new(1.5 / data.duration_s().max(1e-9), 0.5 / data.sample_s);
+        vec![frequency, Coordinate::new(-most, most), Coordinate::new(-most, most)]
+    }
+
+    fn starts(&self, _: usize, Scene { data, residual, .. }: &Scene) -> Vec<Vec<f64>> {
+        spectrum::peaks(residual, data, PEAKS)
+            .into_iter()
+            .filter(|peak| peak.frequency_hz > 2.0 / data.duration_s())
+            .map(|peak| vec![peak.frequency_hz, peak.cosine, peak.sine])
+            .collect()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("amplitude", "V", point[1].hypot(point[2])), Quantity::new("freq_hz", "Hz", point[0])]
+    }
+
+    fn places(&self, data: &Data) -> f64 {
+        // As many lines as half the rows; its three coordinates are charged already.
+        ((data.rows() as f64 / 2.0).max(1.0).ln() - 4.0).max(0.0)
+    }
+
+    fn read(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+        let start = data.time_s.first().copied().unwrap_or(0.0);
+        for (reading, time) in readings.iter_mut().zip(&data.time_s) {
+            let (sin, cos) = (TAU * point[0] * (time - start)).sin_cos();
+            *reading += point[1] * cos + point[2] * sin;
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The relaxation time changes with the voltage: straight or geometric from `tau_low` at 0 V to `tau_high` at 500 V.
+
+use crate::diagnose::data::Data;
+use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::relaxation::Relaxation;
+
+pub(super) struct VoltageDependentTimeConstant;
+
+const GEOMETRIC: usize = 1;
+
+impl Effect for VoltageDependentTimeConstant {
+    fn cause(&self) -> &'static str {
+        "voltage-dependent-time-constant"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Relaxation
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the relaxation time changes with the voltage"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "equal small steps at several voltages, each held for five time constants"
+    }
+
+    fn forms(&self) -> usize {
+        2
+    }
+
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        let coordinate = Coordinate::log(0.2 * data.sample_s, 10.0 * data.duration_s());
+        vec![coordinate, coordinate]
+    }
+
+    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+        [(5.5, 6.5), (5.5, 4.5), (6.5, 4.5), (4.5, 6.5), (4.5, 5.5), (6.5, 5.5), (9.0, 3.0), (3.0, 9.0)]
+            .map(|(low, high): (f64, f64)| vec![low.ln(), high.ln()])
+            .to_vec()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("tau_low_s", "s", point[0].exp()), Quantity::new("tau_high_s", "s", point[1].exp())]
+    }
+
+    fn relax(&self, form: usize, point: &[f64], relaxation: &mut Relaxation) {
+        relaxation.tau_s = point[0].exp();
+        relaxation.tau_high_s = point[1].exp();
+        relaxation.geometric = form == GEOMETRIC;
+    }
+}

@@ -1,0 +1,220 @@
+//! Fits of a model's points to a record: Levenberg and Marquardt's method on the noise's log-likelihood.
+//!
+//! Each round takes the noise's weights for the present residual (iteratively reweighted least squares), steps, and keeps
+//! the step only if the likelihood grew. Coordinates stay within their bounds.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::data::Data;
+use super::effect::Scene;
+use super::model::{Model, Simulator};
+use super::noise::{Noise, Term, scale};
+use super::observed::Observed;
+
+/// A model with its points fitted.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model at its best point.
+    pub model: Model,
+    /// Readings less prediction, in V.
+    pub residual: Vec<f64>,
+    /// The noise's law for this residual.
+    pub noise: Noise,
+    /// Log-likelihood under that law, less the law's own cost.
+    pub log_likelihood: f64,
+}
+
+/// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
+#[derive(Clone, Debug)]
+pub struct Jacobian {
+    /// Places of the columns among all coordinates.
+    pub places: Vec<usize>,
+    /// The columns, in V per unit of the coordinate.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// Rounds of a fit.
+const ROUNDS: usize = 14;
+/// A round that gains less than this, in nats, is the last.
+const ENOUGH: f64 = 0.02;
+
+/// Fits models to one record.
+pub struct Engine<'a> {
+    /// The record.
+    pub data: &'a Data,
+    /// What its readings say.
+    pub observed: &'a Observed,
+    /// Runs the models.
+    pub simulator: Simulator<'a>,
+    predicted: Vec<f64>,
+}
+
+impl<'a> Engine<'a> {
+    /// For one record.
+    pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
+        Self { data, observed, simulator, predicted: Vec::new() }
+    }
+
+    /// Readings less a model's prediction, in V.
+    pub fn residual(&mut self, model: &Model) -> Vec<f64> {
+        self.simulator.run(model, &mut self.predicted);
+        self.data.reading.iter().zip(&self.predicted).map(|(reading, predicted)| reading - predicted).collect()
+    }
+
+    /// A model at the point that it has, with the noise that suits it.
+    pub fn at(&mut self, model: Model) -> Fit {
+        let residual = self.residual(&model);
+        let noise = Noise::fitted(&residual, self.observed);
+        let log_likelihood = self.log(&noise, &residual) - noise.cost(residual.len());
+        Fit { model, residual, noise, log_likelihood }
+    }
+
+    /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.
+    pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
+        let model = self.polished(model);
+        let model = self.descend(model, law);
+        self.at(model)
+    }
+
+    /// Moves what only a search can move, block by block, to where the rest of the model wants it.
+    fn polished(&mut self, mut model: Model) -> Model {
+        for index in 0..model.blocks.len() {
+            let block = model.blocks[index].0;
+            if block.coordinates(self.data).iter().all(|coordinate| coordinate.fitted) {
+                continue;
+            }
+            let residual = self.residual(&model.without(block.effect));
+            let sigma = scale(&residual);
+            let scene = Scene { data: self.data, residual: &residual, sigma };
+            block.effect().polish(block.form, &mut model.blocks[index].1, &scene);
+        }
+        model
+    }
+
+    /// First for robust independent noise, then for the law that it leaves.
+    pub fn fit_twice(&mut self, model: Model) -> Fit {
+        let first = self.fit(model, &Noise::first_look());
+        let second = self.fit(first.model.clone(), &first.noise);
+        if second.log_likelihood >= first.log_likelihood { second } else { first }
+    }
+
+    fn log(&self, noise: &Noise, residual: &[f64]) -> f64 {
+        noise.log_likelihood(residual, self.observed)
+    }
+
+    fn descend(&mut self, mut model: Model, law: &Noise) -> Model {
+        let bounds = model.coordinates(self.data);
+        let mut points = model.points();
+        for (point, bound) in points.iter_mut().zip(&bounds) {
+            *point = point.clamp(bound.lowest, bound.highest);
+        }
+        model.set_points(&points);
+        let mut residual = self.residual(&model);
+        let mut noise = law.rescaled(&residual, self.observed);
+        let mut value = self.log(&noise, &residual);
+        let mut damping = 1e-3;
+        for _ in 0..ROUNDS {
+            let jacobian = self.jacobian(&model, &noise, &residual);
+            if jacobian.places.is_empty() {
+                break;
+            }
+            let (normal, gradient) = normal_equations(&jacobian, &self.terms(&noise, &residual));
+            let mut gained = 0.0;
+            for _ in 0..6 {
+                let Some(step) = damped_step(&normal, &gradient, damping) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let mut moved = points.clone();
+                for (&place, step) in jacobian.places.iter().zip(step.iter()) {
+                    moved[place] = (moved[place] + step).clamp(bounds[place].lowest, bounds[place].highest);
+                }
+                let mut candidate = model.clone();
+                candidate.set_points(&moved);
+                let there = self.residual(&candidate);
+                let noise_there = law.rescaled(&there, self.observed);
+                let value_there = self.log(&noise_there, &there);
+                if value_there > value {
+                    gained = value_there - value;
+                    (points, model, residual, noise, value) = (moved, candidate, there, noise_there, value_there);
+                    damping = (damping / 8.0).max(1e-9);
+                    break;
+                }
+                damping *= 6.0;
+            }
+            if gained < ENOUGH {
+                break;
+            }
+        }
+        model
+    }
+
+    /// Every row's part in the fit.
+    pub fn terms(&self, noise: &Noise, residual: &[f64]) -> Vec<Term> {
+        let white = noise.whitened(&self.observed.errors(residual));
+        (0..residual.len()).map(|row| noise.term(self.observed.kinds[row], residual[row], white[row])).collect()
+    }
+
+    /// Forward differences, from the bounds inwards.
+    pub fn jacobian(&mut self, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
+        let bounds = model.coordinates(self.data);
+        let points = model.points();
+        let places: Vec<usize> = (0..points.len()).filter(|&place| bounds[place].fitted).collect();
+        let mut nudged = model.clone();
+        let columns = places.iter().map(|&place| {
+            let bound = &bounds[place];
+            let mut step = 1e-5 * (bound.highest - bound.lowest).min(1.0 + points[place].abs());
+            if points[place] + step > bound.highest {
+                step = -step;
+            }
+            let mut moved = points.clone();
+            moved[place] += step;
+            nudged.set_points(&moved);
+            let there = self.residual(&nudged);
+            let column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
+            // Rows that stopped at a bound are taken one by one, the others whitened.
+            let mut white = noise.whitened(&column);
+            for (row, kind) in self.observed.kinds.iter().enumerate() {
+                if *kind != super::observed::Kind::Exact {
+                    white[row] = column[row];
+                }
+            }
+            white
+        });
+        let columns = columns.collect();
+        Jacobian { places, columns }
+    }
+}
+
+/// `J' W J` and `J' W r`.
+pub fn normal_equations(jacobian: &Jacobian, terms: &[Term]) -> (DMatrix<f64>, DVector<f64>) {
+    let size = jacobian.columns.len();
+    let mut normal = DMatrix::zeros(size, size);
+    let mut gradient = DVector::zeros(size);
+    let mut weighted = vec![0.0; terms.len()];
+    for (i, column) in jacobian.columns.iter().enumerate() {
+        for ((weighted, value), term) in weighted.iter_mut().zip(column).zip(terms) {
+            *weighted = value * term.weight;
+        }
+        gradient[i] = weighted.iter().zip(terms).map(|(w, term)| w * term.residual).sum();
+        for (j, other) in jacobian.columns.iter().enumerate().skip(i) {
+            let product: f64 = weighted.iter().zip(other).map(|(a, b)| a * b).sum();
+            normal[(i, j)] = product;
+            normal[(j, i)] = product;
+        }
+    }
+    (normal, gradient)
+}
+
+/// The solution of the damped normal equations, scaled to unit diagonal.
+pub fn damped_step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    let size = normal.nrows();
+    let scale = DVector::from_fn(size, |i, _| 1.0 / normal[(i, i)].max(1e-30).sqrt());
+    let mut scaled = DMatrix::from_fn(size, size, |i, j| normal[(i, j)] * scale[i] * scale[j]);
+    for i in 0..size {
+        scaled[(i, i)] = scaled[(i, i)].max(1e-12) + damping;
+    }
+    let right = gradient.component_mul(&scale);
+    let step = scaled.cholesky()?.solve(&right).component_mul(&scale);
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}

@@ -1,0 +1,95 @@
+//! What a simulation gets wrong on measured data, why, and what the cure is worth.
+//!
+//! ```text
+//! record -> Data -> Observed -> Search (Engine: Simulator, Noise; held-out score) -> Diagnosis -> Report
+//! ```
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`data`], [`observed`] | the record made ready; what its readings say before any model |
+//! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
+//! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
+//! | [`search`] | which effects |
+//! | [`leftover`], [`spectrum`] | what no effect explains |
+//! | [`diagnosis`], [`report`], [`text`] | what is said |
+
+use anyhow::Result;
+
+use crate::bad_input;
+use crate::record::Record;
+
+pub mod data;
+pub mod diagnosis;
+pub mod effect;
+pub mod effects;
+pub mod fit;
+pub mod held_out;
+pub mod leftover;
+pub mod model;
+pub mod noise;
+pub mod observed;
+pub mod relaxation;
+pub mod report;
+pub mod search;
+pub mod signal;
+pub mod spectrum;
+pub mod text;
+
+pub use data::Input;
+pub use diagnosis::Diagnosis;
+pub use report::{Report, Verdict};
+
+use data::Data;
+use fit::Engine;
+use model::Simulator;
+use observed::Observed;
+use relaxation::Relaxation;
+
+/// Fewest readings that anything can be said of.
+const FEWEST_ROWS: usize = 8;
+
+/// How to take a record.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// What the voltage did between rows.
+    pub input: Input,
+    /// The simulation to be judged.
+    pub base: Relaxation,
+}
+
+impl Default for Options {
+    /// Held voltage, the paper's plant.
+    fn default() -> Self {
+        let plant = ::model::Plant::PAPER;
+        Self { input: Input::Hold, base: Relaxation::plain(plant.share, plant.time_constant_s) }
+    }
+}
+
+/// Finds out what the simulation gets wrong on a record.
+///
+/// # Errors
+/// [`crate::BadInput`] for a record without readings or with too few.
+pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
+    examine(record, options, |_| ()).map(|diagnosis| diagnosis.report)
+}
+
+/// As [`diagnose`], with all that is needed to draw it; `progress` hears of the best causes so far.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
+    let data = Data::new(record, options.input);
+    if data.rows() < FEWEST_ROWS {
+        bad_input!(
+            "{}: {} row(s) with a reading; expected at least {FEWEST_ROWS} to tell causes apart",
+            record.name,
+            data.rows()
+        );
+    }
+    let observed = Observed::new(&data);
+    let mut engine = Engine::new(&data, &observed, Simulator::new(&data, options.base));
+    Ok(diagnosis::diagnose(data.clone(), &observed, &mut engine, |scored| {
+        let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
+        progress(&causes.join(", "));
+    }))
+}

@@ -1,0 +1,141 @@
+//! A model: the paper's chain with some effects in it, and what it predicts for a record.
+
+use super::data::Data;
+use super::effect::{Coordinate, Effect, Stage};
+use super::effects::EFFECTS;
+use super::relaxation::Relaxation;
+use super::signal::Signal;
+
+/// One effect in one form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Block {
+    /// Its place in [`EFFECTS`], which is the chain's order.
+    pub effect: usize,
+    /// Its form.
+    pub form: usize,
+}
+
+impl Block {
+    /// The effect itself.
+    pub fn effect(&self) -> &'static dyn Effect {
+        EFFECTS[self.effect]
+    }
+
+    /// The cause's name.
+    pub fn cause(&self) -> &'static str {
+        self.effect().cause()
+    }
+
+    /// The coordinates of its form.
+    pub fn coordinates(&self, data: &Data) -> Vec<Coordinate> {
+        self.effect().coordinates(self.form, data)
+    }
+}
+
+/// Blocks in the chain's order, each with its point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Model {
+    /// The blocks.
+    pub blocks: Vec<(Block, Vec<f64>)>,
+}
+
+impl Model {
+    /// The model with one more block.
+    pub fn with(&self, block: Block, point: Vec<f64>) -> Self {
+        let mut blocks = self.blocks.clone();
+        let at = blocks.partition_point(|(other, _)| *other < block);
+        blocks.insert(at, (block, point));
+        Self { blocks }
+    }
+
+    /// The model without one of its effects.
+    pub fn without(&self, effect: usize) -> Self {
+        Self { blocks: self.blocks.iter().filter(|(block, _)| block.effect != effect).cloned().collect() }
+    }
+
+    /// True if an effect is in it, in any form.
+    pub fn has(&self, effect: usize) -> bool {
+        self.blocks.iter().any(|(block, _)| block.effect == effect)
+    }
+
+    /// The point of an effect, if it is there.
+    pub fn point(&self, effect: usize) -> Option<&[f64]> {
+        self.blocks.iter().find(|(block, _)| block.effect == effect).map(|(_, point)| point.as_slice())
+    }
+
+    /// Effects and forms, as a key.
+    pub fn structure(&self) -> Vec<Block> {
+        self.blocks.iter().map(|(block, _)| *block).collect()
+    }
+
+    /// Coordinates of all blocks, one after the other.
+    pub fn coordinates(&self, data: &Data) -> Vec<Coordinate> {
+        self.blocks.iter().flat_map(|(block, _)| block.coordinates(data)).collect()
+    }
+
+    /// All points, one after the other.
+    pub fn points(&self) -> Vec<f64> {
+        self.blocks.iter().flat_map(|(_, point)| point.iter().copied()).collect()
+    }
+
+    /// Sets all points from one vector.
+    pub fn set_points(&mut self, points: &[f64]) {
+        let mut rest = points;
+        for (_, point) in &mut self.blocks {
+            let (own, others) = rest.split_at(point.len());
+            point.copy_from_slice(own);
+            rest = others;
+        }
+    }
+}
+
+/// Runs models on a record.
+#[derive(Clone, Debug)]
+pub struct Simulator<'a> {
+    /// The record.
+    pub data: &'a Data,
+    /// The relaxation that is taken for granted until an effect changes it.
+    pub base: Relaxation,
+    signal: Signal,
+    levels_v: Vec<f64>,
+    /// Runs so far.
+    pub runs: usize,
+}
+
+impl<'a> Simulator<'a> {
+    /// For one record.
+    pub fn new(data: &'a Data, base: Relaxation) -> Self {
+        Self { data, base, signal: Signal::default(), levels_v: Vec::new(), runs: 0 }
+    }
+
+    /// What a model predicts for each row, in V.
+    pub fn run(&mut self, model: &Model, readings: &mut Vec<f64>) {
+        self.runs += 1;
+        let (data, signal) = (self.data, &mut self.signal);
+        signal.clone_from(&data.command);
+        let mut relaxation = self.base;
+        for (block, point) in &model.blocks {
+            block.effect().relax(block.form, point, &mut relaxation);
+        }
+        let amplifier = model.blocks.partition_point(|(block, _)| block.effect().stage() == Stage::Amplifier);
+        let drive = |blocks: &[(Block, Vec<f64>)], signal: &mut Signal| {
+            for (block, point) in blocks {
+                block.effect().drive(block.form, point, data, signal);
+            }
+        };
+        drive(&model.blocks[..amplifier], signal);
+        if relaxation.varies() {
+            signal.middles(&mut self.levels_v);
+        }
+        drive(&model.blocks[amplifier..], signal);
+        relaxation.pass(signal, &self.levels_v);
+        for (block, point) in &model.blocks {
+            block.effect().respond(block.form, point, data, signal);
+        }
+        readings.clear();
+        readings.extend(signal.at_rows());
+        for (block, point) in &model.blocks {
+            block.effect().read(block.form, point, data, readings);
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! What a reading says: a number, a cell of a lattice, or "at least" a bound.
+//!
+//! Continuous noise never gives the same number twice. So readings that all lie on one lattice were rounded to it, and
+//! readings that pile up exactly at the extreme stopped there. Both are seen in the readings themselves, before any model.
+
+use std::borrow::Cow;
+
+use super::data::Data;
+
+/// One row's reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The number that was read.
+    Exact,
+    /// It stopped at the upper bound.
+    AtLeast,
+    /// It stopped at the lower bound.
+    AtMost,
+}
+
+/// What the readings say of themselves.
+#[derive(Clone, Debug)]
+pub struct Observed {
+    /// Of each row.
+    pub kinds: Vec<Kind>,
+    /// The step of the lattice that all readings lie on, in V, however fine.
+    pub step: Option<f64>,
+    /// The bounds at which readings stopped, in V.
+    pub upper: Option<f64>,
+    /// As [`Observed::upper`], below.
+    pub lower: Option<f64>,
+}
+
+/// Fewest readings at an extreme that are a bound, on a continuous scale.
+const FEWEST_TIES: usize = 3;
+/// On a lattice, readings at a bound are this many times as many as on the next step.
+const PILE: usize = 6;
+
+impl Observed {
+    /// Looks at the readings.
+    pub fn new(data: &Data) -> Self {
+        let mut sorted = data.reading.clone();
+        sorted.sort_by(f64::total_cmp);
+        let mut counts: Vec<(f64, usize)> = Vec::new();
+        for value in sorted {
+            match counts.last_mut() {
+                Some((last, count)) if *last == value => *count += 1,
+                _ => counts.push((value, 1)),
+            }
+        }
+        let inner: Vec<f64> = counts.iter().map(|&(value, _)| value).collect();
+        let step = match inner.len() {
+            0..=5 => None,
+            many => lattice(&inner[1..many - 1]),
+        };
+        let ties = counts.iter().filter(|(_, count)| *count > 1).count();
+        let continuous = ties <= counts.len() / 50 + 2;
+        let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
+            let (value, count) = *extreme?;
+            // A spring at rest reads zero again and again.
+            let piled = count >= FEWEST_TIES && (continuous || count >= PILE * next.map_or(1, |next| next.1));
+            (piled && count < data.rows()).then_some(value)
+        };
+        let moves = data.reading.first() != data.reading.last() || counts.len() > 2;
+        let upper = bound(counts.last(), counts.iter().rev().nth(1)).filter(|_| moves);
+        let lower = bound(counts.first(), counts.get(1)).filter(|&value| moves && value != 0.0);
+        let kinds = data.reading.iter().map(|&reading| {
+            if upper.is_some_and(|bound| reading >= bound) {
+                Kind::AtLeast
+            } else if lower.is_some_and(|bound| reading <= bound) {
+                Kind::AtMost
+            } else {
+                Kind::Exact
+            }
+        });
+        Self { kinds: kinds.collect(), step, upper, lower }
+    }
+
+    /// What rows are off by at least: one that stopped at a bound is not off while the prediction is beyond it.
+    pub fn errors<'r>(&self, residual: &'r [f64]) -> Cow<'r, [f64]> {
+        if self.all_exact() {
+            return Cow::Borrowed(residual);
+        }
+        let error = |(&r, kind): (&f64, &Kind)| match kind {
+            Kind::Exact => r,
+            Kind::AtLeast => r.max(0.0),
+            Kind::AtMost => r.min(0.0),
+        };
+        residual.iter().zip(&self.kinds).map(error).collect()
+    }
+
+    /// True if no reading stopped at a bound.
+    pub fn all_exact(&self) -> bool {
+        self.upper.is_none() && self.lower.is_none()
+    }
+}
+
+/// The largest step of which all differences between values are multiples.
+fn lattice(values: &[f64]) -> Option<f64> {
+    let span = values.last()? - values.first()?;
+    let tolerance = 1e-7 * span.max(1e-9);
+    let mut step = span;
+    for pair in values.windows(2) {
+        // Euclid's algorithm.
+        let (mut a, mut b) = (step, pair[1] - pair[0]);
+        while b > tolerance {
+            (a, b) = (b, a - b * (a / b + 1e-4).floor());
+            b = b.max(0.0);
+        }
+        step = a;
+        if step < 20.0 * tolerance {
+            return None;
+        }
+    }
+    (step < span).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lattice_is_found_through_its_gaps() {
+        let values: Vec<f64> = [0, 2, 5, 6, 11, 12, 20].iter().map(|&k| 3.7 + 2.5 * f64::from(k)).collect();
+        assert!((lattice(&values).unwrap() - 2.5).abs() < 1e-9);
+        let values: Vec<f64> = (1..200).map(|k| f64::from(k).sqrt()).collect();
+        assert_eq!(lattice(&values), None);
+    }
+}

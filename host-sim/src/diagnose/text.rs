@@ -1,0 +1,93 @@
+//! A diagnosis as text: three sentences a person can act on, then the table.
+
+use std::fmt::Write;
+
+use super::effects::{EFFECTS, index_of};
+use super::report::{Finding, Report, Verdict};
+
+/// What goes to the terminal.
+pub fn text(name: &str, report: &Report) -> String {
+    let mut text = String::new();
+    for sentence in sentences(name, report) {
+        let _ = writeln!(text, "{sentence}");
+    }
+    if !report.findings.is_empty() {
+        let _ = writeln!(text, "\n{:34} {:>11}   parameters with 95 % intervals", "cause", "probability");
+        for finding in &report.findings {
+            row(&mut text, finding);
+        }
+    }
+    let (before, after) = (&report.baseline, &report.extended.quality);
+    let _ = writeln!(text, "\n{:22} {:>12} {:>12}", "", "simulation", "extended");
+    for (what, before, after) in [
+        ("free run RMSE [V]", before.rmse, after.rmse),
+        ("held-out RMSE [V]", before.held_out_rmse, after.held_out_rmse),
+        ("one-step RMSE [V]", before.one_step_rmse, after.one_step_rmse),
+        ("fit [%]", before.fit_percent, after.fit_percent),
+    ] {
+        let _ = writeln!(text, "{what:22} {before:12.3} {after:12.3}");
+    }
+    text
+}
+
+/// What is wrong; what the cure is worth; what to do next.
+pub fn sentences(name: &str, report: &Report) -> Vec<String> {
+    let causes: Vec<String> = report
+        .findings
+        .iter()
+        .map(|finding| {
+            let meaning = index_of(finding.cause).map_or("", |index| EFFECTS[index].meaning());
+            format!("{} ({meaning})", finding.cause)
+        })
+        .collect();
+    let rows = report.rows;
+    let mut sentences = vec![match report.verdict {
+        Verdict::Consistent => format!("The simulation agrees with {name}: nothing beyond noise in {rows} readings."),
+        Verdict::Insufficient => {
+            format!("{name} cannot tell what is wrong: its {rows} readings hold too little excitation.")
+        }
+        Verdict::Unexplained if causes.is_empty() => {
+            format!("The simulation is wrong on {name}, and no known cause explains it.")
+        }
+        Verdict::Unexplained => {
+            format!("The simulation is wrong on {name}; {} explains only a part.", causes.join(", "))
+        }
+        Verdict::Ambiguous | Verdict::Explained => format!("The simulation is wrong on {name}: {}.", causes.join("; ")),
+    }];
+    if !report.findings.is_empty() {
+        sentences.push(format!(
+            "With {} in the model, the error on stretches that no fit has seen falls from {:.3} to {:.3} V, by {:.1} %.",
+            if causes.len() == 1 { "it" } else { "them" },
+            report.baseline.held_out_rmse,
+            report.extended.quality.held_out_rmse,
+            100.0 * report.extended.gain
+        ));
+    }
+    if !report.alternatives.is_empty() {
+        let rivals: Vec<String> = report
+            .alternatives
+            .iter()
+            .map(|set| if set.is_empty() { "nothing".into() } else { set.join(" with ") })
+            .collect();
+        sentences.push(format!("The data cannot reject instead: {}.", rivals.join("; ")));
+    }
+    if let Some(leftover) = &report.leftover {
+        sentences.push(format!("{leftover}."));
+    }
+    if let Some(next) = &report.next_experiment {
+        sentences.push(format!("To decide, {next}."));
+    }
+    sentences
+}
+
+fn row(text: &mut String, finding: &Finding) {
+    let parameters: Vec<String> = finding
+        .parameters
+        .iter()
+        .map(|(name, it)| {
+            format!("{name} = {:.4} [{:.4}, {:.4}] {}", it.value, it.low, it.high, it.unit).trim().to_owned()
+        })
+        .collect();
+    let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
+    let _ = writeln!(text, "  {}", finding.evidence);
+}

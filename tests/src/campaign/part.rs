@@ -1,0 +1,163 @@
+//! The parts of the campaign and the records that each is made of.
+
+use indicatif::ProgressBar;
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::score::Outcome;
+use super::seam::Diagnose;
+use crate::hidden::cause::{Block, Cause};
+use crate::hidden::noise::{Kind, Noise};
+use crate::hidden::record::Recipe;
+
+/// A record to make, and in which line of the part's table it counts.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// The line.
+    pub group: String,
+    /// What to hide.
+    pub recipe: Recipe,
+    /// In which record.
+    pub seed: u64,
+}
+
+/// Seeds of the records of a part; parts never share a record.
+fn seed(first: u64, part: u64, index: usize) -> u64 {
+    first.wrapping_mul(1_000_000_007) + part * 100_000_000 + index as u64
+}
+
+/// `count` records of each of the 18 causes in its first form, 0.2 % white noise.
+pub fn singles(first: u64, count: usize) -> Vec<Job> {
+    each_cause(first, 1, count, &Cause::ALL, |recipe| recipe)
+}
+
+/// `count` records of each cause that has other forms, in one of these.
+pub fn forms(first: u64, count: usize) -> Vec<Job> {
+    let causes: Vec<_> = Cause::ALL.into_iter().filter(|cause| cause.facts().forms.len() > 1).collect();
+    each_cause(first, 2, count, &causes, |recipe| Recipe { other_forms: true, ..recipe })
+}
+
+fn each_cause(first: u64, part: u64, count: usize, causes: &[Cause], change: impl Fn(Recipe) -> Recipe) -> Vec<Job> {
+    let job = |(index, (cause, _)): (usize, (&Cause, usize))| Job {
+        group: cause.name().to_owned(),
+        recipe: change(Recipe::of(&[*cause])),
+        seed: seed(first, part, index),
+    };
+    causes.iter().flat_map(|cause| (0..count).map(move |k| (cause, k))).enumerate().map(job).collect()
+}
+
+/// `count` records of the paper's spring: white, coloured (both kinds) and heavy-tailed noise in turn.
+pub fn nulls(first: u64, count: usize) -> Vec<Job> {
+    const TURN: [Kind; 6] =
+        [Kind::White, Kind::Coloured, Kind::HeavyTailed, Kind::White, Kind::OneOverF, Kind::HeavyTailed];
+    let job = |index: usize| {
+        let kind = TURN[index % TURN.len()];
+        let recipe = Recipe { noise: Noise::white(0.2).of(kind), ..Recipe::of(&[]) };
+        Job { group: kind.name().to_owned(), recipe, seed: seed(first, 3, index) }
+    };
+    let mut jobs: Vec<_> = (0..count).map(job).collect();
+    jobs.sort_by_key(|job| job.recipe.noise.kind as u8);
+    jobs
+}
+
+/// `count` records of every two causes of different blocks.
+pub fn pairs(first: u64, count: usize) -> Vec<Job> {
+    let mut jobs = Vec::new();
+    for (i, &a) in Cause::ALL.iter().enumerate() {
+        for &b in Cause::ALL[i + 1..].iter().filter(|b| b.block() != a.block()) {
+            jobs.extend((0..count).map(|_| several(&[a, b])));
+        }
+    }
+    numbered(first, 4, jobs)
+}
+
+/// `count` records of three causes of three different blocks, drawn at random.
+pub fn triples(first: u64, count: usize) -> Vec<Job> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed(first, 5, 0));
+    let jobs = (0..count).map(|_| {
+        let mut blocks = vec![Block::Amplifier, Block::Static, Block::Relaxation, Block::Reading];
+        blocks.remove(random.random_range(0..blocks.len()));
+        let mut one_of = |block: &Block| {
+            let inside: Vec<Cause> = Cause::ALL.into_iter().filter(|cause| cause.block() == *block).collect();
+            *inside.choose(&mut random).expect("no block is empty")
+        };
+        several(&blocks.iter().map(&mut one_of).collect::<Vec<_>>())
+    });
+    let jobs = jobs.collect();
+    numbered(first, 5, jobs)
+}
+
+/// `count` records of each cause with what makes it hard: few rows, uneven rows, coloured and heavy-tailed noise.
+pub fn stress(first: u64, count: usize) -> Vec<Job> {
+    let plain = Recipe::of(&[]);
+    let hard = [
+        ("600 rows", Recipe { rows: 600, ..plain.clone() }),
+        ("uneven rows", Recipe { uneven: true, ..plain.clone() }),
+        ("600 uneven rows", Recipe { rows: 600, uneven: true, ..plain.clone() }),
+        ("coloured noise, AR(1)", Recipe { noise: plain.noise.of(Kind::Coloured), ..plain.clone() }),
+        ("coloured noise, 1/f", Recipe { noise: plain.noise.of(Kind::OneOverF), ..plain.clone() }),
+        ("heavy-tailed noise", Recipe { noise: plain.noise.of(Kind::HeavyTailed), ..plain.clone() }),
+        ("1 % noise", Recipe { noise: Noise::white(1.0), ..plain.clone() }),
+    ];
+    let jobs = hard.iter().flat_map(|(group, recipe)| {
+        Cause::ALL.into_iter().flat_map(move |cause| {
+            let recipe = Recipe { causes: vec![cause], ..recipe.clone() };
+            (0..count).map(move |_| Job { group: (*group).to_owned(), recipe: recipe.clone(), seed: 0 })
+        })
+    });
+    let jobs = jobs.collect();
+    numbered(first, 6, jobs)
+}
+
+/// Several causes in one record, counted by their blocks.
+fn several(causes: &[Cause]) -> Job {
+    let mut blocks: Vec<_> = causes.iter().map(|cause| cause.block()).collect();
+    blocks.sort_unstable();
+    let names: Vec<_> = blocks.iter().map(|block| format!("{block:?}").to_lowercase()).collect();
+    Job { group: names.join(" + "), recipe: Recipe::of(causes), seed: 0 }
+}
+
+fn numbered(first: u64, part: u64, jobs: Vec<Job>) -> Vec<Job> {
+    let numbered = |(index, job)| Job { seed: seed(first, part, index), ..job };
+    jobs.into_iter().enumerate().map(numbered).collect()
+}
+
+/// Makes the records and has them diagnosed, on all cores. Outcomes come in the order of the jobs.
+pub fn run(jobs: &[Job], diagnose: &Diagnose<'_>, progress: &ProgressBar) -> Vec<Outcome> {
+    let one = |job: &Job| {
+        let outcome = Outcome::of(&job.recipe.draw(job.seed), diagnose);
+        progress.inc(1);
+        outcome
+    };
+    jobs.par_iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_made_of_what_they_say() {
+        assert_eq!(singles(1, 20).len(), 360);
+        let nulls = nulls(1, 500);
+        let of = |kind| nulls.iter().filter(|job| job.recipe.noise.kind == kind).count();
+        assert!(nulls.len() == 500 && of(Kind::White) == 167 && of(Kind::HeavyTailed) == 166);
+        let blocks = |job: &Job| {
+            let mut blocks: Vec<_> = job.recipe.causes.iter().map(|cause| cause.block()).collect();
+            blocks.sort_unstable();
+            blocks.dedup();
+            blocks.len()
+        };
+        // 3 amplifier, 3 static, 7 relaxation, 5 reading.
+        assert_eq!(pairs(1, 1).len(), 9 + 21 + 15 + 21 + 15 + 35);
+        assert!(pairs(1, 1).iter().all(|job| blocks(job) == 2));
+        assert!(triples(1, 50).iter().all(|job| blocks(job) == 3));
+        let all = [singles(1, 20), forms(1, 20), nulls, pairs(1, 5), triples(1, 100), stress(1, 5)].concat();
+        let mut seeds: Vec<_> = all.iter().map(|job| job.seed).collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        assert_eq!(seeds.len(), all.len(), "no two jobs share a record");
+    }
+}
