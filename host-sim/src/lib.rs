@@ -11,14 +11,19 @@
 //! | [`stair`] | what a run says |
 //! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
 //! | [`plant_file`] | the spring as a file |
+//! | [`beam`], [`dynamics`], [`mod@joint`] | the report's models: leaf spring, how its stiffness changes, springs in a joint |
+//! | [`mod@reproduce`] | every printed number of the report, computed again |
 //! | [`log`] | the log that the firmware writes, decoded |
 //! | [`mod@link`] | the serial link to the MCU |
 //! | [`output`] | terminal, JSON, CSV, plots |
 
 pub mod bad_input;
+pub mod beam;
 pub mod bound;
 pub mod diagnose;
+pub mod dynamics;
 pub mod experiment;
+pub mod joint;
 pub mod judged;
 mod leap;
 pub mod link;
@@ -29,6 +34,7 @@ pub mod output;
 pub mod plant_file;
 pub mod record;
 pub mod reference;
+pub mod reproduce;
 pub mod response;
 pub mod sampled;
 pub mod schedule;

@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let plant = plant_file::load(&arguments.plant)?;
+    let plant = plant_file::load_plain(&arguments.plant)?;
     let record = Record::open(&arguments.data, &arguments.column)?;
     record.require_measured(&arguments.column)?;
     let options = Options { input: arguments.input, base: Relaxation::plain(plant.share, plant.time_constant_s) };

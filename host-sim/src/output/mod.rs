@@ -1,5 +1,6 @@
 //! What a person gets to see: text on the terminal, files in a folder.
 
+pub mod figure;
 pub mod files;
 pub mod plots;
 pub mod terminal;
