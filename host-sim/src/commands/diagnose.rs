@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::diagnose::{Input, Options, examine, relaxation::Relaxation, text};
+use host_sim::diagnose::{Input, Options, base::Base, examine, text};
 use host_sim::plant_file;
 use host_sim::record::{MEASURED, Record};
 use indicatif::ProgressBar;
@@ -44,10 +44,10 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let plant = plant_file::load_plain(&arguments.plant)?;
+    let base = Base::new(plant_file::load(&arguments.plant)?)?;
     let record = Record::open(&arguments.data, &arguments.column)?;
     record.require_measured(&arguments.column)?;
-    let options = Options { input: arguments.input, base: Relaxation::plain(plant.share, plant.time_constant_s) };
+    let options = Options { input: arguments.input, base };
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let diagnosis = examine(&record, &options, |causes| bar.set_message(format!("so far: {causes}")))?;

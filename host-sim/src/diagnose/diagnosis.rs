@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DMatrix;
 
+use super::cure;
 use super::data::Data;
 use super::effect::{Quantity, Scene};
 use super::effects::{EFFECTS, index_of};
@@ -14,6 +15,7 @@ use super::noise::{Noise, scale_of_squares};
 use super::observed::Observed;
 use super::report::{Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict};
 use super::search::{Scored, Search, effects};
+use crate::plant_file::PlantFile;
 
 /// Odds under which a rival set counts as possible, in nats.
 const RIVAL: f64 = 3.0;
@@ -41,6 +43,8 @@ pub struct Diagnosis {
     pub baseline: Fit,
     /// The simulation with the causes.
     pub extended: Fit,
+    /// The extended spring.
+    pub plant: PlantFile,
 }
 
 /// Runs the search and says what it found.
@@ -48,12 +52,19 @@ pub(super) fn diagnose(
     data: Data,
     observed: &Observed,
     engine: &mut Engine,
+    held: bool,
     progress: impl FnMut(&Scored),
 ) -> Diagnosis {
     let baseline = engine.at(Model::default());
     if !informative(engine) {
         let report = insufficient(&data, &baseline, engine);
-        return Diagnosis { report, data, extended: baseline.clone(), baseline };
+        return Diagnosis {
+            report,
+            data,
+            extended: baseline.clone(),
+            baseline,
+            plant: engine.simulator.base.file().clone(),
+        };
     }
     let mut search = Search::new(engine);
     let best = search.run(progress);
@@ -73,6 +84,7 @@ pub(super) fn diagnose(
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
 
     let mut alternatives = rivals;
+    let cure = cure::of(engine, &best.fit.model, held);
     let monotone = never_reverses(&data);
     if monotone {
         alternatives.extend(twin(&findings));
@@ -98,6 +110,7 @@ pub(super) fn diagnose(
             gain: 1.0 - quality_after.held_out_rmse / quality_before.held_out_rmse.max(1e-12),
             quality: quality_after,
             model: None,
+            fixed_point_error_v: cure.fixed_point_error_v,
         },
         findings,
         alternatives,
@@ -106,7 +119,7 @@ pub(super) fn diagnose(
         noise: noise_report(&best.fit.noise),
         residual: residual_report(&data, &best.fit),
     };
-    Diagnosis { report, data, baseline, extended: best.fit }
+    Diagnosis { report, data, baseline, extended: best.fit, plant: cure.file }
 }
 
 fn explained(finding: &Finding) -> f64 {
@@ -122,7 +135,8 @@ fn informative(engine: &mut Engine) -> bool {
     let probe = ["gain-error", "time-constant"].iter().filter_map(|cause| index_of(cause)).fold(
         Model::default(),
         |model, effect| {
-            let point = if EFFECTS[effect].cause() == "gain-error" { 1.0 } else { engine.simulator.base.tau_s.ln() };
+            let point =
+                if EFFECTS[effect].cause() == "gain-error" { 1.0 } else { engine.simulator.base.relaxation.tau_s.ln() };
             model.with(super::model::Block { effect, form: 0 }, vec![point])
         },
     );
@@ -149,7 +163,7 @@ fn insufficient(data: &Data, baseline: &Fit, engine: &mut Engine) -> Report {
              this record the gain or the time constant could be almost anything"
                 .into(),
         ),
-        extended: Extended { quality, gain: 0.0, model: None },
+        extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None },
         leftover: None,
         noise: noise_report(&baseline.noise),
         residual: residual_report(data, baseline),
