@@ -16,6 +16,7 @@ use super::report::{
     Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict,
 };
 use super::search::{Scored, Search, effects};
+use super::standing::{self, Standing};
 
 /// Odds under which a rival set counts as possible, in nats.
 const RIVAL: f64 = 3.0;
@@ -43,6 +44,10 @@ pub struct Diagnosis {
     pub baseline: Fit,
     /// The simulation with the causes.
     pub extended: Fit,
+    /// Readings less what each of the two foretells on stretches that no fit has seen, in V.
+    pub held_out: [Vec<f64>; 2],
+    /// The best sets of causes beside each other, the best first.
+    pub standings: Vec<Standing>,
 }
 
 /// Runs the search and says what it found.
@@ -50,7 +55,9 @@ pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, pro
     let baseline = engine.at(Model::default());
     if !informative(engine) {
         let report = insufficient(&data, &baseline, engine);
-        return Diagnosis { report, data, extended: baseline.clone(), baseline };
+        let unseen = engine.held_out(&baseline).residual;
+        let held_out = [unseen.clone(), unseen];
+        return Diagnosis { report, data, extended: baseline.clone(), baseline, held_out, standings: Vec::new() };
     }
     let mut search = Search::new(engine);
     let best = search.run(progress);
@@ -60,6 +67,8 @@ pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, pro
         let without = search.best_without(effect);
         weights.push((effect, without));
     }
+    let contenders = standing::contenders(&search, &best);
+    let standings = standing::standings(engine, contenders);
     let readings = reading_findings(&data, observed, &best.fit);
     let left = leftover::test(engine, &best.fit).filter(|left| left.significant);
     let quality_before = quality(engine, &baseline, false);
@@ -103,7 +112,8 @@ pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, pro
         noise: noise_report(&best.fit.noise),
         residual: residual_report(&data, &best.fit),
     };
-    Diagnosis { report, data, baseline, extended: best.fit }
+    let held_out = [&baseline, &best.fit].map(|fit| engine.held_out(fit).residual);
+    Diagnosis { report, data, baseline, extended: best.fit, held_out, standings }
 }
 
 fn explained(finding: &Finding) -> f64 {

@@ -9,7 +9,7 @@
 //! | [`data`], [`observed`] | the record made ready; what its readings say before any model |
 //! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
-//! | [`search`] | which effects |
+//! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`leftover`], [`spectrum`] | what no effect explains |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
 
@@ -33,6 +33,7 @@ pub mod report;
 pub mod search;
 pub mod signal;
 pub mod spectrum;
+pub mod standing;
 pub mod text;
 
 pub use data::Input;
