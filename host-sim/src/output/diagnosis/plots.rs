@@ -18,9 +18,8 @@ pub fn readings(diagnosis: &Diagnosis) -> String {
         (0..data.rows()).map(|row| (data.time_s[row], value(row))).collect()
     };
     let read = each(&|row| data.reading[row]);
-    let command = each(&|row| data.voltage_v[row]);
     let before = each(&|row| data.reading[row] - baseline.residual[row]);
-    let mut plots: Vec<Plot> = vec![line(thinned(command), COMMAND, "commanded").with_dashed().into()];
+    let mut plots: Vec<Plot> = vec![line(thinned(command(data)), COMMAND, "commanded").with_dashed().into()];
     let few = data.rows() <= POINTS;
     if !few {
         plots.push(line(thinned(read.clone()), READING, "reading").into());
@@ -34,6 +33,19 @@ pub fn readings(diagnosis: &Diagnosis) -> String {
         plots.push(points(read, READING, "reading").with_size(3.5).into());
     }
     over_time(data, plots, "Readings and simulations", "voltage, scaled stiffness [V]")
+}
+
+/// The commanded voltage, between the rows too.
+fn command(data: &Data) -> Vec<(f64, f64)> {
+    let mut time = data.time_s[0];
+    let mut corners = Vec::new();
+    data.command.clone().pass(|piece| {
+        corners.push((time, piece.from));
+        time += piece.duration_s;
+        corners.push((time, piece.to));
+        (piece.from, piece.to)
+    });
+    corners
 }
 
 /// What both simulations leave, over time.
@@ -84,6 +96,9 @@ fn correlation(values: &[f64], first_lag: usize, band: f64, title: &str) -> Stri
     let reach = values.iter().fold(1.5 * band, |most: f64, value| most.max(1.1 * value.abs())).min(1.0);
     let layout = draw::layout(&plots, Axes { title, x: "rows later", y: "correlation" })
         .with_shaded_region(ShadedRegion::horizontal(-band, band).with_color(COMMAND).with_opacity(0.25))
+        .with_x_axis_min(-0.5)
+        .with_x_axis_max((values.len() + first_lag) as f64 - 0.5)
+        .with_x_tick_step(5.0)
         .with_y_axis_min(-reach)
         .with_y_axis_max(reach)
         .with_width(560.0)
