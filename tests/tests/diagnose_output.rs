@@ -11,7 +11,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// A file name that is HTML, XML and shell at once.
-const NASTY: &str = "<script>alert('a & \"b\"')</script>$x$.csv";
+const NASTY: &str = "<script>alert('a & \"b\"')<script>$x$.csv";
 const FILES: [&str; 8] = [
     "autocorrelation.svg",
     "diagnosis.json",
@@ -235,14 +235,13 @@ fn a_bad_file_is_named_with_its_place() {
 #[test]
 fn a_poor_record_gets_a_verdict() {
     let folder = folder();
-    let constant_voltage =
-        stair(|time, _| 50.0 + (7.0 * time).sin()).lines().enumerate().fold(String::new(), |mut csv, (line, row)| {
-            let fields: Vec<&str> = row.split(',').collect();
-            let voltage = if line == 0 { fields[1] } else { "100" };
-            writeln!(csv, "{},{voltage},{}", fields[0], fields[2]).expect("a string takes anything");
-            csv
-        });
-    // A minute is missing in the middle.
+    let steady = |voltage: &str, reading: f64| -> String {
+        let csv = stair(|time, _| reading + (time * 7919.0).sin());
+        let rows = csv.lines().skip(1).map(|row| row.split(',').collect::<Vec<_>>());
+        let rows = rows.map(|fields| format!("{},{voltage},{}\n", fields[0], fields[2]));
+        std::iter::once("time_s,voltage_v,stiffness\n".to_owned()).chain(rows).collect()
+    };
+    // Twenty seconds are missing in the middle.
     let gap: String = stair(|_, voltage| voltage / 11.0)
         .lines()
         .enumerate()
@@ -250,8 +249,8 @@ fn a_poor_record_gets_a_verdict() {
         .map(|(_, row)| format!("{row}\n"))
         .collect();
     for (name, csv, verdicts) in [
-        ("constant-voltage", constant_voltage, &["insufficient"][..]),
-        ("zero-voltage", stair(|_, _| 0.0).lines().map(zeroed).collect(), &["insufficient"]),
+        ("constant-voltage", steady("100", 100.0), &["insufficient"][..]),
+        ("zero-voltage", steady("0", 0.0), &["insufficient"]),
         ("constant-readings", stair(|_, _| 42.0), &["explained", "ambiguous", "unexplained", "insufficient"]),
         ("gap", gap, &["explained", "ambiguous", "unexplained"]),
     ] {
@@ -265,9 +264,4 @@ fn a_poor_record_gets_a_verdict() {
         let page = fs::read_to_string(folder.path().join(format!("{name}.out/report.html"))).expect("a page");
         assert!(page.contains(verdict) && !page.contains("NaN"), "{name}");
     }
-}
-
-fn zeroed(row: &str) -> String {
-    let time = row.split(',').next().expect("a field");
-    if time == "time_s" { format!("{row}\n") } else { format!("{time},0,0\n") }
 }

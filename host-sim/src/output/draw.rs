@@ -14,8 +14,13 @@ pub(super) struct Axes<'a> {
 
 /// The lowest and the highest point of each stretch, and the last of all: peaks stay.
 pub(super) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    thinned_to(STRETCHES, points)
+}
+
+/// The same with another number of stretches.
+pub(super) fn thinned_to(stretches: usize, points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let last = points.last().copied();
-    let stretches = points.chunks(points.len().div_ceil(STRETCHES));
+    let stretches = points.chunks(points.len().div_ceil(stretches).max(1));
     let extremes = stretches.flat_map(|stretch| {
         let height = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
         let mut pair = [stretch.iter().min_by(height), stretch.iter().max_by(height)];

@@ -8,6 +8,7 @@ use super::files::Files;
 use crate::diagnose::{Diagnosis, Input};
 
 mod page;
+pub mod panels;
 pub mod plots;
 mod residuals;
 mod style;

@@ -19,7 +19,7 @@ pub fn readings(diagnosis: &Diagnosis) -> String {
     };
     let read = each(&|row| data.reading[row]);
     let before = each(&|row| data.reading[row] - baseline.residual[row]);
-    let mut plots: Vec<Plot> = vec![line(thinned(command(data)), COMMAND, "commanded").with_dashed().into()];
+    let mut plots: Vec<Plot> = vec![line(command(data), COMMAND, "commanded").with_dashed().into()];
     let few = data.rows() <= POINTS;
     if !few {
         plots.push(line(thinned(read.clone()), READING, "reading").into());
@@ -35,17 +35,27 @@ pub fn readings(diagnosis: &Diagnosis) -> String {
     over_time(data, plots, "Readings and simulations", "voltage, scaled stiffness [V]")
 }
 
-/// The commanded voltage, between the rows too.
-fn command(data: &Data) -> Vec<(f64, f64)> {
+/// The commanded voltage, between the rows too; of a plateau, its ends.
+pub(super) fn command(data: &Data) -> Vec<(f64, f64)> {
     let mut time = data.time_s[0];
-    let mut corners = Vec::new();
+    let mut corners: Vec<(f64, f64)> = Vec::new();
+    let mut add = |corner: (f64, f64)| {
+        if let [.., before, last] = corners.as_mut_slice()
+            && before.1 == corner.1
+            && last.1 == corner.1
+        {
+            *last = corner;
+        } else {
+            corners.push(corner);
+        }
+    };
     data.command.clone().pass(|piece| {
-        corners.push((time, piece.from));
+        add((time, piece.from));
         time += piece.duration_s;
-        corners.push((time, piece.to));
+        add((time, piece.to));
         (piece.from, piece.to)
     });
-    corners
+    thinned(corners)
 }
 
 /// What both simulations leave, over time.

@@ -62,7 +62,7 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
                         td.number { (format!("{:.1}", behind(standing))) }
                         td.bar { i style=(width(behind(standing))) {} }
                         td.number { (number(standing.held_out_rmse)) }
-                        td.small { (note(standings, place)) }
+                        td.small.note { (note(standings, place)) }
                     }
                 }
             }
