@@ -116,6 +116,8 @@ fn the_page_needs_nothing_else_and_no_name_gets_through() {
     let output = run(folder.path(), &["diagnose", NASTY, "--out", "out"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let page = fs::read_to_string(folder.path().join("out/report.html")).expect("a page");
+    // Within the page, a plot refers to its own clip path.
+    let page = page.replace("url(#", "");
     for outside in ["http:", "https:", "src=", "url(", "@import", "<link", "<script", "<iframe", "<img"] {
         assert!(!page.contains(outside), "{outside} is on the page");
     }
@@ -241,18 +243,15 @@ fn a_poor_record_gets_a_verdict() {
         let rows = rows.map(|fields| format!("{},{voltage},{}\n", fields[0], fields[2]));
         std::iter::once("time_s,voltage_v,stiffness\n".to_owned()).chain(rows).collect()
     };
-    // Twenty seconds are missing in the middle.
-    let gap: String = stair(|_, voltage| voltage / 11.0)
-        .lines()
-        .enumerate()
-        .filter(|(line, _)| !(40..80).contains(line))
-        .map(|(_, row)| format!("{row}\n"))
-        .collect();
+    // A sixth of the rows is missing in the middle.
+    let whole = Recipe { rows: 600, ..Recipe::of(&[Cause::TimeConstant]) }.draw(3).csv();
+    let rows = whole.lines().enumerate().filter(|(line, _)| !(250..350).contains(line));
+    let gap: String = rows.map(|(_, row)| format!("{row}\n")).collect();
     for (name, csv, verdicts) in [
         ("constant-voltage", steady("100", 100.0), &["insufficient"][..]),
         ("zero-voltage", steady("0", 0.0), &["insufficient"]),
         ("constant-readings", stair(|_, _| 42.0), &["explained", "ambiguous", "unexplained", "insufficient"]),
-        ("gap", gap, &["explained", "ambiguous", "unexplained"]),
+        ("gap", gap, &["explained"]),
     ] {
         let name = format!("{name}.csv");
         fs::write(folder.path().join(&name), csv).expect("a file");

@@ -174,3 +174,32 @@ fn number(value: f64) -> String {
     let decimals = (3 - size.log10().floor() as i32).clamp(0, 7) as usize;
     format!("{value:.decimals$}")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits_at_any_size() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.000_404_2, "0.0004042"),
+            (1.0, "1.000"),
+            (-47.921_3, "-47.92"),
+            (499.96, "500.0"),
+            (12_345.6, "12346"),
+            (1.3e-9, "1.300e-9"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn a_rival_is_noted_for_the_first_cause_it_lacks_and_no_later_one_is() {
+        let standing = |causes: &[&'static str]| Standing { causes: causes.to_vec(), score: 0.0, held_out_rmse: 1.0 };
+        let standings = [standing(&["hum", "drift"]), standing(&["drift"]), standing(&["hum"]), standing(&[])];
+        let notes: Vec<String> = (0..4).map(|place| note(&standings, place)).collect();
+        assert_eq!(notes, ["the best", "the best without hum", "the best without drift", ""]);
+    }
+}
