@@ -108,6 +108,11 @@ pub trait Effect: Sync {
     /// The user's parameters at a point.
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity>;
 
+    /// Causes that contain this one: with one of them in the model, it has nothing to add.
+    fn special_case_of(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// How many places a search for it looks at, as a natural logarithm: what a find by chance is discounted by.
     fn places(&self, _data: &Data) -> f64 {
         0.0

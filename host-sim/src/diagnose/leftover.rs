@@ -75,18 +75,15 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
         rms: (share.max(0.0)).sqrt() * fit.noise.marginal,
         significant: quantile(gain / variance, count as f64) > RARE,
     };
-    Some(line(engine, fit, leftover))
+    Some(line(data, fit, &target, leftover))
 }
 
-/// A strong line in the spectrum is structure too, whatever was commanded.
-fn line(engine: &Engine, fit: &Fit, found: Leftover) -> Leftover {
-    let data = engine.data;
-    let white = fit.noise.whitened(&engine.observed.errors(&fit.residual));
-    let bound = 6.0 * fit.noise.sigma;
-    let clipped: Vec<f64> = white.iter().map(|value| value.clamp(-bound, bound)).collect();
+/// A strong line in the spectrum is structure too, whatever was commanded. `target` is in the noise's scales.
+fn line(data: &Data, fit: &Fit, target: &[f64], found: Leftover) -> Leftover {
+    let clipped: Vec<f64> = target.iter().map(|value| value.clamp(-6.0, 6.0)).collect();
     let Some(peak) = spectrum::peaks(&clipped, data, 1).into_iter().next() else { return found };
-    let power = 0.25 * data.rows() as f64 * (peak.cosine.powi(2) + peak.sine.powi(2)) / fit.noise.sigma.powi(2);
-    let share = (peak.cosine.powi(2) + peak.sine.powi(2)) / (2.0 * fit.noise.sigma.powi(2));
+    let share = 0.5 * (peak.cosine.powi(2) + peak.sine.powi(2));
+    let power = 0.5 * data.rows() as f64 * share;
     // As many lines as half the rows were looked at.
     if power - (data.rows() as f64 / 2.0).ln() > 12.0 && share > found.share {
         let place = format!("at a frequency of {:.3} Hz", peak.frequency_hz);

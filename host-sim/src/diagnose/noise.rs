@@ -30,7 +30,7 @@ pub struct Noise {
 }
 
 /// Longest memory that is looked for, in rows.
-const LONGEST_MEMORY: usize = 20;
+const LONGEST_MEMORY: usize = 50;
 /// Shorter records have no memory that could be told from structure.
 const ROWS_FOR_MEMORY: usize = 150;
 /// A step coarser than this many of the noise's scales is a cell, a finer one is noise.
@@ -176,6 +176,29 @@ impl Noise {
     pub fn cost(&self, rows: usize) -> f64 {
         let parameters = self.ar.len() as f64 + f64::from(u8::from(self.nu.is_finite()));
         0.5 * (rows.max(2) as f64).ln() * parameters
+    }
+
+    /// How much more the innovations' means over long stretches vary than independent ones would; 1 unless significant.
+    ///
+    /// Noise that grows towards low frequencies has no finite memory: after any autoregression slow swings remain, and
+    /// they pass for a shift or a drift.
+    pub fn long_memory(&self, errors: &[f64]) -> f64 {
+        let bound = 4.0 * self.sigma;
+        let white: Vec<f64> = self.whitened(errors).into_iter().map(|e| e.clamp(-bound, bound)).collect();
+        let variance = white.iter().map(|e| e * e).sum::<f64>() / white.len().max(1) as f64;
+        let mut most = 1.0f64;
+        for parts in [5, 10, 20, 40, 80] {
+            let length = white.len() / parts;
+            if length < 5 || variance <= 0.0 {
+                continue;
+            }
+            let squares = white.chunks_exact(length).map(|chunk| chunk.iter().sum::<f64>().powi(2) / length as f64);
+            let ratio = squares.take(parts).sum::<f64>() / parts as f64 / variance;
+            if ratio > 1.0 + 2.0 * (2.0 / parts as f64).sqrt() {
+                most = most.max(ratio);
+            }
+        }
+        most
     }
 
     fn fit_tail(&mut self, innovations: &[f64]) {

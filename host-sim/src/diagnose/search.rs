@@ -24,8 +24,10 @@ pub struct Scored {
     pub score: f64,
 }
 
-/// What one block costs, in nats, beside its places and forms.
-const PRICE: f64 = 5.5;
+/// What a block costs, in nats, beside its places and forms: so many are tried.
+const PRICE: f64 = 3.7;
+/// And each of its coordinates, beyond what held-out rows charge: a wider block must not take a narrower one's place.
+const PRICE_OF_COORDINATE: f64 = 1.8;
 /// Structures that are carried on.
 const BEAM: usize = 3;
 /// Extensions of each that are judged on held-out rows.
@@ -34,10 +36,8 @@ const JUDGED: usize = 5;
 const MOST_BLOCKS: usize = 6;
 /// What a block may lose for a while, in nats, where the noise seems to have a memory.
 const PATIENCE: f64 = 30.0;
-/// An extension that promises less, in nats, is not fitted.
+/// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
-/// Extensions that are fitted, at most.
-const FITTED: usize = 14;
 
 /// The search and all that it has seen.
 pub struct Search<'e, 'a> {
@@ -45,6 +45,8 @@ pub struct Search<'e, 'a> {
     seen: HashMap<Vec<Block>, Scored>,
     /// Extensions of each structure, best first.
     extended: HashMap<Vec<Block>, Vec<Scored>>,
+    /// What prices are multiplied by: noise whose memory is longer than its law can say makes chance finds look better.
+    caution: f64,
 }
 
 /// A block that could be added, from one start.
@@ -57,13 +59,14 @@ struct Extension {
 /// What a block costs, in nats.
 pub fn price(block: &Block, engine: &Engine) -> f64 {
     let effect = block.effect();
-    PRICE + effect.places(engine.data) + (effect.forms() as f64).ln()
+    let fitted = block.coordinates(engine.data).iter().filter(|coordinate| coordinate.fitted).count();
+    PRICE + PRICE_OF_COORDINATE * fitted as f64 + effect.places(engine.data) + (effect.forms() as f64).ln()
 }
 
 impl<'e, 'a> Search<'e, 'a> {
     /// With an engine for one record.
     pub fn new(engine: &'e mut Engine<'a>) -> Self {
-        Self { engine, seen: HashMap::new(), extended: HashMap::new() }
+        Self { engine, seen: HashMap::new(), extended: HashMap::new(), caution: 1.0 }
     }
 
     /// Everything that was judged.
@@ -73,6 +76,26 @@ impl<'e, 'a> Search<'e, 'a> {
 
     /// The best structure; `progress` hears of each structure that becomes the best.
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
+        loop {
+            let best = self.pass(&mut progress);
+            let caution = best.fit.noise.long_memory(&self.engine.observed.errors(&best.fit.residual));
+            if caution <= self.caution || best.fit.model.blocks.is_empty() {
+                return best;
+            }
+            self.caution = caution;
+            self.extended.clear();
+            let keys: Vec<Vec<Block>> = self.seen.keys().cloned().collect();
+            for key in keys {
+                let score = self.seen[&key].held_out - self.prices(&self.seen[&key].fit.model);
+                if let Some(scored) = self.seen.get_mut(&key) {
+                    scored.score = score;
+                }
+            }
+        }
+    }
+
+    /// One search at the present caution.
+    fn pass(&mut self, progress: &mut impl FnMut(&Scored)) -> Scored {
         let root = self.engine.at(Model::default());
         let root = self.judged(root);
         let mut best = root.clone();
@@ -219,32 +242,30 @@ impl<'e, 'a> Search<'e, 'a> {
         let sigma = super::noise::scale(&fit.residual);
         let mut found: Vec<Extension> = Vec::new();
         for (index, effect) in EFFECTS.iter().enumerate() {
-            if fit.model.has(index) || !wanted(index) {
+            if fit.model.has(index) || contained(index, &fit.model) || !wanted(index) {
                 continue;
             }
+            let mut of_effect: Vec<Extension> = Vec::new();
             for form in 0..effect.forms() {
                 let block = Block { effect: index, form };
                 let scene = Scene { data: self.engine.data, residual: &fit.residual, sigma };
-                let mut starts: Vec<Extension> = effect
-                    .starts(form, &scene)
-                    .into_iter()
-                    .map(|point| {
-                        let there = self.engine.residual(&fit.model.with(block, point.clone()));
-                        let change: Vec<f64> = fit.residual.iter().zip(&there).map(|(a, b)| a - b).collect();
-                        let promise = metrics.iter().map(|metric| metric.promise(&change)).fold(0.0, f64::max);
-                        Extension { block, point, promise }
-                    })
-                    .filter(|extension| extension.promise > PROMISE)
-                    .collect();
+                let starts = effect.starts(form, &scene).into_iter().map(|point| {
+                    let there = self.engine.residual(&fit.model.with(block, point.clone()));
+                    let change: Vec<f64> = fit.residual.iter().zip(&there).map(|(a, b)| a - b).collect();
+                    let promise = metrics.iter().map(|metric| metric.promise(&change)).fold(0.0, f64::max);
+                    Extension { block, point, promise }
+                });
+                let mut starts: Vec<Extension> = starts.collect();
                 starts.sort_by(|a, b| b.promise.total_cmp(&a.promise));
                 // A second start where the first may be a lesser peak.
-                let keep = usize::from(!starts.is_empty()) + usize::from(starts.len() > 4);
-                starts.truncate(keep);
-                found.extend(starts);
+                starts.truncate(1 + usize::from(starts.len() > 4 && effect.forms() == 1));
+                of_effect.extend(starts);
+            }
+            // A promise is a poor judge of a form: if one form is worth fitting, all are.
+            if of_effect.iter().any(|extension| extension.promise > PROMISE) {
+                found.extend(of_effect);
             }
         }
-        found.sort_by(|a, b| b.promise.total_cmp(&a.promise));
-        found.truncate(FITTED);
         found
     }
 
@@ -266,13 +287,20 @@ impl<'e, 'a> Search<'e, 'a> {
     }
 
     fn prices(&self, model: &Model) -> f64 {
-        model.blocks.iter().map(|(block, _)| price(block, self.engine)).sum()
+        self.caution * model.blocks.iter().map(|(block, _)| price(block, self.engine)).sum::<f64>()
     }
 }
 
 /// The effects of a model, in the chain's order.
 pub fn effects(model: &Model) -> Vec<usize> {
     model.blocks.iter().map(|(block, _)| block.effect).collect()
+}
+
+/// True if an effect is a special case of one that is there: it could only trade with it.
+fn contained(effect: usize, model: &Model) -> bool {
+    let wider = EFFECTS[effect].special_case_of();
+    let narrower = |other: usize| EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause());
+    effects(model).into_iter().any(|other| wider.contains(&EFFECTS[other].cause()) || narrower(other))
 }
 
 /// Keeps the first structure of each set of effects.

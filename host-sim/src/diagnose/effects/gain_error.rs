@@ -23,6 +23,10 @@ impl Effect for GainError {
         "one step, held for ten time constants: the settled value tells the gain"
     }
 
+    fn special_case_of(&self) -> &'static [&'static str] {
+        &["static-nonlinearity"]
+    }
+
     fn coordinates(&self, _: usize, _: &Data) -> Vec<Coordinate> {
         vec![Coordinate::new(0.02, 50.0)]
     }

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | bend | `1 + a (x - 1)`: the ends stay |
 //! | exponential | `(1 - exp(-k x)) / (x (1 - exp(-k)))`: the ends stay |
+//! | exponential with gain | `g` times that |
 //! | quadratic, cubic, quintic | `g + a x`, `+ b x^2`, `+ c x^3 + d x^4`: the gain is its own |
 
 use crate::diagnose::data::Data;
@@ -14,6 +15,9 @@ pub(super) struct StaticNonlinearity;
 
 const BEND: usize = 0;
 const EXPONENTIAL: usize = 1;
+const EXPONENTIAL_WITH_GAIN: usize = 2;
+/// Coefficients of the polynomials, by form.
+const COEFFICIENTS: [usize; 6] = [0, 0, 0, 2, 3, 5];
 
 /// Points of the curve that are reported.
 const POINTS: u32 = 5;
@@ -22,6 +26,7 @@ const POINTS: u32 = 5;
 fn secant(form: usize, point: &[f64], x: f64) -> f64 {
     match form {
         BEND => 1.0 + point[0] * (x - 1.0),
+        EXPONENTIAL_WITH_GAIN => point[1] * secant(EXPONENTIAL, &point[..1], x),
         EXPONENTIAL => {
             let k = if point[0].abs() < 1e-6 { 1e-6 } else { point[0] };
             if x < 1e-9 { k / -(-k).exp_m1() } else { (-k * x).exp_m1() / (x * (-k).exp_m1()) }
@@ -48,16 +53,17 @@ impl Effect for StaticNonlinearity {
     }
 
     fn forms(&self) -> usize {
-        5
+        COEFFICIENTS.len()
     }
 
     fn coordinates(&self, form: usize, _: &Data) -> Vec<Coordinate> {
         match form {
             BEND => vec![Coordinate::new(-2.0, 2.0)],
             EXPONENTIAL => vec![Coordinate::new(-8.0, 8.0)],
+            EXPONENTIAL_WITH_GAIN => vec![Coordinate::new(-8.0, 8.0), Coordinate::new(0.02, 50.0)],
             _ => {
                 let mut coordinates = vec![Coordinate::new(-20.0, 20.0)];
-                coordinates.resize([2, 3, 5][form - 2], Coordinate::new(-100.0, 100.0));
+                coordinates.resize(COEFFICIENTS[form], Coordinate::new(-100.0, 100.0));
                 coordinates
             }
         }
@@ -67,10 +73,14 @@ impl Effect for StaticNonlinearity {
         match form {
             BEND => vec![vec![0.1], vec![-0.1]],
             EXPONENTIAL => vec![vec![0.3], vec![-0.3]],
+            EXPONENTIAL_WITH_GAIN => vec![vec![0.3, 1.0], vec![-0.3, 1.0]],
             _ => {
-                let mut start = vec![0.95, 0.05];
-                start.resize([2, 3, 5][form - 2], 0.0);
-                vec![start]
+                let start = |bend: f64| {
+                    let mut start = vec![1.0 - bend, bend];
+                    start.resize(COEFFICIENTS[form], 0.0);
+                    start
+                };
+                vec![start(0.05), start(-0.05)]
             }
         }
     }

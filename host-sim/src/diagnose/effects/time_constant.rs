@@ -23,6 +23,10 @@ impl Effect for TimeConstant {
         "a step that is read densely for ten time constants"
     }
 
+    fn special_case_of(&self) -> &'static [&'static str] {
+        &["voltage-dependent-time-constant"]
+    }
+
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
         vec![Coordinate::log(0.2 * data.sample_s, 10.0 * data.duration_s())]
     }
