@@ -15,6 +15,7 @@ use super::noise::{Noise, scale_of_squares};
 use super::observed::Observed;
 use super::report::{Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict};
 use super::search::{Scored, Search, effects};
+use super::standing::{self, Standing};
 use crate::plant_file::PlantFile;
 
 /// Odds under which a rival set counts as possible, in nats.
@@ -45,6 +46,10 @@ pub struct Diagnosis {
     pub extended: Fit,
     /// The extended spring.
     pub plant: PlantFile,
+    /// Readings less what each of the two foretells on stretches that no fit has seen, in V.
+    pub held_out: [Vec<f64>; 2],
+    /// The best sets of causes beside each other, the best first.
+    pub standings: Vec<Standing>,
 }
 
 /// Runs the search and says what it found.
@@ -58,12 +63,15 @@ pub(super) fn diagnose(
     let baseline = engine.at(Model::default());
     if !informative(engine) {
         let report = insufficient(&data, &baseline, engine);
+        let unseen = engine.held_out(&baseline).residual;
         return Diagnosis {
             report,
             data,
             extended: baseline.clone(),
             baseline,
             plant: engine.simulator.base.file().clone(),
+            held_out: [unseen.clone(), unseen],
+            standings: Vec::new(),
         };
     }
     let mut search = Search::new(engine);
@@ -74,6 +82,8 @@ pub(super) fn diagnose(
         let without = search.best_without(effect);
         weights.push((effect, without));
     }
+    let contenders = standing::contenders(&search, &best);
+    let standings = standing::standings(engine, contenders);
     let readings = reading_findings(&data, observed, &best.fit);
     let left = leftover::test(engine, &best.fit).filter(|left| left.significant);
     let quality_before = quality(engine, &baseline, false);
@@ -119,7 +129,8 @@ pub(super) fn diagnose(
         noise: noise_report(&best.fit.noise),
         residual: residual_report(&data, &best.fit),
     };
-    Diagnosis { report, data, baseline, extended: best.fit, plant: cure.file }
+    let held_out = [&baseline, &best.fit].map(|fit| engine.held_out(fit).residual);
+    Diagnosis { report, data, baseline, extended: best.fit, plant: cure.file, held_out, standings }
 }
 
 fn explained(finding: &Finding) -> f64 {

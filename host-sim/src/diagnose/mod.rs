@@ -10,7 +10,7 @@
 //! | [`data`], [`observed`] | the record made ready; what its readings say before any model |
 //! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
-//! | [`search`] | which effects |
+//! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
 //! | [`leftover`], [`spectrum`] | what no effect explains |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
@@ -37,6 +37,7 @@ pub mod report;
 pub mod search;
 pub mod signal;
 pub mod spectrum;
+pub mod standing;
 pub mod text;
 
 pub use data::Input;

@@ -27,6 +27,9 @@ pub fn text(name: &str, report: &Report) -> String {
     ] {
         let _ = writeln!(text, "{what:22} {before:12.3} {after:12.3}");
     }
+    if let Some(error) = report.extended.fixed_point_error_v {
+        let _ = writeln!(text, "The fixed-point tick runs the extended spring within {error:.3} V of the fit.");
+    }
     text
 }
 

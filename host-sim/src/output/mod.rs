@@ -1,5 +1,7 @@
 //! What a person gets to see: text on the terminal, files in a folder.
 
+pub mod diagnosis;
+mod draw;
 pub mod figure;
 pub mod files;
 pub mod plots;

@@ -1,0 +1,48 @@
+//! How the best sets of causes stand beside each other: what they score, and what they foretell.
+
+use std::collections::HashSet;
+
+use super::effects::EFFECTS;
+use super::fit::Engine;
+use super::noise::scale_of_squares;
+use super::search::{Scored, Search, effects};
+
+/// A set of causes in its best forms.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// The causes, in the chain's order; none for the simulation as it was.
+    pub causes: Vec<&'static str>,
+    /// Held-out log-likelihood less the price of the blocks, in nats.
+    pub score: f64,
+    /// Error on stretches that no fit has seen, in V.
+    pub held_out_rmse: f64,
+}
+
+/// Sets that are listed for their score alone.
+const BEST: usize = 8;
+
+/// The best sets of causes, the best without each cause of the best one, and the simulation as it was.
+pub(super) fn contenders(search: &Search, best: &Scored) -> Vec<Scored> {
+    let mut ranked: Vec<&Scored> = search.seen().collect();
+    let key = |scored: &Scored| scored.fit.model.structure();
+    ranked.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| key(a).cmp(&key(b))));
+    let mut sets = HashSet::new();
+    ranked.retain(|scored| sets.insert(effects(&scored.fit.model)));
+    let without: Vec<_> =
+        effects(&best.fit.model).into_iter().map(|effect| search.best_without(effect).fit.model.structure()).collect();
+    let kept = |(place, scored): &(usize, &Scored)| {
+        let structure = scored.fit.model.structure();
+        *place < BEST || structure.is_empty() || without.contains(&structure)
+    };
+    ranked.into_iter().enumerate().filter(kept).map(|(_, scored)| scored.clone()).collect()
+}
+
+/// Their standings, in the same order.
+pub(super) fn standings(engine: &mut Engine, contenders: Vec<Scored>) -> Vec<Standing> {
+    let standing = |scored: Scored| Standing {
+        causes: effects(&scored.fit.model).into_iter().map(|effect| EFFECTS[effect].cause()).collect(),
+        score: scored.score,
+        held_out_rmse: scale_of_squares(&engine.held_out(&scored.fit).residual),
+    };
+    contenders.into_iter().map(standing).collect()
+}

@@ -1,0 +1,37 @@
+//! A record beside a simulation, and below it what the simulation leaves: how a cause looks.
+
+use kuva::prelude::*;
+
+use super::plots::command;
+use super::style::{AFTER, BEFORE, COMMAND, READING};
+use crate::diagnose::data::Data;
+use crate::output::draw::{self, Axes, line, thinned_to};
+
+/// Stretches of time that a line is drawn by: the panels are small.
+const STRETCHES: usize = 200;
+
+/// Two panels over the same time as SVG; `simulation` is its value at each row, in V.
+pub fn panels(data: &Data, simulation: &[f64]) -> String {
+    let each = |value: &dyn Fn(usize) -> f64| {
+        thinned_to(STRETCHES, (0..data.rows()).map(|row| (data.time_s[row], value(row))).collect())
+    };
+    let above: Vec<Plot> = vec![
+        line(command(data), COMMAND, "commanded").with_dashed().into(),
+        line(each(&|row| simulation[row]), BEFORE, "simulation").into(),
+        line(each(&|row| data.reading[row]), READING, "reading").into(),
+    ];
+    let below: Vec<Plot> =
+        vec![line(each(&|row| data.reading[row] - simulation[row]), AFTER, "reading less simulation").into()];
+    let (first, last) = (data.time_s[0], data.time_s[data.rows() - 1]);
+    let layout = |plots: &[Plot], y: &str| {
+        let layout = draw::layout(plots, Axes { title: "", x: "time [s]", y });
+        layout.with_x_axis_min(first).with_x_axis_max(last)
+    };
+    let layouts = vec![layout(&above, "stiffness [V]"), layout(&below, "difference [V]")];
+    let figure = Figure::new(2, 1)
+        .with_plots(vec![above, below])
+        .with_layouts(layouts)
+        .with_cell_size(640.0, 200.0)
+        .with_shared_legend();
+    SvgBackend::new().render_scene(&figure.render())
+}

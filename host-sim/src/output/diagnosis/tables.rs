@@ -1,0 +1,205 @@
+//! The page's tables.
+
+use maud::{Markup, html};
+
+use crate::diagnose::Diagnosis;
+use crate::diagnose::noise::scale_of_squares;
+use crate::diagnose::report::{Finding, Parameter, Report};
+use crate::diagnose::standing::Standing;
+
+/// Each cause with its parameters.
+pub(super) fn findings(findings: &[Finding]) -> Markup {
+    if findings.is_empty() {
+        return html! { p { "No cause is named." } };
+    }
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th { "cause" } th.number { "probability" } th { "parameters with 95 % intervals" }
+                th.number { "RMSE without [V]" } th.number { "with [V]" }
+            } }
+            tbody {
+                @for finding in findings {
+                    tr.cause {
+                        td.cause { (finding.cause) }
+                        td.number { (format!("{:.3}", finding.probability)) }
+                        td { ul.parameters {
+                            @for (name, parameter) in &finding.parameters { li { (name) " = " (interval(parameter)) } }
+                        } }
+                        td.number { (number(finding.rmse_before)) }
+                        td.number { (number(finding.rmse_after)) }
+                    }
+                    tr { td.small colspan="5" { (finding.evidence) "." } }
+                }
+            }
+        } }
+    }
+}
+
+/// The best sets of causes, how far each is behind, and which cause it does without.
+pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
+    let standings = &diagnosis.standings;
+    let Some(best) = standings.first() else {
+        return html! { p { "Nothing was compared: the record cannot tell." } };
+    };
+    let behind = |standing: &Standing| best.score - standing.score;
+    let furthest = standings.iter().map(behind).fold(1.0, f64::max);
+    // Rivals are a few nats behind, wrong causes thousands: only a logarithm shows both.
+    let width = |nats: f64| format!("width:{:.1}%", 100.0 * nats.ln_1p() / furthest.ln_1p());
+    html! {
+        p.small {
+            "Nats behind the best on stretches that no fit has seen, the price of each cause paid; bars are logarithmic. "
+            "3 nats are odds of 20 to 1."
+        }
+        div.scroll { table {
+            thead { tr {
+                th { "causes" } th.number { "behind [nats]" } th { "" } th.number { "held-out RMSE [V]" } th { "" }
+            } }
+            tbody {
+                @for (place, standing) in standings.iter().enumerate() {
+                    tr.best[place == 0] {
+                        td.set { (set(&standing.causes)) }
+                        td.number { (format!("{:.1}", behind(standing))) }
+                        td.bar { i style=(width(behind(standing))) {} }
+                        td.number { (number(standing.held_out_rmse)) }
+                        td.small.note { (note(standings, place)) }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+fn set(causes: &[&str]) -> String {
+    if causes.is_empty() { "none: the simulation as it was".to_owned() } else { causes.join(" + ") }
+}
+
+fn note(standings: &[Standing], place: usize) -> String {
+    if place == 0 {
+        return "the best".to_owned();
+    }
+    let lacks = |place: usize, cause: &&&str| !standings[place].causes.contains(cause);
+    let first_without = |cause: &&&str| lacks(place, cause) && !(1..place).any(|earlier| lacks(earlier, cause));
+    let without: Vec<&str> = standings[0].causes.iter().filter(first_without).copied().collect();
+    if without.is_empty() { String::new() } else { format!("the best without {}", without.join(", ")) }
+}
+
+/// Both simulations beside each other.
+pub(super) fn quality(report: &Report) -> Markup {
+    let (before, after) = (&report.baseline, &report.extended.quality);
+    let rows = [
+        ("free run RMSE [V]", before.rmse, after.rmse),
+        ("held-out RMSE [V]", before.held_out_rmse, after.held_out_rmse),
+        ("one-step RMSE [V]", before.one_step_rmse, after.one_step_rmse),
+        ("fit [%]", before.fit_percent, after.fit_percent),
+    ];
+    html! {
+        div.scroll { table {
+            thead { tr { th { "" } th.number { "simulation" } th.number { "extended" } } }
+            tbody {
+                @for (what, before, after) in rows {
+                    tr { td { (what) } td.number { (number(before)) } td.number { (number(after)) } }
+                }
+                tr { td { "gain on held-out stretches [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) } }
+            }
+        } }
+    }
+}
+
+/// The error of both simulations on each fold.
+pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
+    let Diagnosis { data, held_out: [before, after], .. } = diagnosis;
+    let of = |fold: usize, residual: &[f64]| -> Vec<f64> {
+        residual.iter().zip(&data.fold).filter(|(_, of)| usize::from(**of) == fold).map(|(left, _)| *left).collect()
+    };
+    let rows: Vec<(usize, usize, f64, f64)> = (0..data.folds)
+        .map(|fold| {
+            let (before, after) = (of(fold, before), of(fold, after));
+            (fold + 1, before.len(), scale_of_squares(&before), scale_of_squares(&after))
+        })
+        .collect();
+    let largest = rows.iter().map(|row| row.2.max(row.3)).fold(1e-12, f64::max);
+    let width = |rmse: f64| format!("width:{:.1}%", 100.0 * rmse / largest);
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th.number { "fold" } th.number { "rows" } th.number { "simulation [V]" } th.number { "extended [V]" } th { "" }
+                th.number { "gain [%]" }
+            } }
+            tbody {
+                @for (fold, rows, before, after) in rows {
+                    tr {
+                        td.number { (fold) } td.number { (rows) }
+                        td.number { (number(before)) } td.number { (number(after)) }
+                        td.bar { i.before style=(width(before)) {} i style=(width(after)) {} }
+                        td.number { (format!("{:.1}", 100.0 * (1.0 - after / before.max(1e-12)))) }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+/// The noise's law.
+pub(super) fn noise(diagnosis: &Diagnosis) -> Markup {
+    let noise = &diagnosis.report.noise;
+    let tail = match noise.tail {
+        Some(freedom) => format!("a heavy tail (Student's t with {} degrees of freedom)", number(freedom)),
+        None => "a normal tail".to_owned(),
+    };
+    let memory = match noise.memory_rows {
+        0 => "no memory".to_owned(),
+        1 => "a memory of one row".to_owned(),
+        rows => format!("a memory of {rows} rows"),
+    };
+    let wide = diagnosis.extended.noise.wide.map(|(fraction, wide)| {
+        format!(" {} % of the readings are off by {} V.", number(100.0 * fraction), number(wide))
+    });
+    html! { p { "Scale " (number(noise.sigma)) " V, " (tail) ", " (memory) "." (wide.unwrap_or_default()) } }
+}
+
+fn interval(Parameter { value, low, high, unit }: &Parameter) -> String {
+    format!("{} [{}, {}] {unit}", number(*value), number(*low), number(*high)).trim_end().to_owned()
+}
+
+/// Four significant digits.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    if !(1e-4..1e7).contains(&size) {
+        return format!("{value:.3e}");
+    }
+    let decimals = (3 - size.log10().floor() as i32).clamp(0, 7) as usize;
+    format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits_at_any_size() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.000_404_2, "0.0004042"),
+            (1.0, "1.000"),
+            (-47.921_3, "-47.92"),
+            (499.96, "500.0"),
+            (12_345.6, "12346"),
+            (1.3e-9, "1.300e-9"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn a_rival_is_noted_for_the_first_cause_it_lacks_and_no_later_one_is() {
+        let standing = |causes: &[&'static str]| Standing { causes: causes.to_vec(), score: 0.0, held_out_rmse: 1.0 };
+        let standings = [standing(&["hum", "drift"]), standing(&["drift"]), standing(&["hum"]), standing(&[])];
+        let notes: Vec<String> = (0..4).map(|place| note(&standings, place)).collect();
+        assert_eq!(notes, ["the best", "the best without hum", "the best without drift", ""]);
+    }
+}
