@@ -64,7 +64,7 @@ fn main() -> anyhow::Result<()> {
         let hidden = Hidden::new(schedule, vec![effect], Noise::white(0.1), 1);
         let data = Data::new(&hidden.record(), Input::Hold);
         let mut simulation = Vec::new();
-        Simulator::new(&data, Options::default().base).run(&Model::default(), &mut simulation);
+        Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulation);
         let path = folder.join(format!("{cause}.svg"));
         std::fs::write(&path, panels(&data, &simulation)).with_context(|| path.display().to_string())?;
         println!("wrote {}", path.display());

@@ -109,7 +109,7 @@ pub(super) fn diagnose(
     let next_experiment = next_experiment(verdict, &findings, &alternatives, left.as_ref());
     let leftover = left.map(|left| {
         let Leftover { place, share, rms, .. } = left;
-        format!("{:.1} % of what is left ({rms:.3} V RMS) is no noise: it is {place}", 100.0 * share)
+        format!("{:.1} % of what is left ({rms:.3} V RMS) is no noise: it shows {place}", 100.0 * share)
     });
     let report = Report {
         schema: SCHEMA,

@@ -26,6 +26,8 @@ pub struct Leftover {
 
 /// Standard normal quantile of one in ten thousand.
 const RARE: f64 = 3.72;
+/// Standard normal quantile of one in a hundred, for records too short for more.
+const UNLIKELY: f64 = 2.33;
 /// Parts that time and voltage are divided into.
 const PARTS: usize = 6;
 /// Records with fewer rows per feature are not tested.
@@ -37,13 +39,13 @@ struct Group {
     columns: Vec<Vec<f64>>,
 }
 
-/// Tests a fit; `None` where the record is too short for it.
+/// Tests a fit.
 pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     let data = engine.data;
     let mut groups = features(data);
     let count: usize = groups.iter().map(|group| group.columns.len()).sum();
     if data.rows() < ROWS_PER_FEATURE * count {
-        return None;
+        return alike(fit);
     }
     let terms = engine.terms(&fit.noise, &fit.residual);
     let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
@@ -76,6 +78,21 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
         significant: quantile(gain / variance, count as f64) > RARE,
     };
     Some(line(data, fit, &target, leftover))
+}
+
+/// A short record is asked only whether errors are like the ones before them (von Neumann's ratio).
+fn alike(fit: &Fit) -> Option<Leftover> {
+    let errors = &fit.residual;
+    let squares: f64 = errors.iter().map(|error| error * error).sum();
+    let steps: f64 = errors.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    let share = 1.0 - 0.5 * steps / squares.max(1e-300);
+    let rows = errors.len() as f64;
+    Some(Leftover {
+        place: "that each error is like the one before it".into(),
+        share,
+        rms: share.max(0.0).sqrt() * (squares / rows).sqrt(),
+        significant: share * rows.sqrt() > UNLIKELY,
+    })
 }
 
 /// A strong line in the spectrum is structure too, whatever was commanded. `target` is in the noise's scales.

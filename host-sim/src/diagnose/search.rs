@@ -38,6 +38,8 @@ const JUDGED_PLAIN: usize = 3;
 const MOST_BLOCKS: usize = 6;
 /// What a block may lose for a while, in nats, where the noise seems to have a memory.
 const PATIENCE: f64 = 30.0;
+/// How many times its start an effect may be, in the hope of a promise.
+const FARTHEST: f64 = 6.0;
 /// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
 
@@ -187,9 +189,13 @@ impl<'e, 'a> Search<'e, 'a> {
         scored
     }
 
-    /// The best of all judged structures that do without an effect.
+    /// The best of all judged structures that do without an effect, and without a cause that contains it.
     pub fn best_without(&self, effect: usize) -> Scored {
-        let without = self.seen.values().filter(|scored| !scored.fit.model.has(effect));
+        let wider = EFFECTS[effect].special_case_of();
+        let has = |model: &Model| {
+            effects(model).into_iter().any(|other| other == effect || wider.contains(&EFFECTS[other].cause()))
+        };
+        let without = self.seen.values().filter(|scored| !has(&scored.fit.model));
         without.max_by(|a, b| a.score.total_cmp(&b.score)).cloned().expect("the search starts from no effect at all")
     }
 
@@ -355,7 +361,7 @@ impl Metric {
         Self { noise, residual, roots, own }
     }
 
-    /// Gain in nats of a step along `change`, no further than one and a half of it.
+    /// Gain in nats of the best step along `change`, as far as a straight line may be believed.
     fn promise(&self, change: &[f64]) -> f64 {
         let mut change: Vec<f64> =
             self.noise.whitened(change).iter().zip(&self.roots).map(|(value, root)| value * root).collect();
@@ -365,8 +371,11 @@ impl Metric {
             return 0.0;
         }
         let along = dot(&self.residual, &change);
-        let step = (along / size).clamp(0.0, 1.5);
-        step * along - 0.5 * step * step * size
+        let step = (along / size).clamp(0.0, FARTHEST);
+        let total = dot(&self.residual, &self.residual);
+        let part = ((2.0 * along - step * size) * step / total.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
+        // The noise's scale would shrink along.
+        -0.5 * self.residual.len() as f64 * (1.0 - part).ln()
     }
 }
 
