@@ -28,6 +28,7 @@ fn main() {
     // nmagic: no padding to page size, which would move the sections away from where flash needs them.
     for arg in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo:rustc-link-arg-bins={arg}");
+        println!("cargo:rustc-link-arg-examples={arg}");
     }
     println!("cargo:rerun-if-changed={}", memory.display());
     println!("cargo:rerun-if-changed=build.rs");

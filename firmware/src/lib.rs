@@ -10,6 +10,7 @@
 //! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
 //! | [`digest`] | one number for a whole run |
 //! | `last_words`, `stop` | what survives a reset; panic and hard fault |
+//! | `hang_guard` | a control task that hangs is stopped |
 //! | `stack_guard` | an overflow of the stack is a fault |
 //! | `log` | every log line, in one place |
 //! | `tasks` | the control task and the housekeeping below it |
@@ -33,6 +34,8 @@ pub mod roll_call;
 pub mod script;
 
 #[cfg(feature = "mcu")]
+pub mod hang_guard;
+#[cfg(feature = "mcu")]
 pub mod host;
 #[cfg(feature = "mcu")]
 pub mod last_words;
@@ -51,3 +54,7 @@ pub mod tasks;
 
 /// Ticks per second.
 pub const RATE_HZ: u32 = 1000;
+
+/// Longest time without a tick before `hang_guard` stops the program, in ms: more than the supervisor forgives, so that a
+/// late task can still say so itself.
+pub const LONGEST_HANG_MS: u32 = 12;

@@ -9,6 +9,7 @@ use defmt::{error, info, warn};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
+use micromath::F32Ext;
 use model::Volts;
 use model::supervisor::Fault;
 
@@ -38,6 +39,8 @@ pub struct Summary {
     pub overruns: u32,
     /// Since boot, in us.
     pub worst_lateness_us: u32,
+    /// Of the last second's ticks, squared and summed up, in us^2.
+    pub squared_lateness_us2: u32,
     /// Ticks in a limit since boot.
     pub limited_ticks: u32,
     /// As the supervisor names it.
@@ -124,10 +127,11 @@ pub fn event(event: Event) {
         Event::Fault(it, tick) => fault(it, tick),
         Event::Limits(bits, tick) => warn!("limit bits={=u8} tick={=u32}", bits, tick),
         Event::Summary(s) => info!(
-            "summary tick={=u32} overruns={=u32} worst_lateness_us={=u32} limited_ticks={=u32} state={=str} target_mv={=i32} applied_mv={=i32} stiffness_mv={=i32}",
+            "summary tick={=u32} overruns={=u32} worst_lateness_us={=u32} rms_lateness_us={=f32} limited_ticks={=u32} state={=str} target_mv={=i32} applied_mv={=i32} stiffness_mv={=i32}",
             s.tick,
             s.overruns,
             s.worst_lateness_us,
+            rms_us(s.squared_lateness_us2),
             s.limited_ticks,
             s.state,
             millivolts(s.target),
@@ -139,6 +143,12 @@ pub fn event(event: Event) {
             d.ticks, d.missed, d.digest, d.instructions.min, d.instructions.mean, d.instructions.max
         ),
     }
+}
+
+/// Root mean square of a second's ticks, to 6 % and in steps of 0.1 us.
+fn rms_us(sum_us2: u32) -> f32 {
+    let mean = sum_us2 as f32 / crate::RATE_HZ as f32;
+    (mean.sqrt() * 10.0).round() / 10.0
 }
 
 /// Rounded down.

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `stair` | the report's stair: 70 s, from 20 s on every 10 s up by 100 V in 0.1 s |
 //! | `random SEED` | 100 000 ticks of arming, disarming, target jumps, an interlock that opens, a host that falls silent |
-//! | `panic`, `hard-fault`, `stack-overflow`, `stall`, `hang`, `overrun`, `interlock`, `silence` | fault drills |
+//! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `silence` | fault drills |
 //! | (after a reset by a fault) | the aftermath: nothing may leave until the fault is acknowledged |
 
 use model::supervisor::Command;
@@ -22,6 +22,8 @@ pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 pub const STAIR_TICKS: u32 = 70_000;
 /// Ticks of a random run, 100 s.
 pub const RANDOM_TICKS: u32 = 100_000;
+/// When a drill arms.
+pub const ARM_TICK: u32 = 10;
 /// When a drill's mishap happens.
 pub const MISHAP_TICK: u32 = 300;
 
@@ -34,11 +36,15 @@ pub enum Mishap {
     HardFault,
     /// The control task uses up its stack.
     StackOverflow,
+    /// The same with float registers in use, which the processor means to save on that stack.
+    FloatOverflow,
     /// The housekeeping task stops for ever.
     Stall,
     /// The control task itself stops for ever.
     Hang,
-    /// The control task takes 20 ms once.
+    /// The same with interrupts off.
+    Deaf,
+    /// The control task takes 8 ms once.
     Overrun,
     /// The interlock opens for 50 ms.
     Interlock,
@@ -48,12 +54,14 @@ pub enum Mishap {
 
 impl Mishap {
     /// Every drill.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Panic,
         Self::HardFault,
         Self::StackOverflow,
+        Self::FloatOverflow,
         Self::Stall,
         Self::Hang,
+        Self::Deaf,
         Self::Overrun,
         Self::Interlock,
         Self::Silence,
@@ -65,8 +73,10 @@ impl Mishap {
             Self::Panic => "panic",
             Self::HardFault => "hard-fault",
             Self::StackOverflow => "stack-overflow",
+            Self::FloatOverflow => "float-overflow",
             Self::Stall => "stall",
             Self::Hang => "hang",
+            Self::Deaf => "deaf",
             Self::Overrun => "overrun",
             Self::Interlock => "interlock",
             Self::Silence => "silence",
@@ -166,7 +176,7 @@ fn calm(command: Option<Command>, target_v: i32) -> Step {
 /// Armed at 10 ms with 300 V; what can be acknowledged is acknowledged at 1.2 s and armed again at 1.3 s.
 fn drill(mishap: Mishap, tick: u32) -> Step {
     let command = match tick {
-        10 | 1300 => Some(Command::Arm),
+        ARM_TICK | 1300 => Some(Command::Arm),
         1200 => Some(Command::Disarm),
         _ => None,
     };

@@ -42,32 +42,43 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     stop(Fault::Panic, Some(info))
 }
 
-/// In the fault of a stack that ran out there is no stack to stand on: take a fresh one first. Nothing returns to the old,
-/// so the float registers that the processor still means to save there (FPCCR.LSPACT) are given up: the first float
-/// instruction would fault again.
+/// The processor stopped the program.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {
     core::arch::naked_asm!(
-        "ldr r0, =_stack_start",
-        "mov sp, r0",
-        "ldr r0, =0xe000ef34",
-        "ldr r1, [r0]",
-        "bic r1, r1, #1",
-        "str r1, [r0]",
-        "dsb",
-        "isb",
+        "movs r0, #{fault}",
         "b {on}",
-        on = sym hard_fault_on_fresh_stack
+        fault = const Fault::HardFault.code(),
+        on = sym on_fresh_stack
     )
 }
 
-extern "C" fn hard_fault_on_fresh_stack() -> ! {
-    stop(Fault::HardFault, None)
+/// Stops for `fault`, from the top of the stack: when it ran out there is none left to stand on. Nothing
+/// returns to the old one, so the float registers that the processor still means to save there (FPCCR.LSPACT) are given up:
+/// the first float instruction would fault again.
+#[unsafe(naked)]
+pub extern "C" fn on_fresh_stack(fault: Fault) -> ! {
+    core::arch::naked_asm!(
+        "ldr r1, =_stack_start",
+        "mov sp, r1",
+        "ldr r1, =0xe000ef34",
+        "ldr r2, [r1]",
+        "bic r2, r2, #1",
+        "str r2, [r1]",
+        "dsb",
+        "isb",
+        "b {on}",
+        on = sym stop_there
+    )
+}
+
+extern "C" fn stop_there(fault: Fault) -> ! {
+    stop(fault, None)
 }
 
 /// An interrupt that nobody enabled.
 #[unsafe(export_name = "DefaultHandler")]
 extern "C" fn unexpected() -> ! {
-    stop(Fault::HardFault, None)
+    on_fresh_stack(Fault::HardFault)
 }

@@ -11,7 +11,7 @@ use crate::control::{Control, Orders, Senses, Stopwatch, Tick};
 use crate::log::{self, EVENTS, Event, Summary, queue};
 use crate::pace::Pace;
 use crate::roll_call::{Member, RollCall};
-use crate::{RATE_HZ, last_words, stop};
+use crate::{RATE_HZ, hang_guard, last_words, stop};
 
 /// Who must be alive.
 pub static ROLL_CALL: RollCall = RollCall::new();
@@ -58,9 +58,10 @@ pub async fn control<B: Board>(
 
         ticks = ticks.wrapping_add(1);
         stop::TICK.store(ticks, Ordering::Relaxed);
-        report.worst_lateness_us = report.worst_lateness_us.max(arrival.lateness_us);
+        report.late(arrival.lateness_us);
         report.tick(ticks, control, &tick);
 
+        hang_guard::feed();
         ROLL_CALL.check_in(Member::Control);
         if ROLL_CALL.complete() {
             absent = 0;
@@ -73,6 +74,7 @@ pub async fn control<B: Board>(
             }
         }
     }
+    hang_guard::rest();
     (ticks, report.overruns)
 }
 
@@ -84,10 +86,16 @@ struct Report {
     limits: Limits,
     overruns: u32,
     worst_lateness_us: u32,
+    squared_lateness_us2: u32,
     limited_ticks: u32,
 }
 
 impl Report {
+    fn late(&mut self, us: u32) {
+        self.worst_lateness_us = self.worst_lateness_us.max(us);
+        self.squared_lateness_us2 = self.squared_lateness_us2.saturating_add(us.saturating_mul(us));
+    }
+
     fn tick(&mut self, number: u32, control: &Control, tick: &Tick) {
         let supervisor = control.supervisor();
         let state = supervisor.label();
@@ -114,6 +122,7 @@ impl Report {
                 tick: number,
                 overruns: self.overruns,
                 worst_lateness_us: self.worst_lateness_us,
+                squared_lateness_us2: core::mem::take(&mut self.squared_lateness_us2),
                 limited_ticks: self.limited_ticks,
                 state,
                 target: tick.output.target,

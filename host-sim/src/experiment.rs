@@ -1,13 +1,15 @@
-//! A schedule run through the fixed-point controller, tick by tick, beside the exact reference.
+//! A schedule run through the fixed-point controller, tick by tick, beside a reference in double precision.
 //!
+//! The plain spring's reference is the exact solution in continuous time, the extended spring's the loop at the same rate.
 //! Both with the pre-compensator and without it, so that each run shows what the controller is worth.
 
 use anyhow::Result;
-use model::{Config, DacCode, Input, Limits, Output, ScaledStiffness, Settings, Spring, State, Volts};
+use model::estimator::Estimator;
+use model::{Config, DacCode, Input, Limits, Output, Plant, ScaledStiffness, Settings, Spring, State, Volts};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
-use crate::reference::{Loop, Moment};
+pub use crate::judged::{Judged, continuous, reference_at, with_plant};
 use crate::schedule::Schedule;
 
 /// More ticks than this are refused: a run keeps 48 bytes of each.
@@ -15,13 +17,13 @@ const MOST_TICKS: f64 = 10e6;
 
 /// What is run.
 #[derive(Clone, Debug)]
-pub struct Experiment {
+pub struct Experiment<P = Plant> {
     /// What the schedule is called in messages.
     pub name: String,
     /// The voltages asked for.
     pub schedule: Schedule,
     /// Spring, gains and amplifier of the controlled loop.
-    pub settings: Settings,
+    pub settings: Settings<P>,
 }
 
 /// One tick of one loop.
@@ -52,7 +54,7 @@ pub struct Run {
     pub without: Vec<Sample>,
 }
 
-impl Experiment {
+impl<P: Judged> Experiment<P> {
     /// Runs it; `progress` hears of the ticks done, every few thousand, and of their total.
     ///
     /// # Errors
@@ -62,8 +64,7 @@ impl Experiment {
         let uncontrolled = Settings { gains: None, ..self.settings };
         let controlled = self.settings.check().map_err(|error| BadInput(error.to_string()))?;
         let alone = uncontrolled.check().map_err(|error| BadInput(error.to_string()))?;
-        let (lowest, highest) = (self.settings.amplifier.min_v, self.settings.amplifier.max_v);
-        self.schedule.check_range(&self.name, lowest, highest)?;
+        self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;
 
         let start_s = self.schedule.start_s();
         let last = ((self.schedule.end_s() - start_s) * rate_hz + 1e-6).floor();
@@ -77,7 +78,10 @@ impl Experiment {
         run.with = one_loop(&controlled, &targets, |done| progress(done, 2 * ticks))?;
         run.without = one_loop(&alone, &targets, |done| progress(ticks + done, 2 * ticks))?;
         for (settings, samples) in [(&self.settings, &mut run.with), (&uncontrolled, &mut run.without)] {
-            reference_at_ticks(continuous(settings), &self.schedule, rate_hz, &targets, samples);
+            let references = P::reference_at_ticks(settings, &self.schedule, &targets);
+            for (sample, reference) in samples.iter_mut().zip(references) {
+                sample.reference = reference;
+            }
         }
         Ok(run)
     }
@@ -104,22 +108,6 @@ pub fn max_fixed_point_error(samples: &[Sample]) -> f64 {
     samples.iter().map(|sample| (sample.stiffness.to_f64() - sample.reference).abs()).fold(0.0, f64::max)
 }
 
-/// The settings as the reference takes them.
-pub fn continuous(settings: &Settings) -> Loop {
-    Loop {
-        share: settings.plant.share,
-        time_constant_s: settings.plant.time_constant_s,
-        gains: settings.gains.map(|gains| (gains.proportional, gains.integral_per_s)),
-        range_v: (settings.amplifier.min_v, settings.amplifier.max_v),
-        // What the amplifier makes within a tick is no limit to it.
-        slew_v_per_s: settings
-            .amplifier
-            .slew_v_per_s
-            .filter(|slew| slew / settings.rate_hz < settings.amplifier.full_scale_v)
-            .unwrap_or(f64::INFINITY),
-    }
-}
-
 /// The report's leaf spring over the whole range of the model's amplifiers.
 pub fn paper_spring() -> Result<Spring> {
     use model::stiffness::{Cantilever, YoungsModulus};
@@ -127,7 +115,7 @@ pub fn paper_spring() -> Result<Spring> {
 }
 
 /// The fixed-point loop over one target a tick; its reference is not known yet.
-fn one_loop(config: &Config, targets: &[f64], mut progress: impl FnMut(usize)) -> Result<Vec<Sample>> {
+fn one_loop<E: Estimator>(config: &Config<E>, targets: &[f64], mut progress: impl FnMut(usize)) -> Result<Vec<Sample>> {
     let mut state = State::default();
     let mut samples = Vec::with_capacity(targets.len());
     for (tick, &target) in targets.iter().enumerate() {
@@ -139,53 +127,4 @@ fn one_loop(config: &Config, targets: &[f64], mut progress: impl FnMut(usize)) -
         samples.push(Sample { code, applied, stiffness, limits, reference: 0.0 });
     }
     Ok(samples)
-}
-
-/// Adds the exact solution to the samples of a loop.
-fn reference_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f64], samples: &mut [Sample]) {
-    let mut solution = system.at_rest(1.0 / rate_hz);
-    let time = |tick: usize| schedule.start_s() + tick as f64 / rate_hz;
-    // Where the target goes straight from tick to tick, and does not jump at the next, whole runs of ticks are one call.
-    let mut reader = schedule.reader();
-    let mut straight = |tick: usize| {
-        reader.at(time(tick));
-        let mut stretches = reader.clone().stretches(time(tick), time(tick + 1));
-        let first = stretches.next();
-        stretches.next().is_none() && first.is_some_and(|first| (first.to_v() - targets[tick + 1]).abs() < 1e-9)
-    };
-    let mut moments = vec![Moment::default(); targets.len()];
-    // Goes along, like the other: found from the start each time, a long file would take the square of its rows.
-    let mut behind = schedule.reader();
-    let mut tick = 0;
-    while tick < targets.len() {
-        solution.jump(targets[tick]);
-        samples[tick].reference = solution.moment().stiffness;
-        let end = (tick..targets.len() - 1).find(|&tick| !straight(tick)).unwrap_or(targets.len() - 1);
-        solution.run(&targets[tick..=end], &mut moments[tick..end]);
-        for at in tick..end {
-            samples[at + 1].reference = moments[at].stiffness;
-        }
-        behind.at(time(end));
-        for stretch in behind.clone().stretches(time(end), time(end + 1)) {
-            solution.advance(stretch.from_v, stretch.slope, stretch.duration_s);
-        }
-        tick = end + 1;
-    }
-}
-
-/// The stiffness of the exact solution at increasing moments of a schedule, in V.
-pub fn reference_at(system: Loop, schedule: &Schedule, times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    let mut solution = system.at_rest(1e-3);
-    let mut now = schedule.start_s();
-    let mut reader = schedule.reader();
-    let at = |time: f64| {
-        let next = time.clamp(now, schedule.end_s());
-        for stretch in reader.clone().stretches(now, next) {
-            solution.advance(stretch.from_v, stretch.slope, stretch.duration_s);
-        }
-        now = next;
-        solution.jump(reader.at(next));
-        solution.moment().stiffness
-    };
-    times_s.into_iter().map(at).collect()
 }

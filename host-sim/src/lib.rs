@@ -5,27 +5,36 @@
 //! | [`schedule`], [`record`] | what voltage is asked for: the report's stair, or a file |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
-//! | [`experiment`] | fixed point and reference side by side over a schedule |
+//! | [`experiment`], [`judged`] | fixed point and reference side by side over a schedule |
+//! | [`open_loop`] | the fixed-point spring alone over a record |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the fastest any controller could be |
 //! | [`stair`] | what a run says |
 //! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
 //! | [`plant_file`] | the spring as a file |
+//! | [`beam`], [`dynamics`], [`mod@joint`] | the report's models: leaf spring, how its stiffness changes, springs in a joint |
+//! | [`mod@reproduce`] | every printed number of the report, computed again |
 //! | [`log`] | the log that the firmware writes, decoded |
 //! | [`mod@link`] | the serial link to the MCU |
 //! | [`output`] | terminal, JSON, CSV, plots |
 
 pub mod bad_input;
+pub mod beam;
 pub mod bound;
 pub mod diagnose;
+pub mod dynamics;
 pub mod experiment;
+pub mod joint;
+pub mod judged;
 mod leap;
 pub mod link;
 pub mod log;
 pub mod misprint;
+pub mod open_loop;
 pub mod output;
 pub mod plant_file;
 pub mod record;
 pub mod reference;
+pub mod reproduce;
 pub mod response;
 pub mod sampled;
 pub mod schedule;

@@ -24,9 +24,13 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Beam(commands::beam::Arguments),
     Diagnose(commands::diagnose::Arguments),
+    Dynamics(commands::dynamics::Arguments),
+    Joint(commands::joint::Arguments),
     Link(commands::link::Arguments),
     Log(commands::log::Arguments),
+    Reproduce(commands::reproduce::Arguments),
     Stair(commands::stair::Arguments),
 }
 
@@ -36,9 +40,13 @@ fn main() -> ExitCode {
         Err(error) => return usage(&error),
     };
     let done = match cli.command {
+        Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
         Some(Command::Diagnose(arguments)) => commands::diagnose::run(&arguments),
+        Some(Command::Dynamics(arguments)) => commands::dynamics::run(&arguments),
+        Some(Command::Joint(arguments)) => commands::joint::run(&arguments),
         Some(Command::Link(arguments)) => commands::link::run(&arguments),
         Some(Command::Log(arguments)) => commands::log::run(&arguments),
+        Some(Command::Reproduce(arguments)) => commands::reproduce::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),
     };

@@ -66,7 +66,7 @@ fn hundredths(printed: f64) -> f64 {
 }
 
 /// The two neighbouring digits of `expected` whose swap gives `found`.
-fn swapped_digits(expected: &str, found: &str) -> Option<(char, char)> {
+pub(crate) fn swapped_digits(expected: &str, found: &str) -> Option<(char, char)> {
     let digits = |text: &str| text.chars().filter(char::is_ascii_digit).collect::<Vec<_>>();
     let (expected, found) = (digits(expected), digits(found));
     (1..expected.len()).find_map(|index| {
@@ -77,7 +77,7 @@ fn swapped_digits(expected: &str, found: &str) -> Option<(char, char)> {
 }
 
 /// The one digit in which `found` differs from `expected`, and the right one.
-fn single_digit(expected: &str, found: &str) -> Option<(char, char)> {
+pub(crate) fn single_digit(expected: &str, found: &str) -> Option<(char, char)> {
     if expected.len() != found.len() {
         return None;
     }

@@ -1,14 +1,15 @@
 //! What a run says, laid beside what the report printed and measured.
 
 use anyhow::Result;
-use model::Limits;
+use model::{Limits, Settings};
 use serde::Serialize;
 
-use crate::experiment::{Experiment, Run, Sample, continuous, max_fixed_point_error, reference_at};
+use crate::bound::shortest_time;
+use crate::experiment::{Experiment, Judged, Run, Sample, max_fixed_point_error};
 use crate::misprint::Pair;
 use crate::record::Record;
-use crate::reference::Loop;
 use crate::response::{Response, measure};
+use crate::schedule::Change;
 use crate::table3;
 
 /// The whole answer of `vsj stair --json`.
@@ -89,13 +90,17 @@ impl Report {
     ///
     /// # Errors
     /// If the table that was built in is damaged.
-    pub fn new(experiment: &Experiment, run: &Run, source: &Rows<'_>, controlled: bool) -> Result<Self> {
+    pub fn new<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>, controlled: bool) -> Result<Self> {
         let compared = matches!(source, Rows::Table3 { same: true });
         let mut rows = rows(experiment, run, source)?;
         let (printed_compared, printed_agree) = if compared { explain(&mut rows) } else { (0, 0) };
         let samples = if controlled { &run.with } else { &run.without };
-        let system = continuous(&experiment.settings);
-        let steps = experiment.schedule.changes().iter().map(|change| measure(run, samples, change, &system)).collect();
+        let exact = P::exact(&experiment.settings);
+        let step = |change: &Change| {
+            let bound = exact.and_then(|system| shortest_time(&system, change.from_v, change.to_v, 0.97));
+            measure(run, samples, change, bound)
+        };
+        let steps = experiment.schedule.changes().iter().map(step).collect();
         Ok(Self {
             rows,
             steps,
@@ -109,7 +114,7 @@ impl Report {
 }
 
 /// Rows at the moments of a table or file: the reference at the very moment, fixed point at the last tick before.
-fn rows(experiment: &Experiment, run: &Run, source: &Rows<'_>) -> Result<Vec<Row>> {
+fn rows<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>) -> Result<Vec<Row>> {
     let blank = |time_s, voltage_v, measured| {
         let tick = run.tick_at(time_s);
         Row {
@@ -138,10 +143,10 @@ fn rows(experiment: &Experiment, run: &Run, source: &Rows<'_>) -> Result<Vec<Row
             record.rows.iter().map(|point| blank(point.time_s, point.voltage_v, point.measured)).collect()
         }
     };
-    let controlled = continuous(&experiment.settings);
+    let Experiment { schedule, settings, .. } = experiment;
     let times: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
-    let with = reference_at(controlled, &experiment.schedule, times.iter().copied());
-    let without = reference_at(Loop { gains: None, ..controlled }, &experiment.schedule, times);
+    let with = P::reference_at(settings, schedule, run, &run.with, &times);
+    let without = P::reference_at(&Settings { gains: None, ..*settings }, schedule, run, &run.without, &times);
     for ((row, with), without) in rows.iter_mut().zip(with).zip(without) {
         (row.with, row.without) = (with, without);
     }

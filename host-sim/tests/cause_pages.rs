@@ -23,7 +23,7 @@ fn record(read: impl Fn(usize, f64) -> f64) -> Record {
     let mut record = Record { name: "stair".into(), rows: (0..1100).map(row).collect() };
     let data = Data::new(&record, Input::Hold);
     let mut simulated = Vec::new();
-    Simulator::new(&data, Options::default().base).run(&Model::default(), &mut simulated);
+    Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulated);
     for (index, (row, simulated)) in record.rows.iter_mut().zip(simulated).enumerate() {
         // Noise of 0.3 V RMS that is the same everywhere.
         let noise = ((index * 7919) % 101) as f64 / 101.0 - 0.5;

@@ -6,7 +6,7 @@
 
 use std::cell::Cell;
 
-use host_sim::sampled::{SampledLoop, State};
+use host_sim::sampled::SampledLoop;
 use model::{Amplifier, Gains, Input, Plant, Settings, Volts};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -61,14 +61,12 @@ fn disagreement(case: &Case) -> Option<(f64, f64)> {
     let range_v = (lowest.to_f64(), highest.to_f64());
     let double = SampledLoop {
         sample_s: 1.0 / rate_hz,
-        share: plant.share,
-        time_constant_s: plant.time_constant_s,
-        proportional: gains.proportional,
-        integral_per_s: gains.integral_per_s,
+        spring: plant.into(),
+        gains: Some((gains.proportional, gains.integral_per_s)),
         range_v,
         slew_v_per_s: amplifier.slew_v_per_s.unwrap_or(f64::INFINITY),
     };
-    let (mut fixed, mut state) = (model::State::default(), State::default());
+    let (mut fixed, mut state) = (model::State::default(), double.at_rest());
     let (mut stiffness_off, mut voltage_off) = (0.0f64, 0.0f64);
     for &(level, ticks) in &case.stair {
         let target = Volts::new(range_v.0 + level * (range_v.1 - range_v.0)).ok()?;

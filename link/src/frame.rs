@@ -54,15 +54,15 @@ impl Message for Reply {
 }
 
 /// A message as it goes onto the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Frame {
-    bytes: [u8; MAX_FRAME],
-    length: usize,
-}
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame(Bytes<MAX_FRAME>);
+
+/// At most `N` bytes, their number in one of its own.
+pub(crate) type Bytes<const N: usize> = heapless::Vec<u8, N, u8>;
 
 impl Frame {
     /// Nothing to send.
-    pub const EMPTY: Self = Self { bytes: [0; MAX_FRAME], length: 0 };
+    pub const EMPTY: Self = Self(Bytes::new());
 
     /// The frame of a message; every message fits (a test holds the largest of each against [`MAX_FRAME`]).
     pub fn new<M: Message>(sequence: Sequence, message: &M) -> Self {
@@ -73,16 +73,18 @@ impl Frame {
     pub fn with_version<M: Message>(version: u8, sequence: Sequence, message: &M) -> Self {
         let mut frame = Self::EMPTY;
         // None would be a message beyond MAX_MESSAGE. Sending nothing is the harmless way out: the other side asks again.
-        frame.length = frame.fill(version, sequence, message).unwrap_or(0);
+        if frame.fill(version, sequence, message).is_none() {
+            frame.0.clear();
+        }
         frame
     }
 
     /// The bytes to send, delimiters included; empty if there is nothing to send.
     pub fn as_bytes(&self) -> &[u8] {
-        self.bytes.get(..self.length).unwrap_or(&[])
+        &self.0
     }
 
-    fn fill<M: Message>(&mut self, version: u8, sequence: Sequence, message: &M) -> Option<usize> {
+    fn fill<M: Message>(&mut self, version: u8, sequence: Sequence, message: &M) -> Option<()> {
         let mut packet = [0; MAX_PACKET];
         let [low, high] = sequence.0.to_le_bytes();
         packet.get_mut(..HEADER)?.copy_from_slice(&[version, M::KIND, low, high]);
@@ -90,9 +92,9 @@ impl Frame {
         let end = HEADER + postcard::to_slice(message, room).ok()?.len();
         let checksum = CRC.checksum(packet.get(..end)?);
         packet.get_mut(end..end + CHECKSUM)?.copy_from_slice(&checksum.to_le_bytes());
-        let encoded = stuffing::encode(packet.get(..end + CHECKSUM)?, self.bytes.get_mut(1..=MAX_ENCODED)?)?;
-        *self.bytes.get_mut(1 + encoded)? = DELIMITER;
-        Some(encoded + 2)
+        self.0.push(DELIMITER).ok()?;
+        stuffing::encode(packet.get(..end + CHECKSUM)?, &mut self.0)?;
+        self.0.push(DELIMITER).ok()
     }
 }
 

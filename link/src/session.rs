@@ -141,7 +141,7 @@ impl Session {
                 count(&mut self.counters.repeated);
                 self.heard_at = Some(now);
                 self.heard = true;
-                self.outgoing = self.answer;
+                self.outgoing.clone_from(&self.answer);
                 // Nothing to send yet means that the answer is still being worked on, and comes.
                 Some(Action::Send(self.outgoing.as_bytes())).filter(|_| self.answer != Frame::EMPTY)
             }
@@ -168,7 +168,7 @@ impl Session {
     pub fn answer(&mut self, reply: &Reply) -> &[u8] {
         let frame = Frame::new(self.asked, reply);
         if self.accepted.is_some_and(|accepted| accepted.sequence == self.asked) {
-            self.answer = frame;
+            self.answer.clone_from(&frame);
         }
         self.outgoing = frame;
         self.outgoing.as_bytes()

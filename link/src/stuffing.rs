@@ -6,20 +6,21 @@
 //! Not from a crate: a decoder that takes bytes from a wire must have no way to panic, and here the compiler sees that it
 //! has none. The tests hold it against one.
 
-/// Encodes `packet` into `out`; gives the length. `None` if it does not fit.
-pub(crate) fn encode(packet: &[u8], out: &mut [u8]) -> Option<usize> {
-    let (mut start, mut end) = (0, 1);
+use crate::frame::Bytes;
+
+/// Encodes `packet` behind what `out` holds. `None` if it does not fit.
+pub(crate) fn encode<const N: usize>(packet: &[u8], out: &mut Bytes<N>) -> Option<()> {
+    // Each piece's length is filled in at its end.
+    let mut start = out.len();
+    out.push(1).ok()?;
     for &byte in packet {
+        out.push(byte).ok()?;
         if byte == 0 {
-            *out.get_mut(start)? = u8::try_from(end - start).ok()?;
-            start = end;
-        } else {
-            *out.get_mut(end)? = byte;
+            start = out.len() - 1;
         }
-        end += 1;
+        *out.get_mut(start)? = u8::try_from(out.len() - start).ok()?;
     }
-    *out.get_mut(start)? = u8::try_from(end - start).ok()?;
-    Some(end)
+    Some(())
 }
 
 /// Decodes `bytes`, which hold no zero, in place; gives the length. `None` if a piece is cut short.
@@ -53,11 +54,11 @@ mod tests {
         fn a_packet_is_encoded_as_by_the_crate_and_comes_back(
             packet in prop::collection::vec(prop_oneof![Just(0), any::<u8>()], 0..=MAX_PACKET),
         ) {
-            let mut encoded = [0; MAX_ENCODED];
-            let length = encode(&packet, &mut encoded).unwrap();
-            prop_assert_eq!(&encoded[..length], &cobs::encode_vec(&packet));
-            prop_assert!(length == packet.len() + 1 && !encoded[..length].contains(&0));
-            let length = decode_in_place(&mut encoded[..length]).unwrap();
+            let mut encoded = Bytes::<MAX_ENCODED>::new();
+            encode(&packet, &mut encoded).unwrap();
+            prop_assert_eq!(&encoded[..], &cobs::encode_vec(&packet));
+            prop_assert!(encoded.len() == packet.len() + 1 && !encoded.contains(&0));
+            let length = decode_in_place(&mut encoded).unwrap();
             prop_assert_eq!(&encoded[..length], &packet);
         }
 
@@ -74,10 +75,10 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        assert_eq!(encode(&[1, 2, 3], &mut [0; 3]), None);
-        assert_eq!(encode(&[1, 2, 0], &mut [0; 3]), None);
-        assert_eq!(encode(&[], &mut []), None);
-        assert_eq!(encode(&[1; 254], &mut [0; 300]), Some(255));
-        assert_eq!(encode(&[1; 255], &mut [0; 300]), None, "would need the long form");
+        assert_eq!(encode(&[1, 2, 3], &mut Bytes::<3>::new()), None);
+        assert_eq!(encode(&[1, 2, 0], &mut Bytes::<3>::new()), None);
+        assert_eq!(encode(&[], &mut Bytes::<0>::new()), None);
+        assert_eq!(encode(&[1; 254], &mut Bytes::<255>::new()), Some(()));
+        assert_eq!(encode(&[1; 254], &mut Bytes::<254>::new()), None);
     }
 }

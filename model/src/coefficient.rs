@@ -4,9 +4,11 @@
 //!   of 100 nor a share of 0.09 loses precision, and no shift is needed.
 //! - [`Rate`] turns a lag into what an accumulator gains in one tick. A relaxation of 5.5 s moves by 1.8e-5 of its lag
 //!   in a 10 kHz tick; 32 fraction bits would put its time constant off by parts in 1e5, so it has 64.
+//! - [`Weight`] is a factor of a sum of products: the products are added 64 bits wide and saturated once.
 
-use fixed::types::I0F32;
+use fixed::types::{I0F32, I5F27, I17F47};
 
+use crate::error::OutOfRange;
 use crate::units::{Accumulator, Signal};
 
 const TWO_TO_32: f64 = 4_294_967_296.0;
@@ -57,6 +59,43 @@ impl Rate {
         let fine = (i64::from(lag.to_bits()) * i64::from(self.low)) >> 32;
         lag.wide_mul(self.high) + Accumulator::from_bits(fine)
     }
+}
+
+/// A factor of a sum of products, magnitude up to 10, exact to 2^-28.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Weight(I5F27);
+
+/// Signals times weights: with weights whose magnitudes add up to at most 10 it cannot overflow.
+pub(crate) type Sum = I17F47;
+
+impl Weight {
+    /// The largest magnitude, and the largest sum of magnitudes.
+    pub(crate) const MOST: f64 = 10.0;
+    /// What a signal is shifted by to become a sum.
+    pub(crate) const FRACTION_BITS: u32 = I5F27::FRAC_NBITS;
+
+    /// The nearest weight to a finite `value` of at most 10.
+    pub(crate) fn new(value: f64) -> Self {
+        Self(I5F27::from_num(value))
+    }
+
+    /// What is left of the magnitude that the weights of one sum may have together, after this one.
+    pub(crate) fn budget(field: &'static str, value: f64, left: f64) -> Result<f64, OutOfRange> {
+        OutOfRange::check(field, value, -left..=left, "left of a sum of 10").map(|value| left - value.abs())
+    }
+
+    /// `signal * self`, exactly.
+    #[inline(always)]
+    pub(crate) fn of(self, signal: Signal) -> Sum {
+        signal.wide_mul(self.0)
+    }
+}
+
+/// The signal of a sum, rounded down; beyond a signal's range, its end.
+#[inline(always)]
+pub(crate) fn saturated(sum: Sum) -> Signal {
+    let bits = sum.to_bits() >> Weight::FRACTION_BITS;
+    Signal::from_bits(bits.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32)
 }
 
 /// The upper half of an accumulator, which is a signal, rounded down.

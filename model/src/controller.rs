@@ -2,21 +2,21 @@
 //!
 //! [`Settings`] are what a person writes, in SI units and floats. [`Settings::check`] turns them, once and off the hot
 //! path, into a [`Config`] of scaled fixed-point numbers, or into an error that names the field. [`Config::tick`] sees
-//! nothing else.
+//! nothing else. Each of them is written for any spring; without a name it is the plain one, [`Plant`].
 
 use crate::amplifier::{self, Amplifier, Limits};
 use crate::error::OutOfRange;
-use crate::estimator::{self, Plant};
+use crate::estimator::{self, Estimator, Model, Plant};
 use crate::pre_compensator::{self, Gains, ProportionalIntegral};
 use crate::units::{DacCode, SampleTime, ScaledStiffness, Volts};
 
 /// Everything the controller is built from, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct Settings<P = Plant> {
     /// Ticks per second, 100 to 10 000 Hz.
     pub rate_hz: f64,
     /// The spring that the estimator runs.
-    pub plant: Plant,
+    pub plant: P,
     /// Gains of the pre-compensator; `None` puts the target out as it is.
     pub gains: Option<Gains>,
     /// The amplifier and its limits.
@@ -27,18 +27,21 @@ impl Settings {
     /// The report's spring, controller and range at 1 kHz.
     pub const PAPER: Self =
         Self { rate_hz: 1000.0, plant: Plant::PAPER, gains: Some(Gains::PAPER), amplifier: Amplifier::PAPER };
+}
 
+impl<P: Model> Settings<P> {
     /// Scales the settings for the tick.
     ///
     /// # Errors
     /// [`OutOfRange`] names the field, its value and what is allowed.
-    pub fn check(&self) -> Result<Config, OutOfRange> {
+    pub fn check(&self) -> Result<Config<P::Config>, OutOfRange> {
         let sample_time = SampleTime::from_rate(self.rate_hz)?;
-        let estimator = estimator::Config::new(&self.plant, sample_time)?;
+        let estimator = self.plant.scaled(sample_time)?;
         let pre_compensator = match &self.gains {
             None => PreCompensator::None,
             Some(gains) => {
-                PreCompensator::ProportionalIntegral(ProportionalIntegral::new(gains, &self.plant, sample_time)?)
+                let promptness = self.plant.promptness(sample_time);
+                PreCompensator::ProportionalIntegral(ProportionalIntegral::new(gains, &promptness, sample_time)?)
             }
         };
         Ok(Config { estimator, pre_compensator, amplifier: amplifier::Config::new(&self.amplifier, sample_time)? })
@@ -56,16 +59,16 @@ pub enum PreCompensator {
 
 /// A checked configuration, scaled for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config {
-    estimator: estimator::Config,
+pub struct Config<E = estimator::Config> {
+    estimator: E,
     pre_compensator: PreCompensator,
     amplifier: amplifier::Config,
 }
 
 /// What the controller remembers from tick to tick; the default is a spring at rest without voltage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct State {
-    estimator: estimator::State,
+pub struct State<S = estimator::State> {
+    estimator: S,
     pre_compensator: pre_compensator::State,
     amplifier: amplifier::State,
 }
@@ -94,7 +97,7 @@ pub struct Output {
     pub limits: Limits,
 }
 
-impl Config {
+impl<E: Estimator> Config<E> {
     /// The range of voltages that is really used.
     pub fn range(&self) -> (Volts, Volts) {
         self.amplifier.range()
@@ -102,15 +105,16 @@ impl Config {
 
     /// One tick: no heap, no float, no panic, no loop.
     #[inline(always)]
-    pub fn tick(&self, state: &mut State, input: Input) -> Output {
+    pub fn tick(&self, state: &mut State<E::State>, input: Input) -> Output {
         let (target, moved) = self.amplifier.reachable(input.target);
         let wanted = match &self.pre_compensator {
             PreCompensator::None => target,
-            PreCompensator::ProportionalIntegral(it) => it.voltage(&state.pre_compensator, target, &state.estimator),
+            PreCompensator::ProportionalIntegral(it) => {
+                it.voltage(&state.pre_compensator, target, self.estimator.pivot(&state.estimator))
+            }
         };
         let drive = self.amplifier.drive(&mut state.amplifier, wanted);
-        let stiffness = self.estimator.estimate(&state.estimator, drive.applied);
-        self.estimator.advance(&mut state.estimator, drive.applied);
+        let stiffness = self.estimator.run(&mut state.estimator, drive.applied);
         if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
             it.track(&mut state.pre_compensator, drive.voltage);
         }
@@ -122,10 +126,11 @@ impl Config {
     ///
     /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once, and
     /// without a pre-compensator the voltage goes to the target.
-    pub fn adopt(&self, state: &mut State, target: Volts) {
+    pub fn adopt(&self, state: &mut State<E::State>, target: Volts) {
         if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
             let (target, _) = self.amplifier.reachable(target);
-            it.align(&mut state.pre_compensator, state.amplifier.voltage(), target, &state.estimator);
+            let pivot = self.estimator.pivot(&state.estimator);
+            it.align(&mut state.pre_compensator, state.amplifier.voltage(), target, pivot);
         }
     }
 }

@@ -32,12 +32,26 @@ impl OutOfRange {
         let (lowest, highest) = allowed.into_inner();
         Err(Self { field, value, lowest, highest, unit })
     }
+
+    /// The same for how many there are of something.
+    pub(crate) fn check_count(
+        field: &'static str,
+        count: usize,
+        allowed: RangeInclusive<usize>,
+        unit: &'static str,
+    ) -> Result<(), Self> {
+        Self::check(field, count as f64, *allowed.start() as f64..=*allowed.end() as f64, unit).map(drop)
+    }
 }
 
 impl fmt::Display for OutOfRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { field, value, lowest, highest, unit } = self;
-        write!(f, "{field} = {value} is not allowed: expected {lowest} to {highest} {unit}")
+        write!(f, "{field} = {value} is not allowed: expected {lowest}")?;
+        if lowest != highest {
+            write!(f, " to {highest}")?;
+        }
+        write!(f, " {unit}")
     }
 }
 

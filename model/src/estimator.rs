@@ -22,6 +22,49 @@ use crate::coefficient::{Gain, Rate, upper};
 use crate::error::OutOfRange;
 use crate::units::{Accumulator, SampleTime, ScaledStiffness, Signal, Volts};
 
+/// A spring in SI units, to be scaled for one sample time.
+pub trait Model: Copy {
+    /// What it becomes.
+    type Config: Estimator;
+
+    /// # Errors
+    /// [`OutOfRange`] names the field.
+    fn scaled(&self, sample_time: SampleTime) -> Result<Self::Config, OutOfRange>;
+
+    /// How much of a change of voltage shows how soon, at the most.
+    fn promptness(&self, sample_time: SampleTime) -> Promptness;
+}
+
+/// A spring that runs in a tick, on the voltage that was really applied.
+pub trait Estimator: Copy {
+    /// What it remembers; the default is a spring at rest without voltage.
+    type State: Copy + Default;
+
+    /// One tick: the stiffness with `applied` just put across the spring, which then holds for one sample time.
+    fn run(&self, state: &mut Self::State, applied: Volts) -> ScaledStiffness;
+
+    /// A point of what the spring would answer at once to a voltage now.
+    fn pivot(&self, state: &Self::State) -> Pivot;
+}
+
+/// Upper bounds of what one volt more does, in V/V.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promptness {
+    /// At once.
+    pub at_once: f64,
+    /// Later, by one more tick.
+    pub in_a_tick: f64,
+    /// What part of its distance the fastest relaxation makes in a tick.
+    pub relaxed: f64,
+}
+
+/// A voltage, and the stiffness that it would give at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pivot {
+    pub(crate) voltage: Signal,
+    pub(crate) stiffness: Signal,
+}
+
 /// The spring's response to a change of voltage, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plant {
@@ -41,7 +84,7 @@ impl Plant {
     }
 
     /// What part of its lag the relaxed part makes up in one sample time.
-    pub(crate) fn relaxed_in(&self, sample_time: SampleTime) -> f64 {
+    fn relaxed_in(&self, sample_time: SampleTime) -> f64 {
         -libm::expm1(-sample_time.seconds() / self.time_constant_s)
     }
 }
@@ -83,10 +126,40 @@ impl Config {
     }
 }
 
+impl Model for Plant {
+    type Config = Config;
+
+    fn scaled(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
+        Config::new(self, sample_time)
+    }
+
+    fn promptness(&self, sample_time: SampleTime) -> Promptness {
+        let relaxed = self.relaxed_in(sample_time);
+        Promptness { at_once: self.share, in_a_tick: (1.0 - self.share) * relaxed, relaxed }
+    }
+}
+
+impl Estimator for Config {
+    type State = State;
+
+    #[inline(always)]
+    fn run(&self, state: &mut State, applied: Volts) -> ScaledStiffness {
+        let stiffness = self.estimate(state, applied);
+        self.advance(state, applied);
+        stiffness
+    }
+
+    /// Where nothing moves: the voltage that equals the relaxed part.
+    #[inline(always)]
+    fn pivot(&self, state: &State) -> Pivot {
+        Pivot { voltage: state.relaxed(), stiffness: state.relaxed() }
+    }
+}
+
 impl State {
     /// The stiffness that would be left if the voltage's instantaneous share were taken away.
     #[inline(always)]
-    pub(crate) fn relaxed(&self) -> Signal {
+    fn relaxed(&self) -> Signal {
         upper(self.relaxed)
     }
 }

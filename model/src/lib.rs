@@ -16,6 +16,7 @@
 //! | --- | --- |
 //! | [`stiffness`] | Young's modulus against voltage, spring constant of the cantilever, both ways |
 //! | [`estimator`] | the spring's relaxation, run on the applied voltage |
+//! | [`extended`] | the same for a spring with hysteresis, a static law, leakage and several relaxations |
 //! | [`pre_compensator`] | proportional-integral drive past the target and back |
 //! | [`amplifier`] | range, slew, rounding to a DAC code, and back to volts |
 //! | [`controller`] | the four in one tick; settings in SI, checked once |
@@ -32,6 +33,7 @@ pub mod coefficient;
 pub mod controller;
 pub mod error;
 pub mod estimator;
+pub mod extended;
 pub mod pre_compensator;
 pub mod stiffness;
 pub mod supervisor;
@@ -41,6 +43,7 @@ pub use amplifier::{Amplifier, Limits};
 pub use controller::{Config, Input, Output, PreCompensator, Settings, State};
 pub use error::OutOfRange;
 pub use estimator::Plant;
+pub use extended::ExtendedPlant;
 pub use pre_compensator::Gains;
 pub use stiffness::Spring;
 pub use units::{DacCode, SampleTime, ScaledStiffness, Volts};

@@ -3,9 +3,14 @@
 //! It closes a loop around the estimate, `u = Kp e + z`, `dz/dt = Ki e`, `e = target - y`. Two things make it more than
 //! that line:
 //!
-//! - **No delay in the loop.** Part of the stiffness follows the voltage at once, `y = w + share (u - w)`, so `u` stands
-//!   on both sides. Solved for it, with the estimator's relaxed part `w` and `g = 1 / (1 + Kp share)`:
-//!   `u = g z + (1 - g) w + g Kp (target - w)`.
+//! - **No delay in the loop.** Part of the stiffness follows the voltage at once, so `u` stands on both sides. The
+//!   estimator gives a [`Pivot`], a voltage `v0` and the stiffness `y0` that it would give at once; with
+//!   `y = y0 + s (u - v0)` and `g = 1 / (1 + Kp s)`, solved: `u = g z + (1 - g) v0 + g Kp (target - y0)`.
+//!   For the plain spring `s` is its share, `v0 = y0` its relaxed part, and this is exact. An
+//!   [extended](crate::extended) spring answers with a curve of slope `s'`, 0 to `s`, that depends on voltage and
+//!   direction; `s` is the steepest, and the pivot the last voltage. One tick then brings `u` at least
+//!   `g (1 + Kp s')` of the way to the curve's exact solution and never past it, so that what is left shrinks in each
+//!   tick by `Kp (s - s') / (1 + Kp s)`: with the report's gain and share, 0.27 at the most. No division in a tick.
 //! - **Anti-windup by structure.** While nothing limits, `Kp e = u - z`, so `dz/dt = (u - z) Ki / Kp`: the integrator is
 //!   a first-order lag, with the reset time `Kp / Ki`, of the voltage *that the amplifier really gave* after slew and
 //!   range. Limited, it follows the output instead of running away, and it cannot leave the amplifier's range
@@ -16,7 +21,7 @@
 
 use crate::coefficient::{Gain, Rate, upper};
 use crate::error::OutOfRange;
-use crate::estimator::{self, Plant};
+use crate::estimator::{Pivot, Promptness};
 use crate::units::{Accumulator, SampleTime, Signal, Volts};
 
 /// Volts of proportional action beyond which any range is at its end, so that no more need be computed.
@@ -44,7 +49,7 @@ pub struct ProportionalIntegral {
     /// Errors beyond +-this drive the voltage to an end of any range all the same.
     largest_error: Signal,
     /// 1 - g
-    relaxed_gain: Gain,
+    pivot_gain: Gain,
     /// g
     integrator_gain: Gain,
     /// T Ki / Kp
@@ -58,25 +63,26 @@ pub struct State {
 }
 
 impl ProportionalIntegral {
-    /// For a checked `plant`.
+    /// For a spring that is as prompt as this.
     ///
     /// # Errors
     /// [`OutOfRange`] names `proportional_gain` or `integral_gain_per_s`.
-    pub fn new(gains: &Gains, plant: &Plant, sample_time: SampleTime) -> Result<Self, OutOfRange> {
+    pub fn new(gains: &Gains, spring: &Promptness, sample_time: SampleTime) -> Result<Self, OutOfRange> {
         let seconds = sample_time.seconds();
-        // One tick moves the relaxed part by a (1 + Kp) / (1 + Kp share) of its distance; more than all of it rings.
-        let (share, a) = (plant.share, plant.relaxed_in(sample_time));
-        let deadbeat = if a > share { (1.0 - a) / (a - share) } else { f64::INFINITY };
+        // One tick moves what has relaxed by `relaxed + in_a_tick Kp g` of its distance; more than all of it rings.
+        let Promptness { at_once, in_a_tick, relaxed } = *spring;
+        let ringing = in_a_tick - (1.0 - relaxed) * at_once;
+        let deadbeat = if ringing > 0.0 { (1.0 - relaxed) / ringing } else { f64::INFINITY };
         let highest = deadbeat.min(100.0);
         let proportional = OutOfRange::check("proportional_gain", gains.proportional, 0.001..=highest, "V/V")?;
         // A reset within a few ticks makes the loop hunt over DAC codes.
         let fastest = proportional / (10.0 * seconds);
         let integral = OutOfRange::check("integral_gain_per_s", gains.integral_per_s, 0.0..=fastest, "1/s")?;
-        let g = 1.0 / (1.0 + proportional * share);
+        let g = 1.0 / (1.0 + proportional * at_once);
         Ok(Self {
             error_gain: Gain::new(proportional * g),
             largest_error: Signal::from_num((ENOUGH_V / (proportional * g)).min(ENOUGH_V)),
-            relaxed_gain: Gain::new(1.0 - g),
+            pivot_gain: Gain::new(1.0 - g),
             integrator_gain: Gain::new(g),
             reset: Rate::new(seconds * integral / proportional),
         })
@@ -84,16 +90,15 @@ impl ProportionalIntegral {
 
     /// The voltage that this loop asks for, before the amplifier's limits.
     #[inline(always)]
-    pub(crate) fn voltage(&self, state: &State, target: Volts, spring: &estimator::State) -> Volts {
-        Volts(upper(state.integrator).saturating_add(self.without_integrator(target, spring)))
+    pub(crate) fn voltage(&self, state: &State, target: Volts, pivot: Pivot) -> Volts {
+        Volts(upper(state.integrator).saturating_add(self.without_integrator(target, pivot)))
     }
 
-    /// `(1 - g) w + g Kp (target - w)`
+    /// `(1 - g) v0 + g Kp (target - y0)`
     #[inline(always)]
-    fn without_integrator(&self, target: Volts, spring: &estimator::State) -> Signal {
-        let relaxed = spring.relaxed();
-        let error = (target.0 - relaxed).max(-self.largest_error).min(self.largest_error);
-        self.relaxed_gain.times(relaxed) + self.error_gain.times(error)
+    fn without_integrator(&self, target: Volts, pivot: Pivot) -> Signal {
+        let error = (target.0 - pivot.stiffness).max(-self.largest_error).min(self.largest_error);
+        self.pivot_gain.times(pivot.voltage) + self.error_gain.times(error)
     }
 
     /// One sample time passes with `driven` at the amplifier's input, after limits and before rounding.
@@ -104,8 +109,8 @@ impl ProportionalIntegral {
     }
 
     /// Sets the integrator so that, at this `target`, the loop asks for the `driven` voltage again.
-    pub(crate) fn align(&self, state: &mut State, driven: Volts, target: Volts, spring: &estimator::State) {
-        let integrator = driven.0.saturating_sub(self.without_integrator(target, spring));
+    pub(crate) fn align(&self, state: &mut State, driven: Volts, target: Volts, pivot: Pivot) {
+        let integrator = driven.0.saturating_sub(self.without_integrator(target, pivot));
         state.integrator = Accumulator::from_bits(i64::from(integrator.to_bits()) << 32);
     }
 }
@@ -113,12 +118,14 @@ impl ProportionalIntegral {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::{Model, Plant};
 
     #[test]
     fn wrong_gains_are_named() {
         let time = SampleTime::from_rate(1000.0).unwrap();
         let named = |proportional, integral_per_s| {
-            ProportionalIntegral::new(&Gains { proportional, integral_per_s }, &Plant::PAPER, time).unwrap_err().field
+            let gains = Gains { proportional, integral_per_s };
+            ProportionalIntegral::new(&gains, &Plant::PAPER.promptness(time), time).unwrap_err().field
         };
         assert_eq!(named(-4.0, 1.35), "proportional_gain");
         assert_eq!(named(0.0, 1.35), "proportional_gain");
@@ -129,7 +136,7 @@ mod tests {
         assert_eq!(named(4.0, 401.0), "integral_gain_per_s");
         // The spring would be past its target after one tick, back after two, and so on.
         let slow = SampleTime::from_rate(100.0).unwrap();
-        let quick = Plant { share: 0.0, time_constant_s: 0.1 };
+        let quick = Plant { share: 0.0, time_constant_s: 0.1 }.promptness(slow);
         let error = ProportionalIntegral::new(&Gains { proportional: 20.0, integral_per_s: 1.0 }, &quick, slow);
         assert_eq!(error.unwrap_err().field, "proportional_gain");
     }

@@ -12,6 +12,8 @@ from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn import UC_HOOK_BLOCK, UC_HOOK_CODE, UC_HOOK_INTR, UC_HOOK_MEM_WRITE
 from unicorn.arm_const import *
 
+from peripherals import SysTick, Timer, Uart
+
 HZ = 170_000_000
 FLASH, RAM, RAM_SIZE = 0x0800_0000, 0x2000_0000, 128 * 1024
 IDLE = 0x100  # Priority of a core without an active exception: below every other.
@@ -22,57 +24,23 @@ FLOATS = tuple(UC_ARM_REG_S0 + i for i in range(16))
 RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0800, 0x5000_0000
 GPIO = 0x4800_0000
 TIM15, TIM15_IRQ = 0x4001_4000, 24  # The time driver's.
-LPUART1_IRQ = 91  # Ready to send at once, nothing comes in.
+LPUART1_IRQ = 91
+SCS = 0xE000_E000
+SYSTICK_IRQ = -1  # Exception 15.
+BAUD = 115_200  # The host's.
 ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
-
-
-class Timer:
-    """Counts up at the core's clock over PSC + 1; update and compare 1 to 4 set flags."""
-
-    def __init__(self):
-        self.regs, self.at, self.fraction = {}, 0, 0
-
-    def get(self, offset):
-        return self.regs.get(offset, 0xFFFF if offset == 0x2C else 0)
-
-    def run(self, now):
-        """Moves the counter to `now` and sets the flags of what it passed."""
-        ticks, self.fraction = divmod(now - self.at + self.fraction, self.get(0x28) + 1)
-        self.at = now
-        if not self.get(0x00) & 1 or ticks == 0:
-            return
-        count, span = self.get(0x24), self.get(0x2C) + 1
-        flags = int(count + ticks >= span)
-        for i in range(4):
-            if 0 < (self.get(0x34 + 4 * i) - count - 1) % span + 1 <= ticks:
-                flags |= 2 << i
-        self.regs[0x10] = self.get(0x10) | flags
-        self.regs[0x24] = (count + ticks) % span
-
-    def next(self):
-        """Cycles from the last `run` to the next flag that interrupts."""
-        if not self.get(0x00) & 1:
-            return None
-        count, span, enabled = self.get(0x24), self.get(0x2C) + 1, self.get(0x0C)
-        goals = [0] if enabled & 1 else []
-        goals += [self.get(0x34 + 4 * i) for i in range(4) if enabled & 2 << i]
-        ticks = [(goal - count - 1) % span + 1 for goal in goals]
-        return min(ticks) * (self.get(0x28) + 1) - self.fraction if ticks else None
-
-    def write(self, offset, value):
-        if offset == 0x10:
-            self.regs[0x10] = self.get(0x10) & value  # Written zeros clear.
-        elif offset != 0x14:
-            self.regs[offset] = value
-            if offset == 0x24:
-                self.fraction = 0
 
 
 class Board:
     """One chip with the image in its flash. `log` gets (time in us, what, value) of everything that matters outside."""
 
-    def __init__(self, image, rtt):
+    def __init__(self, image, rtt, host):
+        """`host` sends (time in us of the first bit, frame)."""
         self.image, self.rtt, self.log = image, rtt, []
+        byte = self.byte_of_host = 10 * HZ // BAUD
+        self.incoming = [
+            (us * HZ // 1_000_000 + byte * (i + 1), value) for us, frame in host for i, value in enumerate(frame)
+        ]
         self.traps, self.trapped, self.sprung = {}, False, False
         self.now, self.end, self.deadline = 0, 0, 0
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
@@ -100,7 +68,9 @@ class Board:
         self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF}
         self.timer = Timer()
         self.timer.at = self.now
-        self.enabled, self.pending, self.priority, self.active = set(), set(), {}, []
+        self.systick = SysTick()
+        self.uart = Uart(self.incoming, self.byte_of_host, lambda byte: self.note("sent", byte))
+        self.enabled, self.pending, self.priority, self.active = {SYSTICK_IRQ}, set(), {}, []
         self.candidate = None
         self.watchdog = None
         self.outside, self.read_to = None, 0
@@ -135,7 +105,7 @@ class Board:
             elif self.fault is not None:
                 self._hard_fault(self.fault)
             self._advance()
-            while self.sleeping and self.candidate is None and self.now < min(self.end, self.watchdog or self.end):
+            while self.sleeping and not self._ready() and self.now < min(self.end, self.watchdog or self.end):
                 self.now = self.deadline
                 self._advance()
             self.sleeping = False
@@ -257,18 +227,20 @@ class Board:
     def _advance(self):
         """Brings timer and interrupts to `now`."""
         self.timer.run(self.now)
+        self.uart.run(self.now)
+        if self.systick.run(self.now):
+            self.pending.add(SYSTICK_IRQ)
         self._settle()
 
     def _settle(self):
         timer = self.timer.get(0x10) & self.timer.get(0x0C) & 0x1F
-        for irq, level in (TIM15_IRQ, timer), (LPUART1_IRQ, self.regs.get(LPUART1, 0) & 0xC0):
+        for irq, level in (TIM15_IRQ, timer), (LPUART1_IRQ, self.uart.interrupts()):
             if level and all(number != 16 + irq for number, _ in self.active):
                 self.pending.add(irq)
         self._choose()
         wait = self.timer.next()
-        self.deadline = min(
-            [self.end] + ([self.timer.at + wait] if wait else []) + ([self.watchdog] if self.watchdog else [])
-        )
+        times = self.timer.at + wait if wait else None, self.uart.next(), self.systick.zero_at, self.watchdog
+        self.deadline = min(at for at in (self.end, *times) if at is not None)
 
     # --- Registers ---
 
@@ -283,6 +255,11 @@ class Board:
         if at & ~0x3FF == TIM15:
             self._advance()
             return self.timer.get(at - TIM15)
+        if at & ~0x3FF == LPUART1:
+            self._advance()
+            value = self.uart.get(at - LPUART1)
+            self._settle()
+            return value
         if at == RCC:  # Ready as soon as on: HSI, HSE, PLL.
             return value | (value & 1 << 8) << 2 | (value & (1 << 16 | 1 << 24)) << 1
         if at == RCC + 0x08:
@@ -302,8 +279,8 @@ class Board:
         if at & ~0x1FFF == GPIO and at & 0x3FF == 0x10:
             port = at - GPIO >> 10
             return self.regs.get(at + 4, 0) | (1 << INTERLOCK[1] if port == INTERLOCK[0] else 0)
-        if at == LPUART1 + 0x1C:
-            return 1 << 22 | 1 << 21 | 1 << 7 | 1 << 6
+        if at in (SCS + 0x10, SCS + 0x14):
+            return self.systick.regs.get(at - SCS, 0)
         if 0xE000_E100 <= at < 0xE000_E300:
             of = self.enabled if at < 0xE000_E200 else self.pending
             first = (at & 0x7F) * 8
@@ -328,6 +305,13 @@ class Board:
         if at & ~0x3FF == TIM15:
             self.timer.run(self.now)
             self.timer.write(at - TIM15, value)
+            return self._settle()
+        if at & ~0x3FF == LPUART1:
+            self.uart.run(self.now)
+            self.uart.write(at - LPUART1, value, self.now)
+            return self._settle()
+        if at in (SCS + 0x10, SCS + 0x14, SCS + 0x18):
+            self.systick.write(at - SCS, value, self.now)
             return self._settle()
         if 0xE000_E100 <= at < 0xE000_E300:
             of = self.enabled if at < 0xE000_E200 else self.pending
@@ -354,8 +338,6 @@ class Board:
             on, off = (value & 0xFFFF, value >> 16) if at & 0x3FF == 0x18 else (0, value & 0xFFFF)
             at, value = odr, self.regs.get(odr, 0) & ~off | on
         self.regs[at] = value
-        if at == LPUART1:
-            self._settle()
         if at == DAC1 + 0x08:
             self.note("dac", value & 0xFFF)
         self._look_outside()
@@ -376,11 +358,6 @@ class Board:
         if self.outside != (driven, high):
             self.outside = (driven, high)
             self.note("enable", "floats" if not driven else "on" if high else "off")
-
-    def put_voltage(self, code):
-        """As if somebody had armed: without it, zero after a fault would show nothing."""
-        self._write_word(DAC1 + 0x08, code)
-        self._write_word(GPIO + 0x400 * ENABLE[0] + 0x18, 1 << ENABLE[1])
 
     # --- Log ---
 

@@ -1,19 +1,19 @@
-"""Boots an image and does it harm: boot.py IMAGE TICK PANIC RTT prints what happened outside of the chip, as JSON.
+"""Boots an image and does it harm: boot.py IMAGE TICK PANIC RTT HOST prints what happened outside of the chip, as JSON.
 
-TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's.
+TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's. HOST is what a
+host sends, as JSON: [time in us, bytes in hex] each.
 """
 
 import json
 import struct
 import sys
 
-from unicorn.arm_const import UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
+from unicorn.arm_const import UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
 
 from board import FLASH, RAM, Board
 
 POWER_ON = 1 << 27 | 1 << 26
 MISHAP_TICK = 300
-CODE = 1755  # 300 V of 700 V
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 
@@ -37,9 +37,15 @@ def broken(code):
     return mishap
 
 
-def play(mishap, until_us):
-    """Voltage is put out just before the mishap; after the reset the flash is sound again, the memory as it was."""
-    board = Board(IMAGE, RTT)
+def deaf(board):
+    """Hangs with interrupts off."""
+    board.uc.reg_write(UC_ARM_REG_PRIMASK, 1)
+    broken(HANG)(board)
+
+
+def play(host, mishap, until_us):
+    """After the reset the flash is sound again, the memory as it was."""
+    board = Board(IMAGE, RTT, host)
     ticks = 0
 
     def tick(board):
@@ -47,7 +53,6 @@ def play(mishap, until_us):
         ticks += 1
         if mishap and ticks == MISHAP_TICK:
             board.traps.clear()
-            board.put_voltage(CODE)
             board.note("mishap", ticks)
             mishap(board)
 
@@ -63,10 +68,13 @@ def play(mishap, until_us):
 if __name__ == "__main__":
     with open(sys.argv[1], "rb") as file:
         IMAGE = file.read()
-    TICK, PANIC, RTT = (int(word, 0) for word in sys.argv[2:])
+    TICK, PANIC, RTT = (int(word, 0) for word in sys.argv[2:5])
+    HOST = [(us, bytes.fromhex(frame)) for us, frame in json.loads(sys.argv[5])]
     print(json.dumps({
-        "quiet": play(None, 1_200_000),
-        "panic": play(panic, 400_000),
-        "hard fault": play(broken(UNDEFINED), 400_000),
-        "hang": play(broken(HANG), 500_000),
+        "quiet": play([], None, 1_200_000),
+        "host": play(HOST, None, 1_700_000),
+        "panic": play(HOST, panic, 400_000),
+        "hard fault": play(HOST, broken(UNDEFINED), 400_000),
+        "hang": play(HOST, broken(HANG), 500_000),
+        "deaf": play(HOST, deaf, 500_000),
     }))

@@ -2,10 +2,12 @@
 //!
 //! What happened is judged by what left the chip (DAC's register, enable's wire, log), not by what the log says of it.
 
+mod host;
+
 use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
-use defmt_decoder::Table;
+use host_sim::log::Formats;
 use serde::Deserialize;
 
 use crate::image::{self, Board, Opt};
@@ -22,7 +24,7 @@ const KILL_US: f64 = 5.0;
 
 const CANNOT_SHOW: &str = "\
 not shown: real time (an instruction is one cycle here; no wait states, no conversion times), analogue behaviour (DAC, monitors,
-  the amplifier's pull-down), the memory protection unit, silicon errata, a chip that differs from its manual, the host's link";
+  the amplifier's pull-down), the memory protection unit, silicon errata, a chip that differs from its manual";
 
 /// Something that happened outside of the core.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -51,7 +53,7 @@ impl Events {
         }
     }
 
-    fn log(&self, table: &Table) -> Result<Vec<String>> {
+    fn log(&self, image: &[u8]) -> Result<Vec<String>> {
         let mut bytes = Vec::new();
         for Event(_, _, value) in self.0.iter().filter(|event| event.1 == "log") {
             let hex = value.as_str().context("a log that is no text")?;
@@ -59,7 +61,8 @@ impl Events {
                 bytes.push(u8::from_str_radix(hex.get(at..at + 2).context("half a byte")?, 16)?);
             }
         }
-        emulator::decode(table, &mut bytes.as_slice(), |_| {})
+        let lines = emulator::decode(Formats::parse(image)?, &mut bytes.as_slice(), |_| {})?.whole()?;
+        Ok(lines.into_iter().map(|line| line.message).collect())
     }
 }
 
@@ -67,7 +70,6 @@ impl Events {
 pub(crate) fn run() -> Result<()> {
     let elf = image::build(Board::Nucleo, Opt::S)?;
     let bytes = image::read(&elf)?;
-    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
     let flash = elf::flash(&bytes)?;
     ensure!(flash.address == 0x0800_0000, "the image begins at {:#x}", flash.address);
     let bin = elf.with_extension("boot.bin");
@@ -83,24 +85,30 @@ pub(crate) fn run() -> Result<()> {
         shell::command(python)
             .args(["-B", "xtask/image/boot.py"])
             .arg(&bin)
-            .args([ticks[0].address, panic.address, rtt].map(|address| format!("{address:#x}"))),
+            .args([ticks[0].address, panic.address, rtt].map(|address| format!("{address:#x}")))
+            .arg(host::frames().to_string()),
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
-    println!("{}", quiet(&events("quiet")?, &table).context("without a mishap")?);
-    for (name, log) in [("panic", "panic at injected.rs:7"), ("hard fault", "name=hard-fault")] {
-        println!("{name}: {}", stopped(&events(name)?, &table, log).context(name)?);
+    println!("{}", quiet(&events("quiet")?, &bytes).context("without a mishap")?);
+    println!("host: {}", host::check(&events("host")?).context("with a host")?);
+    let hang_us = f64::from(firmware::LONGEST_HANG_MS) * 1e3;
+    for (name, within_us, log) in [
+        ("panic", KILL_US, "panic at injected.rs:7"),
+        ("hard fault", KILL_US, "name=hard-fault"),
+        ("hang", hang_us + KILL_US, "name=watchdog"),
+    ] {
+        println!("{name}: {}", stopped(&events(name)?, &bytes, within_us, log).context(name)?);
     }
-    println!("hang: {}", hang(&events("hang")?, &table).context("hang")?);
-    println!("voltage before each mishap: put into the registers from outside, because no host arms the image here");
+    println!("hang with interrupts off: {}", deaf(&events("deaf")?, &bytes).context("deaf")?);
     println!("{CANNOT_SHOW}");
     Ok(())
 }
 
 /// Boots, stays safe without a host, keeps its pace and feeds the watchdog.
-fn quiet(events: &Events, table: &Table) -> Result<String> {
+fn quiet(events: &Events, image: &[u8]) -> Result<String> {
     events.safe()?;
-    let log = events.log(table)?;
+    let log = events.log(image)?;
     ensure!(log.first().is_some_and(|line| line.contains("reset=power-on last_fault=0")), "the log begins {log:?}");
     ensure!(log.iter().any(|line| line.contains("summary tick=1000 overruns=0")), "no summary in {log:?}");
     ensure!(events.times("reset").len() == 1, "it was reset");
@@ -127,26 +135,27 @@ fn quiet(events: &Events, table: &Table) -> Result<String> {
     ))
 }
 
-/// Zero and off before the first byte of log; then a reset that knows why, and stays safe.
-fn stopped(events: &Events, table: &Table, line: &str) -> Result<String> {
+/// Zero and off in time, and before the first byte of log; then a reset that knows why, and stays safe.
+fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<String> {
     let (_, after) = mishap(events)?;
     let (dying, reborn) = after.split("reset")?;
     let (silent, _) = dying.split("log")?;
     let gone = gone(&silent)?;
-    ensure!(gone < KILL_US, "the voltage goes after {gone:.2} us");
-    let log = dying.log(table)?;
+    ensure!(gone <= within_us, "the voltage goes after {gone:.2} us");
+    let log = dying.log(image)?;
     ensure!(log.iter().any(|said| said.contains(line)), "no `{line}` in {log:?}");
-    let boot = reborn_safe(&reborn, table, "reset=software")?;
-    Ok(format!("DAC zero and enable off {gone:.2} us later, before anything is logged; `{boot}`"))
+    let boot = reborn_safe(&reborn, image, "reset=software")?;
+    let gone = if gone < 1e3 { format!("{gone:.2} us") } else { format!("{:.1} ms", gone / 1e3) };
+    Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
 }
 
 /// Only the watchdog ends it.
-fn hang(events: &Events, table: &Table) -> Result<String> {
+fn deaf(events: &Events, image: &[u8]) -> Result<String> {
     let (_, after) = mishap(events)?;
     let (_, reborn) = after.split("reset")?;
     let us = reborn.0[0].0 - after.0[0].0;
     ensure!(us <= WATCHDOG_US, "the watchdog waits for {us:.0} us");
-    let boot = reborn_safe(&reborn, table, "reset=watchdog")?;
+    let boot = reborn_safe(&reborn, image, "reset=watchdog")?;
     Ok(format!("the voltage stays until the watchdog resets the chip {:.0} ms later; `{boot}`", us / 1e3))
 }
 
@@ -168,11 +177,11 @@ fn gone(events: &Events) -> Result<f64> {
 }
 
 /// Safe for at least 50 ticks; returns the boot line from the cause on.
-fn reborn_safe(events: &Events, table: &Table, cause: &str) -> Result<String> {
+fn reborn_safe(events: &Events, image: &[u8], cause: &str) -> Result<String> {
     events.safe()?;
     ensure!(events.times("reset").len() == 1, "it is reset again");
     ensure!(events.times("dac").len() > 50, "it does not tick again");
-    let log = events.log(table)?;
+    let log = events.log(image)?;
     let line = log.iter().find_map(|line| line.find(cause).map(|at| line[at..].to_owned()));
     line.with_context(|| format!("no `{cause}` in {log:?}"))
 }

@@ -8,7 +8,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use firmware::script::{MISHAP_TICK, Mishap};
+use firmware::LONGEST_HANG_MS;
+use firmware::script::{ARM_TICK, MISHAP_TICK, Mishap};
+use host_sim::log::{Event, Line};
 
 use crate::emulator::{self, Run, SAFE, Written};
 use crate::image::{self, Board, Opt};
@@ -40,8 +42,16 @@ pub(crate) fn all(elf: &Path, bless: bool) -> Result<()> {
 
 fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
     let run = emulator::play(elf, mishap.name(), emulator::SHIFT, |_| {})?;
-    ensure!(run.exit == 0, "the emulator's exit code is {}, the last line {:?}", run.exit, run.log.last());
+    ensure!(
+        run.exit == 0,
+        "the emulator's exit code is {}, the last line {:?}",
+        run.exit,
+        run.log.last().map(emulator::text)
+    );
     voltage_goes(mishap, &run.dac)?;
+    if let Some(limit_us) = patience_us(mishap) {
+        found_within(&run.log, limit_us)?;
+    }
     let text = golden_text(mishap, &run);
     let path = approved(mishap);
     if bless {
@@ -58,11 +68,11 @@ fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
 fn grace(mishap: Mishap) -> usize {
     match mishap {
         // Not one more code.
-        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::Interlock => 0,
+        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow | Mishap::Interlock => 0,
         // The tick that takes too long still ends; the next one finds it out.
         Mishap::Overrun => 1,
-        // Nothing is written while the control task hangs; the next write is the watchdog's zero.
-        Mishap::Hang => 0,
+        // Nothing is written while the control task hangs; the next write is the zero of who finds it.
+        Mishap::Hang | Mishap::Deaf => 0,
         // The roll call is found incomplete after 50 ms and what was on its way.
         Mishap::Stall => 65,
         // 500 ms of patience, then 300 V at 700 V/s.
@@ -70,13 +80,35 @@ fn grace(mishap: Mishap) -> usize {
     }
 }
 
+/// How long a task may hang; its wire does not tell, because nothing is written meanwhile.
+fn patience_us(mishap: Mishap) -> Option<u64> {
+    match mishap {
+        Mishap::Hang => Some(u64::from(LONGEST_HANG_MS) * 1000),
+        // The watchdog's first bite.
+        Mishap::Deaf => Some(100_000),
+        _ => None,
+    }
+}
+
+/// The fault comes that soon after the mishap, which has its place in time from the tick that armed.
+fn found_within(log: &[Line], limit_us: u64) -> Result<()> {
+    let time = |is: fn(&Event) -> bool| log.iter().find(|line| is(&line.event)).and_then(|line| line.time_us);
+    let armed = time(|event| matches!(event, Event::State { to, .. } if to == "armed")).context("never armed")?;
+    let fault = time(|event| matches!(event, Event::Fault { .. })).context("no fault")?;
+    let mishap = armed + u64::from(MISHAP_TICK - ARM_TICK) * 1000;
+    let hung = fault.saturating_sub(mishap);
+    // The log is a little later than what it tells of.
+    ensure!(hung <= limit_us + 1000, "the control task hangs for {hung} us");
+    Ok(())
+}
+
 /// Zero before arming, voltage until the mishap, zero after it; voltage again only where somebody armed again.
 fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
     // One zero is written before the first tick.
-    let (armed, mishap_at) = (1 + 10, 1 + MISHAP_TICK as usize);
+    let (armed, mishap_at) = (1 + ARM_TICK as usize, 1 + MISHAP_TICK as usize);
     let gone = mishap_at + grace(mishap);
     let rearmed = matches!(mishap, Mishap::Interlock | Mishap::Overrun);
-    // An overrun of 20 ms leaves out that many ticks, not orders.
+    // An overrun of 8 ms leaves out that many ticks, not orders.
     let again = if rearmed { 1 + 1300 } else { dac.len() };
     ensure!(dac.len() > gone + 100, "the wire ends after {} writes", dac.len());
     let zero = |from: usize, to: usize| match dac[from..to].iter().position(|written| *written != SAFE) {
@@ -96,9 +128,11 @@ fn golden_text(mishap: Mishap, run: &Run) -> String {
     // When a task is missed depends on where it was in its own 10 ms.
     let any_tick = mishap == Mishap::Stall;
     let mut text = String::new();
-    for line in &run.log {
+    for line in run.log.iter().map(emulator::text) {
         let words = line.split(' ').map(|word| match word.split_once('=') {
-            Some((key @ ("git" | "worst_lateness_us" | "digest" | "min" | "mean" | "max"), _)) => format!("{key}=_"),
+            Some((key @ ("git" | "worst_lateness_us" | "rms_lateness_us" | "digest" | "min" | "mean" | "max"), _)) => {
+                format!("{key}=_")
+            }
             Some(("tick", number)) if any_tick && number.len() > 2 => "tick=_".into(),
             _ => match word.rsplit_once(".rs:") {
                 Some((file, _)) => format!("{file}.rs:_"),

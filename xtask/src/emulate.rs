@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::emulator::{self, Run, SAFE, Written};
 use crate::image::{self, Board, Opt};
-use crate::setup;
+use crate::{rivals, setup};
 
 /// Options of `cargo xtask emulate`.
 #[derive(clap::Args)]
@@ -19,6 +19,9 @@ pub(crate) struct Args {
     /// Play nothing: wait for `vsj link unix:PATH` on this socket until Ctrl-C
     #[arg(long, value_name = "PATH", conflicts_with = "json")]
     link: Option<PathBuf>,
+    /// Count instructions a tick of this controller beside those of other crates and of double precision
+    #[arg(long, conflicts_with = "link")]
+    rivals: bool,
     /// What the optimiser aims at
     #[arg(long, value_enum, default_value = "s")]
     opt: Opt,
@@ -27,6 +30,9 @@ pub(crate) struct Args {
 /// `cargo xtask emulate`.
 pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
+    if args.rivals {
+        return rivals::run(args.opt, args.json);
+    }
     let elf = image::build(Board::Mps2, args.opt)?;
     if let Some(socket) = &args.link {
         let socket = std::path::absolute(socket)?;
@@ -48,8 +54,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 pub(crate) struct Comparison {
     pub(crate) ticks: u32,
     pub(crate) missed: u32,
-    pub(crate) host_digest: String,
-    pub(crate) target_digest: String,
+    pub(crate) host_digest: u64,
+    pub(crate) target_digest: u64,
     /// What left on the wire is what the host computed, tick by tick.
     pub(crate) first_difference: Option<usize>,
     pub(crate) instructions: [u32; 3],
@@ -66,14 +72,15 @@ impl Comparison {
             expected.push(Written { code: tick.drive.code().0, enabled: tick.drive.enabled() });
         })?;
         let different = expected.iter().zip(&run.dac).position(|(host, target)| host != target);
+        let done = run.done()?;
         let shorter = expected.len().min(run.dac.len());
         Ok(Self {
-            ticks: run.number("done", "ticks")?,
-            missed: run.number("done", "missed")?,
-            host_digest: format!("{:x}", digest.value()),
-            target_digest: run.value("done", "digest")?.into(),
+            ticks: done.ticks,
+            missed: done.missed,
+            host_digest: digest.value(),
+            target_digest: done.digest,
             first_difference: different.or((expected.len() != run.dac.len()).then_some(shorter)),
-            instructions: [run.number("done", "min")?, run.number("done", "mean")?, run.number("done", "max")?],
+            instructions: [done.min, done.mean, done.max],
             exit: run.exit,
         })
     }
@@ -82,7 +89,7 @@ impl Comparison {
     pub(crate) fn check(&self) -> Result<()> {
         let Self { host_digest, target_digest, .. } = self;
         if host_digest != target_digest {
-            bail!("target and host differ: digest {target_digest} on the target, {host_digest} on the host");
+            bail!("target and host differ: digest {target_digest:016x} on the target, {host_digest:016x} on the host");
         }
         if let Some(index) = self.first_difference {
             bail!("what left on the DAC's wire differs from the host's from write {index} on");
@@ -96,8 +103,8 @@ impl Comparison {
     fn report(&self, opt: Opt, run: &Run) -> Value {
         let [min, mean, max] = self.instructions;
         json!({
-            "ticks": self.ticks, "missed_ticks": self.missed, "host_digest": self.host_digest,
-            "target_digest": self.target_digest, "instructions_per_tick": {"min": min, "mean": mean, "max": max},
+            "ticks": self.ticks, "missed_ticks": self.missed, "host_digest": hexadecimal(self.host_digest),
+            "target_digest": hexadecimal(self.target_digest), "instructions_per_tick": {"min": min, "mean": mean, "max": max},
             "exit": self.exit, "opt": opt.name(), "wall_s": run.took.as_secs_f64(), "dac_writes": run.dac.len(),
         })
     }
@@ -105,7 +112,7 @@ impl Comparison {
     fn summary(&self, run: &Run) -> String {
         let [min, mean, max] = self.instructions;
         format!(
-            "{} ticks in {:.1} s, {} missed; digest {} on the target, {} on the host; \
+            "{} ticks in {:.1} s, {} missed; digest {:016x} on the target, {:016x} on the host; \
              instructions per tick {min} to {max}, mean {mean}",
             self.ticks,
             run.took.as_secs_f64(),
@@ -114,4 +121,8 @@ impl Comparison {
             self.host_digest,
         )
     }
+}
+
+fn hexadecimal(digest: u64) -> String {
+    format!("{digest:016x}")
 }

@@ -13,7 +13,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use defmt_decoder::{DecodeError, Table};
+use host_sim::log::{Decoder, Done, Event, Formats, Item, Line, table_row};
 
 use crate::{image, shell};
 
@@ -40,8 +40,8 @@ pub(crate) const SAFE: Written = Written { code: 0, enabled: false };
 pub(crate) struct Run {
     /// Of the emulator.
     pub(crate) exit: i32,
-    /// Decoded, level and message; no times.
-    pub(crate) log: Vec<String>,
+    /// Decoded.
+    pub(crate) log: Vec<Line>,
     /// What left.
     pub(crate) dac: Vec<Written>,
     /// Of our time.
@@ -49,20 +49,19 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    /// The value behind `key=` in the last line that starts with `word`.
-    pub(crate) fn value(&self, word: &str, key: &str) -> Result<&str> {
-        let line = self.log.iter().rev().find(|line| line.split_whitespace().nth(1) == Some(word));
-        let line =
-            line.with_context(|| format!("the log has no line `{word}`; its last one is {:?}", self.log.last()))?;
-        let value = line.split_whitespace().find_map(|part| part.strip_prefix(key)?.strip_prefix('='));
-        value.with_context(|| format!("no {key} in `{line}`"))
+    /// What the last line of a script says.
+    pub(crate) fn done(&self) -> Result<&Done> {
+        match self.log.last() {
+            Some(Line { event: Event::Done(done), .. }) => Ok(done),
+            last => bail!("the log does not end with `done` but with {:?}", last.map(text)),
+        }
     }
+}
 
-    /// As [`Self::value`], a number.
-    pub(crate) fn number(&self, word: &str, key: &str) -> Result<u32> {
-        let value = self.value(word, key)?;
-        value.parse().with_context(|| format!("{key}={value} is no number"))
-    }
+/// Level and message of a line, without its time.
+pub(crate) fn text(line: &Line) -> String {
+    let level = line.level.map_or("-".into(), |level| level.to_string().to_lowercase());
+    format!("{level:<5} {}", line.message)
 }
 
 /// QEMU on an image: `host` is the chardev of the host's line, `clock` the rest of `-icount`.
@@ -92,15 +91,14 @@ pub(crate) fn obey<T>(
     show: impl FnMut(&str) + Send,
     work: impl FnOnce() -> Result<T>,
 ) -> Result<(T, Run)> {
-    let bytes = image::read(elf)?;
-    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
+    let formats = Formats::parse(&image::read(elf)?)?;
     let wire = elf.with_file_name(format!("dac-{}-link", std::process::id()));
     let begin = Instant::now();
     let host = format!("unix:{},server=on,wait=off", socket.display());
     let mut child = start(elf, LINK, &host, &wire, &format!("shift={SHIFT},align=on"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let (result, log) = thread::scope(|scope| {
-        let reader = scope.spawn(|| decode(&table, &mut output, show));
+        let reader = scope.spawn(|| decode(formats, &mut output, show));
         let result = work();
         child.kill()?;
         let log = reader.join().map_err(|_| anyhow::anyhow!("the log's reader stopped"))?;
@@ -109,26 +107,25 @@ pub(crate) fn obey<T>(
     child.wait()?;
     let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
     let _ = (fs::remove_file(&wire), fs::remove_file(socket));
-    // Ended by us: it has no exit code of its own.
-    Ok((result?, Run { exit: 0, log, dac: written(&dac?), took: begin.elapsed() }))
+    // Ended by us: it has no exit code of its own. When it cannot keep up with our clock it says so in the midst of the log,
+    // which costs a line.
+    Ok((result?, Run { exit: 0, log: log.lines, dac: written(&dac?), took: begin.elapsed() }))
 }
 
 /// As [`obey`], until the emulator ends, and with every line of the log.
 pub(crate) fn serve(elf: &Path, socket: &Path, show: impl FnMut(&str)) -> Result<()> {
-    let bytes = image::read(elf)?;
-    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
+    let formats = Formats::parse(&image::read(elf)?)?;
     let host = format!("unix:{},server=on,wait=off", socket.display());
     let mut child = start(elf, LINK, &host, Path::new("/dev/null"), &format!("shift={SHIFT},align=on"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
-    let ended = decode(&table, &mut output, show);
+    let ended = decode(formats, &mut output, show);
     child.wait()?;
     ended.map(|_| ())
 }
 
 /// Plays `script`; `show` hears of every line of the log as it comes.
-pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&str) + Send) -> Result<Run> {
-    let bytes = image::read(elf)?;
-    let table = Table::parse(&bytes)?.context("the image has no log formats")?;
+pub(crate) fn play(elf: &Path, script: &str, shift: u32, show: impl FnMut(&str) + Send) -> Result<Run> {
+    let formats = Formats::parse(&image::read(elf)?)?;
     let wire = elf.with_file_name(format!("dac-{}-{}", std::process::id(), script.replace(' ', "-")));
     let begin = Instant::now();
     let mut child = start(elf, script, "null", &wire, &format!("shift={shift},sleep=off"))?;
@@ -136,7 +133,7 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&s
     let over = AtomicBool::new(false);
     let (log, status) = thread::scope(|scope| {
         let reader = scope.spawn(|| {
-            let log = decode(&table, &mut output, |line| show(line));
+            let log = decode(formats, &mut output, show);
             over.store(true, Ordering::Relaxed);
             log
         });
@@ -153,33 +150,45 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, mut show: impl FnMut(&s
     let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
     let _ = fs::remove_file(&wire);
     if took >= TIMEOUT {
-        bail!("the emulator was stopped after {} s; the log's last line is {:?}", took.as_secs(), log.last());
+        let last = log.lines.last().map(text);
+        bail!("the emulator was stopped after {} s; the log's last line is {last:?}", took.as_secs());
     }
-    Ok(Run { exit: status.code().unwrap_or(-1), log, dac: written(&dac?), took })
+    Ok(Run { exit: status.code().unwrap_or(-1), log: log.whole()?, dac: written(&dac?), took })
 }
 
-/// Frames to lines.
-pub(crate) fn decode(table: &Table, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Vec<String>> {
-    let mut decoder = table.new_stream_decoder();
-    let mut log = Vec::new();
+/// What came of a log.
+pub(crate) struct Log {
+    lines: Vec<Line>,
+    /// The first stretch that is no frame.
+    damage: Option<String>,
+}
+
+impl Log {
+    /// The lines, if nothing is damaged.
+    pub(crate) fn whole(self) -> Result<Vec<Line>> {
+        match self.damage {
+            None => Ok(self.lines),
+            Some(damage) => bail!("the log is {damage}"),
+        }
+    }
+}
+
+/// Bytes to lines; `show` hears of each as `vsj log` prints it. What the end cuts off was being written when it came.
+pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Log> {
+    let mut decoder = Decoder::new(formats);
+    let mut log = Log { lines: Vec::new(), damage: None };
     let mut buffer = [0; 4096];
     loop {
         let length = source.read(&mut buffer)?;
         if length == 0 {
             return Ok(log);
         }
-        decoder.received(&buffer[..length]);
-        loop {
-            match decoder.decode() {
-                Ok(frame) => {
-                    let level = frame.level().map_or("-", |level| level.as_str());
-                    let line = format!("{level:<5} {}", frame.display_message());
-                    let time = frame.display_timestamp().map(|time| time.to_string()).unwrap_or_default();
-                    show(&format!("{time:>12} {line}"));
-                    log.push(line);
-                }
-                Err(DecodeError::UnexpectedEof) => break,
-                Err(DecodeError::Malformed) => log.push("MALFORMED".into()),
+        for item in decoder.feed(&buffer[..length]) {
+            let row = table_row(&item);
+            show(&row);
+            match item {
+                Item::Line(line) => log.lines.push(line),
+                _ => _ = log.damage.get_or_insert(row.trim_start_matches([' ', '-']).into()),
             }
         }
     }

@@ -55,17 +55,25 @@ impl Board {
 
 /// Builds an image and returns its ELF file.
 pub(crate) fn build(board: Board, opt: Opt) -> Result<PathBuf> {
-    let name = board.name();
+    compile(board, opt, ["--bin", board.name()], board.name())
+}
+
+/// As [`build`], of an example of the firmware.
+pub(crate) fn example(name: &str, board: Board, opt: Opt) -> Result<PathBuf> {
+    compile(board, opt, ["--example", name], &format!("examples/{name}"))
+}
+
+fn compile(board: Board, opt: Opt, what: [&str; 2], file: &str) -> Result<PathBuf> {
     let target = target_directory()?;
-    shell::run(
-        shell::cargo().args(["build", "--quiet", "--package", "firmware", "--bin", name, "--features", name]).args([
-            "--profile",
-            opt.profile(),
-            "--target",
-            shell::MCU,
-        ]),
-    )?;
-    Ok(target.join(shell::MCU).join(opt.profile()).join(name))
+    shell::run(shell::cargo().args(["build", "--quiet", "--package", "firmware"]).args(what).args([
+        "--features",
+        board.name(),
+        "--profile",
+        opt.profile(),
+        "--target",
+        shell::MCU,
+    ]))?;
+    Ok(target.join(shell::MCU).join(opt.profile()).join(file))
 }
 
 /// Where cargo builds.

@@ -11,6 +11,7 @@ mod flash;
 mod image;
 mod proof;
 mod python;
+mod rivals;
 mod setup;
 mod shell;
 mod size;
@@ -59,10 +60,12 @@ enum Command {
     /// 70 s at 1 kHz, in seconds. Shows the decoded log, and exits with 1 unless every DAC code and every estimate is
     /// the host's, bit for bit, and no tick was missed.
     ///
-    /// With --link it plays nothing and obeys `vsj link`, in real time, its interlock closed.
+    /// With --link it plays nothing and obeys `vsj link`, in real time, its interlock closed. With --rivals it counts
+    /// what a tick of other controllers takes, and exits with 1 unless each leads the spring where it should.
     #[command(after_help = "\
 Examples:
   cargo xtask emulate --json | jq .instructions_per_tick
+  cargo xtask emulate --rivals                         instructions a tick, beside other controllers
   cargo xtask emulate --link /tmp/mcu.sock             then: vsj link unix:/tmp/mcu.sock status")]
     Emulate(emulate::Args),
     /// Everything that the emulated firmware must show
@@ -92,8 +95,9 @@ Examples:
     Image,
     /// Run the very image that is flashed, on models of the STM32G474's registers
     ///
-    /// Boot, 1.2 s without a host, then a panic, a hard fault and a hang while voltage is out. Exits with 1 unless the
-    /// output is safe each time; says what this cannot show. Installs Unicorn into a venv under the target directory.
+    /// Boot, 1.2 s without a host; a host that arms it over LPUART1 and sets targets, every code the host model's; then a
+    /// panic, a hard fault and two hangs while voltage is out. Exits with 1 unless the output is as it must be each time; says
+    /// what this cannot show. Installs Unicorn into a venv under the target directory.
     Boot,
     /// Compare the host's speed with Python's
     ///

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::emulate::Comparison;
 use crate::image::{self, Board, Opt};
-use crate::{audit, drill, emulator, size, talk};
+use crate::{audit, drill, emulator, rivals, size, talk};
 
 /// Most instructions that one tick of the model may take.
 const MOST_INSTRUCTIONS: u32 = 150;
@@ -22,6 +22,7 @@ pub(crate) fn run() -> Result<()> {
             bit_for_bit(&elf, script).with_context(|| format!("opt-level {name}, {script}"))?;
         }
         if opt == Opt::S {
+            eprint!("{}", rivals::table(opt, &rivals::count(opt)?));
             drill::all(&elf, false)?;
             eprintln!("link: {}", talk::run(&elf).context("the host's link")?);
         }
@@ -40,7 +41,7 @@ fn bit_for_bit(elf: &std::path::Path, script: &str) -> Result<()> {
     let [min, mean, max] = comparison.instructions;
     ensure!(max <= MOST_INSTRUCTIONS, "{max} instructions in a tick, expected at most {MOST_INSTRUCTIONS}");
     eprintln!(
-        "{script}: {} ticks in {:.1} s, none missed, {} as on the host, {min} to {max} instructions a tick, mean {mean}",
+        "{script}: {} ticks in {:.1} s, none missed, {:016x} as on the host, {min} to {max} instructions a tick, mean {mean}",
         comparison.ticks,
         run.took.as_secs_f64(),
         comparison.target_digest,

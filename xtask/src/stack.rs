@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 
 use crate::elf::{self, Function};
 use crate::thumb::{Code, Shape};
@@ -22,8 +22,10 @@ const SAVED: u32 = 104 + 4;
 const DRILL: &str = "deeper";
 /// What every panic goes through.
 const PANIC: &str = "core::panicking";
-/// Interrupt levels that can nest, deepest handlers first: alarm, control, line, tasks below, NMI.
-const LEVELS: usize = 5;
+/// Starts again from the stack's top.
+const FRESH: &str = "firmware::stop::on_fresh_stack";
+/// Interrupt levels that can nest, deepest handlers first: SysTick, alarm, control, line, tasks below, NMI.
+const LEVELS: usize = 6;
 
 /// The most that thread and handlers take together.
 pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
@@ -58,7 +60,9 @@ pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
     handlers.sort_unstable_by(|a, b| b.cmp(a));
     let again = functions.iter().filter(|f| f.name.contains(PANIC)).map(|f| depths.of(f.address, &mut Vec::new()));
     let again = again.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0);
-    Ok(thread + again + handlers.iter().take(LEVELS).map(|depth| depth + SAVED).sum::<u32>())
+    let nested = thread + again + handlers.iter().take(LEVELS).map(|depth| depth + SAVED).sum::<u32>();
+    let fresh = functions.iter().find(|f| f.name == FRESH).context("nothing starts from a fresh stack")?;
+    Ok(nested.max(depths.of(fresh.address, &mut Vec::new())?))
 }
 
 /// Everything that the processor may start.
@@ -77,6 +81,9 @@ impl Depths<'_> {
     fn of(&self, address: u32, path: &mut Vec<u32>) -> Result<u32> {
         // Not a function with a size: a few lines of assembly without a frame.
         let Some(shape) = self.shapes.get(&address) else { return Ok(0) };
+        if self.name(address) == FRESH && !path.is_empty() {
+            return Ok(0);
+        }
         if path.contains(&address) {
             let name = self.name(address);
             // A panic while panicking: `worst` counts it, and it only resets.

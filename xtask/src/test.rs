@@ -25,8 +25,10 @@ const STEPS: &[Step] = &[
     Step { name: "build vsj", args: &["build", "--release", "-p", "host-sim", "--bin", "vsj"], env: None },
 ];
 
-const fn lint(board: &'static str) -> [&'static str; 10] {
-    ["clippy", "-pfirmware", "--profile", "firmware", "--target", shell::MCU, "--features", board, "--", "-Dwarnings"]
+#[rustfmt::skip]
+const fn lint(board: &'static str) -> [&'static str; 13] {
+    ["clippy", "-pfirmware", "--lib", "--bins", "--examples", "--profile", "firmware", "--target", shell::MCU,
+     "--features", board, "--", "-Dwarnings"]
 }
 
 /// The steps, for `--help`.

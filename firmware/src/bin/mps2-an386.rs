@@ -11,11 +11,12 @@ use firmware::host::{self, Host};
 use firmware::log::{self, Done, Event};
 use firmware::mps2::actor::{self, Actor};
 use firmware::mps2::instructions::Counter;
+use firmware::mps2::registers::CLOCK_HZ;
 use firmware::mps2::uart::Uart;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
 use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
 use firmware::script::{SETTINGS, SUPERVISION, Script};
-use firmware::{stack_guard, tasks};
+use firmware::{hang_guard, stack_guard, tasks};
 use link::Desk;
 
 use core::sync::atomic::Ordering;
@@ -56,6 +57,7 @@ fn main() -> ! {
 
     if let Some(mut core) = Peripherals::take() {
         stack_guard::set(&mut core.MPU);
+        hang_guard::start(&mut core.SYST, CLOCK_HZ);
         // SAFETY: before they are enabled. The smaller, the more urgent: the alarm wakes the control task, and that one
         // interrupts all else.
         unsafe {

@@ -16,7 +16,7 @@ use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
 use firmware::script::{SETTINGS, SUPERVISION};
 use firmware::tasks;
-use firmware::{last_words, log, stack_guard};
+use firmware::{hang_guard, last_words, log, stack_guard};
 use link::Desk;
 use model::supervisor::Fault;
 
@@ -45,6 +45,7 @@ fn main() -> ! {
     log::boot(reset, last_fault.map_or(0, Fault::code));
     if let Some(mut core) = Peripherals::take() {
         stack_guard::set(&mut core.MPU);
+        hang_guard::start(&mut core.SYST, clocks::CORE_HZ);
     }
     interrupt::CORDIC.set_priority(Priority::P4);
     interrupt::LPUART1.set_priority(Priority::P8);

@@ -57,10 +57,19 @@ fn act(mishap: Mishap) {
         Mishap::StackOverflow => {
             core::hint::black_box(deeper(1));
         }
+        Mishap::FloatOverflow => {
+            // SAFETY: does nothing, but from here on the task's float registers are in use.
+            unsafe { core::arch::asm!("vmov s0, s0") };
+            core::hint::black_box(deeper(1));
+        }
         Mishap::Stall => STALL.store(true, Ordering::Relaxed),
         Mishap::Hang => hang(),
+        Mishap::Deaf => {
+            cortex_m::interrupt::disable();
+            hang()
+        }
         Mishap::Overrun => {
-            let until = Instant::now().as_micros() + 20_000;
+            let until = Instant::now().as_micros() + 8_000;
             while Instant::now().as_micros() < until {}
         }
         // The script itself opens the interlock and silences the host.

@@ -10,8 +10,12 @@
 
 use model::supervisor::Drive;
 
-use super::registers::{UART_1_CONTROL, UART_1_DATA, UART_1_DIVIDER};
+use super::registers::{FAULT_STATUS, UART_1_CONTROL, UART_1_DATA, UART_1_DIVIDER};
+use super::semihosting;
 use crate::board::Amplifier;
+
+/// See `floats_are_free`.
+const EXIT_LAZY_SAVE_FAILED: u32 = 3;
 
 /// The wire.
 #[derive(Debug)]
@@ -28,6 +32,19 @@ pub fn kill() {
     UART_1_DIVIDER.write(16);
     UART_1_CONTROL.write(1);
     send(0, false);
+    floats_are_free();
+}
+
+/// Whoever stops the program may use a float register. Ends the emulator if that makes the processor save the old ones on a
+/// stack that ran out.
+fn floats_are_free() {
+    /// CFSR.MLSPERR
+    const LAZY_SAVE_FAILED: u32 = 1 << 5;
+    // SAFETY: does nothing.
+    unsafe { core::arch::asm!("vmov s0, s0") };
+    if FAULT_STATUS.read() & LAZY_SAVE_FAILED != 0 {
+        semihosting::exit(EXIT_LAZY_SAVE_FAILED);
+    }
 }
 
 fn send(code: u32, enabled: bool) {

@@ -4,11 +4,10 @@
 //! an instruction is longer than a count, so that the count tells the number of instructions exactly; below, it is rounded
 //! to 40 ns / 2^N instructions. The scale is not told but measured at the start, on a thousand instructions that do nothing.
 
-use super::registers::{SYSTICK_CONTROL, SYSTICK_RELOAD, SYSTICK_VALUE};
+use super::registers::{SYSTICK_RELOAD, SYSTICK_VALUE};
 use crate::control::Stopwatch;
 use crate::log::Instructions;
 
-const TOP: u32 = 0xff_ffff;
 const KNOWN: u32 = 1000;
 
 /// Fewest, most and sum over all ticks, in counts.
@@ -16,6 +15,7 @@ const KNOWN: u32 = 1000;
 pub struct Counter {
     counts_of_known: u32,
     counts_of_nothing: u32,
+    reload: u32,
     started: u32,
     min: u32,
     max: u32,
@@ -24,13 +24,18 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Starts SysTick and measures its scale.
+    /// Measures the scale of SysTick, which runs already: nothing counted may take longer than its millisecond.
     pub fn begin() -> Self {
-        SYSTICK_RELOAD.write(TOP);
-        SYSTICK_VALUE.write(0);
-        SYSTICK_CONTROL.write(0b101);
-        let mut counter =
-            Self { counts_of_known: 1, counts_of_nothing: 0, started: 0, min: u32::MAX, max: 0, sum: 0, ticks: 0 };
+        let mut counter = Self {
+            counts_of_known: 1,
+            counts_of_nothing: 0,
+            reload: SYSTICK_RELOAD.read(),
+            started: 0,
+            min: u32::MAX,
+            max: 0,
+            sum: 0,
+            ticks: 0,
+        };
         counter.start();
         counter.counts_of_nothing = counter.passed();
         counter.start();
@@ -60,7 +65,8 @@ impl Counter {
         let now = SYSTICK_VALUE.read();
         // SAFETY: `start` kept them out, and nobody else had.
         unsafe { cortex_m::interrupt::enable() };
-        self.started.wrapping_sub(now) & TOP
+        // Down from `reload`, and from there again after zero.
+        if now <= self.started { self.started - now } else { self.started + self.reload + 1 - now }
     }
 }
 

@@ -77,9 +77,10 @@ pub const WATCHDOG_CONTROL: Register = Register(0x4000_8008);
 /// Any value starts anew.
 pub const WATCHDOG_FEED: Register = Register(0x4000_800c);
 
-/// SysTick: bit 0 counts, bit 2 at the processor's clock.
-pub const SYSTICK_CONTROL: Register = Register(0xe000_e010);
-/// 24 bits.
+/// SysTick: 24 bits.
 pub const SYSTICK_RELOAD: Register = Register(0xe000_e014);
 /// Counts down.
 pub const SYSTICK_VALUE: Register = Register(0xe000_e018);
+
+/// Why the last fault came (CFSR).
+pub const FAULT_STATUS: Register = Register(0xe000_ed28);

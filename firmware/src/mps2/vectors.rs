@@ -72,7 +72,7 @@ unsafe extern "C" fn low() {
 /// The watchdog's first zero: its second one resets, so use the time to say why.
 #[unsafe(no_mangle)]
 extern "C" fn NonMaskableInt() {
-    stop::stop(Fault::Watchdog, None)
+    stop::on_fresh_stack(Fault::Watchdog)
 }
 
 /// The linker puts this behind the processor's own vectors.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::diagnose::{Input, Options, examine, relaxation::Relaxation, text};
+use host_sim::diagnose::{Input, Options, base::Base, examine, text};
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
 use host_sim::plant_file;
@@ -20,7 +20,8 @@ use super::print;
 #[command(after_help = "\
 Examples:
   vsj diagnose record.csv                        three sentences and a table
-  vsj diagnose record.csv --out out/diagnosis    with report.html, plots and residuals
+  vsj diagnose record.csv --out out/diagnosis    with report.html, plots, residuals
+  vsj stair --plant out/diagnosis/plant.toml     the controller on the extended spring, in fixed point
   vsj diagnose record.csv --json | jq .findings  for scripts
   vsj diagnose data/table3_stair.csv --column measured --input stair
 
@@ -39,7 +40,7 @@ pub(crate) struct Arguments {
     /// Column with the measured stiffness
     #[arg(long, default_value = MEASURED, value_name = "NAME")]
     column: String,
-    /// Write report.html, diagnosis.json, residuals.csv and the plots to this folder
+    /// Write report.html, diagnosis.json, residuals.csv, the plots and the extended spring (plant.toml) to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON object on stdout
@@ -71,16 +72,19 @@ fn quoted(word: &str) -> String {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let plant = plant_file::load(&arguments.plant)?;
+    let base = Base::new(plant_file::load(&arguments.plant)?)?;
     let record = Record::open(&arguments.data, &arguments.column)?;
     record.require_measured(&arguments.column)?;
-    let options = Options { input: arguments.input, base: Relaxation::plain(plant.share, plant.time_constant_s) };
+    let options = Options { input: arguments.input, base };
     // A folder that cannot be made is known before the search begins.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
-    let diagnosis = examine(&record, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
+    let mut diagnosis = examine(&record, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
     bar.finish_and_clear();
+    if let Some(folder) = &arguments.out {
+        diagnosis.report.extended.model = Some(folder.join(output::PLANT_FILE).display().to_string());
+    }
     let paths = match files {
         Some(files) => output::write(files, &diagnosis, &arguments.origin(&record))?,
         None => Vec::new(),

@@ -6,15 +6,15 @@ use super::print;
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::bad_input;
-use host_sim::experiment::{Experiment, Run, paper_spring};
+use host_sim::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
 use host_sim::output::files::{Files, write_csv};
 use host_sim::output::{plots, terminal};
-use host_sim::plant_file;
+use host_sim::plant_file::{self, PlantFile};
 use host_sim::record::{MEASURED, Record};
 use host_sim::schedule::{Between, Schedule};
 use host_sim::stair::{Report, Rows};
 use indicatif::{ProgressBar, ProgressStyle};
-use model::{Amplifier, Gains, Plant, Settings};
+use model::{Amplifier, ExtendedPlant, Gains, Plant, Settings};
 
 /// Run the stair experiment in closed loop on the fixed-point controller, beside the report's Table 3
 #[derive(Args, Debug)]
@@ -24,12 +24,14 @@ Examples:
   vsj stair --out out/stair                   with CSV and plots
   vsj stair --controller none --input step    the spring left alone, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7    another amplifier, other gains
+  vsj stair --plant spring.toml               another spring: hysteresis, leakage, several relaxations ...
   vsj stair --input schedule.csv --json       any schedule with columns time_s,voltage_v")]
 pub(crate) struct Arguments {
     /// Whose steps, CSV and voltage are shown: the spring left alone, or the report's controller
     #[arg(long, value_enum, default_value_t = Controller::Paper)]
     controller: Controller,
-    /// The spring: `paper`, or a plant file
+    /// The spring: `paper`, or a plant file; the limit and slew that it records act where they are stricter than the
+    /// options'
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns
@@ -95,14 +97,18 @@ impl Arguments {
         Defaults::parse_from(["vsj", "--out", "out/stair"]).arguments
     }
 
-    fn settings(&self, plant: Plant) -> Settings {
+    /// The settings of a plant file's spring, behind the stricter of its amplifier and the options'.
+    fn settings<'a>(&self, file: &'a PlantFile) -> Settings<ExtendedPlant<'a>> {
+        let recorded = file.amplifier.clone().unwrap_or_default();
+        let slews = [self.slew_v_per_s, recorded.slew_v_per_s];
         Settings {
             rate_hz: self.rate_hz,
-            plant,
+            plant: file.extended(),
             gains: Some(Gains { proportional: self.kp, integral_per_s: self.ki }),
             amplifier: Amplifier {
                 min_v: self.min_v,
-                slew_v_per_s: self.slew_v_per_s,
+                max_v: recorded.limit_v.map_or(self.limit_v, |limit| limit.min(self.limit_v)),
+                slew_v_per_s: slews.into_iter().flatten().reduce(f64::min),
                 dac_bits: self.dac_bits,
                 ..Amplifier::up_to(self.limit_v)
             },
@@ -121,8 +127,26 @@ impl Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let file = plant_file::load(&arguments.plant)?;
+    let left_out = file.left_out();
+    if !left_out.is_empty() {
+        eprintln!("vsj: {}: not simulated: {}", arguments.plant, left_out.join(", "));
+    }
+    let settings = arguments.settings(&file);
+    // Where the range ends below what may be asked for, only the sampled reference takes the target at its end.
+    match settings.plant.plain().filter(|_| settings.amplifier.max_v == arguments.limit_v) {
+        Some(plant) => run_plant(arguments, with_plant(&settings, plant), is_the_reports),
+        None => run_plant(arguments, settings, |_| false),
+    }
+}
+
+/// Runs the command for one kind of spring; `is_the_reports` says whether Table 3's simulated columns should come out.
+fn run_plant<P: Judged>(
+    arguments: &Arguments,
+    settings: Settings<P>,
+    is_the_reports: impl Fn(&Settings<P>) -> bool,
+) -> Result<()> {
     let stride = arguments.stride()?;
-    let plant = plant_file::load(&arguments.plant)?;
     let mut record = None;
     let (name, schedule) = match arguments.input.as_str() {
         "stair" => ("the stair".to_owned(), Schedule::stair()),
@@ -133,7 +157,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             (file.to_owned(), Schedule::from_record(read, arguments.between))
         }
     };
-    let experiment = Experiment { name, schedule, settings: arguments.settings(plant) };
+    let experiment = Experiment { name, schedule, settings };
     if let Err(error) = experiment.settings.check() {
         bad_input!("{}{error}", option(error.field));
     }
@@ -173,7 +197,7 @@ fn option(field: &str) -> &'static str {
         "dac_bits" => "--dac-bits: ",
         "proportional_gain" => "--kp: ",
         "integral_gain_per_s" => "--ki: ",
-        "share" | "time_constant_s" => "--plant: ",
+        field if field == "share" || field == "time_constant_s" || field.contains('.') => "--plant: ",
         _ => "",
     }
 }
@@ -187,9 +211,9 @@ fn is_the_reports(settings: &Settings) -> bool {
         && settings.amplifier.max_v >= 700.0
 }
 
-fn write(
+fn write<P>(
     folder: &Path,
-    experiment: &Experiment,
+    experiment: &Experiment<P>,
     run: &Run,
     report: &Report,
     controlled: bool,

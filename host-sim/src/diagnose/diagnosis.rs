@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DMatrix;
 
+use super::cure;
 use super::data::Data;
 use super::effect::{Quantity, Scene};
 use super::effects::{EFFECTS, index_of};
@@ -12,11 +13,10 @@ use super::leftover::{self, Leftover};
 use super::model::Model;
 use super::noise::{Noise, scale_of_squares};
 use super::observed::Observed;
-use super::report::{
-    Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict,
-};
+use super::report::{Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict};
 use super::search::{Scored, Search, effects};
 use super::standing::{self, Standing};
+use crate::plant_file::PlantFile;
 
 /// Odds under which a rival set counts as possible, in nats.
 const RIVAL: f64 = 3.0;
@@ -44,6 +44,8 @@ pub struct Diagnosis {
     pub baseline: Fit,
     /// The simulation with the causes.
     pub extended: Fit,
+    /// The extended spring.
+    pub plant: PlantFile,
     /// Readings less what each of the two foretells on stretches that no fit has seen, in V.
     pub held_out: [Vec<f64>; 2],
     /// The best sets of causes beside each other, the best first.
@@ -51,13 +53,26 @@ pub struct Diagnosis {
 }
 
 /// Runs the search and says what it found.
-pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, progress: impl FnMut(&Scored)) -> Diagnosis {
+pub(super) fn diagnose(
+    data: Data,
+    observed: &Observed,
+    engine: &mut Engine,
+    held: bool,
+    progress: impl FnMut(&Scored),
+) -> Diagnosis {
     let baseline = engine.at(Model::default());
     if !informative(engine) {
         let report = insufficient(&data, &baseline, engine);
         let unseen = engine.held_out(&baseline).residual;
-        let held_out = [unseen.clone(), unseen];
-        return Diagnosis { report, data, extended: baseline.clone(), baseline, held_out, standings: Vec::new() };
+        return Diagnosis {
+            report,
+            data,
+            extended: baseline.clone(),
+            baseline,
+            plant: engine.simulator.base.file().clone(),
+            held_out: [unseen.clone(), unseen],
+            standings: Vec::new(),
+        };
     }
     let mut search = Search::new(engine);
     let best = search.run(progress);
@@ -79,6 +94,7 @@ pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, pro
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
 
     let mut alternatives = rivals;
+    let cure = cure::of(engine, &best.fit.model, held);
     let monotone = never_reverses(&data);
     if monotone {
         alternatives.extend(twin(&findings));
@@ -104,6 +120,7 @@ pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, pro
             gain: 1.0 - quality_after.held_out_rmse / quality_before.held_out_rmse.max(1e-12),
             quality: quality_after,
             model: None,
+            fixed_point_error_v: cure.fixed_point_error_v,
         },
         findings,
         alternatives,
@@ -113,7 +130,7 @@ pub(super) fn diagnose(data: Data, observed: &Observed, engine: &mut Engine, pro
         residual: residual_report(&data, &best.fit),
     };
     let held_out = [&baseline, &best.fit].map(|fit| engine.held_out(fit).residual);
-    Diagnosis { report, data, baseline, extended: best.fit, held_out, standings }
+    Diagnosis { report, data, baseline, extended: best.fit, plant: cure.file, held_out, standings }
 }
 
 fn explained(finding: &Finding) -> f64 {
@@ -129,14 +146,15 @@ fn informative(engine: &mut Engine) -> bool {
     let probe = ["gain-error", "time-constant"].iter().filter_map(|cause| index_of(cause)).fold(
         Model::default(),
         |model, effect| {
-            let point = if EFFECTS[effect].cause() == "gain-error" { 1.0 } else { engine.simulator.base.tau_s.ln() };
+            let point =
+                if EFFECTS[effect].cause() == "gain-error" { 1.0 } else { engine.simulator.base.relaxation.tau_s.ln() };
             model.with(super::model::Block { effect, form: 0 }, vec![point])
         },
     );
     // The noise as it is at best, the information as it is where the search starts.
     let best = engine.fit(probe.clone(), &Noise::first_look());
     let residual = engine.residual(&probe);
-    let start = Fit { model: probe, residual, noise: best.noise, log_likelihood: 0.0 };
+    let start = Fit { model: probe, residual, noise: best.noise, ..best };
     let Some(covariance) = covariance(engine, &start) else { return false };
     // Half of the gain, or a factor of e in the time constant, is no knowledge.
     covariance[(0, 0)].sqrt() < 0.5 && covariance[(1, 1)].sqrt() < 1.0
@@ -156,7 +174,7 @@ fn insufficient(data: &Data, baseline: &Fit, engine: &mut Engine) -> Report {
              this record the gain or the time constant could be almost anything"
                 .into(),
         ),
-        extended: Extended { quality, gain: 0.0, model: None },
+        extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None },
         leftover: None,
         noise: noise_report(&baseline.noise),
         residual: residual_report(data, baseline),
@@ -187,9 +205,10 @@ fn twin(findings: &[Finding]) -> Option<Vec<&'static str>> {
         _ => None,
     };
     let causes: Vec<&'static str> = findings.iter().map(|finding| finding.cause).collect();
-    causes.iter().any(|cause| swapped(*cause).is_some()).then(|| {
-        causes.iter().map(|&cause| swapped(cause).unwrap_or(cause)).collect()
-    })
+    causes
+        .iter()
+        .any(|cause| swapped(*cause).is_some())
+        .then(|| causes.iter().map(|&cause| swapped(cause).unwrap_or(cause)).collect())
 }
 
 /// True if the voltage never turns back by more than a fiftieth of its range.
@@ -220,9 +239,10 @@ fn next_experiment(
             let experiment = EFFECTS[index_of(cause)?].experiment();
             Some(format!("run {experiment}"))
         }
-        Verdict::Unexplained => {
-            Some(format!("repeat the record and look {}: what comes back there is a cause that has no name here yet", left?.place))
-        }
+        Verdict::Unexplained => Some(format!(
+            "repeat the record and look {}: what comes back there is a cause that has no name here yet",
+            left?.place
+        )),
         _ => None,
     }
 }
@@ -252,7 +272,10 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
             parameters: single("step", step, step * (1.0 - 1e-6), step * (1.0 + 1e-6), "V"),
             rmse_before: raw.max(step / 12f64.sqrt()),
             rmse_after: scale_of_squares(&after).min(raw),
-            evidence: format!("every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left", step / raw),
+            evidence: format!(
+                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left",
+                step / raw
+            ),
         });
     }
     for (bound, upper) in [(observed.upper, true), (observed.lower, false)] {
@@ -264,7 +287,10 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
             parameters: single("limit", bound, bound - 1e-6 * bound.abs(), bound + 1e-6 * bound.abs(), "V"),
             rmse_before: raw,
             rmse_after: stopped_raw,
-            evidence: format!("{stopped} readings are exactly {bound}, the {} of all", if upper { "highest" } else { "lowest" }),
+            evidence: format!(
+                "{stopped} readings are exactly {bound}, the {} of all",
+                if upper { "highest" } else { "lowest" }
+            ),
         });
     }
     if let Some((_, wide)) = fit.noise.wide {
@@ -398,17 +424,14 @@ fn quality(engine: &mut Engine, fit: &Fit, stops: bool) -> Quality {
 }
 
 fn noise_report(noise: &Noise) -> NoiseReport {
-    NoiseReport {
-        sigma: noise.sigma,
-        tail: noise.nu.is_finite().then_some(noise.nu),
-        memory_rows: noise.ar.len(),
-    }
+    NoiseReport { sigma: noise.sigma, tail: noise.nu.is_finite().then_some(noise.nu), memory_rows: noise.ar.len() }
 }
 
 fn residual_report(data: &Data, fit: &Fit) -> ResidualReport {
     let white = fit.noise.whitened(&fit.residual);
-    let changes: Vec<f64> =
-        (0..data.rows()).map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] }).collect();
+    let changes: Vec<f64> = (0..data.rows())
+        .map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] })
+        .collect();
     let correlation = |a: &[f64], b: &[f64], lag: usize| {
         let lag = lag.min(a.len());
         let product: f64 = a[lag..].iter().zip(b).map(|(a, b)| a * b).sum();

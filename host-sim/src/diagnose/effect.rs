@@ -10,6 +10,7 @@
 use super::data::Data;
 use super::relaxation::Relaxation;
 use super::signal::Signal;
+use crate::plant_file::PlantFile;
 
 /// Where in the chain an effect acts. Two effects of one stage are harder to tell apart than two of different stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -124,6 +125,14 @@ pub trait Effect: Sync {
     /// Lowest and highest of the user's parameters that a search alone has found; others are left to the fit.
     fn searched_range(&self, _form: usize, _point: &[f64], _scene: &Scene) -> Vec<(String, f64, f64)> {
         Vec::new()
+    }
+
+    /// Writes itself into a plant file, whose tables say what the tick runs; what no table holds is kept as unmodelled.
+    fn extend(&self, form: usize, point: &[f64], data: &Data, file: &mut PlantFile) {
+        let values =
+            self.quantities(form, point, data).into_iter().map(|quantity| (quantity.name, quantity.value.into()));
+        let table = toml::Value::Table(values.collect());
+        file.unmodelled.get_or_insert_default().insert(self.cause().to_owned(), table);
     }
 
     /// Acts on the voltage before it reaches the relaxation, in V.

@@ -22,6 +22,8 @@ pub struct Fit {
     pub noise: Noise,
     /// Log-likelihood under that law, less the law's own cost.
     pub log_likelihood: f64,
+    /// Log-likelihood under independent noise: what a memory that is really structure cannot hide.
+    pub plain: f64,
 }
 
 /// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
@@ -66,7 +68,8 @@ impl<'a> Engine<'a> {
         let residual = self.residual(&model);
         let noise = Noise::fitted(&residual, self.observed);
         let log_likelihood = self.log(&noise, &residual) - noise.cost(residual.len());
-        Fit { model, residual, noise, log_likelihood }
+        let plain = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
+        Fit { model, residual, noise, log_likelihood, plain }
     }
 
     /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.

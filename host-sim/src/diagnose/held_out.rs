@@ -33,7 +33,10 @@ impl Engine<'_> {
                 let seen: Vec<Term> = terms
                     .iter()
                     .zip(&data.fold)
-                    .map(|(term, &of)| Term { weight: if usize::from(of) == fold { 0.0 } else { term.weight }, ..*term })
+                    .map(|(term, &of)| Term {
+                        weight: if usize::from(of) == fold { 0.0 } else { term.weight },
+                        ..*term
+                    })
                     .collect();
                 let mut moved = points.clone();
                 for (place, step) in newton(&jacobian, &seen) {

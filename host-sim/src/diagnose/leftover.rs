@@ -136,9 +136,9 @@ fn features(data: &Data) -> Vec<Group> {
     };
     let sample = data.sample_s;
     let past = [4.0, 20.0, 100.0, 500.0].map(|samples| followed(samples * sample, &|row| data.voltage_v[row]));
-    let after = [2.0, 10.0, 50.0]
-        .into_iter()
-        .flat_map(|samples| [followed(samples * sample, &change), followed(samples * sample, &|row| change(row).abs())]);
+    let after = [2.0, 10.0, 50.0].into_iter().flat_map(|samples| {
+        [followed(samples * sample, &change), followed(samples * sample, &|row| change(row).abs())]
+    });
     let mut groups = vec![
         Group { place: "in what the voltage was before".into(), columns: past.to_vec() },
         Group { place: "just after changes of the voltage".into(), columns: after.collect() },

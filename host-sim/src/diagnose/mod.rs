@@ -6,10 +6,12 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
+//! | [`base`] | the simulation that is judged |
 //! | [`data`], [`observed`] | the record made ready; what its readings say before any model |
 //! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
+//! | [`cure`] | the extended spring as a plant file, and in the tick |
 //! | [`leftover`], [`spectrum`] | what no effect explains |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
 
@@ -18,6 +20,8 @@ use anyhow::Result;
 use crate::bad_input;
 use crate::record::Record;
 
+pub mod base;
+pub mod cure;
 pub mod data;
 pub mod diagnosis;
 pub mod effect;
@@ -40,29 +44,28 @@ pub use data::Input;
 pub use diagnosis::Diagnosis;
 pub use report::{Report, Verdict};
 
+use base::Base;
 use data::Data;
 use fit::Engine;
 use model::Simulator;
 use observed::Observed;
-use relaxation::Relaxation;
 
 /// Fewest readings that anything can be said of.
 const FEWEST_ROWS: usize = 8;
 
 /// How to take a record.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// What the voltage did between rows.
     pub input: Input,
     /// The simulation to be judged.
-    pub base: Relaxation,
+    pub base: Base,
 }
 
 impl Default for Options {
     /// Held voltage, the paper's plant.
     fn default() -> Self {
-        let plant = ::model::Plant::PAPER;
-        Self { input: Input::Hold, base: Relaxation::plain(plant.share, plant.time_constant_s) }
+        Self { input: Input::Hold, base: Base::paper() }
     }
 }
 
@@ -88,8 +91,9 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         );
     }
     let observed = Observed::new(&data);
-    let mut engine = Engine::new(&data, &observed, Simulator::new(&data, options.base));
-    Ok(diagnosis::diagnose(data.clone(), &observed, &mut engine, |scored| {
+    let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &options.base));
+    let held = options.input == Input::Hold;
+    Ok(diagnosis::diagnose(data.clone(), &observed, &mut engine, held, |scored| {
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     }))

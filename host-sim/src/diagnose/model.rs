@@ -1,10 +1,11 @@
 //! A model: the paper's chain with some effects in it, and what it predicts for a record.
 
+use super::base::Base;
 use super::data::Data;
 use super::effect::{Coordinate, Effect, Stage};
 use super::effects::EFFECTS;
-use super::relaxation::Relaxation;
 use super::signal::Signal;
+use crate::plant_file::PlantFile;
 
 /// One effect in one form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -94,17 +95,31 @@ impl Model {
 pub struct Simulator<'a> {
     /// The record.
     pub data: &'a Data,
-    /// The relaxation that is taken for granted until an effect changes it.
-    pub base: Relaxation,
+    /// The simulation without any effect.
+    pub base: &'a Base,
     signal: Signal,
     levels_v: Vec<f64>,
     /// Runs so far.
     pub runs: usize,
 }
 
+impl Model {
+    /// The base with the model's blocks in it, as a plant file.
+    pub fn extend(&self, base: &Base, data: &Data) -> PlantFile {
+        let mut file = base.file().clone();
+        let mut relaxation = base.relaxation;
+        for (block, point) in &self.blocks {
+            block.effect().relax(block.form, point, &mut relaxation);
+            block.effect().extend(block.form, point, data, &mut file);
+        }
+        relaxation.extend(&mut file);
+        file
+    }
+}
+
 impl<'a> Simulator<'a> {
     /// For one record.
-    pub fn new(data: &'a Data, base: Relaxation) -> Self {
+    pub fn new(data: &'a Data, base: &'a Base) -> Self {
         Self { data, base, signal: Signal::default(), levels_v: Vec::new(), runs: 0 }
     }
 
@@ -113,7 +128,7 @@ impl<'a> Simulator<'a> {
         self.runs += 1;
         let (data, signal) = (self.data, &mut self.signal);
         signal.clone_from(&data.command);
-        let mut relaxation = self.base;
+        let mut relaxation = self.base.relaxation;
         for (block, point) in &model.blocks {
             block.effect().relax(block.form, point, &mut relaxation);
         }
@@ -123,10 +138,12 @@ impl<'a> Simulator<'a> {
                 block.effect().drive(block.form, point, data, signal);
             }
         };
+        self.base.amplify(signal);
         drive(&model.blocks[..amplifier], signal);
         if relaxation.varies() {
             signal.middles(&mut self.levels_v);
         }
+        self.base.drive(signal);
         drive(&model.blocks[amplifier..], signal);
         relaxation.pass(signal, &self.levels_v);
         for (block, point) in &model.blocks {

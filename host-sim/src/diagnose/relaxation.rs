@@ -7,6 +7,7 @@
 //! `q` is the stiffness that would be reached in the end. The paper's plant has `creep = 0` and one `tau`.
 
 use super::signal::{Lag, Piece, Signal};
+use crate::plant_file::{self, PlantFile};
 
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +44,32 @@ impl Relaxation {
             self.tau_s + (self.tau_high_s - self.tau_s) * part
         };
         tau.max(0.02 * self.tau_s)
+    }
+
+    /// Writes itself into a plant file.
+    pub fn extend(&self, file: &mut PlantFile) {
+        let main = 1.0 - self.share - self.creep;
+        let (tau_s, weights) = match self.creep {
+            0.0 => (vec![self.tau_s], Vec::new()),
+            creep => (vec![self.tau_s, self.creep_tau_s], vec![main, creep]),
+        };
+        let tau_high_s = self.varies().then_some(self.tau_high_s);
+        file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s };
+    }
+
+    /// The relaxation of a plant file; `None` for one with more than two time constants.
+    pub fn of(file: &plant_file::Relaxation) -> Option<Self> {
+        let (&tau_s, rest) = file.tau_s.split_first()?;
+        let mut relaxation = Self { tau_high_s: file.tau_high_s.unwrap_or(tau_s), ..Self::plain(file.share, tau_s) };
+        match (rest, file.weights.as_slice()) {
+            ([], []) => Some(relaxation),
+            (&[creep_tau_s], &[_, creep]) => {
+                relaxation.creep = creep;
+                relaxation.creep_tau_s = creep_tau_s;
+                Some(relaxation)
+            }
+            _ => None,
+        }
     }
 
     /// True if the time constant depends on the voltage.

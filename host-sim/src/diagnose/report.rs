@@ -73,6 +73,8 @@ pub struct Extended {
     pub gain: f64,
     /// The plant file that was written.
     pub model: Option<String>,
+    /// Largest difference between the fixed-point tick and the fit, over the record, in V.
+    pub fixed_point_error_v: Option<f64>,
 }
 
 /// A named cause.

@@ -25,13 +25,15 @@ pub struct Scored {
 }
 
 /// What a block costs, in nats, beside its places and forms: so many are tried.
-const PRICE: f64 = 3.7;
+const PRICE: f64 = 4.3;
 /// And each of its coordinates, beyond what held-out rows charge: a wider block must not take a narrower one's place.
 const PRICE_OF_COORDINATE: f64 = 1.8;
 /// Structures that are carried on.
 const BEAM: usize = 3;
 /// Extensions of each that are judged on held-out rows.
 const JUDGED: usize = 5;
+/// And as many more by their plain error, where the noise seems to have a memory.
+const JUDGED_PLAIN: usize = 3;
 /// Most blocks in a model.
 const MOST_BLOCKS: usize = 6;
 /// What a block may lose for a while, in nats, where the noise seems to have a memory.
@@ -105,14 +107,22 @@ impl<'e, 'a> Search<'e, 'a> {
             let mut next: Vec<Scored> = Vec::new();
             for node in &beam {
                 // Blocks that are only good together: while the noise seems to have a memory, one may make a loss.
-                let loss = if node.fit.noise.ar.is_empty() { 0.0 } else { PATIENCE };
-                let children = self.children(node).into_iter().filter(|child| child.score > node.score - loss);
+                let patient = |child: &Scored| {
+                    let gain = child.score - node.score;
+                    gain > -PATIENCE || child.fit.plain > node.fit.plain + PATIENCE
+                };
+                let alone = node.fit.noise.ar.is_empty();
+                let children = self.children(node).into_iter();
+                let children = children.filter(|child| child.score > node.score || !alone && patient(child));
                 next.extend(children);
             }
             next.sort_by(|a, b| b.score.total_cmp(&a.score));
             distinct(&mut next);
-            next.truncate(BEAM);
-            let mut next: Vec<Scored> = next.into_iter().map(|scored| self.pruned(scored)).collect();
+            let rest = next.split_off(BEAM.min(next.len()));
+            next.extend(rest.into_iter().max_by(|a, b| a.fit.plain.total_cmp(&b.fit.plain)));
+            // One that makes a loss for a while would only be taken back.
+            let prune = |scored: Scored| if scored.score > best.score { self.pruned(scored) } else { scored };
+            let mut next: Vec<Scored> = next.into_iter().map(prune).collect();
             if let Some(first) = next.first().cloned()
                 && first.score > best.score
             {
@@ -228,7 +238,13 @@ impl<'e, 'a> Search<'e, 'a> {
             *count += 1;
             *count <= 2
         });
-        fits.truncate(JUDGED);
+        // What a memory of the noise hides while much is still wrong shows in the plain error.
+        let rest = fits.split_off(JUDGED.min(fits.len()));
+        let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.fit.plain).collect();
+        plain.sort_by(|a, b| b.1.plain.total_cmp(&a.1.plain));
+        if !node.fit.noise.ar.is_empty() {
+            fits.extend(plain.into_iter().take(JUDGED_PLAIN));
+        }
         fits.into_iter().map(|(_, fit)| self.judge(fit.model)).collect()
     }
 

@@ -258,7 +258,10 @@ mod tests {
     #[test]
     fn a_lag_is_exact_for_steps_and_ramps() {
         let mut lag = Lag::at(5.5, 0.0);
-        assert!((lag.pass(Piece { duration_s: 2.0, from: 3.0, to: 3.0 }).1 - 3.0 * (1.0 - (-2.0f64 / 5.5).exp())).abs() < 1e-12);
+        assert!(
+            (lag.pass(Piece { duration_s: 2.0, from: 3.0, to: 3.0 }).1 - 3.0 * (1.0 - (-2.0f64 / 5.5).exp())).abs()
+                < 1e-12
+        );
         let mut lag = Lag::at(2.0, 0.0);
         let exact = 3.0 - 2.0 * (1.0 - (-1.5f64).exp());
         assert!((lag.pass(Piece { duration_s: 3.0, from: 0.0, to: 3.0 }).1 - exact).abs() < 1e-12);

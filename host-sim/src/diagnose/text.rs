@@ -27,6 +27,9 @@ pub fn text(name: &str, report: &Report) -> String {
     ] {
         let _ = writeln!(text, "{what:22} {before:12.3} {after:12.3}");
     }
+    if let Some(error) = report.extended.fixed_point_error_v {
+        let _ = writeln!(text, "The fixed-point tick runs the extended spring within {error:.3} V of the fit.");
+    }
     text
 }
 
@@ -43,9 +46,15 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
     let rows = report.rows;
     let mut sentences = vec![match report.verdict {
         Verdict::Consistent => format!("The simulation agrees with {name}: nothing beyond noise in {rows} readings."),
-        Verdict::Insufficient => format!("{name} cannot tell what is wrong: its {rows} readings hold too little excitation."),
-        Verdict::Unexplained if causes.is_empty() => format!("The simulation is wrong on {name}, and no known cause explains it."),
-        Verdict::Unexplained => format!("The simulation is wrong on {name}; {} explains only a part.", causes.join(", ")),
+        Verdict::Insufficient => {
+            format!("{name} cannot tell what is wrong: its {rows} readings hold too little excitation.")
+        }
+        Verdict::Unexplained if causes.is_empty() => {
+            format!("The simulation is wrong on {name}, and no known cause explains it.")
+        }
+        Verdict::Unexplained => {
+            format!("The simulation is wrong on {name}; {} explains only a part.", causes.join(", "))
+        }
         Verdict::Ambiguous | Verdict::Explained => format!("The simulation is wrong on {name}: {}.", causes.join("; ")),
     }];
     if !report.findings.is_empty() {
@@ -58,8 +67,11 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         ));
     }
     if !report.alternatives.is_empty() {
-        let rivals: Vec<String> =
-            report.alternatives.iter().map(|set| if set.is_empty() { "nothing".into() } else { set.join(" with ") }).collect();
+        let rivals: Vec<String> = report
+            .alternatives
+            .iter()
+            .map(|set| if set.is_empty() { "nothing".into() } else { set.join(" with ") })
+            .collect();
         sentences.push(format!("The data cannot reject instead: {}.", rivals.join("; ")));
     }
     if let Some(leftover) = &report.leftover {
@@ -75,7 +87,9 @@ fn row(text: &mut String, finding: &Finding) {
     let parameters: Vec<String> = finding
         .parameters
         .iter()
-        .map(|(name, it)| format!("{name} = {:.4} [{:.4}, {:.4}] {}", it.value, it.low, it.high, it.unit).trim().to_owned())
+        .map(|(name, it)| {
+            format!("{name} = {:.4} [{:.4}, {:.4}] {}", it.value, it.low, it.high, it.unit).trim().to_owned()
+        })
         .collect();
     let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
     let _ = writeln!(text, "  {}", finding.evidence);

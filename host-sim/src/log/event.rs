@@ -51,6 +51,9 @@ pub enum Event {
         overruns: u32,
         /// The latest of them.
         worst_lateness_us: u32,
+        /// Root mean square over the last second, to 6 %; older firmware does not tell.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        rms_lateness_us: Option<f32>,
         /// Ticks in which a limit acted.
         limited_ticks: u32,
         /// Of the supervisor.
@@ -166,6 +169,7 @@ impl Values {
                 tick: self.number("tick=")?,
                 overruns: self.number("overruns=")?,
                 worst_lateness_us: self.number("worst_lateness_us=")?,
+                rms_lateness_us: self.number("rms_lateness_us="),
                 limited_ticks: self.number("limited_ticks=")?,
                 state: self.text("state=")?,
                 target_mv: self.number("target_mv=")?,

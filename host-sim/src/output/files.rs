@@ -81,9 +81,9 @@ fn readable_by_all(_: &std::fs::File) -> std::io::Result<()> {
 ///
 /// # Errors
 /// As the sink's.
-pub fn write_csv(
+pub fn write_csv<P>(
     out: &mut dyn Write,
-    experiment: &Experiment,
+    experiment: &Experiment<P>,
     run: &Run,
     samples: &[Sample],
     spring: &Spring,

@@ -2,6 +2,7 @@
 
 pub mod diagnosis;
 mod draw;
+pub mod figure;
 pub mod files;
 pub mod plots;
 pub mod terminal;

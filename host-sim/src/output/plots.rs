@@ -13,7 +13,7 @@ const WITHOUT: &str = "#d55e00";
 const MEASURED: &str = "#000000";
 
 /// Target, stiffness with and without controller, and the measured points.
-pub fn stiffness(experiment: &Experiment, run: &Run, report: &Report) -> String {
+pub fn stiffness<P>(experiment: &Experiment<P>, run: &Run, report: &Report) -> String {
     let measured: Vec<(f64, f64)> = report.rows.iter().filter_map(|row| Some((row.time_s, row.measured?))).collect();
     let mut plots: Vec<Plot> = vec![
         line(target(experiment, run), TARGET, "target").with_dashed().into(),
@@ -29,7 +29,7 @@ pub fn stiffness(experiment: &Experiment, run: &Run, report: &Report) -> String 
 }
 
 /// Target and the voltage put across the spring.
-pub fn voltage(experiment: &Experiment, run: &Run, samples: &[Sample]) -> String {
+pub fn voltage<P>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> String {
     let plots: Vec<Plot> = vec![
         line(target(experiment, run), TARGET, "target").with_dashed().into(),
         line(points(run, samples, |s| s.applied.to_f64()), WITH, "applied").into(),
@@ -37,7 +37,7 @@ pub fn voltage(experiment: &Experiment, run: &Run, samples: &[Sample]) -> String
     render(plots, "Voltage across the spring", "voltage [V]")
 }
 
-fn target(experiment: &Experiment, run: &Run) -> Vec<(f64, f64)> {
+fn target<P>(experiment: &Experiment<P>, run: &Run) -> Vec<(f64, f64)> {
     let mut reader = experiment.schedule.reader();
     thinned((0..run.with.len()).map(|tick| (run.time_s(tick), reader.at(run.time_s(tick)))).collect())
 }

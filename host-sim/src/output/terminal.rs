@@ -94,7 +94,9 @@ fn steps(text: &mut String, steps: &[Response]) {
             ),
         );
     }
-    line(text, "Shortest possible: any controller within range and slew, from a spring settled at the old value.");
+    if steps.iter().any(|step| step.bound_t97_s.is_some()) {
+        line(text, "Shortest possible: any controller within range and slew, from a spring settled at the old value.");
+    }
 }
 
 /// At most six decimals, none that are zero.

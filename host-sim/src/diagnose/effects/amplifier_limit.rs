@@ -3,6 +3,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::Signal;
+use crate::plant_file::PlantFile;
 
 pub(super) struct AmplifierLimit;
 
@@ -28,11 +29,18 @@ impl Effect for AmplifierLimit {
     }
 
     fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
-        (1..20).map(|part| vec![data.full_scale_v * (1.0 - 0.04 * f64::from(part))]).chain([vec![0.985 * data.full_scale_v]]).collect()
+        (1..20)
+            .map(|part| vec![data.full_scale_v * (1.0 - 0.04 * f64::from(part))])
+            .chain([vec![0.985 * data.full_scale_v]])
+            .collect()
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("limit_v", "V", point[0])]
+    }
+
+    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
+        file.amplifier.get_or_insert_default().limit_v = Some(point[0]);
     }
 
     fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {

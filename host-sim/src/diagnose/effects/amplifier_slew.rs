@@ -3,6 +3,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::Signal;
+use crate::plant_file::PlantFile;
 
 pub(super) struct AmplifierSlew;
 
@@ -42,6 +43,10 @@ impl Effect for AmplifierSlew {
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("slew_v_per_s", "V/s", point[0].exp())]
+    }
+
+    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
+        file.amplifier.get_or_insert_default().slew_v_per_s = Some(point[0].exp());
     }
 
     fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {

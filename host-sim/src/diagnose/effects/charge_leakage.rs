@@ -10,6 +10,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::{Lag, Signal};
+use crate::plant_file::{Leakage, PlantFile};
 
 pub(super) struct ChargeLeakage;
 
@@ -48,6 +49,10 @@ impl Effect for ChargeLeakage {
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
+    }
+
+    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
+        file.leakage = Some(Leakage { share: point[0], tau_s: point[1].exp() });
     }
 
     fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {

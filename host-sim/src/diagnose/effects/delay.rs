@@ -3,6 +3,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::Signal;
+use crate::plant_file::PlantFile;
 
 pub(super) struct Delay;
 
@@ -48,6 +49,10 @@ impl Effect for Delay {
 
     fn places(&self, data: &Data) -> f64 {
         (longest(data) / data.sample_s).clamp(1.0, 5.0).ln()
+    }
+
+    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
+        file.amplifier.get_or_insert_default().delay_s = Some(point[0]);
     }
 
     fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {

@@ -1,8 +1,10 @@
 //! The static gain is not 1: `f = gain u`.
 
+use crate::diagnose::base::extend_law;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::Signal;
+use crate::plant_file::PlantFile;
 
 pub(super) struct GainError;
 
@@ -37,6 +39,10 @@ impl Effect for GainError {
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("gain", "", point[0])]
+    }
+
+    fn extend(&self, _: usize, point: &[f64], data: &Data, file: &mut PlantFile) {
+        extend_law(file, data.full_scale_v, 2, |stiffness| point[0] * stiffness);
     }
 
     fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {

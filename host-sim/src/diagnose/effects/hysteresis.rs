@@ -17,6 +17,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::Signal;
+use crate::plant_file::{Memory, PlantFile};
 
 pub(super) struct Hysteresis;
 
@@ -141,6 +142,13 @@ impl Effect for Hysteresis {
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
         vec![Quantity::new("width_v", "V", Bank::new(form, point).width(data.full_scale_v))]
+    }
+
+    fn extend(&self, form: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
+        let Bank { gain, direct, plays } = Bank::new(form, point);
+        let plays = plays.into_iter().filter(|play| play.weight != 0.0);
+        let (thresholds_v, weights) = plays.map(|play| (play.threshold, gain * play.weight)).unzip();
+        file.memory = Some(Memory { direct: gain * direct, thresholds_v, weights });
     }
 
     fn drive(&self, form: usize, point: &[f64], _: &Data, signal: &mut Signal) {

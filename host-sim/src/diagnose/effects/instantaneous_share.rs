@@ -3,6 +3,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::relaxation::Relaxation;
+use crate::plant_file::PlantFile;
 
 pub(super) struct InstantaneousShare;
 
@@ -34,6 +35,9 @@ impl Effect for InstantaneousShare {
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("share", "", point[0])]
     }
+
+    /// The relaxation is written as a whole, by [`Relaxation::extend`].
+    fn extend(&self, _: usize, _: &[f64], _: &Data, _: &mut PlantFile) {}
 
     fn relax(&self, _: usize, point: &[f64], relaxation: &mut Relaxation) {
         relaxation.share = point[0];

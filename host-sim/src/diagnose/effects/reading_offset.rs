@@ -111,7 +111,7 @@ impl Effect for ReadingOffset {
 
     fn places(&self, data: &Data) -> f64 {
         // Both edges; neighbouring runs are nearly the same.
-        (data.rows() as f64).max(1.0).ln()
+        1.25 * (data.rows() as f64).max(1.0).ln()
     }
 
     fn polish(&self, _: usize, point: &mut [f64], scene: &Scene) {

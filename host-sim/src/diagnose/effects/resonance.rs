@@ -84,8 +84,5 @@ fn transition(omega: f64, zeta: f64, time_s: f64) -> [[f64; 2]; 2] {
     let decay = (-zeta * omega * time_s).exp();
     let (sin, cos) = (damped * time_s).sin_cos();
     let s = sin / damped;
-    [
-        [decay * (cos + zeta * omega * s), decay * s],
-        [-decay * omega * omega * s, decay * (cos - zeta * omega * s)],
-    ]
+    [[decay * (cos + zeta * omega * s), decay * s], [-decay * omega * omega * s, decay * (cos - zeta * omega * s)]]
 }

@@ -8,6 +8,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::relaxation::Relaxation;
+use crate::plant_file::PlantFile;
 
 pub(super) struct SecondRelaxation;
 
@@ -51,6 +52,9 @@ impl Effect for SecondRelaxation {
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
     }
+
+    /// The relaxation is written as a whole, by [`Relaxation::extend`].
+    fn extend(&self, _: usize, _: &[f64], _: &Data, _: &mut PlantFile) {}
 
     fn relax(&self, form: usize, point: &[f64], relaxation: &mut Relaxation) {
         relaxation.creep = point[0];

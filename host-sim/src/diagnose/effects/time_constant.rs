@@ -3,6 +3,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::relaxation::Relaxation;
+use crate::plant_file::PlantFile;
 
 pub(super) struct TimeConstant;
 
@@ -38,6 +39,9 @@ impl Effect for TimeConstant {
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("tau_s", "s", point[0].exp())]
     }
+
+    /// The relaxation is written as a whole, by [`Relaxation::extend`].
+    fn extend(&self, _: usize, _: &[f64], _: &Data, _: &mut PlantFile) {}
 
     fn relax(&self, _: usize, point: &[f64], relaxation: &mut Relaxation) {
         let factor = point[0].exp() / relaxation.tau_s;

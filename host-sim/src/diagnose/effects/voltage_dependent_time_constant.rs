@@ -3,6 +3,7 @@
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::relaxation::Relaxation;
+use crate::plant_file::PlantFile;
 
 pub(super) struct VoltageDependentTimeConstant;
 
@@ -42,6 +43,14 @@ impl Effect for VoltageDependentTimeConstant {
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("tau_low_s", "s", point[0].exp()), Quantity::new("tau_high_s", "s", point[1].exp())]
+    }
+
+    /// The relaxation is written as a whole, by [`Relaxation::extend`]; the tick's time constant is straight between both ends.
+    fn extend(&self, form: usize, _: &[f64], _: &Data, file: &mut PlantFile) {
+        if form == GEOMETRIC {
+            let note = "fitted as geometric between its ends, written as straight";
+            file.unmodelled.get_or_insert_default().insert(self.cause().to_owned(), note.into());
+        }
     }
 
     fn relax(&self, form: usize, point: &[f64], relaxation: &mut Relaxation) {

@@ -27,6 +27,9 @@ pub struct Origin {
     pub command: String,
 }
 
+/// The extended spring, for `vsj stair --plant`.
+pub const PLANT_FILE: &str = "plant.toml";
+
 /// A plot of a diagnosis.
 struct Figure {
     /// Its file.
@@ -48,6 +51,10 @@ pub fn write(mut files: Files, diagnosis: &Diagnosis, origin: &Origin) -> Result
         files.add(name, |out| out.write_all(svg.as_bytes()))?;
     }
     files.add("residuals.csv", |out| residuals::write(out, diagnosis))?;
+    let plant = diagnosis.plant.to_toml()?;
+    files.add(PLANT_FILE, |out| {
+        write!(out, "# Identified from {}\n{plant}", origin.record.replace(['\n', '\r'], " "))
+    })?;
     let answer = serde_json::to_string_pretty(&diagnosis.report).context("diagnosis.json")?;
     files.add("diagnosis.json", |out| writeln!(out, "{answer}"))?;
     files.finish()

@@ -1,0 +1,152 @@
+//! `vsj beam`: the leaf spring's statics.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::BadInput;
+use host_sim::beam::cantilever::{Beam, Load};
+use host_sim::beam::report::{ELEMENTS, Question, Report};
+use host_sim::beam::stack::{self, ORDER, Stack};
+use host_sim::beam::{experiment, stack::TABLE2};
+use host_sim::output::files::Files;
+
+use super::print;
+
+/// The leaf spring's statics: beam experiment, deflection small and large, layers that slip
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj beam                                        the report's experiment, its aluminium foil, its layers
+  vsj beam --thickness-um 40 --force-un 500 --at-mm 10,30,59.8
+  vsj beam --force-un 500 --voltage-v 400 --json  the stack at 400 V, under 500 uN
+  vsj beam --experiment readings.csv --layers layers.csv --stack PET,PVdF,PET --out out/beam")]
+pub(crate) struct Arguments {
+    /// Readings of a beam experiment, with columns displacement_mm and force_un_<V>v; without it, the report's Table 1
+    #[arg(long, value_name = "FILE.csv")]
+    experiment: Option<PathBuf>,
+    /// Free length of the beam of one material, in mm
+    #[arg(long, default_value_t = 59.8, value_name = "MM", allow_negative_numbers = true)]
+    length_mm: f64,
+    /// Its width, in mm
+    #[arg(long, default_value_t = 19.8, value_name = "MM", allow_negative_numbers = true)]
+    width_mm: f64,
+    /// Its thickness, in um
+    #[arg(long, default_value_t = 20.0, value_name = "UM", allow_negative_numbers = true)]
+    thickness_um: f64,
+    /// Its Young's modulus, in GPa
+    #[arg(long, default_value_t = 69.0, value_name = "GPA", allow_negative_numbers = true)]
+    modulus_gpa: f64,
+    /// Its density, in kg/m3
+    #[arg(long, default_value_t = 2700.0, value_name = "KG/M3", allow_negative_numbers = true)]
+    density: f64,
+    /// Force at the tip, upwards, in uN; it bends the stack too
+    #[arg(long, default_value_t = 900.0, value_name = "UN", allow_negative_numbers = true)]
+    force_un: f64,
+    /// Gravity, downwards, in m/s2; 0 leaves the weight out
+    #[arg(long, default_value_t = 9.8, value_name = "M/S2", allow_negative_numbers = true)]
+    gravity: f64,
+    /// Places along the beam, in mm from the clamp; without it, every quarter of the length
+    #[arg(long, value_name = "MM", value_delimiter = ',', allow_negative_numbers = true)]
+    at_mm: Vec<f64>,
+    /// Error of the linear theory that is tolerated, as part of the largest displacement
+    #[arg(long, default_value_t = 0.05, value_name = "PART", allow_negative_numbers = true)]
+    tolerance: f64,
+    /// Layers, with the columns of the report's Table 2; without it, Table 2
+    #[arg(long, value_name = "FILE.csv")]
+    layers: Option<PathBuf>,
+    /// Their order, bottom to top
+    #[arg(long, default_value = ORDER, value_name = "MATERIAL,...")]
+    stack: String,
+    /// Voltage across the stack, in V
+    #[arg(long, default_value_t = 0.0, value_name = "V", allow_negative_numbers = true)]
+    voltage_v: f64,
+    /// Stiffness against slip between layers, in Pa/m; without it, as identified on the experiment
+    #[arg(long, value_name = "PA/M", allow_negative_numbers = true)]
+    interlayer: Option<f64>,
+    /// Finite elements along the stack
+    #[arg(long, default_value_t = ELEMENTS, value_name = "N")]
+    elements: usize,
+    /// Write beam.txt, experiment.svg, beam.svg and stack.svg to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let question = question(arguments)?;
+    let report = Report::new(&question).map_err(named)?;
+    let text = report.text();
+    let mut wrote = String::new();
+    if let Some(folder) = &arguments.out {
+        let mut files = Files::new(folder)?;
+        files.add("beam.txt", |out| out.write_all(text.as_bytes()))?;
+        for (name, svg) in report.figures(&question.readings) {
+            files.add(name, |out| out.write_all(svg.as_bytes()))?;
+        }
+        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    }
+    if arguments.json { print(&format!("{}\n", serde_json::to_string(&report)?)) } else { print(&(text + &wrote)) }
+}
+
+fn question(arguments: &Arguments) -> Result<Question> {
+    let beam = Beam {
+        length_m: 1e-3 * arguments.length_mm,
+        width_m: 1e-3 * arguments.width_mm,
+        thickness_m: 1e-6 * arguments.thickness_um,
+        youngs_modulus_pa: 1e9 * arguments.modulus_gpa,
+        density_kg_per_m3: arguments.density,
+    };
+    let beam = beam.checked().map_err(named)?;
+    let load = Load { tip_n: 1e-6 * arguments.force_un, gravity_m_per_s2: arguments.gravity };
+    let readings = arguments.experiment.as_deref().map_or_else(experiment::table1, experiment::open)?;
+    let kinds = match &arguments.layers {
+        None => stack::kinds("Table 2", TABLE2)?,
+        Some(path) => stack::kinds(&path.display().to_string(), &read(path)?)?,
+    };
+    let at_m = if arguments.at_mm.is_empty() {
+        [0.25, 0.5, 0.75, 1.0].map(|part| part * beam.length_m).to_vec()
+    } else {
+        arguments.at_mm.iter().map(|mm| 1e-3 * mm).collect()
+    };
+    Ok(Question {
+        readings,
+        stack: Stack::in_order(&kinds, &arguments.stack)?,
+        beam,
+        load: load.checked().map_err(named)?,
+        tolerance: arguments.tolerance,
+        at_m,
+        voltage_v: arguments.voltage_v,
+        interlayer_pa_per_m: arguments.interlayer,
+        elements: arguments.elements,
+    })
+}
+
+fn read(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path)
+        .map_err(|error| BadInput(format!("{}: cannot be read: {error}", path.display())).into())
+}
+
+/// Says which option sets the field that an error begins with.
+fn named(error: anyhow::Error) -> anyhow::Error {
+    let text = error.to_string();
+    let option = match text.split(' ').next().unwrap_or_default() {
+        "length_m" => "--length-mm",
+        "width_m" => "--width-mm",
+        "thickness_m" => "--thickness-um",
+        "youngs_modulus_pa" => "--modulus-gpa",
+        "density_kg_per_m3" => "--density",
+        "tip_n" => "--force-un",
+        "gravity_m_per_s2" => "--gravity",
+        "interlayer_pa_per_m" => "--interlayer",
+        "tolerance" => "--tolerance",
+        "voltage_v" => "--voltage-v",
+        "elements" => "--elements",
+        "at_mm" => "--at-mm",
+        _ => return error,
+    };
+    BadInput(format!("{option}: {text}")).into()
+}

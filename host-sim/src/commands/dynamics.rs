@@ -1,0 +1,121 @@
+//! `vsj dynamics`: the report's dynamic models.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::BadInput;
+use host_sim::dynamics::input::Input;
+use host_sim::dynamics::mapping::PlantGains;
+use host_sim::dynamics::report::{Model, Question, Report};
+use host_sim::dynamics::zener::{Changes, Start, Zener};
+use host_sim::output::files::Files;
+use host_sim::schedule::Between;
+
+use super::print;
+
+/// Run one of the report's dynamic models, and say what it is in terms of the others
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj dynamics spring-damper               the report's input: stiffness 1, 4, 7, 1 for 30 s each, D = 10, L = 1, F = 10
+  vsj dynamics zener --changes both --out out/zener
+  vsj dynamics analogue --json             the same springs as a circuit, and how far the two are apart
+  vsj dynamics pi-plant --input stair      the plant alone on the stair of Table 3
+  vsj dynamics zener --k1 5 --k2 0.5 --damper 3 --input levels.csv --between linear")]
+pub(crate) struct Arguments {
+    /// The model
+    #[arg(value_enum)]
+    model: Model,
+    /// Series spring at level 1, in N/m
+    #[arg(long, default_value_t = 10.0, value_name = "N/M", allow_negative_numbers = true)]
+    k1: f64,
+    /// Damped spring at level 1, in N/m
+    #[arg(long, default_value_t = 1.0, value_name = "N/M", allow_negative_numbers = true)]
+    k2: f64,
+    /// Damper, in N s/m
+    #[arg(long, default_value_t = 10.0, value_name = "N_S/M", allow_negative_numbers = true)]
+    damper: f64,
+    /// Constant force, in N
+    #[arg(long, default_value_t = 10.0, value_name = "N", allow_negative_numbers = true)]
+    force: f64,
+    /// Relaxed length of spring and damper, in m
+    #[arg(long, default_value_t = 1.0, value_name = "M", allow_negative_numbers = true)]
+    length: f64,
+    /// The springs of the Zener model that follow the level
+    #[arg(long, value_enum, default_value_t)]
+    changes: Changes,
+    /// Proportional gain of the plant
+    #[arg(long, default_value_t = 0.1, value_name = "GAIN", allow_negative_numbers = true)]
+    kp: f64,
+    /// Integral gain of the plant, in 1/s
+    #[arg(long, default_value_t = 0.2, value_name = "GAIN", allow_negative_numbers = true)]
+    ki: f64,
+    /// The report's levels, the stair, or a file with columns time_s,voltage_v
+    #[arg(long, default_value = "report", value_name = "report|stair|FILE.csv")]
+    input: String,
+    /// What the level does between two rows of an input file
+    #[arg(long, value_enum, default_value_t)]
+    between: Between,
+    /// Start at rest under force and first level, not just loaded
+    #[arg(long)]
+    settled: bool,
+    /// Time between two rows, in s
+    #[arg(long, default_value_t = 5.0, value_name = "S", allow_negative_numbers = true)]
+    every: f64,
+    /// Write response.csv and response.svg to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let question = Question {
+        model: arguments.model,
+        zener: Zener {
+            k1_n_per_m: arguments.k1,
+            k2_n_per_m: arguments.k2,
+            damper_n_s_per_m: arguments.damper,
+            force_n: arguments.force,
+            changes: arguments.changes,
+        },
+        length_m: arguments.length,
+        gains: PlantGains { proportional: arguments.kp, integral_per_s: arguments.ki },
+        input: Input::open(&arguments.input, arguments.between)?,
+        start: if arguments.settled { Start::Settled } else { Start::Unloaded },
+        every_s: arguments.every,
+    };
+    let report = Report::new(&question).map_err(named)?;
+    let mut wrote = String::new();
+    if let Some(folder) = &arguments.out {
+        let mut files = Files::new(folder)?;
+        files.add("response.csv", |out| out.write_all(report.csv().as_bytes()))?;
+        files.add("response.svg", |out| out.write_all(report.figure().as_bytes()))?;
+        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    }
+    if arguments.json {
+        print(&format!("{}\n", serde_json::to_string(&report)?))
+    } else {
+        print(&(report.text() + &wrote))
+    }
+}
+
+/// Says which option sets the field that an error begins with.
+fn named(error: anyhow::Error) -> anyhow::Error {
+    let text = error.to_string();
+    let option = match text.split(' ').next().unwrap_or_default() {
+        "k1_n_per_m" => "--k1",
+        "k2_n_per_m" => "--k2",
+        "damper_n_s_per_m" => "--damper",
+        "force_n" => "--force",
+        "length_m" => "--length",
+        "proportional" => "--kp",
+        "integral_per_s" => "--ki",
+        "every_s" => "--every",
+        _ => return error,
+    };
+    BadInput(format!("{option}: {text}")).into()
+}

@@ -1,0 +1,132 @@
+//! `vsj joint`: what springs between two rings can do.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::BadInput;
+use host_sim::beam::cantilever::Beam;
+use host_sim::joint::{Joint, OuterEnd, Report, Requirement};
+use host_sim::output::files::Files;
+use host_sim::plant_file;
+use host_sim::reference::Loop;
+
+use super::print;
+
+/// Joint stiffness of springs set radially between two rings, against what the report requires
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj joint                                       12 springs of the report's size around an inner radius of 20 mm
+  vsj joint --springs 24 --inner-radius-mm 40 --outer-end clamped
+  vsj joint --stiffness 0.02                      which spring constant gives 0.02 N m/rad, and is it within reach
+  vsj joint --limit-v 1000 --within-s 1 --json    another amplifier, more time")]
+pub(crate) struct Arguments {
+    /// Number of springs
+    #[arg(long, default_value_t = 12, value_name = "N")]
+    springs: u32,
+    /// Radius of the inner ring, in mm
+    #[arg(long, default_value_t = 20.0, value_name = "MM", allow_negative_numbers = true)]
+    inner_radius_mm: f64,
+    /// How the outer end of a spring is held
+    #[arg(long, value_enum, default_value_t)]
+    outer_end: OuterEnd,
+    /// Free length of a spring, in mm
+    #[arg(long, default_value_t = 59.8, value_name = "MM", allow_negative_numbers = true)]
+    length_mm: f64,
+    /// Its width, in mm
+    #[arg(long, default_value_t = 19.8, value_name = "MM", allow_negative_numbers = true)]
+    width_mm: f64,
+    /// Its thickness, in um
+    #[arg(long, default_value_t = 190.0, value_name = "UM", allow_negative_numbers = true)]
+    thickness_um: f64,
+    /// A joint stiffness to be made, in N m/rad
+    #[arg(long, value_name = "N_M/RAD", allow_negative_numbers = true)]
+    stiffness: Option<f64>,
+    /// Softest joint required, in N m/rad
+    #[arg(long, default_value_t = Requirement::PAPER.low_n_m_per_rad, value_name = "N_M/RAD", allow_negative_numbers = true)]
+    low: f64,
+    /// Stiffest joint required, in N m/rad
+    #[arg(long, default_value_t = Requirement::PAPER.high_n_m_per_rad, value_name = "N_M/RAD", allow_negative_numbers = true)]
+    high: f64,
+    /// Time required, in s
+    #[arg(long, default_value_t = Requirement::PAPER.within_s, value_name = "S", allow_negative_numbers = true)]
+    within_s: f64,
+    /// Highest voltage of the amplifier, in V
+    #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
+    limit_v: f64,
+    /// Fastest change of the amplifier, in V/s; without it, no limit
+    #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
+    slew_v_per_s: Option<f64>,
+    /// The spring's relaxation: `paper`, or a plant file
+    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
+    plant: String,
+    /// Write joint.json and joint.txt to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let joint = Joint {
+        inner_radius_m: 1e-3 * arguments.inner_radius_mm,
+        spring_length_m: 1e-3 * arguments.length_mm,
+        springs: arguments.springs,
+        outer_end: arguments.outer_end,
+    };
+    let beam = Beam {
+        length_m: joint.spring_length_m,
+        width_m: 1e-3 * arguments.width_mm,
+        thickness_m: 1e-6 * arguments.thickness_um,
+        // Young's modulus is what the experiment says.
+        youngs_modulus_pa: 1.0,
+        density_kg_per_m3: 0.0,
+    };
+    let requirement = Requirement {
+        low_n_m_per_rad: arguments.low,
+        high_n_m_per_rad: arguments.high,
+        within_s: arguments.within_s,
+        ..Requirement::PAPER
+    };
+    let plant = plant_file::load_plain(&arguments.plant)?;
+    let system = Loop {
+        share: plant.share,
+        time_constant_s: plant.time_constant_s,
+        gains: None,
+        range_v: (0.0, arguments.limit_v),
+        slew_v_per_s: arguments.slew_v_per_s.unwrap_or(f64::INFINITY),
+    };
+    let report = Report::new(joint, requirement, &beam, &system, arguments.stiffness).map_err(named)?;
+    let (json, text) = (format!("{}\n", serde_json::to_string(&report)?), report.text());
+    let mut wrote = String::new();
+    if let Some(folder) = &arguments.out {
+        let mut files = Files::new(folder)?;
+        files.add("joint.json", |out| out.write_all(json.as_bytes()))?;
+        files.add("joint.txt", |out| out.write_all(text.as_bytes()))?;
+        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    }
+    print(&if arguments.json { json } else { text + &wrote })
+}
+
+/// Says which option sets the field that an error begins with.
+fn named(error: anyhow::Error) -> anyhow::Error {
+    let text = error.to_string();
+    let option = match text.split(' ').next().unwrap_or_default() {
+        "inner_radius_m" => "--inner-radius-mm",
+        "spring_length_m" | "length_m" => "--length-mm",
+        "width_m" => "--width-mm",
+        "thickness_m" => "--thickness-um",
+        "springs" => "--springs",
+        "low_n_m_per_rad" => "--low",
+        "high_n_m_per_rad" => "--high",
+        "within_s" => "--within-s",
+        "limit_v" => "--limit-v",
+        "slew_v_per_s" => "--slew-v-per-s",
+        "stiffness_n_m_per_rad" => "--stiffness",
+        _ => return error,
+    };
+    BadInput(format!("{option}: {text}")).into()
+}

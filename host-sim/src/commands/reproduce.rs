@@ -1,0 +1,44 @@
+//! `vsj reproduce`: every printed number of the source report, computed again.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::output::files::Files;
+use host_sim::reproduce::reproduce;
+
+use super::print;
+
+/// Compute every printed number of the source report again, and say which do not come out and why
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj reproduce                          what does not come out, most important first
+  vsj reproduce --json                   every number
+  vsj reproduce --out docs/reproduce     as a page
+
+The printed numbers are in data/printed.toml and the tables beside it.")]
+pub(crate) struct Arguments {
+    /// Write README.md, a page with every number, to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let report = reproduce()?;
+    let mut wrote = String::new();
+    if let Some(folder) = &arguments.out {
+        let mut files = Files::new(folder)?;
+        files.add("README.md", |out| out.write_all(report.page().as_bytes()))?;
+        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    }
+    if arguments.json {
+        print(&format!("{}\n", serde_json::to_string(&report)?))
+    } else {
+        print(&(report.text() + &wrote))
+    }
+}

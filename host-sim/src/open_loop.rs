@@ -1,0 +1,72 @@
+//! The fixed-point spring alone over a record: what the estimator makes of its voltages.
+//!
+//! [`crate::sampled::simulate`] is the same in double precision.
+
+use anyhow::Result;
+use model::estimator::{Estimator, Model};
+use model::{SampleTime, Volts};
+
+use crate::bad_input;
+use crate::bad_input::BadInput;
+
+/// The stiffness in V at increasing times in s, just after each of the voltages in V was put across the spring, each held
+/// until the next time. A time counts as its nearest tick.
+///
+/// # Errors
+/// [`BadInput`] for a spring that the tick refuses at this rate, voltages beyond +-2000 V and times that do not increase.
+pub fn simulate(spring: &impl Model, rate_hz: f64, time_s: &[f64], voltage_v: &[f64]) -> Result<Vec<f64>> {
+    let refused = |error: model::OutOfRange| BadInput(error.to_string());
+    let config = SampleTime::from_rate(rate_hz).and_then(|time| spring.scaled(time)).map_err(refused)?;
+    let start = time_s.first().copied().unwrap_or(0.0);
+    let mut state = Default::default();
+    let mut tick = 0;
+    let mut stiffness = Vec::with_capacity(time_s.len());
+    for (row, (&time, &voltage)) in time_s.iter().zip(voltage_v).enumerate() {
+        let applied = Volts::new(voltage).map_err(refused)?;
+        let next = time_s.get(row + 1).copied().unwrap_or(time);
+        if next < time || next.is_nan() {
+            bad_input!("time_s = {next} after {time}; expected times that increase");
+        }
+        // A copy: between two rows there may be no tick at all.
+        let mut now = state;
+        stiffness.push(config.run(&mut now, applied).to_f64());
+        let until = ((next - start) * rate_hz).round() as u64;
+        while tick < until {
+            config.run(&mut state, applied);
+            tick += 1;
+        }
+    }
+    Ok(stiffness)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampled::{self, Spring};
+    use model::Plant;
+
+    #[test]
+    fn it_agrees_with_double_precision_over_uneven_rows() {
+        let (times, volts) = ([3.0, 4.0, 4.0002, 6.5, 60.0, 61.0], [100.0, 500.0, 300.0, 20.0, 700.0, 0.0]);
+        let got = simulate(&Plant::PAPER, 1000.0, &times, &volts).unwrap();
+        let exact = sampled::simulate(&Spring::from(Plant::PAPER), &times, &volts);
+        // Two rows share a tick: 0.2 ms of a relaxation over 5.5 s.
+        for (got, exact) in got.iter().zip(&exact) {
+            assert!((got - exact).abs() < 0.02, "{got} {exact}");
+        }
+        assert_eq!((got.len(), exact.len()), (6, 6));
+    }
+
+    #[test]
+    fn what_cannot_be_run_is_bad_input() {
+        let paper = Plant::PAPER;
+        for error in [
+            simulate(&paper, 1.0, &[0.0], &[0.0]),
+            simulate(&paper, 1000.0, &[0.0], &[f64::NAN]),
+            simulate(&paper, 1000.0, &[0.0, f64::NAN], &[0.0, 0.0]),
+            simulate(&paper, 1000.0, &[1.0, 0.5], &[0.0, 0.0]),
+        ] {
+            assert!(error.unwrap_err().is::<BadInput>());
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Where in a TOML text a value stands.
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// File, line and column of a byte of `text`.
+pub(super) fn line_and_column(name: &str, text: &str, at: usize) -> String {
+    let before = text.get(..at).unwrap_or(text);
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+    format!("{name}, line {line}, column {column}")
+}
+
+/// The byte at which the `value` of a field `table.key` starts: the value itself in a list that has it, else the list;
+/// where the field was left out, its table.
+pub(super) fn of_field(text: &str, field: &str, value: f64) -> usize {
+    let Ok(root) = DeTable::parse(text) else { return 0 };
+    let mut start = 0;
+    let mut table = root.get_ref();
+    for key in field.split('.') {
+        let Some(found) = table.get(key) else { return start };
+        start = found.span().start;
+        match found.get_ref() {
+            DeValue::Table(inner) => table = inner,
+            DeValue::Array(list) => {
+                return list.iter().find(|item| is(item, value)).map_or(start, |item| item.span().start);
+            }
+            _ => return start,
+        }
+    }
+    start
+}
+
+fn is(item: &Spanned<DeValue<'_>>, value: f64) -> bool {
+    let number = match item.get_ref() {
+        DeValue::Float(float) => float.as_str().parse().ok(),
+        DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64),
+        _ => None,
+    };
+    number.is_some_and(|number: f64| number == value || (number.is_nan() && value.is_nan()))
+}

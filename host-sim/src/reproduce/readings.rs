@@ -1,0 +1,151 @@
+//! Numbers that were measured: they follow from nothing, but other measured numbers say where they should lie.
+//!
+//! A number is out of line if it would be so even when each number of its table gets its chance (Bonferroni, 5 % a table).
+
+use anyhow::{Context, Result};
+use model::Plant;
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+use super::compute::{Inputs, Outcome};
+use crate::beam::experiment::{Reading, lines, table1 as readings, voltages};
+use crate::beam::regression::Fit;
+use crate::beam::slip::tips;
+use crate::experiment::reference_at;
+use crate::reference::Loop;
+use crate::schedule::Schedule;
+use crate::table3 as printed;
+
+/// How often a table may be accused wrongly.
+const FALSE_ALARM: f64 = 0.05;
+
+/// The slope through the origin of one voltage of Table 1, from all of its readings.
+pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
+    let voltage = inputs.number("voltage_v")?;
+    let of_voltage: Vec<Reading> = readings()?.into_iter().filter(|r| r.voltage_v == voltage).collect();
+    let fit = lines(&of_voltage, &[voltage])?;
+    let error = 1.0 / fit.standard_errors_from(0, fit.coefficients[0] + 1.0);
+    let mut evidence = format!("the readings give {:.2} with a standard error of {error:.2}", fit.coefficients[0]);
+    for (index, reading) in of_voltage.iter().enumerate() {
+        let mut others = of_voltage.clone();
+        others.remove(index);
+        let without = lines(&others, &[voltage])?.coefficients[0];
+        if (without - fit.coefficients[0]).abs() > error / 2.0 {
+            evidence += &format!("; {without:.2} without the reading at {} mm", reading.displacement_mm);
+        }
+    }
+    Ok(Outcome { standard_error: Some(error), evidence: Some(evidence), ..Outcome::exact(fit.coefficients[0]) })
+}
+
+/// A reading of Table 1, expected from all others: lines through the origin with one scatter.
+pub(crate) fn table1(inputs: &Inputs<'_>) -> Result<Outcome> {
+    let (voltage, displacement) = (inputs.number("voltage_v")?, inputs.number("displacement_mm")?);
+    let all = readings()?;
+    let index = all
+        .iter()
+        .position(|r| r.voltage_v == voltage && r.displacement_mm == displacement)
+        .context("Table 1 has no such reading")?;
+    let fit = lines(&all, &voltages(&all))?;
+    let expected = fit.readings[index].expected;
+    // The interval holds one more reading with 95 %; widened, all readings of the table.
+    let half = (expected.high - expected.value) * widening(&fit, all.len())?;
+    let evidence = format!(
+        "the line through the other readings, which gives {:.1} +- {half:.1}; by chance a reading falls so far off once in \
+         {:.0}",
+        expected.value,
+        1.0 / fit.readings[index].chance
+    );
+    Ok(near(expected.value, half, evidence))
+}
+
+/// A measured number that should lie within `half` of `value`.
+fn near(value: f64, half: f64, evidence: String) -> Outcome {
+    Outcome { expected: Some((value - half, value + half)), evidence: Some(evidence), ..Outcome::exact(value) }
+}
+
+/// How much wider than one number's 95 % interval that of `numbers` numbers is.
+fn widening(fit: &Fit, numbers: usize) -> Result<f64> {
+    let student = StudentsT::new(0.0, 1.0, (fit.degrees_of_freedom - 1) as f64)?;
+    Ok(student.inverse_cdf(1.0 - 0.5 * FALSE_ALARM / numbers as f64) / student.inverse_cdf(0.975))
+}
+
+/// A displacement of section 4.1.4, expected from Table 1: force by slope, with the scatter of a force reading.
+pub(crate) fn tip_by_table1_mm(inputs: &Inputs<'_>) -> Result<Outcome> {
+    let (voltage, force) = (inputs.number("voltage_v")?, inputs.number("force_un")?);
+    let mut kept = readings()?;
+    let voltages = voltages(&kept);
+    let mut fit = lines(&kept, &voltages)?;
+    while let Some(index) = fit.out_of_line() {
+        kept.remove(index);
+        fit = lines(&kept, &voltages)?;
+    }
+    let index = voltages.iter().position(|&v| v == voltage).context("Table 1 has no such voltage")?;
+    let slope = fit.coefficients[index];
+    // As far as a reading in the middle of the table scatters.
+    let spread = fit.readings.iter().map(|r| r.expected.high - r.expected.value).fold(0.0, f64::max);
+    let half = spread * widening(&fit, tips()?.len())? / slope;
+    let value = force / slope;
+    let evidence =
+        format!("{force} uN by the slope of Table 1 at {voltage} V, {slope:.2} uN/mm: {value:.3} +- {half:.3} mm");
+    Ok(near(value, half, evidence))
+}
+
+/// A reading of Table 3, expected from the one before: the simulation without controller, shifted to go through that.
+///
+/// How far apart neighbours may be is what most neighbours are (median absolute deviation).
+pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
+    let time = inputs.number("time_s")?;
+    let rows = printed::rows()?;
+    let Plant { share, time_constant_s } = Plant::PAPER;
+    let everything = (f64::NEG_INFINITY, f64::INFINITY);
+    let alone = Loop { share, time_constant_s, gains: None, range_v: everything, slew_v_per_s: f64::INFINITY };
+    let simulated = reference_at(alone, &Schedule::stair(), rows.iter().map(|row| row.time_s));
+    let off: Vec<f64> = rows.iter().zip(&simulated).map(|(row, simulated)| row.measured - simulated).collect();
+    let jumps: Vec<f64> = off.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let index =
+        rows.iter().position(|row| row.time_s == time).filter(|&index| index > 0).context("no row before it")?;
+
+    let deviation = 1.4826 * median(jumps.iter().map(|jump| jump.abs()).collect());
+    let half = Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_ALARM / jumps.len() as f64) * deviation;
+    let value = simulated[index] + off[index - 1];
+    let sign = if off[index - 1] < 0.0 { -1.0 } else { 1.0 };
+    let run = off[1..index].iter().rev().take_while(|off| **off * sign > 0.0).count();
+    let evidence = format!(
+        "from the reading before ({} at {} s) the spring's relaxation leads to {value:.0} +- {half:.0}; the jump of {:+.0} is \
+         {:.1} times the usual scatter ({deviation:.0}) between neighbours. The {run} readings before lie {} the simulation, \
+         the last by {:.0}; this one lies {:.0} {} it: what was measured shifted between the two",
+        rows[index - 1].measured,
+        rows[index - 1].time_s,
+        jumps[index - 1],
+        (jumps[index - 1] / deviation).abs(),
+        if sign < 0.0 { "below" } else { "above" },
+        off[index - 1].abs(),
+        off[index].abs(),
+        if off[index] < 0.0 { "below" } else { "above" },
+    );
+    Ok(near(value, half, evidence))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+}
+
+/// The largest error of the finite elements of section 4.1.4 against what was measured.
+pub(crate) fn largest_fem_error_percent() -> Result<Outcome> {
+    let errors = tips()?.into_iter().map(|tip| (1e2 * (tip.fem_mm / tip.measured_mm - 1.0).abs(), tip));
+    let (worst, tip) = errors.max_by(|one, other| one.0.total_cmp(&other.0)).context("no rows")?;
+    let evidence = format!("at {} uN and {} V, the worst row of section 4.1.4", tip.force_un, tip.voltage_v);
+    Ok(Outcome { evidence: Some(evidence), ..Outcome::exact(worst) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.5);
+    }
+}

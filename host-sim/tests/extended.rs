@@ -1,0 +1,178 @@
+//! The extended spring's fixed-point tick against a double-precision loop of the same rate, over random springs such as
+//! identification finds: each block alone and all together, up a stair and down again, at 100 Hz, 1 kHz and 10 kHz.
+//!
+//! Twice: told which code of 12 bits was put out, which leaves the arithmetic and the interpolated time constant; and on
+//! its own, without a DAC beside one of 16 bits. With 12 bits the spring left alone would show up to half a code, 0.085 V.
+//!
+//! `cargo test -p host-sim --test extended -- --nocapture` prints the worst cases.
+
+use host_sim::plant_file::{Law, Leakage, Memory, PlantFile, Relaxation};
+use host_sim::sampled::SampledLoop;
+use model::{Amplifier, ExtendedPlant, Input, Plant, Settings, State, Volts};
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+
+/// What is promised of the tick, and of `vsj stair`, in V.
+const ALLOWED_V: f64 = 0.05;
+/// Levels in V, 6 s each, with the report's ramps of 0.1 s.
+const STAIR: [f64; 9] = [100.0, 200.0, 300.0, 400.0, 500.0, 250.0, 50.0, 350.0, 0.0];
+
+/// Which blocks are there.
+#[derive(Clone, Copy, Debug, Default)]
+struct Blocks {
+    memory: bool,
+    law: bool,
+    leakage: bool,
+    several: bool,
+    varying: bool,
+}
+
+const NONE: Blocks = Blocks { memory: false, law: false, leakage: false, several: false, varying: false };
+const ALL: Blocks = Blocks { memory: true, law: true, leakage: true, several: true, varying: true };
+const SETS: [(&str, Blocks); 7] = [
+    ("no block", NONE),
+    ("memory", Blocks { memory: true, ..NONE }),
+    ("law", Blocks { law: true, ..NONE }),
+    ("leakage", Blocks { leakage: true, ..NONE }),
+    ("several lags", Blocks { several: true, ..NONE }),
+    ("varying lag", Blocks { varying: true, ..NONE }),
+    ("all together", ALL),
+];
+
+prop_compose! {
+    fn memory()(plays in prop::collection::vec((0.0..80.0f64, 0.01..1.0f64), 1..=8), direct in 0.3..0.99f64) -> Memory {
+        let all: f64 = plays.iter().map(|play| play.1).sum::<f64>() / (1.0 - direct);
+        let (thresholds_v, weights) = plays.iter().map(|&(threshold, weight)| (threshold, weight / all)).unzip();
+        Memory { direct, thresholds_v, weights }
+    }
+}
+
+prop_compose! {
+    fn law()(lines in prop::collection::vec((20.0..150.0f64, 0.4..1.6f64), 1..=8)) -> Law {
+        let (mut voltage_v, mut stiffness, mut at) = (vec![0.0], vec![0.0], (0.0, 0.0));
+        for (width, slope) in lines {
+            at = (f64::min(at.0 + width, 1000.0), at.1 + width * slope);
+            voltage_v.push(at.0);
+            stiffness.push(at.1);
+        }
+        Law { voltage_v, stiffness }
+    }
+}
+
+prop_compose! {
+    fn relaxation(several: bool, varying: bool)(
+        share in 0.0..0.4f64,
+        lags in prop::collection::vec((-0.3..1.7f64, 0.1..1.0f64), if several { 2..=4 } else { 1..=1 }),
+        gain in 0.8..1.2f64,
+        ratio in -0.5..0.5f64,
+    ) -> Relaxation {
+        let all: f64 = lags.iter().map(|lag| lag.1).sum::<f64>() / (gain - share);
+        let tau_s: Vec<f64> = lags.iter().map(|lag| 10f64.powf(lag.0)).collect();
+        let weights = if several { lags.iter().map(|lag| lag.1 / all).collect() } else { Vec::new() };
+        let tau_high_s = varying.then_some(tau_s[0] * 10f64.powf(ratio));
+        Relaxation { share, tau_s, weights, tau_high_s }
+    }
+}
+
+prop_compose! {
+    fn plant(blocks: Blocks)(
+        memory in memory(),
+        law in law(),
+        (share, tau) in (0.0..0.4f64, 0.7..2.3f64),
+        relaxation in relaxation(blocks.several, blocks.varying),
+    ) -> PlantFile {
+        PlantFile {
+            memory: blocks.memory.then_some(memory),
+            law: blocks.law.then_some(law),
+            leakage: blocks.leakage.then_some(Leakage { share, tau_s: 10f64.powf(tau) }),
+            relaxation,
+            ..Plant::PAPER.into()
+        }
+    }
+}
+
+/// Largest differences of the stiffness, in V.
+#[derive(Clone, Copy, Debug, Default)]
+struct Worst {
+    /// Told the codes.
+    told: f64,
+    /// On its own.
+    alone: f64,
+    /// On its own, without pre-compensator.
+    uncontrolled: f64,
+}
+
+impl Worst {
+    fn of_both(self, other: Self) -> Self {
+        Self {
+            told: self.told.max(other.told),
+            alone: self.alone.max(other.alone),
+            uncontrolled: self.uncontrolled.max(other.uncontrolled),
+        }
+    }
+}
+
+/// Over the stair.
+fn disagreement(file: &PlantFile, rate_hz: f64) -> Worst {
+    let of = |gains, dac_bits, told| {
+        let amplifier = Amplifier { dac_bits, ..Amplifier::PAPER };
+        of_loop(&Settings { rate_hz, plant: file.extended(), gains, amplifier }, told)
+    };
+    let gains = Settings::PAPER.gains;
+    Worst {
+        told: f64::max(of(gains, 12, true), of(None, 12, true)),
+        alone: of(gains, 16, false),
+        uncontrolled: of(None, 16, false),
+    }
+}
+
+/// Of one loop, whose double is `told` the codes or left to itself.
+fn of_loop(settings: &Settings<ExtendedPlant<'_>>, told: bool) -> f64 {
+    let config = settings.check().expect("a spring such as identification finds");
+    let double = SampledLoop::from(settings);
+    let (mut fixed, mut state) = (State::default(), double.at_rest());
+    let (mut off, mut from) = (0.0f64, 0.0);
+    for to in STAIR {
+        for tick in 0..(6.0 * settings.rate_hz) as u32 {
+            let target = from + (to - from) * (f64::from(tick) / (0.1 * settings.rate_hz)).min(1.0);
+            let output = config.tick(&mut fixed, Input { target: Volts::new(target).unwrap() });
+            let voltage = double.drive(&mut state, target);
+            let stiffness = double.apply(&mut state, if told { output.applied.to_f64() } else { voltage });
+            off = off.max((output.stiffness.to_f64() - stiffness).abs());
+        }
+        from = to;
+    }
+    off
+}
+
+/// Always the same springs.
+#[test]
+fn each_block_alone_and_all_together_at_three_rates() {
+    println!("worst difference to double precision [V]   told codes   with controller   without");
+    for (name, blocks) in SETS {
+        for (rate_hz, springs) in [(100.0, 60), (1000.0, 20), (10_000.0, 2)] {
+            let mut runner = TestRunner::deterministic();
+            let mut worst = Worst::default();
+            for _ in 0..springs {
+                let file = plant(blocks).new_tree(&mut runner).expect("no filters").current();
+                worst = worst.of_both(disagreement(&file, rate_hz));
+            }
+            let Worst { told, alone, uncontrolled } = worst;
+            println!("{name:12} {rate_hz:5} Hz, {springs:3} springs {told:22.6} {alone:17.6} {uncontrolled:9.6}");
+            assert!(told < ALLOWED_V && alone < ALLOWED_V && uncontrolled < ALLOWED_V, "{name} {rate_hz}");
+            // Exact agreement would mean that both are the same code.
+            assert!(told > 0.0);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 16, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_random_spring_agrees_at_1_khz(file in plant(ALL)) {
+        let worst = disagreement(&file, 1000.0);
+        prop_assert!(worst.told < ALLOWED_V && worst.alone < ALLOWED_V && worst.uncontrolled < ALLOWED_V, "{worst:?}");
+    }
+}

@@ -1,0 +1,81 @@
+//! `vsj stair --plant FILE` with everything that a plant file can hold.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::tempdir;
+
+const WHOLE: &str = include_str!("../../docs/plant.toml");
+
+fn stair(folder: &Path, file: &str, arguments: &[&str]) -> Output {
+    std::fs::write(folder.join("plant.toml"), file).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
+    command.current_dir(folder).args(["stair", "--plant", "plant.toml"]).args(arguments).output().unwrap()
+}
+
+fn json(output: &Output) -> serde_json::Value {
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {output:?}"))
+}
+
+#[test]
+fn an_extended_spring_behind_its_recorded_amplifier() {
+    let folder = tempdir().unwrap();
+    let weaker = WHOLE.replace("650.0", "450.0");
+    let output = stair(folder.path(), &weaker, &["--json", "--out", "out", "--every", "1"]);
+    assert!(output.status.success(), "{output:?}");
+    let said = String::from_utf8(output.stderr.clone()).unwrap();
+    assert!(said.contains("plant.toml: not simulated: amplifier.delay_s, drift, remarks"), "{said}");
+    let report = json(&output);
+    let error = report["max_fixed_point_error"].as_f64().unwrap();
+    assert!(error > 0.0 && error < 0.15, "the end of the range at a code of the DAC, 0.1 V lower: {error}");
+    assert_eq!(report["steps"].as_array().unwrap().len(), 5);
+    assert!(report["steps"][0]["bound_t97_s"].is_null());
+    assert!((report["steps"][4]["peak_v"].as_f64().unwrap() - 450.0).abs() < 0.2, "{}", report["steps"][4]);
+    for name in ["stair.csv", "stiffness.svg", "voltage.svg"] {
+        assert!(folder.path().join("out").join(name).exists(), "{name}");
+    }
+    // The options' amplifier where it is the stricter one.
+    let report = json(&stair(folder.path(), &weaker, &["--json", "--slew-v-per-s", "50"]));
+    assert!(report["limited_ticks"]["slew"].as_u64().unwrap() > 10_000, "{}", report["limited_ticks"]);
+}
+
+/// Each block changes the answer, so each of them runs.
+#[test]
+fn every_table_has_its_effect() {
+    let folder = tempdir().unwrap();
+    let tables: Vec<&str> = WHOLE.split_inclusive('\n').collect();
+    let without = |table: &str| {
+        let mut inside = false;
+        let kept = tables.iter().filter(|line| {
+            inside = if line.starts_with('[') { line.starts_with(table) } else { inside };
+            !inside
+        });
+        kept.copied().collect::<String>()
+    };
+    let at_the_end = |file: &str| {
+        let report = json(&stair(folder.path(), file, &["--json", "--controller", "none"]));
+        assert!(report["max_fixed_point_error_without"].as_f64().unwrap() < 0.15);
+        report["rows"].as_array().unwrap().last().unwrap()["without_fixed"].as_f64().unwrap()
+    };
+    let whole = at_the_end(WHOLE);
+    let changes = ["[memory]", "[law]", "[leakage]"].map(|table| at_the_end(&without(table)) - whole);
+    assert!(changes.iter().all(|change| change.abs() > 1.0), "{changes:?}");
+    let changed = at_the_end(&WHOLE.replace("tau_high_s", "# tau_high_s")) - whole;
+    assert!(changed > 1.0, "the quicker spring is further: {changed}");
+}
+
+#[test]
+fn what_the_tick_refuses_is_named_with_its_place() {
+    let folder = tempdir().unwrap();
+    for (from, to, expected) in [
+        ("[10.0, 25.0]", "[10.0, -25.0]", "plant.toml, line 5, column 23: thresholds_v = -25 is not allowed"),
+        ("weights = [0.8, 0.109]\n", "", "weights = 0 is not allowed: expected 2 weights, one a time constant"),
+        ("[leakage]", "[leak]", "plant.toml, line 12, column 2: unknown field `leak`"),
+        ("tau_s = 40.0", "tau_s = 0.5", "--plant: leakage.tau_s = 0.5 is not allowed: expected 1 to 100000 s"),
+    ] {
+        let output = stair(folder.path(), &WHOLE.replace(from, to), &["--rate-hz", "100"]);
+        let said = String::from_utf8(output.stderr.clone()).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(expected), "{said}");
+    }
+}

@@ -1,0 +1,178 @@
+//! Relaxation with several time constants: what comes at once, and what later.
+//!
+//! ```text
+//! y = share q + sum_k weight_k w_k,    dw_k/dt = (q - w_k) / tau_k,    w_k = 0 at rest
+//! ```
+//!
+//! A sum of first-order lags with spread time constants is the usual model of creep in piezo actuators, a generalised
+//! Kelvin-Voigt chain. For a `q` that is held between ticks each lag is exact, as in [`crate::estimator`]. A lag moves by
+//! less than half of its distance in a tick, so it stays between inputs that were there.
+//!
+//! The first time constant may depend on the voltage: [`super::varying_rate`].
+
+use super::varying_rate::{TimeConstant, VaryingRate};
+use crate::coefficient::{Rate, Weight, saturated, upper};
+use crate::error::OutOfRange;
+use crate::estimator::Promptness;
+use crate::units::{Accumulator, SampleTime, Signal};
+
+/// The most lags of a relaxation.
+pub const MOST_LAGS: usize = 4;
+
+/// Share and lags. The magnitudes of `share` and `weights` add up to at most 10; for a static gain of 1 their sum is 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relaxation<'a> {
+    /// What comes at once, 0 to 10.
+    pub share: f64,
+    /// One to four time constants, in s, each two sample times (four where it varies) to 10 000 s.
+    pub time_constants_s: &'a [f64],
+    /// What each of them brings; none for one time constant that brings all the rest, `1 - share`.
+    pub weights: &'a [f64],
+    /// The first time constant at 500 V, in s, a tenth to ten times of that at 0 V; `None`: the same at all voltages.
+    pub time_constant_high_s: Option<f64>,
+}
+
+impl Relaxation<'_> {
+    /// Time constant and weight of each lag.
+    pub fn lags(&self) -> impl Iterator<Item = (f64, f64)> {
+        let weight = |lag| self.weights.get(lag).copied().unwrap_or(1.0 - self.share);
+        self.time_constants_s.iter().enumerate().map(move |(lag, &tau)| (tau, weight(lag)))
+    }
+
+    pub(crate) fn promptness(&self, sample_time: SampleTime) -> Promptness {
+        let mut promptness = Promptness { at_once: self.share.max(0.0), in_a_tick: 0.0, relaxed: 0.0 };
+        for (lag, (tau, weight)) in self.lags().enumerate() {
+            let shortest = match self.time_constant_high_s {
+                Some(high_s) if lag == 0 => TimeConstant { low_s: tau, high_s }.shortest_s(),
+                _ => tau,
+            };
+            let part = relaxed_in(shortest, sample_time);
+            promptness.in_a_tick += part * weight.max(0.0);
+            promptness.relaxed = promptness.relaxed.max(part);
+        }
+        promptness
+    }
+}
+
+/// What part of its distance a lag makes in one sample time.
+fn relaxed_in(time_constant_s: f64, sample_time: SampleTime) -> f64 {
+    -libm::expm1(-sample_time.seconds() / time_constant_s)
+}
+
+/// The relaxation for one sample time, scaled for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Config {
+    share: Weight,
+    weights: [Weight; MOST_LAGS],
+    rates: [Rate; MOST_LAGS],
+    count: u8,
+    /// In place of the first rate.
+    varying: Option<VaryingRate>,
+}
+
+/// How far each lag has come.
+pub(crate) type State = [Accumulator; MOST_LAGS];
+
+impl Config {
+    /// # Errors
+    /// [`OutOfRange`] names `relaxation.share`, `.tau_s`, `.weights` or `.tau_high_s`.
+    pub(crate) fn new(relaxation: &Relaxation<'_>, sample_time: SampleTime) -> Result<Self, OutOfRange> {
+        let Relaxation { share, time_constants_s, weights, time_constant_high_s } = *relaxation;
+        let count = time_constants_s.len();
+        OutOfRange::check_count("relaxation.tau_s", count, 1..=MOST_LAGS, "time constants")?;
+        let fewest = if count == 1 { 0 } else { count };
+        OutOfRange::check_count("relaxation.weights", weights.len(), fewest..=count, "weights, one a time constant")?;
+        OutOfRange::check("relaxation.share", share, 0.0..=Weight::MOST, "of a step")?;
+        let mut left = Weight::budget("relaxation.share", share, Weight::MOST)?;
+
+        let mut config = Self {
+            share: Weight::new(share),
+            weights: [Weight::default(); MOST_LAGS],
+            rates: [Rate::new(0.0); MOST_LAGS],
+            count: count as u8,
+            varying: None,
+        };
+        for (lag, (tau, weight)) in relaxation.lags().enumerate() {
+            let ticks = if lag == 0 && time_constant_high_s.is_some() { 4.0 } else { 2.0 };
+            OutOfRange::check("relaxation.tau_s", tau, ticks * sample_time.seconds()..=1e4, "s")?;
+            left = Weight::budget("relaxation.weights", weight, left)?;
+            config.weights[lag] = Weight::new(weight);
+            config.rates[lag] = Rate::new(relaxed_in(tau, sample_time));
+        }
+        if let Some(high_s) = time_constant_high_s {
+            let low_s = time_constants_s[0];
+            let lowest = (4.0 * sample_time.seconds()).max(0.1 * low_s);
+            OutOfRange::check("relaxation.tau_high_s", high_s, lowest..=(10.0 * low_s).min(1e4), "s")?;
+            let time_constant = TimeConstant { low_s, high_s };
+            config.varying = Some(VaryingRate::new(&time_constant, sample_time));
+        }
+        Ok(config)
+    }
+
+    /// Stiffness with `input` just there.
+    #[inline(always)]
+    pub(crate) fn stiffness(&self, state: &State, input: Signal) -> Signal {
+        let mut sum = self.share.of(input);
+        for (weight, relaxed) in self.weights.iter().zip(state).take(usize::from(self.count)) {
+            sum += weight.of(upper(*relaxed));
+        }
+        saturated(sum)
+    }
+
+    /// One sample time passes with `input` held, at this voltage.
+    #[inline(always)]
+    pub(crate) fn advance(&self, state: &mut State, input: Signal, voltage: Signal) {
+        let before = state[0];
+        for (rate, relaxed) in self.rates.iter().zip(&mut *state).take(usize::from(self.count)) {
+            *relaxed += rate.step(input.saturating_sub(upper(*relaxed)));
+        }
+        if let Some(varying) = &self.varying {
+            state[0] = before + varying.step(voltage, input.saturating_sub(upper(before)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact for a held input at any rate, and the slowest lag moves at 10 kHz.
+    #[test]
+    fn a_step_follows_its_exponentials() {
+        let relaxation = Relaxation {
+            share: 0.1,
+            time_constants_s: &[0.3, 2.0, 40.0, 3000.0],
+            weights: &[0.5, 0.2, 0.15, 0.05],
+            time_constant_high_s: None,
+        };
+        for rate_hz in [100.0, 10_000.0] {
+            let config = Config::new(&relaxation, SampleTime::from_rate(rate_hz).unwrap()).unwrap();
+            let (mut state, input) = (State::default(), Signal::from_num(600));
+            for tick in 0..(10.0 * rate_hz) as u32 {
+                let time = f64::from(tick) / rate_hz;
+                let lags = relaxation.lags().map(|(tau, weight)| weight * (1.0 - (-time / tau).exp()));
+                let exact = 600.0 * (0.1 + lags.sum::<f64>());
+                let got = config.stiffness(&state, input).to_num::<f64>();
+                assert!((got - exact).abs() < 1e-4, "{rate_hz} Hz, {time} s: {got} {exact}");
+                config.advance(&mut state, input, Signal::ZERO);
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_relaxation_is_named() {
+        let named = |share, time_constants_s: &[f64], weights: &[f64], time_constant_high_s| {
+            let relaxation = Relaxation { share, time_constants_s, weights, time_constant_high_s };
+            Config::new(&relaxation, SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field
+        };
+        assert_eq!(named(-0.1, &[5.0], &[], None), "relaxation.share");
+        assert_eq!(named(0.1, &[], &[], None), "relaxation.tau_s");
+        assert_eq!(named(0.1, &[5.0; 5], &[0.1; 5], None), "relaxation.tau_s");
+        assert_eq!(named(0.1, &[5.0, 0.001], &[0.4, 0.4], None), "relaxation.tau_s");
+        assert_eq!(named(0.1, &[5.0, 9.0], &[], None), "relaxation.weights");
+        assert_eq!(named(0.1, &[5.0, 9.0], &[0.4, 10.0], None), "relaxation.weights");
+        assert_eq!(named(0.1, &[5.0], &[], Some(51.0)), "relaxation.tau_high_s");
+        assert_eq!(named(0.1, &[0.003], &[], Some(0.005)), "relaxation.tau_s");
+        assert_eq!(named(0.1, &[5.0], &[], Some(f64::NAN)), "relaxation.tau_high_s");
+    }
+}

@@ -1,0 +1,156 @@
+//! The static law: sensitivity that depends on the voltage, without memory.
+//!
+//! Straight lines through up to nine points, the first of them (0, 0); beyond both ends the line goes on as it was:
+//!
+//! ```text
+//! f = value_i + slope_i (p - start_i),    i: the last point at or below p
+//! ```
+//!
+//! Exact but for the rounding of values (2^-21 V) and slopes (2^-28 of the distance to the point).
+
+use crate::coefficient::{Sum, Weight, saturated};
+use crate::error::OutOfRange;
+use crate::units::Signal;
+
+/// The most points of a law, (0, 0) included.
+pub const MOST_POINTS: usize = 9;
+
+/// Points that the law goes through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Law<'a> {
+    /// 2 to 9 voltages, from 0 V upwards at least 1 mV apart, up to 1000 V.
+    pub voltage_v: &'a [f64],
+    /// The law at each, in V; the first is 0. No line between two is steeper than 10, no value beyond +-2000 V.
+    pub stiffness: &'a [f64],
+}
+
+impl Law<'_> {
+    /// The steepest line's slope, at least 0.
+    pub(crate) fn steepest(&self) -> f64 {
+        let slopes = self.voltage_v.windows(2).zip(self.stiffness.windows(2)).map(|(v, f)| slope(v, f));
+        slopes.fold(0.0, f64::max)
+    }
+}
+
+fn slope(voltages: &[f64], values: &[f64]) -> f64 {
+    match (voltages, values) {
+        ([from_v, to_v], [from, to]) => (to - from) / (to_v - from_v),
+        _ => 0.0,
+    }
+}
+
+/// The law, scaled for the tick; lines that are not needed repeat the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Config {
+    lines: [Line; MOST_POINTS - 1],
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Line {
+    start: Signal,
+    value: Signal,
+    slope: Weight,
+}
+
+impl Config {
+    /// # Errors
+    /// [`OutOfRange`] names `law.voltage_v` or `law.stiffness`.
+    pub(crate) fn new(law: &Law<'_>) -> Result<Self, OutOfRange> {
+        let Law { voltage_v, stiffness } = *law;
+        OutOfRange::check_count("law.voltage_v", voltage_v.len(), 2..=MOST_POINTS, "points")?;
+        let count = voltage_v.len();
+        OutOfRange::check_count("law.stiffness", stiffness.len(), count..=count, "values, one a voltage")?;
+        let (mut start, mut value) = (voltage_v[0], stiffness[0]);
+        OutOfRange::check("law.voltage_v", start, 0.0..=0.0, "V, where the law starts")?;
+        OutOfRange::check("law.stiffness", value, 0.0..=0.0, "V, where the law starts")?;
+        let mut lines = [Line::default(); MOST_POINTS - 1];
+        let mut line = Line::default();
+        let mut points = voltage_v.iter().zip(stiffness).skip(1);
+        for next in &mut lines {
+            if let Some((&end, &at_end)) = points.next() {
+                OutOfRange::check("law.voltage_v", end, start + 1e-3..=1000.0, "V, upwards")?;
+                let reach = Weight::MOST * (end - start);
+                let (lowest, highest) = ((value - reach).max(-2000.0), (value + reach).min(2000.0));
+                OutOfRange::check("law.stiffness", at_end, lowest..=highest, "V")?;
+                line = Line {
+                    start: Signal::from_num(start),
+                    value: Signal::from_num(value),
+                    slope: Weight::new((at_end - value) / (end - start)),
+                };
+                (start, value) = (end, at_end);
+            }
+            *next = line;
+        }
+        Ok(Self { lines })
+    }
+
+    /// The law at `input`.
+    #[inline(always)]
+    pub(crate) fn at(&self, input: Signal) -> Signal {
+        let mut line = &self.lines[0];
+        for next in &self.lines[1..] {
+            if input >= next.start {
+                line = next;
+            }
+        }
+        // Cannot wrap: either the line starts at 0 V, or the input lies beyond its positive start.
+        let along = input - line.start;
+        saturated(Sum::from_bits(i64::from(line.value.to_bits()) << Weight::FRACTION_BITS) + line.slope.of(along))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn at(law: &Law<'_>, input: f64) -> f64 {
+        Config::new(law).unwrap().at(Signal::from_num(input)).to_num()
+    }
+
+    proptest! {
+        /// Another way to the same curve: a sum of kinks.
+        #[test]
+        fn it_goes_straight_through_its_points(
+            lines in prop::collection::vec((1.0..100.0f64, -2.0..2.0f64), 1..=8),
+            input in -500.0..1000.0f64,
+        ) {
+            let (mut voltage_v, mut stiffness) = (Vec::from([0.0]), Vec::from([0.0]));
+            let (mut expected, mut before) = (0.0, 0.0);
+            for (line, (width, slope)) in lines.into_iter().enumerate() {
+                let start = voltage_v[line];
+                let beyond = if line == 0 { input } else { (input - start).max(0.0) };
+                expected += (slope - before) * beyond;
+                before = slope;
+                voltage_v.push(start + width);
+                stiffness.push(stiffness[line] + slope * width);
+            }
+            let got = at(&Law { voltage_v: &voltage_v, stiffness: &stiffness }, input);
+            let expected = expected.clamp(-2048.0, 2048.0);
+            prop_assert!((got - expected).abs() < 1e-4, "{got} {expected}");
+        }
+    }
+
+    #[test]
+    fn too_steep_an_end_saturates() {
+        let steep = Law { voltage_v: &[0.0, 100.0], stiffness: &[0.0, 900.0] };
+        assert_eq!(at(&steep, 2000.0), Signal::MAX.to_num::<f64>());
+        assert_eq!(at(&steep, -2000.0), Signal::MIN.to_num::<f64>());
+        assert!((at(&steep, -100.0) + 900.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_wrong_law_is_named() {
+        let named =
+            |voltage_v: &[f64], stiffness: &[f64]| Config::new(&Law { voltage_v, stiffness }).unwrap_err().field;
+        assert_eq!(named(&[0.0], &[0.0]), "law.voltage_v");
+        assert_eq!(named(&[0.0; 10], &[0.0; 10]), "law.voltage_v");
+        assert_eq!(named(&[0.0, 1.0], &[0.0]), "law.stiffness");
+        assert_eq!(named(&[0.0, 0.0], &[0.0, 1.0]), "law.voltage_v");
+        assert_eq!(named(&[0.0, f64::NAN], &[0.0, 1.0]), "law.voltage_v");
+        assert_eq!(named(&[0.0, 1.0], &[1.0, 2.0]), "law.stiffness");
+        assert_eq!(named(&[0.0, 1.0], &[0.0, 11.0]), "law.stiffness");
+        assert_eq!(named(&[0.0, 1.0], &[0.0, f64::NAN]), "law.stiffness");
+    }
+}

@@ -1,0 +1,136 @@
+//! Rate-independent memory: a bank of play operators.
+//!
+//! ```text
+//! p = direct v + sum_j weight_j z_j,    z_j' = max(v - r_j, min(v + r_j, z_j)),    z_j = 0 at rest
+//! ```
+//!
+//! A play follows the voltage from a distance `r` and stays where it is while the voltage turns. A weighted sum of plays
+//! is the Prandtl-Ishlinskii model of hysteresis (M. Brokate, J. Sprekels: Hysteresis and Phase Transitions, 1996,
+//! chapter 2; K. Kuhnen: Modeling, identification and compensation of complex hysteretic nonlinearities, European
+//! Journal of Control 9, 2003). With a [law](super::law) behind it, it is Kuhnen's modified model.
+//!
+//! Exact but for the rounding of thresholds (2^-21 V) and weights (2^-28).
+
+use crate::coefficient::{Weight, saturated};
+use crate::error::OutOfRange;
+use crate::units::Signal;
+
+/// The most plays of a bank.
+pub const MOST_PLAYS: usize = 8;
+
+/// A bank of plays. The magnitudes of `direct` and `weights` add up to at most 10.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory<'a> {
+    /// Weight of the voltage itself.
+    pub direct: f64,
+    /// Half the width of each play, in V, 0 to 1000; up to 8.
+    pub thresholds_v: &'a [f64],
+    /// Weight of each play.
+    pub weights: &'a [f64],
+}
+
+impl Memory<'_> {
+    /// The steepest that the bank can be: all plays move.
+    pub(crate) fn steepest(&self) -> f64 {
+        self.direct.max(0.0) + self.weights.iter().map(|weight| weight.max(0.0)).sum::<f64>()
+    }
+}
+
+/// The bank, scaled for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Config {
+    direct: Weight,
+    plays: [Play; MOST_PLAYS],
+    count: u8,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Play {
+    threshold: Signal,
+    weight: Weight,
+}
+
+/// Where each play is.
+pub(crate) type State = [Signal; MOST_PLAYS];
+
+impl Config {
+    /// # Errors
+    /// [`OutOfRange`] names `memory.direct`, `memory.thresholds_v` or `memory.weights`.
+    pub(crate) fn new(memory: &Memory<'_>) -> Result<Self, OutOfRange> {
+        let Memory { direct, thresholds_v, weights } = *memory;
+        OutOfRange::check_count("memory.thresholds_v", thresholds_v.len(), 0..=MOST_PLAYS, "plays")?;
+        let count = thresholds_v.len();
+        OutOfRange::check_count("memory.weights", weights.len(), count..=count, "weights, one a threshold")?;
+        let mut left = Weight::budget("memory.direct", direct, Weight::MOST)?;
+        let mut plays = [Play::default(); MOST_PLAYS];
+        for (play, (&threshold, &weight)) in plays.iter_mut().zip(thresholds_v.iter().zip(weights)) {
+            let threshold = OutOfRange::check("memory.thresholds_v", threshold, 0.0..=1000.0, "V")?;
+            left = Weight::budget("memory.weights", weight, left)?;
+            *play = Play { threshold: Signal::from_num(threshold), weight: Weight::new(weight) };
+        }
+        Ok(Self { direct: Weight::new(direct), plays, count: count as u8 })
+    }
+
+    /// The bank's output with `voltage` just applied.
+    #[inline(always)]
+    pub(crate) fn run(&self, state: &mut State, voltage: Signal) -> Signal {
+        let mut sum = self.direct.of(voltage);
+        for (play, place) in self.plays.iter().zip(state).take(usize::from(self.count)) {
+            let (low, high) = (voltage.saturating_sub(play.threshold), voltage.saturating_add(play.threshold));
+            *place = (*place).max(low).min(high);
+            sum += play.weight.of(*place);
+        }
+        saturated(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const BANK: Memory<'_> = Memory { direct: 0.5, thresholds_v: &[10.0, 40.0], weights: &[0.3, 0.2] };
+
+    fn walk(memory: &Memory<'_>, voltages: &[f64]) -> f64 {
+        let (config, mut state) = (Config::new(memory).unwrap(), State::default());
+        let outputs = voltages.iter().map(|&voltage| config.run(&mut state, Signal::from_num(voltage)).to_num());
+        outputs.last().unwrap_or(0.0)
+    }
+
+    #[test]
+    fn up_and_back_by_hand() {
+        for (voltages, expected) in [
+            (&[100.0][..], 50.0 + 0.3 * 90.0 + 0.2 * 60.0),
+            // Within twice the threshold a play stays.
+            (&[100.0, 85.0], 42.5 + 0.3 * 90.0 + 0.2 * 60.0),
+            (&[100.0, 50.0], 25.0 + 0.3 * 60.0 + 0.2 * 60.0),
+            (&[100.0, 0.0], 0.3 * 10.0 + 0.2 * 40.0),
+        ] {
+            let got = walk(&BANK, voltages);
+            assert!((got - expected).abs() < 1e-5, "{voltages:?}: {got} {expected}");
+        }
+    }
+
+    proptest! {
+        /// A minor loop that is passed again leaves no trace, and speed does not matter: only the turns are remembered.
+        #[test]
+        fn closed_loops_are_forgotten(peak in 200.0..900.0f64, low in 0.0..150.0f64, inner in 150.0..200.0f64) {
+            let straight = walk(&BANK, &[peak, low, peak]);
+            let detour = walk(&BANK, &[peak / 3.0, peak, low, inner, low, 0.5 * (low + inner), peak]);
+            prop_assert!((straight - detour).abs() < 1e-5, "{straight} {detour}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_bank_is_named() {
+        let named = |direct, thresholds_v: &[f64], weights: &[f64]| {
+            Config::new(&Memory { direct, thresholds_v, weights }).unwrap_err().field
+        };
+        assert_eq!(named(f64::NAN, &[], &[]), "memory.direct");
+        assert_eq!(named(1.0, &[-1.0], &[0.1]), "memory.thresholds_v");
+        assert_eq!(named(1.0, &[1.0; 9], &[0.1; 9]), "memory.thresholds_v");
+        assert_eq!(named(1.0, &[1.0], &[]), "memory.weights");
+        // Each is allowed, but not all of them.
+        assert_eq!(named(4.0, &[1.0, 2.0], &[4.0, -4.0]), "memory.weights");
+    }
+}

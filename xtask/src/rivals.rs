@@ -1,0 +1,83 @@
+//! Instructions a tick, beside what one could run instead: counted in one run by `firmware/examples/rivals.rs`.
+
+use anyhow::{Context, Result, ensure};
+use host_sim::log::Line;
+use serde_json::{Value, json};
+
+use crate::emulator;
+use crate::image::{self, Board, Opt};
+
+/// The first is this controller; names as in the example.
+const CONTENDERS: [(&str, &str); 5] = [
+    ("tick", "this controller, the whole tick"),
+    ("tick_f64", "the whole tick in f64"),
+    ("idsp", "idsp, clamped i32 biquad: PI only"),
+    ("pid", "pid, f32: PI only"),
+    ("discrete_pid", "discrete_pid, f32: PI only"),
+];
+/// Where all must arrive, and how close, in mV: single precision is no better.
+const END_MV: i32 = 300_000;
+const TOLERANCE_MV: i32 = 100;
+
+/// One line of the table.
+pub(crate) struct Row {
+    name: &'static str,
+    what: &'static str,
+    min: u32,
+    mean: u32,
+    max: u32,
+}
+
+/// `cargo xtask emulate --rivals`.
+pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
+    let rows = count(opt)?;
+    if as_json {
+        println!("{}", report(opt, &rows));
+    } else {
+        print!("{}", table(opt, &rows));
+    }
+    Ok(())
+}
+
+/// Every contender, this controller first.
+pub(crate) fn count(opt: Opt) -> Result<Vec<Row>> {
+    let elf = image::example("rivals", Board::Mps2, opt)?;
+    let run = emulator::play(&elf, "rivals", emulator::SHIFT, |_| {})?;
+    ensure!(run.exit == 0, "the emulator's exit code is {}", run.exit);
+    CONTENDERS.iter().map(|(name, what)| row(name, what, &run.log)).collect()
+}
+
+fn row(name: &'static str, what: &'static str, log: &[Line]) -> Result<Row> {
+    let start = format!("rival name={name} ");
+    let line = log.iter().find_map(|line| line.message.strip_prefix(&start));
+    let line = line.with_context(|| format!("{name} has not run"))?;
+    let value = |key: &str| {
+        let value = line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
+        value.with_context(|| format!("no {key} in `{line}`"))
+    };
+    let end_mv: i32 = value("end_mv")?.parse()?;
+    ensure!((end_mv - END_MV).abs() <= TOLERANCE_MV, "{name} ends at {end_mv} mV instead of {END_MV} mV");
+    Ok(Row { name, what, min: value("min")?.parse()?, mean: value("mean")?.parse()?, max: value("max")?.parse()? })
+}
+
+/// By the mean.
+fn to_ours(row: &Row, rows: &[Row]) -> f64 {
+    f64::from(row.mean) / f64::from(rows[0].mean)
+}
+
+pub(crate) fn table(opt: Opt, rows: &[Row]) -> String {
+    let head = format!("instructions a tick, opt-level {}", opt.name());
+    let mut text = format!("{head:<36}{:>7}{:>7}{:>7}{:>10}\n", "min", "mean", "max", "to ours");
+    for row @ Row { what, min, mean, max, .. } in rows {
+        text += &format!("{what:<36}{min:>7}{mean:>7}{max:>7}{:>10.2}\n", to_ours(row, rows));
+    }
+    text
+}
+
+fn report(opt: Opt, rows: &[Row]) -> Value {
+    let row = |row: &Row| {
+        json!({"name": row.name, "what": row.what, "min": row.min, "mean": row.mean, "max": row.max,
+               "to_ours": to_ours(row, rows)})
+    };
+    json!({"opt": opt.name(), "rows": rows.iter().map(row).collect::<Vec<_>>()})
+}
