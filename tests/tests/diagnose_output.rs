@@ -12,10 +12,11 @@ use tempfile::TempDir;
 
 /// A file name that is HTML, XML and shell at once.
 const NASTY: &str = "<script>alert('a & \"b\"')<script>$x$.csv";
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     "autocorrelation.svg",
     "diagnosis.json",
     "input_correlation.svg",
+    "plant.toml",
     "readings.svg",
     "report.html",
     "residual.svg",
@@ -79,8 +80,8 @@ fn every_file_is_written_and_named() {
     }
     // The plots are on the page and beside it.
     assert_eq!(page.matches("<svg ").count(), 5);
-    // Both say the same as `--json`.
-    let answer = json(folder.path(), &["diagnose", "record.csv", "--json"]);
+    // The file says the same as `--json`.
+    let answer = json(folder.path(), &["diagnose", "record.csv", "--json", "--out", "made/here"]);
     assert_eq!(serde_json::from_str::<Value>(&made("diagnosis.json")).expect("JSON"), answer);
 }
 
