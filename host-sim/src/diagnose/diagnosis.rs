@@ -106,7 +106,7 @@ pub(super) fn diagnose(
         () if findings.is_empty() => Verdict::Consistent,
         () => Verdict::Explained,
     };
-    let next_experiment = next_experiment(verdict, &findings, &alternatives, left.as_ref());
+    let next_experiment = next_experiment(verdict, &findings, &alternatives);
     let leftover = left.map(|left| {
         let Leftover { place, share, rms, .. } = left;
         format!("{:.1} % of what is left ({rms:.3} V RMS) is no noise: it shows {place}", 100.0 * share)
@@ -140,7 +140,8 @@ fn explained(finding: &Finding) -> f64 {
 /// True if gain and time constant would show in this record at all.
 fn informative(engine: &mut Engine) -> bool {
     let data = engine.data;
-    if data.full_scale_v <= 0.0 {
+    let moves = |values: &[f64]| values.iter().any(|value| *value != values[0]);
+    if data.full_scale_v <= 0.0 || !moves(&data.reading) {
         return false;
     }
     let probe = ["gain-error", "time-constant"].iter().filter_map(|cause| index_of(cause)).fold(
@@ -224,12 +225,7 @@ fn never_reverses(data: &Data) -> bool {
     !(falls && rises)
 }
 
-fn next_experiment(
-    verdict: Verdict,
-    findings: &[Finding],
-    alternatives: &[Vec<&'static str>],
-    left: Option<&Leftover>,
-) -> Option<String> {
+fn next_experiment(verdict: Verdict, findings: &[Finding], alternatives: &[Vec<&'static str>]) -> Option<String> {
     match verdict {
         Verdict::Ambiguous => {
             let named: Vec<&str> = findings.iter().map(|finding| finding.cause).collect();
@@ -239,10 +235,9 @@ fn next_experiment(
             let experiment = EFFECTS[index_of(cause)?].experiment();
             Some(format!("run {experiment}"))
         }
-        Verdict::Unexplained => Some(format!(
-            "repeat the record and look {}: what comes back there is a cause that has no name here yet",
-            left?.place
-        )),
+        Verdict::Unexplained => Some(
+            "run the same schedule again: what comes back is the spring's, what does not is the readings'".to_owned(),
+        ),
         _ => None,
     }
 }

@@ -70,7 +70,7 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
         };
         part(a).total_cmp(&part(b))
     })?;
-    let share = gain / total.max(1e-300);
+    let share = (gain / total.max(1e-300)).clamp(0.0, 1.0);
     let leftover = Leftover {
         place: most.place.clone(),
         share,
@@ -99,7 +99,7 @@ fn alike(fit: &Fit) -> Option<Leftover> {
 fn line(data: &Data, fit: &Fit, target: &[f64], found: Leftover) -> Leftover {
     let clipped: Vec<f64> = target.iter().map(|value| value.clamp(-6.0, 6.0)).collect();
     let Some(peak) = spectrum::peaks(&clipped, data, 1).into_iter().next() else { return found };
-    let share = 0.5 * (peak.cosine.powi(2) + peak.sine.powi(2));
+    let share = (0.5 * (peak.cosine.powi(2) + peak.sine.powi(2))).min(1.0);
     let power = 0.5 * data.rows() as f64 * share;
     // As many lines as half the rows were looked at.
     if power - (data.rows() as f64 / 2.0).ln() > 12.0 && share > found.share {
