@@ -2,6 +2,7 @@
 //!
 //! One header row, columns by name in any order, lines that start with `#` are comments.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use anyhow::Result;
@@ -30,6 +31,9 @@ pub struct Record {
     /// The rows in order of time.
     pub rows: Vec<Row>,
 }
+
+/// Longer files are refused: a row takes 40 bytes, its diagnosis 500.
+pub const MOST_ROWS: usize = 1_000_000;
 
 /// The measured column unless another is asked for.
 pub const MEASURED: &str = "stiffness";
@@ -66,6 +70,15 @@ impl Record {
     /// [`BadInput`] with file, line, column and what was expected.
     pub fn open(path: &Path, measured: &str) -> Result<Self> {
         let name = path.display().to_string();
+        if let Ok(file) = std::fs::File::open(path) {
+            // Counted without keeping them.
+            let lines = BufReader::new(file).split(b'\n').take(MOST_ROWS + 2).take_while(Result::is_ok).count();
+            if lines > MOST_ROWS + 1 {
+                bad_input!(
+                    "{name}: more than {MOST_ROWS} lines; expected fewer: keep every tenth row, or a part of it"
+                );
+            }
+        }
         match std::fs::read_to_string(path) {
             Ok(text) => Self::parse(&name, &text, measured),
             Err(error) => bad_input!("{name}: cannot be read: {error}"),

@@ -268,3 +268,21 @@ fn a_poor_record_gets_a_verdict() {
         assert!(page.contains(verdict) && !page.contains("NaN"), "{name}");
     }
 }
+
+/// `docs/table3/` is what the diagnosis says of the report's own measurement today.
+#[test]
+fn the_page_on_table_3_is_up_to_date() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+    let data = format!("{root}/data/table3_stair.csv");
+    let mut today = json(Path::new(root), &["diagnose", &data, "--column", "measured", "--input", "stair", "--json"]);
+    let committed = fs::read_to_string(format!("{root}/docs/table3/diagnosis.json")).unwrap();
+    let mut committed: Value = serde_json::from_str(&committed).unwrap();
+    for report in [&mut today, &mut committed] {
+        report["extended"]["model"].take();
+    }
+    assert_eq!(
+        today, committed,
+        "run `cargo run --release -- diagnose data/table3_stair.csv --column measured --input stair --out docs/table3`"
+    );
+    assert_eq!(today["verdict"], "unexplained");
+}

@@ -48,12 +48,21 @@ pub struct Data {
 impl Data {
     /// Rows without a reading are left out; the schedule keeps their voltage.
     pub fn new(record: &Record, input: Input) -> Self {
+        Self::of_rows(record, input, 1)
+    }
+
+    /// The same with every so many rows' reading, under the same voltage: for a first look at a long record.
+    pub fn thinned(record: &Record, input: Input, every: usize) -> Self {
+        Self::of_rows(record, input, every)
+    }
+
+    fn of_rows(record: &Record, input: Input, every: usize) -> Self {
         let schedule = match input {
             Input::Hold => Schedule::from_record(record, Between::Hold),
             Input::Linear => Schedule::from_record(record, Between::Linear),
             Input::Stair => Schedule::stair(),
         };
-        let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?)));
+        let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?))).step_by(every);
         let time_s: Vec<f64> = rows().map(|(row, _)| row.time_s).collect();
         let voltage_v: Vec<f64> = rows().map(|(row, _)| row.voltage_v).collect();
         let reading: Vec<f64> = rows().map(|(_, reading)| reading).collect();

@@ -58,6 +58,7 @@ pub(super) fn diagnose(
     observed: &Observed,
     engine: &mut Engine,
     held: bool,
+    given: Option<Vec<Model>>,
     progress: impl FnMut(&Scored),
 ) -> Diagnosis {
     let baseline = engine.at(Model::default());
@@ -75,7 +76,10 @@ pub(super) fn diagnose(
         };
     }
     let mut search = Search::new(engine);
-    let best = search.run(progress);
+    let best = match given {
+        None => search.run(progress),
+        Some(models) => search.from(models, progress),
+    };
     let rivals = rivals(&mut search, &best);
     let mut weights = Vec::new();
     for effect in effects(&best.fit.model) {

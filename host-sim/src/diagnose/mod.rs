@@ -49,9 +49,15 @@ use data::Data;
 use fit::Engine;
 use model::Simulator;
 use observed::Observed;
+use search::{Scored, Search};
 
 /// Fewest readings that anything can be said of.
 const FEWEST_ROWS: usize = 8;
+
+/// A longer record is searched on every so many of its rows first.
+const ROWS_TO_SEARCH: usize = 10_000;
+/// Sets of causes from there that are judged on all rows.
+const LEADERS: usize = 3;
 
 /// How to take a record.
 #[derive(Clone, Debug)]
@@ -90,11 +96,21 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
             data.rows()
         );
     }
+    let mut progress = |scored: &Scored| {
+        let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
+        progress(&causes.join(", "));
+    };
+    let every = data.rows().div_ceil(ROWS_TO_SEARCH);
+    let given = (every > 1).then(|| {
+        let thinned = Data::thinned(record, options.input, every);
+        let observed = Observed::new(&thinned);
+        let mut engine = Engine::new(&thinned, &observed, Simulator::new(&thinned, &options.base));
+        let mut search = Search::new(&mut engine);
+        search.run(&mut progress);
+        search.leaders(LEADERS)
+    });
     let observed = Observed::new(&data);
     let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &options.base));
     let held = options.input == Input::Hold;
-    Ok(diagnosis::diagnose(data.clone(), &observed, &mut engine, held, |scored| {
-        let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
-        progress(&causes.join(", "));
-    }))
+    Ok(diagnosis::diagnose(data.clone(), &observed, &mut engine, held, given, progress))
 }

@@ -98,6 +98,35 @@ impl<'e, 'a> Search<'e, 'a> {
         }
     }
 
+    /// The best structure when others, found on a part of the rows, are given: those are judged, and extended once more.
+    pub fn from(&mut self, given: Vec<Model>, mut progress: impl FnMut(&Scored)) -> Scored {
+        let root = self.engine.at(Model::default());
+        let mut best = self.judged(root);
+        for model in given {
+            let scored = self.judge(model);
+            if scored.score > best.score {
+                best = scored;
+                progress(&best);
+            }
+        }
+        for _ in 0..MOST_BLOCKS {
+            let better = self.children(&best).into_iter().next().filter(|child| child.score > best.score);
+            let Some(better) = better else { break };
+            best = better;
+            progress(&best);
+        }
+        self.pruned(best)
+    }
+
+    /// The best structures of different causes, the best first.
+    pub fn leaders(&self, count: usize) -> Vec<Model> {
+        let mut seen: Vec<&Scored> = self.seen.values().collect();
+        seen.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut sets = HashSet::new();
+        seen.retain(|scored| sets.insert(effects(&scored.fit.model)));
+        seen.into_iter().take(count).map(|scored| scored.fit.model.clone()).collect()
+    }
+
     /// One search at the present caution.
     fn pass(&mut self, progress: &mut impl FnMut(&Scored)) -> Scored {
         let root = self.engine.at(Model::default());

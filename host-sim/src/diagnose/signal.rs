@@ -3,7 +3,7 @@
 //! Every block maps one signal to another. For pieces that are straight, a lag is solved exactly; what a lag makes of
 //! them is taken as straight again, so pieces are kept short beside the time constants (`LONGEST_PIECE_S`).
 
-use crate::schedule::Schedule;
+use crate::schedule::{Schedule, Stretch};
 
 /// Longer pieces are divided: a curve of time constant 1 s departs from its chord by 1/800 of its change at most.
 const LONGEST_PIECE_S: f64 = 0.1;
@@ -56,6 +56,9 @@ impl Signal {
             signal.start_row();
             reader.at(pair[0]);
             for stretch in reader.clone().stretches(pair[0], pair[1]) {
+                if signal.lengthened(&stretch, longest) {
+                    continue;
+                }
                 let parts = (stretch.duration_s / longest).ceil().max(1.0);
                 let duration_s = stretch.duration_s / parts;
                 for part in 0..parts as usize {
@@ -70,6 +73,18 @@ impl Signal {
             signal.pieces.push(Piece { duration_s: 0.0, from: value, to: value });
         }
         signal
+    }
+
+    /// True if a flat stretch could be added to the last piece of the same row.
+    fn lengthened(&mut self, stretch: &Stretch, longest: f64) -> bool {
+        let row = self.rows.last().map_or(0, |&row| row as usize);
+        let Some(last) = self.pieces[row..].last_mut() else { return false };
+        let same = stretch.slope == 0.0 && last.from == last.to && last.from == stretch.from_v;
+        let fits = same && last.duration_s + stretch.duration_s <= longest * (1.0 + 1e-9);
+        if fits {
+            last.duration_s += stretch.duration_s;
+        }
+        fits
     }
 
     /// The value just after each row's moment.
