@@ -40,6 +40,8 @@ const MOST_BLOCKS: usize = 6;
 const PATIENCE: f64 = 30.0;
 /// How many times its start an effect may be, in the hope of a promise.
 const FARTHEST: f64 = 6.0;
+/// A fit that is likelier by so many nats than the one that was judged is judged anew.
+const ANEW: f64 = 1.0;
 /// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
 
@@ -280,7 +282,7 @@ impl<'e, 'a> Search<'e, 'a> {
         if !node.fit.noise.ar.is_empty() {
             fits.extend(plain.into_iter().take(JUDGED_PLAIN));
         }
-        fits.into_iter().map(|(_, fit)| self.judge(fit.model)).collect()
+        fits.into_iter().map(|(_, fit)| self.judge_anew(fit)).collect()
     }
 
     /// Blocks that might be added, the most promising first.
@@ -318,6 +320,23 @@ impl<'e, 'a> Search<'e, 'a> {
             }
         }
         found
+    }
+
+    /// As [`Search::judge`], from a point that may be better than the one that was judged.
+    fn judge_anew(&mut self, fit: Fit) -> Scored {
+        let seen = self.seen.get(&fit.model.structure()).cloned();
+        match seen {
+            Some(seen) if seen.fit.log_likelihood + ANEW < fit.log_likelihood => {
+                let again = self.engine.fit_twice(fit.model);
+                let again = self.judged(again);
+                if seen.score > again.score {
+                    self.seen.insert(seen.fit.model.structure(), seen.clone());
+                    return seen;
+                }
+                again
+            }
+            _ => self.judge(fit.model),
+        }
     }
 
     fn judge(&mut self, model: Model) -> Scored {
