@@ -48,7 +48,7 @@ impl Effect for Hum {
 
     fn places(&self, data: &Data) -> f64 {
         // As many lines as half the rows; its three coordinates are charged already.
-        ((data.rows() as f64 / 2.0).max(1.0).ln() - 3.0).max(0.0)
+        ((data.rows() as f64 / 2.0).max(1.0).ln() - 4.5).max(0.0)
     }
 
     fn read(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {

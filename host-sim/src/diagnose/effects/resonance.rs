@@ -1,8 +1,10 @@
 //! Underdamped oscillation after a change, with the natural frequency `w = 2 pi freq`:
 //!
 //! ```text
-//! x'' + 2 zeta w x' + w^2 x = w^2 y
+//! x'' + 2 zeta w x' + w^2 x = w^2 y        y' = y + part (x - y)
 //! ```
+//!
+//! In one form the whole response swings (`part = 1`), in the other a part of it.
 
 use std::f64::consts::TAU;
 
@@ -11,6 +13,8 @@ use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::{Piece, Signal};
 
 pub(super) struct Resonance;
+
+const IN_PART: usize = 1;
 
 /// Frequencies, in Hz, from a period of the whole record to what two samples show.
 fn range(data: &Data) -> (f64, f64) {
@@ -34,16 +38,29 @@ impl Effect for Resonance {
         "single steps, read at ten times the frequency in question"
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        let (lowest, highest) = range(data);
-        vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(1e-3, 0.95)]
+    fn forms(&self) -> usize {
+        2
     }
 
-    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        let (lowest, highest) = range(data);
+        let mut coordinates = vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(1e-3, 0.95)];
+        if form == IN_PART {
+            coordinates.push(Coordinate::new(0.0, 1.5));
+        }
+        coordinates
+    }
+
+    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
         let (lowest, highest) = range(data);
         let (from, to) = ((8.0 * lowest).ln(), (0.95 * highest).ln());
         let frequencies = (0..24).map(|part| from + (to - from) * f64::from(part) / 23.0);
-        frequencies.flat_map(|freq| [0.05f64, 0.3].map(|zeta| vec![freq, zeta.ln()])).collect()
+        let starts = frequencies.flat_map(|freq| [0.05f64, 0.3].map(|zeta| vec![freq, zeta.ln()]));
+        let in_part = |mut point: Vec<f64>| {
+            point.extend((form == IN_PART).then_some(0.2));
+            point
+        };
+        starts.map(in_part).collect()
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
@@ -51,11 +68,12 @@ impl Effect for Resonance {
     }
 
     fn places(&self, _: &Data) -> f64 {
-        30f64.ln()
+        10f64.ln()
     }
 
     fn respond(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
         let (omega, zeta) = (TAU * point[0].exp(), point[1].exp());
+        let part = point.get(2).copied().unwrap_or(1.0);
         let (mut x, mut v) = (signal.before, 0.0);
         let mut last = f64::NAN;
         let mut step = [[1.0, 0.0], [0.0, 1.0]];
@@ -73,7 +91,7 @@ impl Effect for Resonance {
                 x = to - lag + step[0][0] * dx + step[0][1] * dv;
                 v = slope + step[1][0] * dx + step[1][1] * dv;
             }
-            (start, x)
+            (from + part * (start - from), to + part * (x - to))
         });
     }
 }
