@@ -83,11 +83,20 @@ impl Base {
 
 /// Puts a law behind a file's own: at its points, or at some from 0 to `full_scale_v`.
 pub(super) fn extend_law(file: &mut PlantFile, full_scale_v: f64, points: u32, law: impl Fn(f64) -> f64) {
-    let own = file.law.take().unwrap_or_else(|| {
-        let voltage_v: Vec<f64> = (0..points).map(|i| full_scale_v * f64::from(i) / f64::from(points - 1)).collect();
-        Law { stiffness: voltage_v.clone(), voltage_v }
-    });
-    file.law = Some(Law { stiffness: own.stiffness.iter().map(|&stiffness| law(stiffness)).collect(), ..own });
+    if let Some(own) = &mut file.law {
+        own.stiffness.iter_mut().for_each(|stiffness| *stiffness = law(*stiffness));
+        return;
+    }
+    let voltage_v: Vec<f64> = (0..points).map(|i| full_scale_v * f64::from(i) / f64::from(points - 1)).collect();
+    let mut stiffness: Vec<f64> = voltage_v.iter().map(|&voltage| law(voltage)).collect();
+    // A chord is off on one side of its bow: half of that to either side.
+    let bow = |pair: &[f64]| law((pair[0] + pair[1]) / 2.0) - (law(pair[0]) + law(pair[1])) / 2.0;
+    let bows: Vec<f64> = voltage_v.windows(2).map(bow).collect();
+    for (point, value) in stiffness.iter_mut().enumerate().skip(1) {
+        let after = bows.get(point).copied().unwrap_or(bows[point - 1]);
+        *value += (bows[point - 1] + after) / 4.0;
+    }
+    file.law = Some(Law { voltage_v, stiffness });
 }
 
 /// Straight between points and beyond them.
