@@ -226,17 +226,14 @@ fn curvature_chance(readings: &[Reading]) -> Result<f64> {
     Ok(2.0 * student.cdf(-fit.standard_errors_from(2, 0.0).abs()))
 }
 
+/// The report's spring taken as one piece.
+#[cfg(test)]
+pub(super) const WHOLE: Beam =
+    Beam { length_m: 59.8e-3, width_m: 19.8e-3, thickness_m: 190e-6, youngs_modulus_pa: 1.0, density_kg_per_m3: 0.0 };
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const WHOLE: Beam = Beam {
-        length_m: 59.8e-3,
-        width_m: 19.8e-3,
-        thickness_m: 190e-6,
-        youngs_modulus_pa: 1.0,
-        density_kg_per_m3: 0.0,
-    };
 
     /// By hand: sum F x / sum x^2 with sum x^2 = 45.65.
     #[test]

@@ -208,17 +208,8 @@ fn active_alone(stack: &Stack, interlayer_pa_per_m: f64, n_per_m: f64) -> Result
 
 #[cfg(test)]
 mod tests {
-    use super::super::cantilever::Beam;
-    use super::super::experiment::table1;
+    use super::super::experiment::{WHOLE, table1};
     use super::*;
-
-    const WHOLE: Beam = Beam {
-        length_m: 59.8e-3,
-        width_m: 19.8e-3,
-        thickness_m: 190e-6,
-        youngs_modulus_pa: 1.0,
-        density_kg_per_m3: 0.0,
-    };
 
     #[test]
     fn slip_that_was_put_in_is_found() {

@@ -48,15 +48,11 @@ pub struct Data {
 impl Data {
     /// Rows without a reading are left out; the schedule keeps their voltage.
     pub fn new(record: &Record, input: Input) -> Self {
-        Self::of_rows(record, input, 1)
+        Self::thinned(record, input, 1)
     }
 
     /// The same with every so many rows' reading, under the same voltage: for a first look at a long record.
     pub fn thinned(record: &Record, input: Input, every: usize) -> Self {
-        Self::of_rows(record, input, every)
-    }
-
-    fn of_rows(record: &Record, input: Input, every: usize) -> Self {
         let schedule = match input {
             Input::Hold => Schedule::from_record(record, Between::Hold),
             Input::Linear => Schedule::from_record(record, Between::Linear),

@@ -1,6 +1,6 @@
 //! From a record to an answer: search, then what each cause is worth, what rivals there are, what is left.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
@@ -63,8 +63,8 @@ pub(super) fn diagnose(
 ) -> Diagnosis {
     let baseline = engine.at(Model::default());
     if !informative(engine) {
-        let report = insufficient(&data, &baseline, engine);
         let unseen = engine.held_out(&baseline).residual;
+        let report = insufficient(&data, &baseline, engine, &unseen);
         return Diagnosis {
             report,
             data,
@@ -80,7 +80,7 @@ pub(super) fn diagnose(
         None => search.run(progress),
         Some(models) => search.from(models, progress),
     };
-    let rivals = rivals(&mut search, &best);
+    let rivals = rivals(&search, &best);
     let mut weights = Vec::new();
     for effect in effects(&best.fit.model) {
         let without = search.best_without(effect);
@@ -90,8 +90,9 @@ pub(super) fn diagnose(
     let standings = standing::standings(engine, contenders);
     let readings = reading_findings(&data, observed, &best.fit);
     let left = leftover::test(engine, &best.fit).filter(|left| left.significant);
-    let quality_before = quality(engine, &baseline, false);
-    let quality_after = quality(engine, &best.fit, true);
+    let held_out = [&baseline, &best.fit].map(|fit| engine.held_out(fit).residual);
+    let quality_before = quality(engine, &baseline, &held_out[0], false);
+    let quality_after = quality(engine, &best.fit, &held_out[1], true);
     let mut findings: Vec<Finding> =
         weights.iter().map(|(effect, without)| finding(engine, &best, *effect, without)).collect();
     findings.extend(readings);
@@ -133,7 +134,6 @@ pub(super) fn diagnose(
         noise: noise_report(&best.fit.noise),
         residual: residual_report(&data, &best.fit),
     };
-    let held_out = [&baseline, &best.fit].map(|fit| engine.held_out(fit).residual);
     Diagnosis { report, data, baseline, extended: best.fit, plant: cure.file, held_out, standings }
 }
 
@@ -165,8 +165,8 @@ fn informative(engine: &mut Engine) -> bool {
     covariance[(0, 0)].sqrt() < 0.5 && covariance[(1, 1)].sqrt() < 1.0
 }
 
-fn insufficient(data: &Data, baseline: &Fit, engine: &mut Engine) -> Report {
-    let quality = quality(engine, baseline, false);
+fn insufficient(data: &Data, baseline: &Fit, engine: &Engine, unseen: &[f64]) -> Report {
+    let quality = quality(engine, baseline, unseen, false);
     Report {
         schema: SCHEMA,
         rows: data.rows(),
@@ -187,19 +187,17 @@ fn insufficient(data: &Data, baseline: &Fit, engine: &mut Engine) -> Report {
 }
 
 /// Sets of causes that are nearly as good, without being the best with more.
-fn rivals(search: &mut Search, best: &Scored) -> Vec<Vec<&'static str>> {
-    let own: BTreeSet<usize> = effects(&best.fit.model).into_iter().collect();
-    let mut found: Vec<(f64, BTreeSet<usize>)> = search
-        .seen()
-        .filter(|other| other.score > best.score - RIVAL)
-        .map(|other| (other.score, effects(&other.fit.model).into_iter().collect()))
-        .filter(|(_, set): &(f64, BTreeSet<usize>)| !set.is_superset(&own))
-        .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut seen = BTreeSet::new();
-    found.retain(|(_, set)| seen.insert(set.clone()));
-    found.truncate(MOST_RIVALS);
-    found.into_iter().map(|(_, set)| set.into_iter().map(|effect| EFFECTS[effect].cause()).collect()).collect()
+fn rivals(search: &Search, best: &Scored) -> Vec<Vec<&'static str>> {
+    let own = effects(&best.fit.model);
+    search
+        .ranked()
+        .into_iter()
+        .take_while(|other| other.score > best.score - RIVAL)
+        .map(|other| effects(&other.fit.model))
+        .filter(|set| !own.iter().all(|effect| set.contains(effect)))
+        .take(MOST_RIVALS)
+        .map(|set| set.into_iter().map(|effect| EFFECTS[effect].cause()).collect())
+        .collect()
 }
 
 /// On a record that only rises (or falls), memory and a law without memory are one.
@@ -235,7 +233,7 @@ fn next_experiment(verdict: Verdict, findings: &[Finding], alternatives: &[Vec<&
             let named: Vec<&str> = findings.iter().map(|finding| finding.cause).collect();
             let rival = alternatives.iter().flatten().find(|cause| !named.contains(cause));
             let ours = named.iter().find(|cause| !alternatives.iter().all(|set| set.contains(cause)));
-            let cause = rival.or(ours.and_then(|ours| named.iter().find(|name| *name == ours)))?;
+            let cause = rival.or(ours)?;
             let experiment = EFFECTS[index_of(cause)?].experiment();
             Some(format!("run {experiment}"))
         }
@@ -406,8 +404,8 @@ fn interval(value: f64, error: f64, unit: &'static str) -> Parameter {
     Parameter { value, low, high, unit }
 }
 
-/// `stops` if the simulation knows of bounds at which readings stop.
-fn quality(engine: &mut Engine, fit: &Fit, stops: bool) -> Quality {
+/// `unseen` is the residual on held-out stretches; `stops` if the simulation knows of bounds at which readings stop.
+fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -> Quality {
     let observed = engine.observed;
     let error = |residual: &[f64]| scale_of_squares(&if stops { observed.errors(residual) } else { residual.into() });
     let rmse = error(&fit.residual);
@@ -417,7 +415,7 @@ fn quality(engine: &mut Engine, fit: &Fit, stops: bool) -> Quality {
     Quality {
         rmse,
         fit_percent: 100.0 * (1.0 - rmse / spread.max(1e-12)),
-        held_out_rmse: error(&engine.held_out(fit).residual),
+        held_out_rmse: error(unseen),
         one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
     }
 }

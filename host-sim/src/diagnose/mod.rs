@@ -107,7 +107,7 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         let mut engine = Engine::new(&thinned, &observed, Simulator::new(&thinned, &options.base));
         let mut search = Search::new(&mut engine);
         search.run(&mut progress);
-        search.leaders(LEADERS)
+        search.ranked().into_iter().take(LEADERS).map(|scored| scored.fit.model.clone()).collect()
     });
     let observed = Observed::new(&data);
     let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &options.base));

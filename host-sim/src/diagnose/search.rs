@@ -75,11 +75,6 @@ impl<'e, 'a> Search<'e, 'a> {
         Self { engine, seen: HashMap::new(), extended: HashMap::new(), caution: 1.0 }
     }
 
-    /// Everything that was judged.
-    pub fn seen(&self) -> impl Iterator<Item = &Scored> {
-        self.seen.values()
-    }
-
     /// The best structure; `progress` hears of each structure that becomes the best.
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
         loop {
@@ -120,13 +115,14 @@ impl<'e, 'a> Search<'e, 'a> {
         self.pruned(best)
     }
 
-    /// The best structures of different causes, the best first.
-    pub fn leaders(&self, count: usize) -> Vec<Model> {
-        let mut seen: Vec<&Scored> = self.seen.values().collect();
-        seen.sort_by(|a, b| b.score.total_cmp(&a.score));
+    /// The best structure of each set of effects, the best set first.
+    pub fn ranked(&self) -> Vec<&Scored> {
+        let mut ranked: Vec<&Scored> = self.seen.values().collect();
+        let key = |scored: &Scored| scored.fit.model.structure();
+        ranked.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| key(a).cmp(&key(b))));
         let mut sets = HashSet::new();
-        seen.retain(|scored| sets.insert(effects(&scored.fit.model)));
-        seen.into_iter().take(count).map(|scored| scored.fit.model.clone()).collect()
+        ranked.retain(|scored| sets.insert(effects(&scored.fit.model)));
+        ranked
     }
 
     /// One search at the present caution.

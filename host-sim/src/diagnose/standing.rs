@@ -1,7 +1,5 @@
 //! How the best sets of causes stand beside each other: what they score, and what they foretell.
 
-use std::collections::HashSet;
-
 use super::effects::EFFECTS;
 use super::fit::Engine;
 use super::noise::scale_of_squares;
@@ -23,18 +21,13 @@ const BEST: usize = 8;
 
 /// The best sets of causes, the best without each cause of the best one, and the simulation as it was.
 pub(super) fn contenders(search: &Search, best: &Scored) -> Vec<Scored> {
-    let mut ranked: Vec<&Scored> = search.seen().collect();
-    let key = |scored: &Scored| scored.fit.model.structure();
-    ranked.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| key(a).cmp(&key(b))));
-    let mut sets = HashSet::new();
-    ranked.retain(|scored| sets.insert(effects(&scored.fit.model)));
     let without: Vec<_> =
         effects(&best.fit.model).into_iter().map(|effect| search.best_without(effect).fit.model.structure()).collect();
     let kept = |(place, scored): &(usize, &Scored)| {
         let structure = scored.fit.model.structure();
         *place < BEST || structure.is_empty() || without.contains(&structure)
     };
-    ranked.into_iter().enumerate().filter(kept).map(|(_, scored)| scored.clone()).collect()
+    search.ranked().into_iter().enumerate().filter(kept).map(|(_, scored)| scored.clone()).collect()
 }
 
 /// Their standings, in the same order.
