@@ -8,14 +8,18 @@
 //! | [`cause`] | the 18 causes: names, blocks, parameters, forms |
 //! | [`effect`], [`plain`] | one cause with its values; values that are plain to see |
 //! | [`schedule`], [`noise`] | what the amplifier is told; what rides on the readings |
-//! | [`spring`], [`physics`], [`memory`] | the spring, stepped through time |
+//! | [`spring`], [`physics`], [`memory`] | the spring and its amplifier |
+//! | [`moving`] | the same, stepped through time |
 //! | [`reading`] | what happens to the readings after the spring |
+//! | [`live`] | spring and sensor step by step, for a controller to close a loop around |
 //! | [`record`], [`truth`], [`export`] | the finished record, what is true about it, both as files |
 
 pub mod cause;
 pub mod effect;
 pub mod export;
+pub mod live;
 pub mod memory;
+pub mod moving;
 pub mod noise;
 pub mod physics;
 pub mod plain;
@@ -27,6 +31,7 @@ pub mod truth;
 
 pub use cause::{Block, Cause};
 pub use effect::Effect;
+pub use live::Live;
 pub use noise::Noise;
 pub use record::Hidden;
 pub use schedule::Schedule;

@@ -7,6 +7,72 @@ use super::cause::Cause;
 use super::effect::Effect;
 use super::schedule::Schedule;
 
+/// What a sensor does to a reading, whatever the spring does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensor {
+    /// Those of the effects that touch readings.
+    effects: Vec<Effect>,
+    /// The bound, in V.
+    limit: Option<f64>,
+    /// What it rounds to, in V.
+    step: Option<f64>,
+}
+
+/// One reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Noise and all, in V.
+    pub read: f64,
+    /// Without noise, outliers and rounding, in V.
+    pub expected: f64,
+    /// It is an outlier.
+    pub outlier: bool,
+}
+
+impl Sensor {
+    /// With those of the effects that touch readings; `top` is the largest stiffness that it is to see, in V.
+    pub fn new(effects: &[Effect], top: f64) -> Self {
+        let mut sensor = Self { effects: Vec::new(), limit: None, step: None };
+        for effect in effects.iter().filter(|effect| effect.size > 0.0) {
+            match (effect.cause, effect.values().as_slice()) {
+                (Cause::ReadingOffset | Cause::Hum | Cause::Outliers, _) => sensor.effects.push(effect.clone()),
+                (Cause::SensorSaturation, &[part]) => sensor.limit = Some(part * top),
+                (Cause::Quantisation, &[volts]) => sensor.step = Some(volts),
+                _ => {}
+            }
+        }
+        sensor
+    }
+
+    /// Reads a `stiffness` at time `t`, with that much noise on it (both in V).
+    pub fn read(&self, stiffness: f64, t: f64, noise: f64, random: &mut ChaCha8Rng) -> Reading {
+        let (mut expected, mut extra, mut outlier) = (stiffness, noise, false);
+        for effect in &self.effects {
+            match (effect.cause, effect.values().as_slice()) {
+                (Cause::ReadingOffset, &[from_s, to_s, offset]) => {
+                    expected += if (from_s..=to_s).contains(&t) { offset } else { 0.0 };
+                }
+                (Cause::Hum, &[amplitude, freq_hz, phase]) => {
+                    expected += amplitude * (std::f64::consts::TAU * freq_hz * t + phase).sin();
+                }
+                (Cause::Outliers, &[fraction, typical_v]) => {
+                    // As many draws whatever the outcome: the same readings are hit at every size.
+                    let (hit, far, down) =
+                        (random.random_bool(fraction), random.random_range(0.5..1.5), random.random_bool(0.5));
+                    if hit {
+                        extra += if down && effect.form == 0 { -typical_v * far } else { typical_v * far };
+                        outlier = true;
+                    }
+                }
+                _ => {}
+            }
+        }
+        let bound = self.limit.unwrap_or(f64::INFINITY);
+        let rounded = |y: f64| self.step.map_or(y, |step| (y / step).round() * step);
+        Reading { read: rounded((expected + extra).min(bound)), expected: expected.min(bound), outlier }
+    }
+}
+
 /// What ends up in the file, and what of it could have been foretold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Readings {
@@ -29,42 +95,14 @@ impl Readings {
         effects: &[Effect],
         random: &mut ChaCha8Rng,
     ) -> Self {
-        let top = stiffness.iter().copied().fold(0.0, f64::max);
-        let mut expected = stiffness;
-        let mut extra = noise.to_vec();
-        let (mut limit, mut step, mut outliers) = (None, None, 0);
-        for effect in effects.iter().filter(|effect| effect.size > 0.0) {
-            match (effect.cause, effect.values().as_slice()) {
-                (Cause::ReadingOffset, &[from_s, to_s, offset]) => {
-                    for (y, &t) in expected.iter_mut().zip(&schedule.time_s) {
-                        *y += if (from_s..=to_s).contains(&t) { offset } else { 0.0 };
-                    }
-                }
-                (Cause::Hum, &[amplitude, freq_hz, phase]) => {
-                    for (y, &t) in expected.iter_mut().zip(&schedule.time_s) {
-                        *y += amplitude * (std::f64::consts::TAU * freq_hz * t + phase).sin();
-                    }
-                }
-                (Cause::Outliers, &[fraction, typical_v]) => {
-                    for e in &mut extra {
-                        // As many draws whatever the outcome: the same readings are hit at every size.
-                        let (hit, far, down) =
-                            (random.random_bool(fraction), random.random_range(0.5..1.5), random.random_bool(0.5));
-                        if hit {
-                            *e += if down && effect.form == 0 { -typical_v * far } else { typical_v * far };
-                            outliers += 1;
-                        }
-                    }
-                }
-                (Cause::SensorSaturation, &[part]) => limit = Some(part * top),
-                (Cause::Quantisation, &[volts]) => step = Some(volts),
-                _ => {}
-            }
+        let sensor = Sensor::new(effects, stiffness.iter().copied().fold(0.0, f64::max));
+        let mut readings = Self { limit: sensor.limit, ..Self::default() };
+        for ((y, &t), &noise) in stiffness.into_iter().zip(&schedule.time_s).zip(noise) {
+            let Reading { read, expected, outlier } = sensor.read(y, t, noise, random);
+            readings.read.push(read);
+            readings.expected.push(expected);
+            readings.outliers += usize::from(outlier);
         }
-        let bound = limit.unwrap_or(f64::INFINITY);
-        let rounded = |y: f64| step.map_or(y, |step| (y / step).round() * step);
-        let read = expected.iter().zip(extra).map(|(y, e)| rounded((y + e).min(bound))).collect();
-        expected.iter_mut().for_each(|y| *y = y.min(bound));
-        Self { read, expected, limit, outliers }
+        readings
     }
 }

@@ -112,10 +112,7 @@ impl Hidden {
 
 /// What the spring does, without noise and reading.
 pub(super) fn stiffness(schedule: &Schedule, effects: &[Effect], steps: usize) -> Vec<f64> {
-    let mut spring = Spring::default();
-    // At size 0 it is the paper's plant itself, not a form of it that comes close.
-    effects.iter().filter(|effect| effect.size > 0.0).for_each(|effect| effect.alter(&mut spring));
-    spring.run(schedule, steps)
+    Spring::with(effects).run(schedule, steps)
 }
 
 #[cfg(test)]

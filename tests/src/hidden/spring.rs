@@ -1,9 +1,12 @@
-//! The spring and its amplifier, stepped through time: fourth-order Runge-Kutta, at least 20 steps a row.
+//! The spring and its amplifier: what may be told of them, and how their state changes.
 //!
 //! Command, delay, limit, slew -> voltage u -> memory, law, gain -> v -> relaxation (w, creep w2) -> leakage L ->
-//! resonance p -> drift -> stiffness. A row's voltage is held until the next row; its stiffness is read just after it.
+//! resonance p -> drift -> stiffness. A row's voltage is held until the next row; its stiffness is read just after it. [`moving`](super::moving) steps it
+//! through time.
 
+use super::effect::Effect;
 use super::memory::Memory;
+use super::moving::Moving;
 use super::physics::{Creep, Drift, Law, Leakage, Resonance, SHARE, TAU_S, Tau};
 use super::schedule::Schedule;
 
@@ -48,34 +51,32 @@ impl Default for Spring {
 }
 
 /// What changes with time, memory aside: w, w2, L, p, p'.
-type State = [f64; 5];
+pub(super) type State = [f64; 5];
 
 impl Spring {
+    /// With those of the effects that are not of the readings.
+    pub fn with(effects: &[Effect]) -> Self {
+        let mut spring = Self::default();
+        // At size 0 it is the paper's plant itself, not a form of it that comes close.
+        effects.iter().filter(|effect| effect.size > 0.0).for_each(|effect| effect.alter(&mut spring));
+        spring
+    }
+
     /// The stiffness at every row, `steps` time steps a row.
     pub fn run(&self, schedule: &Schedule, steps: usize) -> Vec<f64> {
-        let mut moving = Moving { spring: self, memory: self.memory.clone(), u: 0.0, v: 0.0, state: [0.0; 5] };
-        let rows: Vec<(f64, f64)> = schedule.rows().collect();
-        let mut stiffness = Vec::with_capacity(rows.len());
-        let (mut arrived, mut target) = (0, 0.0);
-        for (k, &(now, _)) in rows.iter().enumerate() {
-            // Commands that arrive on the way here split the row.
-            let mut at = if k == 0 { now } else { rows[k - 1].0 };
-            let step_s = (now - at) / steps as f64;
-            while arrived <= k && rows[arrived].0 + self.delay_s <= now {
-                let arrival = rows[arrived].0 + self.delay_s;
-                moving.go(target, arrival - at, step_s);
-                at = at.max(arrival);
-                target = rows[arrived].1.min(self.limit_v);
-                arrived += 1;
-            }
-            moving.go(target, now - at, step_s);
-            stiffness.push(moving.read(target, now - rows[0].0));
-        }
-        stiffness
+        let mut last = schedule.time_s[0];
+        let mut moving = Moving::new(self.clone(), last);
+        let row = |(now, voltage)| {
+            moving.go_to(now, (now - last) / steps as f64);
+            last = now;
+            moving.command(voltage);
+            moving.stiffness()
+        };
+        schedule.rows().map(row).collect()
     }
 
     /// The response before resonance and drift, and what excites the resonance.
-    fn response(&self, v: f64, [w, w2, leaked, ..]: State) -> (f64, f64) {
+    pub(super) fn response(&self, v: f64, [w, w2, leaked, ..]: State) -> (f64, f64) {
         let immediate = self.share * v;
         let mut y = immediate + (1.0 - self.share) * w;
         match self.creep {
@@ -88,7 +89,7 @@ impl Spring {
     }
 
     /// Rates of the state at voltage `u`, of which the relaxing parts see `v`.
-    fn rates(&self, u: f64, v: f64, state: State) -> State {
+    pub(super) fn rates(&self, u: f64, v: f64, state: State) -> State {
         let [w, w2, leaked, p, p_rate] = state;
         let (y, excites) = self.response(v, state);
         let creep = self.creep.map_or(0.0, |creep| (v - w2) / creep.tau_s);
@@ -102,67 +103,6 @@ impl Spring {
             omega * omega * (excites - p) - 2.0 * mode.zeta * omega * p_rate
         });
         [(v - w) / self.tau.at(u), creep, leak, p_rate, acceleration]
-    }
-}
-
-/// A spring on its way.
-struct Moving<'a> {
-    spring: &'a Spring,
-    memory: Memory,
-    /// Across the spring, in V.
-    u: f64,
-    /// What memory, law and gain make of it.
-    v: f64,
-    state: State,
-}
-
-impl Moving<'_> {
-    /// Through `duration` s with the command at `target`.
-    fn go(&mut self, target: f64, duration: f64, step_s: f64) {
-        if duration <= 0.0 {
-            return;
-        }
-        let steps = (duration / step_s - 1e-6).ceil().max(1.0);
-        let h = duration / steps;
-        for _ in 0..steps as usize {
-            let reach = self.spring.slew_v_per_s * h;
-            if reach.is_infinite() {
-                self.apply(target);
-            }
-            let (u, v) = (self.u, self.v);
-            self.apply(target.clamp(u - reach, u + reach));
-            self.integrate((u, v), h);
-        }
-    }
-
-    fn apply(&mut self, u: f64) {
-        if u != self.u {
-            self.u = u;
-            self.v = self.spring.gain * self.spring.law.at(self.memory.step(u));
-        }
-    }
-
-    /// From the voltages `before` to the present ones, which between them are linear.
-    fn integrate(&mut self, before: (f64, f64), h: f64) {
-        let middle = (0.5 * (before.0 + self.u), 0.5 * (before.1 + self.v));
-        let x = self.state;
-        let rates = |at: (f64, f64), x| self.spring.rates(at.0, at.1, x);
-        let along = |rates: State, h: f64| std::array::from_fn(|i| x[i] + h * rates[i]);
-        let k1 = rates(before, x);
-        let k2 = rates(middle, along(k1, h / 2.0));
-        let k3 = rates(middle, along(k2, h / 2.0));
-        let k4 = rates((self.u, self.v), along(k3, h));
-        self.state = std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
-    }
-
-    /// The stiffness `t` s after the start, just after a command for `target` arrived.
-    fn read(&mut self, target: f64, t: f64) -> f64 {
-        if self.spring.slew_v_per_s.is_infinite() {
-            self.apply(target);
-        }
-        let (y, excites) = self.spring.response(self.v, self.state);
-        let y = self.spring.resonance.map_or(y, |mode| y + mode.participation * (self.state[3] - excites));
-        self.spring.drift.map_or(y, |drift| drift.of(y, t))
     }
 }
 
