@@ -3,7 +3,7 @@
 //! Pure: no clock, no pin, no log. The same bits on the host and on the MCU.
 
 use model::supervisor::{self, Command, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
-use model::{Config, Input, OutOfRange, Output, SampleTime, Settings, State, Volts};
+use model::{Compensation, Config, Input, OutOfRange, Output, SampleTime, Settings, State, Volts};
 
 /// What the host ordered since the last tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,7 +80,7 @@ impl Control {
         last_fault: Option<Fault>,
     ) -> Result<Self, OutOfRange> {
         let amplifier = model::Amplifier { min_v: 0.0, slew_v_per_s: None, ..settings.amplifier };
-        let rest = Settings { gains: None, amplifier, ..*settings };
+        let rest = Settings { compensation: Compensation::None, amplifier, ..*settings };
         Ok(Self {
             config: settings.check()?,
             rest: rest.check()?,

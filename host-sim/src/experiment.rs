@@ -5,7 +5,9 @@
 
 use anyhow::Result;
 use model::estimator::Estimator;
-use model::{Config, DacCode, Input, Limits, Output, Plant, ScaledStiffness, Settings, Spring, State, Volts};
+use model::{
+    Compensation, Config, DacCode, Input, Limits, Output, Plant, ScaledStiffness, Settings, Spring, State, Volts,
+};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
@@ -22,7 +24,7 @@ pub struct Experiment<P = Plant> {
     pub name: String,
     /// The voltages asked for.
     pub schedule: Schedule,
-    /// Spring, gains and amplifier of the controlled loop.
+    /// Spring, pre-compensator and amplifier of the controlled loop.
     pub settings: Settings<P>,
 }
 
@@ -61,7 +63,7 @@ impl<P: Judged> Experiment<P> {
     /// [`BadInput`] for settings that the model refuses and schedules beyond the amplifier's range.
     pub fn run(&self, mut progress: impl FnMut(usize, usize)) -> Result<Run> {
         let rate_hz = self.settings.rate_hz;
-        let uncontrolled = Settings { gains: None, ..self.settings };
+        let uncontrolled = Settings { compensation: Compensation::None, ..self.settings };
         let controlled = self.settings.check().map_err(|error| BadInput(error.to_string()))?;
         let alone = uncontrolled.check().map_err(|error| BadInput(error.to_string()))?;
         self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;

@@ -1,14 +1,14 @@
 //! What the fixed-point run of a spring is laid beside: a reference in double precision.
 //!
-//! The plain spring's is the exact solution in continuous time, [`crate::reference`]; the extended spring's is the loop at
-//! the controller's own rate, [`crate::sampled`].
+//! The plain spring's is the exact solution in continuous time, [`crate::reference`]; the extended spring's, and that of the
+//! time-optimal pre-compensator, which thinks in ticks, is the loop at the controller's own rate, [`crate::sampled`].
 
 use model::estimator::Model;
-use model::{ExtendedPlant, Plant, Settings};
+use model::{Compensation, ExtendedPlant, Plant, Settings};
 
 use crate::experiment::{Run, Sample};
 use crate::reference::{Loop, Moment};
-use crate::sampled::SampledLoop;
+use crate::sampled::{Controller, SampledLoop, Spring};
 use crate::schedule::Schedule;
 
 /// A spring whose fixed-point run is laid beside a reference.
@@ -38,11 +38,23 @@ impl Judged for Plant {
     }
 
     fn reference_at_ticks(settings: &Settings, schedule: &Schedule, targets: &[f64]) -> Vec<f64> {
-        exact_at_ticks(continuous(settings), schedule, settings.rate_hz, targets)
+        match settings.compensation {
+            Compensation::TimeOptimal(_) => sampled_at_ticks(settings, targets),
+            _ => exact_at_ticks(continuous(settings), schedule, settings.rate_hz, targets),
+        }
     }
 
-    fn reference_at(settings: &Settings, schedule: &Schedule, _: &Run, _: &[Sample], times_s: &[f64]) -> Vec<f64> {
-        reference_at(continuous(settings), schedule, times_s.iter().copied())
+    fn reference_at(
+        settings: &Settings,
+        schedule: &Schedule,
+        run: &Run,
+        samples: &[Sample],
+        times_s: &[f64],
+    ) -> Vec<f64> {
+        match settings.compensation {
+            Compensation::TimeOptimal(_) => at_last_ticks(run, samples, times_s),
+            _ => reference_at(continuous(settings), schedule, times_s.iter().copied()),
+        }
     }
 
     fn exact(settings: &Settings) -> Option<Loop> {
@@ -58,17 +70,11 @@ impl Judged for ExtendedPlant<'_> {
     }
 
     fn reference_at_ticks(settings: &Settings<Self>, _: &Schedule, targets: &[f64]) -> Vec<f64> {
-        let sampled = SampledLoop::from(settings);
-        let mut state = sampled.at_rest();
-        let at = |&target: &f64| {
-            let voltage = sampled.drive(&mut state, target);
-            sampled.apply(&mut state, voltage)
-        };
-        targets.iter().map(at).collect()
+        sampled_at_ticks(settings, targets)
     }
 
     fn reference_at(_: &Settings<Self>, _: &Schedule, run: &Run, samples: &[Sample], times_s: &[f64]) -> Vec<f64> {
-        times_s.iter().map(|&time| samples[run.tick_at(time)].reference).collect()
+        at_last_ticks(run, samples, times_s)
     }
 
     fn exact(settings: &Settings<Self>) -> Option<Loop> {
@@ -78,18 +84,38 @@ impl Judged for ExtendedPlant<'_> {
 
 /// The settings with another spring.
 pub fn with_plant<P, Q>(settings: &Settings<P>, plant: Q) -> Settings<Q> {
-    Settings { rate_hz: settings.rate_hz, plant, gains: settings.gains, amplifier: settings.amplifier }
+    let Settings { rate_hz, compensation, amplifier, .. } = *settings;
+    Settings { rate_hz, plant, compensation, amplifier }
 }
 
-/// The settings as the reference takes them.
+/// The settings as the reference takes them; the target is put out as it is where it cannot be led by gains.
 pub fn continuous(settings: &Settings) -> Loop {
     Loop {
         share: settings.plant.share,
         time_constant_s: settings.plant.time_constant_s,
-        gains: settings.gains.map(|gains| (gains.proportional, gains.integral_per_s)),
+        gains: match settings.compensation {
+            Compensation::ProportionalIntegral(gains) => Some((gains.proportional, gains.integral_per_s)),
+            _ => None,
+        },
         range_v: (settings.amplifier.min_v, settings.amplifier.max_v),
         slew_v_per_s: slew(settings),
     }
+}
+
+/// The sampled loop's stiffness, in V, for one target a tick.
+fn sampled_at_ticks<P: Copy + Into<Spring>>(settings: &Settings<P>, targets: &[f64]) -> Vec<f64> {
+    let sampled = SampledLoop::from(settings);
+    let mut state = sampled.at_rest();
+    let at = |&target: &f64| {
+        let voltage = sampled.drive(&mut state, target);
+        sampled.apply(&mut state, voltage)
+    };
+    targets.iter().map(at).collect()
+}
+
+/// Between ticks the last one counts.
+fn at_last_ticks(run: &Run, samples: &[Sample], times_s: &[f64]) -> Vec<f64> {
+    times_s.iter().map(|&time| samples[run.tick_at(time)].reference).collect()
 }
 
 /// The amplifier's slew, in V/s; what it makes within a tick is no limit to it.
@@ -99,12 +125,18 @@ fn slew<P>(settings: &Settings<P>) -> f64 {
     amplifier.slew_v_per_s.filter(acts).unwrap_or(f64::INFINITY)
 }
 
-impl From<&Settings<ExtendedPlant<'_>>> for SampledLoop {
-    fn from(settings: &Settings<ExtendedPlant<'_>>) -> Self {
+impl<P: Copy + Into<Spring>> From<&Settings<P>> for SampledLoop {
+    fn from(settings: &Settings<P>) -> Self {
         Self {
             sample_s: 1.0 / settings.rate_hz,
             spring: settings.plant.into(),
-            gains: settings.gains.map(|gains| (gains.proportional, gains.integral_per_s)),
+            controller: match settings.compensation {
+                Compensation::None => Controller::None,
+                Compensation::ProportionalIntegral(gains) => {
+                    Controller::ProportionalIntegral(gains.proportional, gains.integral_per_s)
+                }
+                Compensation::TimeOptimal(approach) => Controller::TimeOptimal(approach.time_constant_s),
+            },
             range_v: (settings.amplifier.min_v, settings.amplifier.max_v),
             slew_v_per_s: slew(settings),
         }

@@ -1,9 +1,12 @@
-//! The loop at the controller's own rate in double precision: the textbook PI that the fixed-point tick must agree with.
+//! The loop at the controller's own rate in double precision: what the fixed-point tick must agree with.
 //!
-//! Written from the equations, not from the `model` crate, of which it takes numbers only: a proportional and an integral
-//! part, back-calculation as anti-windup, limits by clamping, and the [spring]'s exact step for a voltage held between
-//! ticks. Where the spring's answer to a voltage is a curve, the controller takes it for straight, from the last voltage
-//! on and as steep as it is anywhere.
+//! Written from the equations, not from the `model` crate, of which it takes numbers only: limits by clamping, and the
+//! [spring]'s exact step for a voltage held between ticks.
+//!
+//! - The textbook PI: a proportional and an integral part, back-calculation as anti-windup. Where the spring's answer to a
+//!   voltage is a curve, the controller takes it for straight, from the last voltage on and as steep as it is anywhere.
+//! - Time-optimal: the voltage that brings the spring to its target by the end of the tick, found by running copies of the
+//!   spring through that tick.
 
 pub mod spring;
 
@@ -16,12 +19,23 @@ pub struct SampledLoop {
     pub sample_s: f64,
     /// The spring.
     pub spring: Spring,
-    /// Proportional and integral gain (1/s) of the controller; `None` puts the target out as it is.
-    pub gains: Option<(f64, f64)>,
+    /// How the voltage is led to the target.
+    pub controller: Controller,
     /// Lowest and highest voltage, in V.
     pub range_v: (f64, f64),
     /// Fastest change, in V/s; infinite where there is no limit.
     pub slew_v_per_s: f64,
+}
+
+/// The controllers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Controller {
+    /// Puts the target out as it is.
+    None,
+    /// Proportional and integral gain (1/s).
+    ProportionalIntegral(f64, f64),
+    /// Time constant of the approach, in s.
+    TimeOptimal(f64),
 }
 
 /// State of the spring, the controller and the amplifier, all in V.
@@ -42,9 +56,10 @@ impl SampledLoop {
     pub fn drive(&self, state: &mut State, target: f64) -> f64 {
         let (lowest, highest) = self.range_v;
         let target = target.clamp(lowest, highest);
-        let wanted = match self.gains {
-            None => target,
-            Some((proportional, _)) => {
+        let wanted = match self.controller {
+            Controller::None => target,
+            Controller::TimeOptimal(approach_s) => self.leading_to(&state.spring, target, approach_s),
+            Controller::ProportionalIntegral(proportional, _) => {
                 // u = Kp (target - y) + z with y = y0 + s (u - u0)
                 let (before, steepest) = (state.spring.voltage(), self.spring.steepest());
                 let error = target - self.spring.stiffness(&state.spring) + steepest * before;
@@ -54,12 +69,53 @@ impl SampledLoop {
         let step = self.slew_v_per_s * self.sample_s;
         let slewed = wanted.clamp(state.voltage - step, state.voltage + step);
         state.voltage = slewed.clamp(lowest, highest);
-        if let Some((proportional, integral_per_s)) = self.gains {
+        if let Controller::ProportionalIntegral(proportional, integral_per_s) = self.controller {
             let error = (wanted - state.integral) / proportional;
             let tracking_per_s = integral_per_s / proportional;
             state.integral += self.sample_s * (integral_per_s * error + tracking_per_s * (state.voltage - wanted));
         }
         state.voltage
+    }
+
+    /// The voltage, within the range, that makes up as much of the way to the target in the coming tick as the approach
+    /// says; by regula falsi (Illinois), since more voltage always gives more stiffness.
+    fn leading_to(&self, spring: &spring::State, target: f64, approach_s: f64) -> f64 {
+        let now = self.spring.stiffness(spring);
+        let part = if approach_s > 0.0 { -(-self.sample_s / approach_s).exp_m1() } else { 1.0 };
+        let aim = now + part * (target - now);
+        let missed = |volts: f64| {
+            let mut tried = spring.clone();
+            self.spring.apply(&mut tried, volts);
+            self.spring.hold(&mut tried, self.sample_s);
+            self.spring.stiffness(&tried) - aim
+        };
+        let (mut low, mut high) = self.range_v;
+        let (mut at_low, mut at_high) = (missed(low), missed(high));
+        if at_low >= 0.0 || at_high <= 0.0 {
+            return if at_low >= 0.0 { low } else { high };
+        }
+        let mut side = 0;
+        for _ in 0..100 {
+            let middle = high - at_high * (high - low) / (at_high - at_low);
+            let at_middle = missed(middle);
+            if at_middle.abs() < 1e-12 || high - low < 1e-9 {
+                return middle;
+            }
+            if at_middle > 0.0 {
+                (high, at_high) = (middle, at_middle);
+                if side == 1 {
+                    at_low *= 0.5;
+                }
+                side = 1;
+            } else {
+                (low, at_low) = (middle, at_middle);
+                if side == -1 {
+                    at_high *= 0.5;
+                }
+                side = -1;
+            }
+        }
+        0.5 * (low + high)
     }
 
     /// Second half: `applied` volts are put across the spring and held; returns the stiffness just after, in V.

@@ -1,7 +1,7 @@
 //! What a run says, laid beside what the report printed and measured.
 
 use anyhow::Result;
-use model::{Limits, Settings};
+use model::{Compensation, Limits, Settings};
 use serde::Serialize;
 
 use crate::bound::shortest_time;
@@ -146,7 +146,13 @@ fn rows<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>) -> 
     let Experiment { schedule, settings, .. } = experiment;
     let times: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
     let with = P::reference_at(settings, schedule, run, &run.with, &times);
-    let without = P::reference_at(&Settings { gains: None, ..*settings }, schedule, run, &run.without, &times);
+    let without = P::reference_at(
+        &Settings { compensation: Compensation::None, ..*settings },
+        schedule,
+        run,
+        &run.without,
+        &times,
+    );
     for ((row, with), without) in rows.iter_mut().zip(with).zip(without) {
         (row.with, row.without) = (with, without);
     }

@@ -8,7 +8,7 @@
 
 use host_sim::plant_file::{Law, Leakage, Memory, PlantFile, Relaxation};
 use host_sim::sampled::SampledLoop;
-use model::{Amplifier, ExtendedPlant, Input, Plant, Settings, State, Volts};
+use model::{Amplifier, Compensation, ExtendedPlant, Input, Plant, Settings, State, Volts};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -115,15 +115,15 @@ impl Worst {
 
 /// Over the stair.
 fn disagreement(file: &PlantFile, rate_hz: f64) -> Worst {
-    let of = |gains, dac_bits, told| {
+    let of = |compensation, dac_bits, told| {
         let amplifier = Amplifier { dac_bits, ..Amplifier::PAPER };
-        of_loop(&Settings { rate_hz, plant: file.extended(), gains, amplifier }, told)
+        of_loop(&Settings { rate_hz, plant: file.extended(), compensation, amplifier }, told)
     };
-    let gains = Settings::PAPER.gains;
+    let paper = Settings::PAPER.compensation;
     Worst {
-        told: f64::max(of(gains, 12, true), of(None, 12, true)),
-        alone: of(gains, 16, false),
-        uncontrolled: of(None, 16, false),
+        told: f64::max(of(paper, 12, true), of(Compensation::None, 12, true)),
+        alone: of(paper, 16, false),
+        uncontrolled: of(Compensation::None, 16, false),
     }
 }
 

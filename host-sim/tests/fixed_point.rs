@@ -6,8 +6,8 @@
 
 use std::cell::Cell;
 
-use host_sim::sampled::SampledLoop;
-use model::{Amplifier, Gains, Input, Plant, Settings, Volts};
+use host_sim::sampled::{Controller, SampledLoop};
+use model::{Amplifier, Compensation, Gains, Input, Plant, Settings, Volts};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -48,21 +48,22 @@ prop_compose! {
         let integral = proportional + rate - reset_ticks;
         let gains = Gains { proportional: 10f64.powf(proportional), integral_per_s: 10f64.powf(integral) };
         let plant = Plant { share, time_constant_s: 10f64.powf(time_constant) };
-        Case { settings: Settings { rate_hz: 10f64.powf(rate), plant, gains: Some(gains), amplifier }, stair }
+        let compensation = Compensation::ProportionalIntegral(gains);
+        Case { settings: Settings { rate_hz: 10f64.powf(rate), plant, compensation, amplifier }, stair }
     }
 }
 
 /// Largest differences of stiffness and voltage, in V; `None` if the settings are refused.
 fn disagreement(case: &Case) -> Option<(f64, f64)> {
-    let Settings { rate_hz, plant, gains, amplifier } = case.settings;
+    let Settings { rate_hz, plant, compensation, amplifier } = case.settings;
     let config = case.settings.check().ok()?;
-    let gains = gains?;
+    let Compensation::ProportionalIntegral(gains) = compensation else { return None };
     let (lowest, highest) = config.range();
     let range_v = (lowest.to_f64(), highest.to_f64());
     let double = SampledLoop {
         sample_s: 1.0 / rate_hz,
         spring: plant.into(),
-        gains: Some((gains.proportional, gains.integral_per_s)),
+        controller: Controller::ProportionalIntegral(gains.proportional, gains.integral_per_s),
         range_v,
         slew_v_per_s: amplifier.slew_v_per_s.unwrap_or(f64::INFINITY),
     };

@@ -156,6 +156,12 @@ impl Config {
         }
     }
 
+    /// The voltage that the last tick put across the spring, rounding included.
+    #[inline(always)]
+    pub(crate) fn applied(&self, state: &State) -> Volts {
+        self.volts(self.code(Volts(state.voltage)))
+    }
+
     /// `target` as far as the range goes, and whether it had to be moved.
     #[inline(always)]
     pub(crate) fn reachable(&self, target: Volts) -> (Volts, bool) {

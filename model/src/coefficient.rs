@@ -5,6 +5,7 @@
 //! - [`Rate`] turns a lag into what an accumulator gains in one tick. A relaxation of 5.5 s moves by 1.8e-5 of its lag
 //!   in a 10 kHz tick; 32 fraction bits would put its time constant off by parts in 1e5, so it has 64.
 //! - [`Weight`] is a factor of a sum of products: the products are added 64 bits wide and saturated once.
+//! - [`Steep`] is a positive factor of any size, for reciprocals; what it makes saturates.
 
 use fixed::types::{I0F32, I5F27, I17F47};
 
@@ -84,10 +85,44 @@ impl Weight {
         OutOfRange::check(field, value, -left..=left, "left of a sum of 10").map(|value| left - value.abs())
     }
 
+    /// The factor itself, exactly.
+    pub(crate) fn to_f64(self) -> f64 {
+        self.0.to_num()
+    }
+
+    /// What this weight makes `signal` of; beyond a signal's range, its end. Off the hot path: it divides.
+    pub(crate) fn into(self, signal: Signal) -> Signal {
+        let whole = i64::from(signal.to_bits()) << Self::FRACTION_BITS;
+        let bits = whole.checked_div(i64::from(self.0.to_bits())).unwrap_or(whole);
+        Signal::from_bits(bits.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32)
+    }
+
     /// `signal * self`, exactly.
     #[inline(always)]
     pub(crate) fn of(self, signal: Signal) -> Sum {
         signal.wide_mul(self.0)
+    }
+}
+
+/// A positive factor from 2^-32 to 2^29, exact to 2^-30 of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Steep {
+    mantissa: i32,
+    shift: u8,
+}
+
+impl Steep {
+    /// The nearest to a positive, finite `value`; beyond its range, the end.
+    pub(crate) fn new(value: f64) -> Self {
+        let (mantissa, exponent) = libm::frexp(value.max(libm::ldexp(1.0, -32)).min(libm::ldexp(1.0, 29)));
+        Self { mantissa: libm::round(libm::ldexp(mantissa, 30)) as i32, shift: (30 - exponent) as u8 }
+    }
+
+    /// `signal * self`, rounded down; beyond a signal's range, its end.
+    #[inline(always)]
+    pub(crate) fn times(self, signal: Signal) -> Signal {
+        let product = (i64::from(signal.to_bits()) * i64::from(self.mantissa)) >> (self.shift & 63);
+        Signal::from_bits(product.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32)
     }
 }
 
@@ -116,6 +151,14 @@ mod tests {
             let got = f64::from(Gain::new(gain).times(signal).to_bits());
             let exact = gain * f64::from(signal.to_bits());
             prop_assert!(got <= exact + 0.01 && got > exact - 1.01, "{got} {exact}");
+        }
+
+        #[test]
+        fn a_steep_factor_is_exact_or_saturates(exponent in -31.0..28.0f64, volts in -2000.0..2000.0f64) {
+            let (factor, signal) = (libm::exp2(exponent), Signal::from_num(volts));
+            let got = Steep::new(factor).times(signal).to_num::<f64>();
+            let exact = (factor * signal.to_num::<f64>()).clamp(-2048.0, Signal::MAX.to_num());
+            prop_assert!((got - exact).abs() < exact.abs() * 2e-9 + 1e-6, "{got} {exact}");
         }
 
         #[test]

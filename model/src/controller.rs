@@ -8,6 +8,7 @@ use crate::amplifier::{self, Amplifier, Limits};
 use crate::error::OutOfRange;
 use crate::estimator::{self, Estimator, Model, Plant};
 use crate::pre_compensator::{self, Gains, ProportionalIntegral};
+use crate::time_optimal::{self, Approach, TimeOptimal};
 use crate::units::{DacCode, SampleTime, ScaledStiffness, Volts};
 
 /// Everything the controller is built from, in SI units.
@@ -17,16 +18,31 @@ pub struct Settings<P = Plant> {
     pub rate_hz: f64,
     /// The spring that the estimator runs.
     pub plant: P,
-    /// Gains of the pre-compensator; `None` puts the target out as it is.
-    pub gains: Option<Gains>,
+    /// How the voltage is led to its target.
+    pub compensation: Compensation,
     /// The amplifier and its limits.
     pub amplifier: Amplifier,
 }
 
+/// Which pre-compensator, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Compensation {
+    /// None: the target is put out as it is.
+    None,
+    /// The report's.
+    ProportionalIntegral(Gains),
+    /// As fast as the amplifier allows.
+    TimeOptimal(Approach),
+}
+
 impl Settings {
     /// The report's spring, controller and range at 1 kHz.
-    pub const PAPER: Self =
-        Self { rate_hz: 1000.0, plant: Plant::PAPER, gains: Some(Gains::PAPER), amplifier: Amplifier::PAPER };
+    pub const PAPER: Self = Self {
+        rate_hz: 1000.0,
+        plant: Plant::PAPER,
+        compensation: Compensation::ProportionalIntegral(Gains::PAPER),
+        amplifier: Amplifier::PAPER,
+    };
 }
 
 impl<P: Model> Settings<P> {
@@ -37,31 +53,38 @@ impl<P: Model> Settings<P> {
     pub fn check(&self) -> Result<Config<P::Config>, OutOfRange> {
         let sample_time = SampleTime::from_rate(self.rate_hz)?;
         let estimator = self.plant.scaled(sample_time)?;
-        let pre_compensator = match &self.gains {
-            None => PreCompensator::None,
-            Some(gains) => {
+        let amplifier = amplifier::Config::new(&self.amplifier, sample_time)?;
+        let pre_compensator = match &self.compensation {
+            Compensation::None => PreCompensator::None,
+            Compensation::ProportionalIntegral(gains) => {
                 let promptness = self.plant.promptness(sample_time);
                 PreCompensator::ProportionalIntegral(ProportionalIntegral::new(gains, &promptness, sample_time)?)
             }
+            Compensation::TimeOptimal(approach) => {
+                let inverse = self.plant.inverse(sample_time, self.amplifier.volts_per_code())?;
+                PreCompensator::TimeOptimal(TimeOptimal::new(approach, inverse, sample_time)?)
+            }
         };
-        Ok(Config { estimator, pre_compensator, amplifier: amplifier::Config::new(&self.amplifier, sample_time)? })
+        Ok(Config { estimator, pre_compensator, amplifier })
     }
 }
 
 /// How the voltage is led to its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PreCompensator {
+enum PreCompensator<I> {
     /// The target is the voltage.
     None,
     /// Past the target and back, around the estimate.
     ProportionalIntegral(ProportionalIntegral),
+    /// To where the target can be held, by the spring's inverse.
+    TimeOptimal(TimeOptimal<I>),
 }
 
 /// A checked configuration, scaled for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config<E = estimator::Config> {
+pub struct Config<E: Estimator = estimator::Config> {
     estimator: E,
-    pre_compensator: PreCompensator,
+    pre_compensator: PreCompensator<E::Inverse>,
     amplifier: amplifier::Config,
 }
 
@@ -70,6 +93,7 @@ pub struct Config<E = estimator::Config> {
 pub struct State<S = estimator::State> {
     estimator: S,
     pre_compensator: pre_compensator::State,
+    time_optimal: time_optimal::State,
     amplifier: amplifier::State,
 }
 
@@ -103,7 +127,7 @@ impl<E: Estimator> Config<E> {
         self.amplifier.range()
     }
 
-    /// One tick: no heap, no float, no panic, no loop.
+    /// One tick: no heap, no float, no panic, no loop without bound.
     #[inline(always)]
     pub fn tick(&self, state: &mut State<E::State>, input: Input) -> Output {
         let (target, moved) = self.amplifier.reachable(input.target);
@@ -111,6 +135,10 @@ impl<E: Estimator> Config<E> {
             PreCompensator::None => target,
             PreCompensator::ProportionalIntegral(it) => {
                 it.voltage(&state.pre_compensator, target, self.estimator.pivot(&state.estimator))
+            }
+            PreCompensator::TimeOptimal(it) => {
+                let applied = self.amplifier.applied(&state.amplifier);
+                it.voltage(&mut state.time_optimal, target, &self.estimator, &state.estimator, applied)
             }
         };
         let drive = self.amplifier.drive(&mut state.amplifier, wanted);
@@ -127,10 +155,17 @@ impl<E: Estimator> Config<E> {
     /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once, and
     /// without a pre-compensator the voltage goes to the target.
     pub fn adopt(&self, state: &mut State<E::State>, target: Volts) {
-        if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
-            let (target, _) = self.amplifier.reachable(target);
-            let pivot = self.estimator.pivot(&state.estimator);
-            it.align(&mut state.pre_compensator, state.amplifier.voltage(), target, pivot);
+        let (target, _) = self.amplifier.reachable(target);
+        match &self.pre_compensator {
+            PreCompensator::None => (),
+            PreCompensator::ProportionalIntegral(it) => {
+                let pivot = self.estimator.pivot(&state.estimator);
+                it.align(&mut state.pre_compensator, state.amplifier.voltage(), target, pivot);
+            }
+            PreCompensator::TimeOptimal(it) => {
+                let applied = self.amplifier.applied(&state.amplifier);
+                it.align(&mut state.time_optimal, target, &self.estimator, &state.estimator, applied);
+            }
         }
     }
 }

@@ -18,7 +18,9 @@
 //! `w' = w + (1 - exp(-T / tau)) (u - w)`. `w` is always between voltages that were
 //! applied, so no sum here can overflow.
 
-use crate::coefficient::{Gain, Rate, upper};
+use core::fmt::Debug;
+
+use crate::coefficient::{Gain, Rate, Steep, upper};
 use crate::error::OutOfRange;
 use crate::units::{Accumulator, SampleTime, ScaledStiffness, Signal, Volts};
 
@@ -33,18 +35,51 @@ pub trait Model: Copy {
 
     /// How much of a change of voltage shows how soon, at the most.
     fn promptness(&self, sample_time: SampleTime) -> Promptness;
+
+    /// The way back, from a stiffness to a voltage whose `resolution_v` is that of the amplifier's converter.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names what keeps more voltage from always giving more stiffness.
+    fn inverse(
+        &self,
+        sample_time: SampleTime,
+        resolution_v: f64,
+    ) -> Result<<Self::Config as Estimator>::Inverse, OutOfRange>;
 }
 
 /// A spring that runs in a tick, on the voltage that was really applied.
 pub trait Estimator: Copy {
     /// What it remembers; the default is a spring at rest without voltage.
     type State: Copy + Default;
+    /// What it takes to go back from a stiffness to a voltage.
+    type Inverse: Copy + Debug + Eq;
 
     /// One tick: the stiffness with `applied` just put across the spring, which then holds for one sample time.
     fn run(&self, state: &mut Self::State, applied: Volts) -> ScaledStiffness;
 
     /// A point of what the spring would answer at once to a voltage now.
     fn pivot(&self, state: &Self::State) -> Pivot;
+
+    /// Where the spring is and where it goes, while the `applied` voltage of the last tick stays.
+    fn outlook(&self, state: &Self::State, applied: Volts) -> Outlook;
+
+    /// The voltage that makes the stiffness at the end of the coming tick `change` V more than `applied` would.
+    fn voltage_for(&self, state: &Self::State, inverse: &Self::Inverse, applied: Volts, change: Signal) -> Volts;
+}
+
+/// Stiffness before the coming tick and at its end, both under the last voltage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outlook {
+    pub(crate) now: Signal,
+    pub(crate) then: Signal,
+}
+
+/// The most volts that a law asks for to make up for one volt of stiffness within a tick: more only amplifies rounding.
+const MOST_DEMANDED: f64 = 8192.0;
+
+/// The volts that make up for one volt of stiffness, where one volt makes up for `within_a_tick`.
+pub(crate) fn demanded(within_a_tick: f64) -> f64 {
+    (1.0 / within_a_tick).min(MOST_DEMANDED)
 }
 
 /// Upper bounds of what one volt more does, in V/V.
@@ -137,10 +172,16 @@ impl Model for Plant {
         let relaxed = self.relaxed_in(sample_time);
         Promptness { at_once: self.share, in_a_tick: (1.0 - self.share) * relaxed, relaxed }
     }
+
+    fn inverse(&self, sample_time: SampleTime, _: f64) -> Result<Steep, OutOfRange> {
+        let Promptness { at_once, in_a_tick, .. } = self.promptness(sample_time);
+        Ok(Steep::new(demanded(at_once + in_a_tick)))
+    }
 }
 
 impl Estimator for Config {
     type State = State;
+    type Inverse = Steep;
 
     #[inline(always)]
     fn run(&self, state: &mut State, applied: Volts) -> ScaledStiffness {
@@ -153,6 +194,18 @@ impl Estimator for Config {
     #[inline(always)]
     fn pivot(&self, state: &State) -> Pivot {
         Pivot { voltage: state.relaxed(), stiffness: state.relaxed() }
+    }
+
+    #[inline(always)]
+    fn outlook(&self, state: &State, applied: Volts) -> Outlook {
+        let mut next = *state;
+        self.advance(&mut next, applied);
+        Outlook { now: self.estimate(state, applied).0, then: self.estimate(&next, applied).0 }
+    }
+
+    #[inline(always)]
+    fn voltage_for(&self, _: &State, inverse: &Steep, applied: Volts, change: Signal) -> Volts {
+        Volts(applied.0.saturating_add(inverse.times(change)))
     }
 }
 

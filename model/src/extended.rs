@@ -12,19 +12,21 @@
 //! exceptions whose bounds are stated where they are made: the lags see the mean of a leaking input ([`leakage`]), and
 //! the rate of a time constant that depends on the voltage is approximated ([`varying_rate`]).
 
+pub mod inverse;
 pub mod lags;
 pub mod law;
 pub mod leakage;
 pub mod memory;
 pub mod varying_rate;
 
+pub use inverse::Inverse;
 pub use lags::Relaxation;
 pub use law::Law;
 pub use leakage::Leakage;
 pub use memory::Memory;
 
 use crate::error::OutOfRange;
-use crate::estimator::{Estimator, Model, Pivot, Plant, Promptness};
+use crate::estimator::{Estimator, Model, Outlook, Pivot, Plant, Promptness};
 use crate::units::{SampleTime, ScaledStiffness, Signal, Volts};
 
 /// The lowest stiffness that the pre-compensator is shown, so that its error fits in a signal.
@@ -56,6 +58,8 @@ pub struct Config {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct State {
     voltage: Signal,
+    /// The memory's output.
+    remembered: Signal,
     /// The law's answer to it.
     answer: Signal,
     memory: memory::State,
@@ -94,6 +98,10 @@ impl Model for ExtendedPlant<'_> {
         let Promptness { at_once, in_a_tick, relaxed } = self.relaxation.promptness(sample_time);
         Promptness { at_once: steepness * at_once, in_a_tick: steepness * in_a_tick, relaxed }
     }
+
+    fn inverse(&self, sample_time: SampleTime, resolution_v: f64) -> Result<Inverse, OutOfRange> {
+        Inverse::new(self, sample_time, resolution_v)
+    }
 }
 
 impl Config {
@@ -105,10 +113,21 @@ impl Config {
             Some(leakage) => leakage.charge(&state.leakage, answer),
         }
     }
+
+    /// One sample time passes with the last voltage held; `charge` takes part in the relaxation at first.
+    #[inline(always)]
+    fn relax(&self, state: &mut State, charge: Signal) {
+        let mean = match &self.leakage {
+            None => charge,
+            Some(leakage) => leakage.advance(&mut state.leakage, state.answer, charge),
+        };
+        self.lags.advance(&mut state.lags, mean, state.voltage);
+    }
 }
 
 impl Estimator for Config {
     type State = State;
+    type Inverse = Inverse;
 
     #[inline(always)]
     fn run(&self, state: &mut State, applied: Volts) -> ScaledStiffness {
@@ -121,14 +140,10 @@ impl Estimator for Config {
             None => remembered,
             Some(law) => law.at(remembered),
         };
-        (state.voltage, state.answer) = (voltage, answer);
+        (state.voltage, state.remembered, state.answer) = (voltage, remembered, answer);
         let charge = self.charge(state, answer);
         let stiffness = self.lags.stiffness(&state.lags, charge);
-        let mean = match &self.leakage {
-            None => charge,
-            Some(leakage) => leakage.advance(&mut state.leakage, answer, charge),
-        };
-        self.lags.advance(&mut state.lags, mean, voltage);
+        self.relax(state, charge);
         ScaledStiffness(stiffness)
     }
 
@@ -136,5 +151,30 @@ impl Estimator for Config {
     fn pivot(&self, state: &State) -> Pivot {
         let stiffness = self.lags.stiffness(&state.lags, self.charge(state, state.answer));
         Pivot { voltage: state.voltage, stiffness: stiffness.max(LOWEST) }
+    }
+
+    #[inline(always)]
+    fn outlook(&self, state: &State, _: Volts) -> Outlook {
+        let charge = self.charge(state, state.answer);
+        let mut next = *state;
+        self.relax(&mut next, charge);
+        let then = self.lags.stiffness(&next.lags, self.charge(&next, state.answer));
+        Outlook { now: self.lags.stiffness(&state.lags, charge), then }
+    }
+
+    #[inline(always)]
+    fn voltage_for(&self, state: &State, inverse: &Inverse, _: Volts, change: Signal) -> Volts {
+        let answer = state.answer.saturating_add(inverse.more(state.voltage, change));
+        let remembered = match &self.law {
+            None => answer,
+            Some(law) => inverse.law.at(law, answer),
+        };
+        Volts(match &self.memory {
+            None => remembered,
+            Some(memory) => {
+                let more = remembered.saturating_sub(state.remembered);
+                inverse.memory.voltage(memory, &state.memory, state.voltage, more)
+            }
+        })
     }
 }

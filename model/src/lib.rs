@@ -18,6 +18,7 @@
 //! | [`estimator`] | the spring's relaxation, run on the applied voltage |
 //! | [`extended`] | the same for a spring with hysteresis, a static law, leakage and several relaxations |
 //! | [`pre_compensator`] | proportional-integral drive past the target and back |
+//! | [`time_optimal`] | the same, as fast as the amplifier allows |
 //! | [`amplifier`] | range, slew, rounding to a DAC code, and back to volts |
 //! | [`controller`] | the four in one tick; settings in SI, checked once |
 //! | [`supervisor`] | whether a voltage may leave at all |
@@ -37,13 +38,15 @@ pub mod extended;
 pub mod pre_compensator;
 pub mod stiffness;
 pub mod supervisor;
+pub mod time_optimal;
 pub mod units;
 
 pub use amplifier::{Amplifier, Limits};
-pub use controller::{Config, Input, Output, PreCompensator, Settings, State};
+pub use controller::{Compensation, Config, Input, Output, Settings, State};
 pub use error::OutOfRange;
 pub use estimator::Plant;
 pub use extended::ExtendedPlant;
 pub use pre_compensator::Gains;
 pub use stiffness::Spring;
+pub use time_optimal::Approach;
 pub use units::{DacCode, SampleTime, ScaledStiffness, Volts};

@@ -2,7 +2,7 @@
 
 use model::estimator::{Estimator, Model};
 use model::extended::{self, ExtendedPlant, Law, Leakage, Memory, Relaxation};
-use model::{Amplifier, Config, Gains, Input, Limits, Plant, SampleTime, Settings, State, Volts};
+use model::{Amplifier, Compensation, Config, Gains, Input, Limits, Plant, SampleTime, Settings, State, Volts};
 use proptest::prelude::*;
 
 /// Everything at once, on the scale of a real spring.
@@ -32,8 +32,12 @@ const PLAIN: ExtendedPlant<'_> = ExtendedPlant {
 type Running = State<extended::State>;
 
 fn settings<P: Model>(plant: P) -> Settings<P> {
-    let Settings { rate_hz, gains, amplifier, .. } = Settings::PAPER;
-    Settings { rate_hz, plant, gains, amplifier }
+    let Settings { rate_hz, compensation, amplifier, .. } = Settings::PAPER;
+    Settings { rate_hz, plant, compensation, amplifier }
+}
+
+fn gains(proportional: f64, integral_per_s: f64) -> Compensation {
+    Compensation::ProportionalIntegral(Gains { proportional, integral_per_s })
 }
 
 fn run(config: &Config<extended::Config>, state: &mut Running, target_v: f64, ticks: u32) -> model::Output {
@@ -67,13 +71,13 @@ fn nothing_extended_is_the_plain_spring() {
 #[test]
 fn the_voltage_settles_on_the_curve_within_a_few_ticks() {
     // No integral action: nothing else moves so soon.
-    let gains = Gains { proportional: 4.0, integral_per_s: 0.0 };
+    let compensation = gains(4.0, 0.0);
     // A law four times as steep further up.
     let law = Law { voltage_v: &[0.0, 200.0, 400.0], stiffness: &[0.0, 100.0, 500.0] };
     let relaxation = Relaxation { time_constants_s: &[5000.0], ..PLAIN.relaxation };
     let plant = ExtendedPlant { law: Some(law), relaxation, ..PLAIN };
     let amplifier = Amplifier { dac_bits: 16, ..Amplifier::PAPER };
-    let config = Settings { gains: Some(gains), amplifier, ..settings(plant) }.check().unwrap();
+    let config = Settings { compensation, amplifier, ..settings(plant) }.check().unwrap();
     let mut state = Running::default();
     // On the flat part u (1 + 4 / 11 / 2) = 4 * 40.
     let exact = 160.0 / (1.0 + 2.0 / 11.0);
@@ -114,7 +118,7 @@ fn new_gains_and_springs_come_without_a_bump() {
     let before = settings(WHOLE).check().unwrap();
     let slower = Relaxation { time_constants_s: &[7.0, 70.0], ..WHOLE.relaxation };
     for other in [
-        Settings { gains: Some(Gains { proportional: 12.0, integral_per_s: 0.3 }), ..settings(WHOLE) },
+        Settings { compensation: gains(12.0, 0.3), ..settings(WHOLE) },
         settings(ExtendedPlant { leakage: None, relaxation: slower, ..WHOLE }),
         Settings { rate_hz: 5000.0, ..settings(WHOLE) },
     ] {
@@ -225,9 +229,9 @@ proptest! {
     ) {
         let mut state = Running::default();
         for (numbers, proportional, integral) in loops {
-            let gains = Gains { proportional: 10f64.powf(proportional), integral_per_s: 10f64.powf(integral) };
+            let compensation = gains(10f64.powf(proportional), 10f64.powf(integral));
             let amplifier = Amplifier { slew_v_per_s: slew.map(|decades| 10f64.powf(decades)), ..Amplifier::up_to(1000.0) };
-            let settings = Settings { gains: Some(gains), amplifier, ..settings(numbers.plant()) };
+            let settings = Settings { compensation, amplifier, ..settings(numbers.plant()) };
             let Ok(config) = settings.check() else { continue };
             let (lowest, highest) = config.range();
             config.adopt(&mut state, Volts::new(targets[0]).unwrap());

@@ -14,7 +14,7 @@ use host_sim::record::{MEASURED, Record};
 use host_sim::schedule::{Between, Schedule};
 use host_sim::stair::{Report, Rows};
 use indicatif::{ProgressBar, ProgressStyle};
-use model::{Amplifier, ExtendedPlant, Gains, Plant, Settings};
+use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Plant, Settings};
 
 /// Run the stair experiment in closed loop on the fixed-point controller, beside the report's Table 3
 #[derive(Args, Debug)]
@@ -27,7 +27,8 @@ Examples:
   vsj stair --plant spring.toml               another spring: hysteresis, leakage, several relaxations ...
   vsj stair --input schedule.csv --json       any schedule with columns time_s,voltage_v")]
 pub(crate) struct Arguments {
-    /// Whose steps, CSV and voltage are shown: the spring left alone, or the report's controller
+    /// Whose steps, CSV and voltage are shown: the spring left alone, the report's controller, or one as fast as the
+    /// amplifier allows
     #[arg(long, value_enum, default_value_t = Controller::Paper)]
     controller: Controller,
     /// The spring: `paper`, or a plant file; the limit and slew that it records act where they are stricter than the
@@ -62,6 +63,9 @@ pub(crate) struct Arguments {
     /// Integral gain of the controller, in 1/s
     #[arg(long, default_value_t = Gains::PAPER.integral_per_s, value_name = "GAIN", allow_negative_numbers = true)]
     ki: f64,
+    /// Time constant with which the fast controller makes the last part of the way, in s, 0 to 1
+    #[arg(long, default_value_t = 0.0, value_name = "S", allow_negative_numbers = true)]
+    approach_s: f64,
     /// Ticks per second, 100 to 10 000
     #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
@@ -82,6 +86,8 @@ enum Controller {
     None,
     /// The report's proportional-integral pre-compensator
     Paper,
+    /// The end of the range until the target can be held, then exactly that
+    Fast,
 }
 
 /// Lets the main job be what the command line says without arguments.
@@ -104,7 +110,10 @@ impl Arguments {
         Settings {
             rate_hz: self.rate_hz,
             plant: file.extended(),
-            gains: Some(Gains { proportional: self.kp, integral_per_s: self.ki }),
+            compensation: match self.controller {
+                Controller::Fast => Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s }),
+                _ => Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki }),
+            },
             amplifier: Amplifier {
                 min_v: self.min_v,
                 max_v: recorded.limit_v.map_or(self.limit_v, |limit| limit.min(self.limit_v)),
@@ -173,7 +182,7 @@ fn run_plant<P: Judged>(
         Some(record) => Rows::Record(record),
         None => Rows::Table3 { same: arguments.input == "stair" && is_the_reports(&experiment.settings) },
     };
-    let controlled = arguments.controller == Controller::Paper;
+    let controlled = arguments.controller != Controller::None;
     let report = Report::new(&experiment, &run, &rows, controlled)?;
     let paths = match &arguments.out {
         Some(folder) => write(folder, &experiment, &run, &report, controlled, stride)?,
@@ -197,6 +206,7 @@ fn option(field: &str) -> &'static str {
         "dac_bits" => "--dac-bits: ",
         "proportional_gain" => "--kp: ",
         "integral_gain_per_s" => "--ki: ",
+        "approach_s" => "--approach-s: ",
         field if field == "share" || field == "time_constant_s" || field.contains('.') => "--plant: ",
         _ => "",
     }
@@ -205,7 +215,7 @@ fn option(field: &str) -> &'static str {
 /// True if Table 3's simulated columns should come out.
 fn is_the_reports(settings: &Settings) -> bool {
     settings.plant == Plant::PAPER
-        && settings.gains == Some(Gains::PAPER)
+        && settings.compensation == Compensation::ProportionalIntegral(Gains::PAPER)
         && settings.amplifier.slew_v_per_s.is_none()
         && settings.amplifier.min_v == 0.0
         && settings.amplifier.max_v >= 700.0

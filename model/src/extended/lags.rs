@@ -39,14 +39,25 @@ impl Relaxation<'_> {
         self.time_constants_s.iter().enumerate().map(move |(lag, &tau)| (tau, weight(lag)))
     }
 
+    /// The first time constant, if it depends on the voltage.
+    pub(super) fn varying(&self) -> Option<TimeConstant> {
+        let (&low_s, high_s) = (self.time_constants_s.first()?, self.time_constant_high_s?);
+        Some(TimeConstant { low_s, high_s })
+    }
+
+    /// Time constant and weight of each lag at `volts`.
+    pub(super) fn lags_at(&self, volts: f64) -> impl Iterator<Item = (f64, f64)> {
+        let first = self.varying().map(|tau| tau.at(volts));
+        let at = move |(lag, (tau, weight))| (first.filter(|_| lag == 0).unwrap_or(tau), weight);
+        self.lags().enumerate().map(at)
+    }
+
     pub(crate) fn promptness(&self, sample_time: SampleTime) -> Promptness {
         let mut promptness = Promptness { at_once: self.share.max(0.0), in_a_tick: 0.0, relaxed: 0.0 };
-        for (lag, (tau, weight)) in self.lags().enumerate() {
-            let shortest = match self.time_constant_high_s {
-                Some(high_s) if lag == 0 => TimeConstant { low_s: tau, high_s }.shortest_s(),
-                _ => tau,
-            };
-            let part = relaxed_in(shortest, sample_time);
+        // At an end it is shortest.
+        let shortest = if self.varying().is_some_and(|tau| tau.at(1000.0) < tau.at(0.0)) { 1000.0 } else { 0.0 };
+        for (tau, weight) in self.lags_at(shortest) {
+            let part = relaxed_in(tau, sample_time);
             promptness.in_a_tick += part * weight.max(0.0);
             promptness.relaxed = promptness.relaxed.max(part);
         }
@@ -55,7 +66,7 @@ impl Relaxation<'_> {
 }
 
 /// What part of its distance a lag makes in one sample time.
-fn relaxed_in(time_constant_s: f64, sample_time: SampleTime) -> f64 {
+pub(super) fn relaxed_in(time_constant_s: f64, sample_time: SampleTime) -> f64 {
     -libm::expm1(-sample_time.seconds() / time_constant_s)
 }
 
@@ -99,11 +110,10 @@ impl Config {
             config.weights[lag] = Weight::new(weight);
             config.rates[lag] = Rate::new(relaxed_in(tau, sample_time));
         }
-        if let Some(high_s) = time_constant_high_s {
-            let low_s = time_constants_s[0];
+        if let Some(time_constant) = relaxation.varying() {
+            let TimeConstant { low_s, high_s } = time_constant;
             let lowest = (4.0 * sample_time.seconds()).max(0.1 * low_s);
             OutOfRange::check("relaxation.tau_high_s", high_s, lowest..=(10.0 * low_s).min(1e4), "s")?;
-            let time_constant = TimeConstant { low_s, high_s };
             config.varying = Some(VaryingRate::new(&time_constant, sample_time));
         }
         Ok(config)

@@ -8,12 +8,15 @@
 //!
 //! Exact but for the rounding of values (2^-21 V) and slopes (2^-28 of the distance to the point).
 
-use crate::coefficient::{Sum, Weight, saturated};
+use crate::coefficient::{Steep, Sum, Weight, saturated};
 use crate::error::OutOfRange;
 use crate::units::Signal;
 
 /// The most points of a law, (0, 0) included.
 pub const MOST_POINTS: usize = 9;
+
+/// The least slope that can be gone back.
+const LEAST_SLOPE: f64 = 0.01;
 
 /// Points that the law goes through.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,6 +99,49 @@ impl Config {
         // Cannot wrap: either the line starts at 0 V, or the input lies beyond its positive start.
         let along = input - line.start;
         saturated(Sum::from_bits(i64::from(line.value.to_bits()) << Weight::FRACTION_BITS) + line.slope.of(along))
+    }
+}
+
+/// The law's way back, where every line rises: the reciprocal slope of each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Inverse {
+    per_slope: [Steep; MOST_POINTS - 1],
+}
+
+impl Inverse {
+    /// Of a law that [`Config::new`] accepts.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names `law.stiffness` where it does not rise.
+    pub(crate) fn new(law: &Law<'_>) -> Result<Self, OutOfRange> {
+        let mut inverse = Self::default();
+        let lines = law.voltage_v.windows(2).zip(law.stiffness.windows(2));
+        let mut last = Steep::default();
+        let mut each = inverse.per_slope.iter_mut();
+        for ((volts, values), place) in lines.zip(&mut each) {
+            if let ([from_v, to_v], [from, to]) = (volts, values) {
+                let lowest = from + LEAST_SLOPE * (to_v - from_v);
+                OutOfRange::check("law.stiffness", *to, lowest..=2000.0, "V, to be led by its inverse")?;
+            }
+            last = Steep::new(1.0 / slope(volts, values));
+            *place = last;
+        }
+        each.for_each(|place| *place = last);
+        Ok(inverse)
+    }
+
+    /// The input that `law` answers with `value`.
+    #[inline(always)]
+    pub(crate) fn at(&self, law: &Config, value: Signal) -> Signal {
+        let [first, lines @ ..] = &law.lines;
+        let [per_slope, others @ ..] = &self.per_slope;
+        let (mut line, mut per_slope) = (first, per_slope);
+        for (next, other) in lines.iter().zip(others) {
+            if value >= next.value {
+                (line, per_slope) = (next, other);
+            }
+        }
+        line.start.saturating_add(per_slope.times(value.saturating_sub(line.value)))
     }
 }
 

@@ -22,6 +22,15 @@ pub struct Leakage {
     pub time_constant_s: f64,
 }
 
+impl Leakage {
+    /// What part of a new input is lost at the end of a tick, and of its mean in the tick.
+    pub(super) fn lost_in_a_tick(&self, sample_time: SampleTime) -> (f64, f64) {
+        let ticks = self.time_constant_s / sample_time.seconds();
+        let rate = -libm::expm1(-1.0 / ticks);
+        (self.share * rate, self.share * (1.0 - rate * ticks))
+    }
+}
+
 /// The leakage for one sample time, scaled for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Config {
@@ -41,11 +50,11 @@ impl Config {
         let seconds = sample_time.seconds();
         let share = OutOfRange::check("leakage.share", leakage.share, 0.0..=1.0, "of the stiffness")?;
         let tau = OutOfRange::check("leakage.tau_s", leakage.time_constant_s, 100.0 * seconds..=1e5, "s")?;
-        let rate = -libm::expm1(-seconds / tau);
+        let (_, until_mean) = leakage.lost_in_a_tick(sample_time);
         Ok(Self {
             share: Weight::new(share),
-            until_mean: Weight::new(share * (1.0 - rate * tau / seconds)),
-            rate: Rate::new(rate),
+            until_mean: Weight::new(until_mean),
+            rate: Rate::new(-libm::expm1(-seconds / tau)),
         })
     }
 

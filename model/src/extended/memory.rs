@@ -11,12 +11,17 @@
 //!
 //! Exact but for the rounding of thresholds (2^-21 V) and weights (2^-28).
 
-use crate::coefficient::{Weight, saturated};
+use crate::coefficient::{Steep, Weight, saturated};
 use crate::error::OutOfRange;
 use crate::units::Signal;
 
 /// The most plays of a bank.
 pub const MOST_PLAYS: usize = 8;
+
+/// The least slope with all plays in motion that can be gone back.
+const LEAST_SLOPE: f64 = 0.01;
+/// What is not steeper than this is level.
+const LEVEL: f64 = 1e-3;
 
 /// A bank of plays. The magnitudes of `direct` and `weights` add up to at most 10.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +73,8 @@ impl Config {
             left = Weight::budget("memory.weights", weight, left)?;
             *play = Play { threshold: Signal::from_num(threshold), weight: Weight::new(weight) };
         }
+        // The sum is exact: its order is the inverse's choice.
+        plays[..count].sort_unstable_by_key(|play| play.threshold);
         Ok(Self { direct: Weight::new(direct), plays, count: count as u8 })
     }
 
@@ -81,6 +88,75 @@ impl Config {
             sum += play.weight.of(*place);
         }
         saturated(sum)
+    }
+}
+
+/// The bank's way back. Upwards a play begins to move at `z + r`. Of two plays that saw the same voltages, the one with
+/// the smaller threshold begins first: `z' + r = max(v, min(v + 2 r, z + r))` keeps that order. So the bank is straight
+/// in pieces, each with one play more in motion, and downwards it is the same with all signs turned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Inverse {
+    /// With as many plays in motion.
+    pieces: [Piece; MOST_PLAYS + 1],
+    /// What is not worth crossing a level piece for: one code of the converter where the bank is steepest.
+    toll: Signal,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Piece {
+    slope: Weight,
+    /// `None`: level or falling; it is crossed at once or not at all.
+    per_slope: Option<Steep>,
+}
+
+impl Inverse {
+    /// Of a bank that [`Config::new`] accepts, for steps of `resolution_v` of the voltage.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names `memory.direct` if the bank does not rise once all plays move.
+    pub(crate) fn new(memory: &Memory<'_>, resolution_v: f64) -> Result<Self, OutOfRange> {
+        let bank = Config::new(memory)?;
+        let (mut slope, mut steepest) = (bank.direct.to_f64(), 0.0f64);
+        let mut inverse = Self::default();
+        let plays = bank.plays.iter().take(usize::from(bank.count));
+        for (piece, weight) in inverse.pieces.iter_mut().zip(plays.map(|play| play.weight.to_f64()).chain([0.0])) {
+            *piece = Piece { slope: Weight::new(slope), per_slope: (slope > LEVEL).then(|| Steep::new(1.0 / slope)) };
+            (slope, steepest) = (slope + weight, steepest.max(slope));
+        }
+        OutOfRange::check(
+            "memory.direct",
+            slope,
+            LEAST_SLOPE..=Weight::MOST,
+            "with all weights, to be led by its inverse",
+        )?;
+        inverse.toll = Signal::from_num(steepest * resolution_v);
+        Ok(inverse)
+    }
+
+    /// The voltage that makes the bank's output `more` than at `voltage`, which is the last one.
+    #[inline(always)]
+    pub(crate) fn voltage(&self, bank: &Config, state: &State, voltage: Signal, more: Signal) -> Signal {
+        let down = more < Signal::ZERO;
+        let turned = |signal: Signal| if down { signal.saturating_neg() } else { signal };
+        let (mut at, mut left) = (turned(voltage), turned(more));
+        let ends = bank.plays.iter().zip(state).take(usize::from(bank.count));
+        let ends = ends.map(|(play, &place)| turned(place).saturating_add(play.threshold));
+        for (piece, end) in self.pieces.iter().zip(ends.chain([Signal::MAX])) {
+            let way = match piece.per_slope {
+                Some(per_slope) => per_slope.times(left),
+                None if left > self.toll => Signal::MAX,
+                None => Signal::ZERO,
+            };
+            if end > at {
+                let width = end.saturating_sub(at);
+                if way <= width {
+                    return turned(at.saturating_add(way));
+                }
+                left = left.saturating_sub(saturated(piece.slope.of(width)));
+                at = end;
+            }
+        }
+        turned(at)
     }
 }
 

@@ -44,16 +44,11 @@ impl TimeConstant {
     }
 
     /// The voltage up to which it is straight, 500 to 1000 V.
-    fn end_v(&self) -> f64 {
+    pub(super) fn end_v(&self) -> f64 {
         if self.straight(1000.0) >= self.floor_s() {
             return 1000.0;
         }
         500.0 * (self.low_s - self.floor_s()) / (self.low_s - self.high_s)
-    }
-
-    /// The shortest at any voltage of an amplifier.
-    pub(crate) fn shortest_s(&self) -> f64 {
-        self.at(0.0).min(self.at(1000.0))
     }
 }
 
@@ -127,7 +122,7 @@ mod tests {
             let got = VaryingRate::new(&tau, sample_time).step(Signal::from_num(volts), lag).to_num::<f64>();
             let x = sample_time.seconds() / tau.at(volts);
             let exact = -libm::expm1(-x) * lag.to_num::<f64>();
-            let shortest = sample_time.seconds() / tau.shortest_s();
+            let shortest = sample_time.seconds() / tau.at(0.0).min(tau.at(1000.0));
             let allowed = exact.abs() * (shortest * shortest / 12.0 + 1.5e-6) + 1e-12;
             prop_assert!((got - exact).abs() < allowed, "{tau:?}: {got} {exact}");
         }

@@ -1,0 +1,105 @@
+//! The extended spring's way back, against the order of its blocks: from a stiffness to the voltage that gives it.
+//!
+//! ```text
+//! change of the stiffness at the end of a tick -> relaxation -> law -> memory -> voltage
+//!                                                 more f        p      v
+//! ```
+//!
+//! Through relaxation and leakage one volt more of `f`, held for a tick of length `T`, brings at its end
+//!
+//! ```text
+//! H = share (1 - loss exp1(T / tau_l)) + (1 - loss m) sum_k weight_k exp1(T / tau_k),    exp1(x) = 1 - exp(-x)
+//! ```
+//!
+//! with `loss` and `m` of the [leakage](super::leakage), whose effect on what was there before is not needed: the spring
+//! is run ahead for it. Where the first time constant depends on the voltage, `1 / H` is taken for straight between both
+//! ends of it. It bends the other way: too little is asked for, never too much, and what is left shrinks with every tick,
+//! by more than half even where the time constant changes tenfold. [`law`] and [`memory`] are inverted exactly.
+//!
+//! What it needs of a spring: no negative weight in the relaxation, a rising law, a memory that rises once all plays move.
+
+use super::lags::relaxed_in;
+use super::{ExtendedPlant, Leakage, law, memory};
+use crate::coefficient::{Steep, Weight};
+use crate::error::OutOfRange;
+use crate::estimator::demanded;
+use crate::units::{SampleTime, Signal};
+
+/// The largest loss of charge that leaves something to hold a stiffness by.
+const MOST_LOSS: f64 = 0.95;
+/// The least gain of a relaxation.
+const LEAST_GAIN: f64 = 0.01;
+
+/// The way back for one sample time, scaled for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inverse {
+    demanded: Demanded,
+    pub(super) law: law::Inverse,
+    pub(super) memory: memory::Inverse,
+}
+
+/// `1 / H`
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Demanded {
+    at_zero: Steep,
+    varying: Option<Varying>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Varying {
+    at_end: Steep,
+    end: Signal,
+    /// 1 / end
+    per_volt: Steep,
+}
+
+impl Inverse {
+    /// # Errors
+    /// [`OutOfRange`] names the field as [`ExtendedPlant`]'s blocks do.
+    pub(super) fn new(
+        plant: &ExtendedPlant<'_>,
+        sample_time: SampleTime,
+        resolution_v: f64,
+    ) -> Result<Self, OutOfRange> {
+        let ExtendedPlant { memory, law, leakage, relaxation } = plant;
+        let mut gain = relaxation.share;
+        for (_, weight) in relaxation.lags() {
+            gain += OutOfRange::check("relaxation.weights", weight, 0.0..=Weight::MOST, "to be led by its inverse")?;
+        }
+        OutOfRange::check("relaxation.weights", gain, LEAST_GAIN..=Weight::MOST, "with the share, in all")?;
+        let (lost, lost_in_mean) = leakage.map_or((0.0, 0.0), |leakage| leakage.lost_in_a_tick(sample_time));
+        if let Some(Leakage { share, .. }) = leakage {
+            OutOfRange::check("leakage.share", *share, 0.0..=MOST_LOSS, "of the stiffness, to be led by its inverse")?;
+        }
+        let demanded_at = |volts: f64| {
+            let later: f64 = relaxation.lags_at(volts).map(|(tau, weight)| weight * relaxed_in(tau, sample_time)).sum();
+            Steep::new(demanded(relaxation.share * (1.0 - lost) + (1.0 - lost_in_mean) * later))
+        };
+        let varying = relaxation.varying().map(|tau| {
+            let end_v = tau.end_v();
+            Varying { at_end: demanded_at(end_v), end: Signal::from_num(end_v), per_volt: Steep::new(1.0 / end_v) }
+        });
+        Ok(Self {
+            demanded: Demanded { at_zero: demanded_at(0.0), varying },
+            law: law.as_ref().map(law::Inverse::new).transpose()?.unwrap_or_default(),
+            memory: memory.as_ref().map(|it| memory::Inverse::new(it, resolution_v)).transpose()?.unwrap_or_default(),
+        })
+    }
+
+    /// How much more the law must answer, at this voltage, for a `change` of the stiffness.
+    #[inline(always)]
+    pub(super) fn more(&self, voltage: Signal, change: Signal) -> Signal {
+        let Demanded { at_zero, varying } = &self.demanded;
+        let at_zero = at_zero.times(change);
+        match varying {
+            None => at_zero,
+            Some(Varying { at_end, end, per_volt }) => {
+                let part = per_volt.times(voltage.max(Signal::ZERO).min(*end));
+                let apart = at_end.times(change).saturating_sub(at_zero);
+                // At most all of it.
+                let more = (i64::from(apart.to_bits()) * i64::from(part.to_bits())) >> Signal::FRAC_NBITS;
+                at_zero.saturating_add(Signal::from_bits(more as i32))
+            }
+        }
+    }
+}
