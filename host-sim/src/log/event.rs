@@ -8,18 +8,7 @@ use serde::{Serialize, Serializer};
 #[serde(tag = "event", rename_all = "lowercase")]
 pub enum Event {
     /// `boot version=.. git=.. reset=.. last_fault=.. rate_hz=..`: the firmware starts.
-    Boot {
-        /// Of the firmware.
-        version: String,
-        /// Revision it is built from.
-        git: String,
-        /// What the start comes from.
-        reset: String,
-        /// Code of the fault before it, 0 for none.
-        last_fault: u8,
-        /// Ticks per second.
-        rate_hz: u32,
-    },
+    Boot(Boot),
     /// `state .. -> ..`: the supervisor goes from one state to another.
     State {
         /// Old state.
@@ -83,6 +72,21 @@ pub enum Event {
     Text,
 }
 
+/// A start of the firmware.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Boot {
+    /// Of the firmware.
+    pub version: String,
+    /// Revision it is built from.
+    pub git: String,
+    /// What the start comes from.
+    pub reset: String,
+    /// Code of the fault before it, 0 for none.
+    pub last_fault: u8,
+    /// Ticks per second.
+    pub rate_hz: u32,
+}
+
 /// End of an emulated run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Done {
@@ -115,7 +119,7 @@ impl Event {
     /// The word that JSON and CSV call it.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Boot { .. } => "boot",
+            Self::Boot(_) => "boot",
             Self::State { .. } => "state",
             Self::Fault { .. } => "fault",
             Self::Limit { .. } => "limit",
@@ -153,13 +157,13 @@ impl Values {
 
     fn event(&self) -> Option<Event> {
         Some(match self.head.as_str() {
-            "boot" => Event::Boot {
+            "boot" => Event::Boot(Boot {
                 version: self.text("version=")?,
                 git: self.text("git=")?,
                 reset: self.text("reset=")?,
                 last_fault: self.number("last_fault=")?,
                 rate_hz: self.number("rate_hz=")?,
-            },
+            }),
             "state" => Event::State { from: self.text("state")?, to: self.text("->")? },
             "fault" => {
                 Event::Fault { code: self.number("code=")?, name: self.text("name=")?, tick: self.number("tick=")? }

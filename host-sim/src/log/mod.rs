@@ -31,10 +31,10 @@ mod summary;
 mod text;
 
 pub use decoder::{Decoder, Item};
-pub use event::Event;
+pub use event::{Boot, Done, Event};
 pub use formats::{Encoding, Formats};
 pub use line::{Level, Line};
-pub use summary::{Boot, Done, Fault, LimitLines, Summary};
+pub use summary::{Fault, LimitLines, Summary};
 pub use text::{
     CSV_HEADER, TABLE_HEADER, csv_row, more_damage_csv_row, more_damage_table_row, summary_text, table_row,
 };

@@ -4,8 +4,7 @@ use model::Limits;
 use serde::Serialize;
 
 use super::Item;
-pub use super::event::Done;
-use super::event::Event;
+use super::event::{Boot, Done, Event};
 use super::line::{Level, Line};
 
 /// All the lines of a log, added up. The firmware counts from its start, so each start is added to those before.
@@ -53,21 +52,6 @@ pub struct Summary {
     start: Start,
     #[serde(skip)]
     before: Start,
-}
-
-/// A start of the firmware.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Boot {
-    /// Of the firmware.
-    pub version: String,
-    /// Revision it is built from.
-    pub git: String,
-    /// What the start comes from.
-    pub reset: String,
-    /// Code of the fault before it, 0 for none.
-    pub last_fault: u8,
-    /// Ticks per second.
-    pub rate_hz: u32,
 }
 
 /// One kind of fault.
@@ -151,14 +135,13 @@ impl Summary {
         self.errors += u64::from(line.level == Some(Level::Error));
         self.warnings += u64::from(line.level == Some(Level::Warn));
         match &line.event {
-            Event::Boot { version, git, reset, last_fault, rate_hz } => {
+            Event::Boot(boot) => {
                 // The fault that led here is told once more; its first line may have got lost in the crash.
-                let told = self.start.last_fault.filter(|code| code == last_fault);
+                let told = self.start.last_fault.filter(|code| *code == boot.last_fault);
                 self.next_start();
-                self.start.rate_hz = Some(*rate_hz);
+                self.start.rate_hz = Some(boot.rate_hz);
                 self.start.told = told;
-                let (version, git, reset) = (version.clone(), git.clone(), reset.clone());
-                self.boots.push(Boot { version, git, reset, last_fault: *last_fault, rate_hz: *rate_hz });
+                self.boots.push(boot.clone());
             }
             Event::Fault { code, name, tick } => {
                 self.tick(*tick);
@@ -203,12 +186,13 @@ impl Summary {
         }
     }
 
-    /// So many ticks since the start.
+    /// So many were missed since the start.
     fn missed(&mut self, ticks: u32) {
         self.start.overruns = self.start.overruns.max(ticks.into());
         self.overruns = Some(0);
     }
 
+    /// So many ticks since the start.
     fn tick(&mut self, tick: u32) {
         self.start.ticks = self.start.ticks.max(tick.into());
     }
