@@ -1,6 +1,9 @@
 //! The error that is the caller's to mend: a wrong file, setting or schedule. Exit code 2.
 
 use std::fmt;
+use std::ops::RangeInclusive;
+
+use anyhow::Result;
 
 /// One line that names what was given and what was expected.
 #[derive(Debug)]
@@ -20,4 +23,17 @@ macro_rules! bad_input {
     ($($message:tt)*) => {
         return Err($crate::bad_input::BadInput(format!($($message)*)).into())
     };
+}
+
+/// Returns `value` if it is in `allowed`; NaN is in no range.
+///
+/// # Errors
+/// [`BadInput`] that names the field, the value and what is expected.
+pub(crate) fn check(field: &str, value: f64, allowed: RangeInclusive<f64>, unit: &str) -> Result<f64> {
+    if allowed.contains(&value) {
+        return Ok(value);
+    }
+    let (lowest, highest) = allowed.into_inner();
+    let expected = format!("{lowest} to {highest} {unit}");
+    bad_input!("{field} = {value} is not allowed: expected {}", expected.trim_end())
 }

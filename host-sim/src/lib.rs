@@ -3,6 +3,7 @@
 //! | module | what it is |
 //! | --- | --- |
 //! | [`schedule`], [`record`] | what voltage is asked for: the report's stair, or a file |
+//! | [`csv_table`] | tables as CSV, read with clear errors |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
 //! | [`experiment`], [`judged`] | fixed point and reference side by side over a schedule |
@@ -20,6 +21,7 @@
 pub mod bad_input;
 pub mod beam;
 pub mod bound;
+pub mod csv_table;
 pub mod diagnose;
 pub mod dynamics;
 pub mod experiment;

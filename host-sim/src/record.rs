@@ -1,6 +1,4 @@
 //! Records of an experiment as CSV: `time_s`, `voltage_v` and perhaps a measured column.
-//!
-//! One header row, columns by name in any order, lines that start with `#` are comments.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -8,7 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::bad_input;
-use crate::bad_input::BadInput;
+use crate::csv_table::{Table, read};
 
 /// One row of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +40,7 @@ impl Record {
     /// Checks that an amplifier can put out every voltage of the record.
     ///
     /// # Errors
-    /// [`BadInput`] with file, line and column of the first voltage outside of `lowest_v` to `highest_v`.
+    /// [`crate::BadInput`] with file, line and column of the first voltage outside of `lowest_v` to `highest_v`.
     pub fn check_range(&self, lowest_v: f64, highest_v: f64) -> Result<()> {
         match self.rows.iter().find(|row| !(lowest_v..=highest_v).contains(&row.voltage_v)) {
             None => Ok(()),
@@ -56,7 +54,7 @@ impl Record {
     /// Checks that the measured column is there.
     ///
     /// # Errors
-    /// [`BadInput`] with the name of the column that is missing.
+    /// [`crate::BadInput`] with the name of the column that is missing.
     pub fn require_measured(&self, column: &str) -> Result<()> {
         if self.rows.iter().all(|row| row.measured.is_some()) {
             return Ok(());
@@ -67,7 +65,7 @@ impl Record {
     /// Reads a file; `measured` names the column of the measured stiffness, [`MEASURED`] unless the user says another.
     ///
     /// # Errors
-    /// [`BadInput`] with file, line, column and what was expected.
+    /// [`crate::BadInput`] with file, line, column and what was expected.
     pub fn open(path: &Path, measured: &str) -> Result<Self> {
         let name = path.display().to_string();
         if let Ok(file) = std::fs::File::open(path) {
@@ -79,10 +77,7 @@ impl Record {
                 );
             }
         }
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&name, &text, measured),
-            Err(error) => bad_input!("{name}: cannot be read: {error}"),
-        }
+        Self::parse(&name, &read(path)?, measured)
     }
 
     /// Reads the text of a file; `name` is what messages call it.
@@ -90,47 +85,31 @@ impl Record {
     /// # Errors
     /// As [`Record::open`].
     pub fn parse(name: &str, text: &str, measured: &str) -> Result<Self> {
-        let place = Place { name, text };
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|error| place.unreadable(&error))?.clone();
-        let column = |wanted: &str| header.iter().position(|name| name == wanted);
-        let required = |wanted| {
-            column(wanted).ok_or_else(|| {
-                let found = header.iter().collect::<Vec<_>>().join(",");
-                let at = place.of(header.position());
-                let also = if measured == MEASURED { String::new() } else { format!(", {measured}") };
-                BadInput(format!(
-                    "{at}: no column `{wanted}`; expected a header with time_s, voltage_v{also}, found `{found}`"
-                ))
-            })
-        };
-        let (time, voltage) = (required("time_s")?, required("voltage_v")?);
+        let mut table = Table::new(name, text)?;
+        let also = if measured == MEASURED { String::new() } else { format!(", {measured}") };
+        let expected = format!("time_s, voltage_v{also}");
+        let (time, voltage) = (table.require("time_s", &expected)?, table.require("voltage_v", &expected)?);
         // The usual column may be absent, one that was asked for must not.
-        let measured = if measured == MEASURED { column(measured) } else { Some(required(measured)?) };
+        let measured =
+            if measured == MEASURED { table.find(measured) } else { Some(table.require(measured, &expected)?) };
 
         let mut rows: Vec<Row> = Vec::new();
-        let mut lines = Lines { text, byte: 0, line: 1 };
-        for record in reader.records() {
-            let record = record.map_err(|error| place.unreadable(&error))?;
-            let number = |index: usize| match record[index].parse::<f64>() {
-                Ok(number) if number.is_finite() => Ok(number),
-                _ => {
-                    let (at, column) = (place.of(record.position()), &header[index]);
-                    Err(BadInput(format!("{at}, column {column}: `{}` is not a finite number", &record[index])))
-                }
-            };
+        while let Some(row) = table.next()? {
             let row = Row {
-                line: lines.at(record.position()),
-                time_s: number(time)?,
-                voltage_v: number(voltage)?,
-                measured: measured.map(number).transpose()?,
+                line: row.line,
+                time_s: row.number(time)?,
+                voltage_v: row.number(voltage)?,
+                measured: measured.map(|column| row.number(column)).transpose()?,
             };
             if let Some(last) = rows.last()
                 && row.time_s <= last.time_s
             {
-                let (now, before, at) = (row.time_s, last.time_s, place.of(record.position()));
-                bad_input!("{at}, column time_s: {now} follows {before}; expected increasing times");
+                bad_input!(
+                    "{name}, line {}, column time_s: {} follows {}; expected increasing times",
+                    row.line,
+                    row.time_s,
+                    last.time_s
+                );
             }
             rows.push(row);
         }
@@ -141,50 +120,10 @@ impl Record {
     }
 }
 
-/// Finds the lines of records, in order.
-struct Lines<'a> {
-    text: &'a str,
-    byte: usize,
-    line: usize,
-}
-
-impl Lines<'_> {
-    /// The line of a record. Its position is where the reader stood before comments and blank lines.
-    fn at(&mut self, position: Option<&csv::Position>) -> usize {
-        let start = position.map_or(0, |at| at.byte() as usize).clamp(self.byte, self.text.len());
-        self.line += self.text[self.byte..start].matches('\n').count();
-        self.byte = start;
-        let skipped = self.text[start..].lines().take_while(|line| line.trim().is_empty() || line.starts_with('#'));
-        self.line + skipped.count()
-    }
-}
-
-/// Names places of a text.
-struct Place<'a> {
-    name: &'a str,
-    text: &'a str,
-}
-
-impl Place<'_> {
-    /// File and line of a record.
-    fn of(&self, position: Option<&csv::Position>) -> String {
-        format!("{}, line {}", self.name, Lines { text: self.text, byte: 0, line: 1 }.at(position))
-    }
-
-    fn unreadable(&self, error: &csv::Error) -> BadInput {
-        let at = self.of(error.position());
-        BadInput(match error.kind() {
-            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                format!("{at}: {len} field(s); expected {expected_len} as in the header")
-            }
-            _ => format!("{at}: {error}; expected CSV"),
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::BadInput;
 
     fn message(text: &str) -> String {
         let error = Record::parse("data.csv", text, MEASURED).unwrap_err();

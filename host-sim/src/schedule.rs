@@ -83,7 +83,8 @@ impl Schedule {
         Self::new(record.rows.iter().map(|row| (row.time_s, row.voltage_v)).collect(), between)
     }
 
-    fn new(points: Vec<(f64, f64)>, between: Between) -> Self {
+    /// Through points of time in s and voltage in V, at least two; two at the same time make a jump.
+    pub(crate) fn new(points: Vec<(f64, f64)>, between: Between) -> Self {
         let end_v = points.last().map_or(0.0, |last| last.1);
         Self { pieces: pieces(points, between), end_v }
     }
@@ -203,17 +204,19 @@ impl Stretch {
 }
 
 impl Piece {
-    fn at(&self, time_s: f64) -> f64 {
+    /// The voltage at a moment of the piece, in V.
+    pub(crate) fn at(&self, time_s: f64) -> f64 {
         let part = ((time_s - self.start_s) / (self.end_s - self.start_s)).clamp(0.0, 1.0);
         self.from_v + part * (self.to_v - self.from_v)
     }
 
-    fn slope(&self) -> f64 {
+    /// In V/s.
+    pub(crate) fn slope(&self) -> f64 {
         (self.to_v - self.from_v) / (self.end_s - self.start_s)
     }
 }
 
-/// Pieces between points; two points at the same time make a jump.
+/// Pieces between points.
 fn pieces(points: impl IntoIterator<Item = (f64, f64)>, between: Between) -> Vec<Piece> {
     let mut points = points.into_iter();
     let Some(mut last) = points.next() else { return Vec::new() };

@@ -90,6 +90,15 @@ fn layers_and_readings_of_the_users() {
     let found = json(folder.path(), &arguments);
     assert!((number(&found, "/experiment/lines/1/un_per_mm/value") - 25_000.0).abs() < 1.0);
     assert!(number(&found, "/layers/identified/at_lowest_pa_per_m/low") > 0.0);
+    let tips = found.pointer("/layers/identified/tips").unwrap();
+    assert_eq!(tips, &Value::Array(Vec::new()), "section 4.1.4 is about another spring");
+
+    // Readings without any scatter.
+    fs::write(folder.path().join("r.csv"), "displacement_mm,force_un_0v,force_un_400v\n1,100,150\n2,200,300\n")
+        .unwrap();
+    let found = json(folder.path(), &["beam", "--json", "--experiment", "r.csv"]);
+    assert!((number(&found, "/experiment/reach_ratio/value") - 1.5).abs() < 1e-9);
+    assert_eq!(found["experiment"]["out_of_line"], Value::Array(Vec::new()));
 }
 
 #[test]
@@ -101,6 +110,12 @@ fn the_joint_against_the_requirement() {
     assert!((number(&found, "/reach_n_m_per_rad/0") - 8.0 * soft * 0.0064).abs() < 1e-9);
     assert!((number(&found, "/reach_ratio") - stiff / soft).abs() < 1e-9);
     assert!((number(&found, "/required_ratio") - 948.0 / 0.7).abs() < 1e-6);
+    // By hand: 12 times as thick and twice as wide a spring of the same material.
+    let thick = json(folder.path(), &["joint", "--json", "--thickness-um", "2280", "--width-mm", "39.6"]);
+    let usual = json(folder.path(), &["joint", "--json"]);
+    for path in ["/springs_n_per_m/0", "/springs_n_per_m/1", "/reach_n_m_per_rad/1"] {
+        assert!((number(&thick, path) / number(&usual, path) - 2.0 * 1728.0).abs() < 1e-6, "{path}");
+    }
     let whole = number(&found, "/times/4/shortest_s");
     assert!((whole - 5.5 * (10.0f64 / 11.0 / 0.03).ln()).abs() < 1e-6, "{whole}");
     let said = text(&run(folder.path(), &["joint"]).stdout);
@@ -118,7 +133,8 @@ fn the_joint_against_the_requirement() {
 fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("l.csv"), "material,youngs_modulus_gpa\nPET,3\n").unwrap();
-    fs::write(folder.path().join("r.csv"), "displacement_mm,force_un_0v,force_un_9v\n1,x,2\n").unwrap();
+    fs::write(folder.path().join("r.csv"), "# balance\ndisplacement_mm,force_un_0v,force_un_9v\n# mm,uN,uN\n1,x,2\n")
+        .unwrap();
     for (arguments, expected) in [
         (&["beam", "--length-mm", "0"][..], "--length-mm: length_m = 0 is not allowed"),
         (&["beam", "--width-mm", "-1"], "--width-mm: width_m = -0.001 is not allowed"),
@@ -134,8 +150,8 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         (&["beam", "--elements", "0"], "--elements: elements = 0"),
         (&["beam", "--stack", "PET,PVdF,PET"], "the stack has 0 layer(s) of aluminium; expected 2"),
         (&["beam", "--layers", "no.csv"], "no.csv: cannot be read"),
-        (&["beam", "--layers", "l.csv"], "l.csv: "),
-        (&["beam", "--experiment", "r.csv"], "r.csv, line 2, column force_un_0v: `x` is not a finite number"),
+        (&["beam", "--layers", "l.csv"], "l.csv, line 1: no column `length_mm`"),
+        (&["beam", "--experiment", "r.csv"], "r.csv, line 4, column force_un_0v: `x` is not a finite number"),
         (&["joint", "--springs", "0"], "--springs: springs = 0"),
         (&["joint", "--inner-radius-mm", "-1"], "--inner-radius-mm: inner_radius_m = -0.001"),
         (&["joint", "--thickness-um", "0"], "--thickness-um: thickness_m = 0"),

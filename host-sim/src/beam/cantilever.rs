@@ -8,7 +8,7 @@
 
 use anyhow::Result;
 
-use super::check;
+use crate::bad_input::check;
 
 /// A straight beam with a rectangular cross-section.
 #[derive(Clone, Copy, Debug, PartialEq)]

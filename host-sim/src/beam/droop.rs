@@ -7,8 +7,8 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::cantilever::{Beam, Load};
-use super::check;
 use super::elastica::{self, Point};
+use crate::bad_input::check;
 
 /// A loaded beam, solved by the simplest theory that is valid.
 #[derive(Clone, Debug)]

@@ -9,29 +9,18 @@
 //! is fitted to all remaining readings at once: the report fits three Young's moduli, which leaves its interval one
 //! degree of freedom.
 
-use std::path::Path;
-
-use anyhow::{Context, Result};
+use anyhow::Result;
 use serde::Serialize;
 
 use super::cantilever::Beam;
-use super::regression::{Fit, Interval};
+use super::readings::{Reading, table1};
+use super::regression::{self, Fit, Interval, chance_beyond};
 use crate::bad_input;
 use crate::bad_input::BadInput;
 
-/// Table 1 as it was printed.
-pub const TABLE1: &str = include_str!("../../../data/table1_bending.csv");
-
-/// One reading of the balance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Reading {
-    /// Across the spring, in V.
-    pub voltage_v: f64,
-    /// Of the free end, in mm.
-    pub displacement_mm: f64,
-    /// In uN.
-    pub force_un: f64,
-}
+/// The report's spring taken as one piece (section 2.5). Its Young's modulus is what the experiment finds.
+pub const SPRING: Beam =
+    Beam { length_m: 59.8e-3, width_m: 19.8e-3, thickness_m: 190e-6, youngs_modulus_pa: 1.0, density_kg_per_m3: 0.0 };
 
 /// What an experiment says. Intervals hold with 95 %.
 #[derive(Clone, Debug, Serialize)]
@@ -76,62 +65,6 @@ pub struct OutOfLine {
     pub chance: f64,
 }
 
-/// Reads a table with the columns `displacement_mm` and one `force_un_<V>v` a voltage.
-///
-/// # Errors
-/// [`BadInput`] with file, line, column and what was expected.
-pub fn open(path: &Path) -> Result<Vec<Reading>> {
-    let name = path.display().to_string();
-    match std::fs::read_to_string(path) {
-        Ok(text) => parse(&name, &text),
-        Err(error) => bad_input!("{name}: cannot be read: {error}"),
-    }
-}
-
-/// As [`open`], from text.
-///
-/// # Errors
-/// As [`open`].
-pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-    let unreadable = |error: csv::Error| BadInput(format!("{name}: {error}; expected CSV"));
-    let header = reader.headers().map_err(unreadable)?.clone();
-    let voltage = |column: &str| column.strip_prefix("force_un_")?.strip_suffix('v')?.parse::<f64>().ok();
-    let voltages: Vec<(usize, f64)> =
-        header.iter().enumerate().filter_map(|(index, column)| Some((index, voltage(column)?))).collect();
-    let Some(displacement) = header.iter().position(|column| column == "displacement_mm") else {
-        bad_input!("{name}: no column `displacement_mm`; expected it beside force_un_0v, force_un_400v, ...");
-    };
-    if voltages.is_empty() {
-        bad_input!("{name}: no column `force_un_<V>v`; expected one a voltage, such as force_un_400v");
-    }
-    let mut readings = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(unreadable)?;
-        let number = |index: usize| match record[index].parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number),
-            _ => {
-                let line = record.position().map_or(0, csv::Position::line);
-                let (column, found) = (&header[index], &record[index]);
-                Err(BadInput(format!("{name}, line {line}, column {column}: `{found}` is not a finite number")))
-            }
-        };
-        for &(index, voltage_v) in &voltages {
-            let displacement_mm = number(displacement)?;
-            readings.push(Reading { voltage_v, displacement_mm, force_un: number(index)? });
-        }
-    }
-    Ok(readings)
-}
-
-/// The readings of Table 1.
-///
-/// # Errors
-/// If the file that was built in is damaged.
-pub fn table1() -> Result<Vec<Reading>> {
-    parse("data/table1_bending.csv", TABLE1)
-}
-
 /// Lines through the origin, one a voltage, with one scatter for all.
 ///
 /// # Errors
@@ -144,6 +77,20 @@ pub fn lines(readings: &[Reading], voltages: &[f64]) -> Result<Fit> {
     Fit::new(&readings.iter().map(row).collect::<Vec<_>>(), &forces)
 }
 
+/// The readings that are in line, the lines through them, and what was set aside, one by one.
+///
+/// # Errors
+/// [`BadInput`] if there are too few.
+pub fn in_line(readings: &[Reading], voltages: &[f64]) -> Result<(Vec<Reading>, Fit, Vec<OutOfLine>)> {
+    let (mut kept, mut set_aside) = (readings.to_vec(), Vec::new());
+    loop {
+        let fit = determined(lines(&kept, voltages))?;
+        let Some(index) = fit.out_of_line() else { return Ok((kept, fit, set_aside)) };
+        let regression::Reading { expected, chance } = fit.readings[index];
+        set_aside.push(OutOfLine { reading: kept.remove(index), expected_un: expected, chance });
+    }
+}
+
 /// The voltages of a table, ascending.
 pub fn voltages(readings: &[Reading]) -> Vec<f64> {
     let mut voltages: Vec<f64> = readings.iter().map(|reading| reading.voltage_v).collect();
@@ -153,6 +100,19 @@ pub fn voltages(readings: &[Reading]) -> Vec<f64> {
 }
 
 impl Experiment {
+    /// The report's: Table 1, on its spring.
+    ///
+    /// # Errors
+    /// If the file that was built in is damaged.
+    pub fn paper() -> Result<Self> {
+        Self::new(&table1()?, &SPRING)
+    }
+
+    /// Young's modulus of the whole beam at a voltage, in Pa.
+    pub fn youngs_modulus_pa(&self, voltage_v: f64) -> f64 {
+        self.at_zero_pa.value + self.per_volt_pa.value * voltage_v
+    }
+
     /// Evaluates readings made on `beam`, whose own Young's modulus is not looked at.
     ///
     /// # Errors
@@ -162,16 +122,8 @@ impl Experiment {
         let &[lowest, .., highest] = &voltages[..] else {
             bad_input!("the beam experiment has {} voltage(s); expected at least two", voltages.len())
         };
-        let fitted = |readings: &[Reading]| {
-            lines(readings, &voltages).map_err(|error| BadInput(format!("the beam experiment: {error}")))
-        };
-        let all = fitted(readings)?;
-        let (mut kept, mut out_of_line, mut fit) = (readings.to_vec(), Vec::new(), all.clone());
-        while let Some(index) = fit.out_of_line() {
-            let (expected_un, chance) = (fit.readings[index].expected, fit.readings[index].chance);
-            out_of_line.push(OutOfLine { reading: kept.remove(index), expected_un, chance });
-            fit = fitted(&kept)?;
-        }
+        let all = determined(lines(readings, &voltages))?;
+        let (kept, fit, out_of_line) = in_line(readings, &voltages)?;
         // uN/mm is 1e-3 N/m.
         let pascal = |un_per_mm: Interval| un_per_mm.scaled(1e-3 * beam.youngs_modulus_of(1.0));
         let lines: Vec<Line> = (0..voltages.len())
@@ -213,32 +165,31 @@ fn law(readings: &[Reading], degree: i32) -> Result<Fit> {
         .map(|reading| (0..=degree).map(|power| reading.displacement_mm * reading.voltage_v.powi(power)).collect())
         .collect();
     let forces: Vec<f64> = readings.iter().map(|reading| reading.force_un).collect();
-    Fit::new(&rows, &forces).context("the voltage law")
+    determined(Fit::new(&rows, &forces))
+}
+
+/// Readings that determine no fit are the caller's to mend.
+fn determined(fit: Result<Fit>) -> Result<Fit> {
+    fit.map_err(|error| BadInput(format!("the beam experiment: {error}")).into())
 }
 
 /// Two-sided chance of the quadratic term.
 fn curvature_chance(readings: &[Reading]) -> Result<f64> {
-    use statrs::distribution::{ContinuousCDF, StudentsT};
     // In kV, so that the normal equations stay well conditioned.
     let scaled: Vec<Reading> = readings.iter().map(|r| Reading { voltage_v: 1e-3 * r.voltage_v, ..*r }).collect();
     let fit = law(&scaled, 2)?;
-    let student = StudentsT::new(0.0, 1.0, fit.degrees_of_freedom as f64)?;
-    Ok(2.0 * student.cdf(-fit.standard_errors_from(2, 0.0).abs()))
+    chance_beyond(fit.standard_errors_from(2, 0.0), fit.degrees_of_freedom)
 }
-
-/// The report's spring taken as one piece.
-#[cfg(test)]
-pub(super) const WHOLE: Beam =
-    Beam { length_m: 59.8e-3, width_m: 19.8e-3, thickness_m: 190e-6, youngs_modulus_pa: 1.0, density_kg_per_m3: 0.0 };
 
 #[cfg(test)]
 mod tests {
+    use super::super::readings::parse;
     use super::*;
 
     /// By hand: sum F x / sum x^2 with sum x^2 = 45.65.
     #[test]
     fn slopes_of_table_1() {
-        let found = Experiment::new(&table1().unwrap(), &WHOLE).unwrap();
+        let found = Experiment::paper().unwrap();
         for (line, expected) in found.lines.iter().zip([9350.1 / 45.65, 12579.9 / 45.65, 14725.3 / 45.65]) {
             assert!((line.all_un_per_mm.value - expected).abs() < 1e-9, "{line:?} {expected}");
         }
@@ -269,25 +220,37 @@ mod tests {
                 })
             })
             .collect();
-        let found = Experiment::new(&readings, &WHOLE).unwrap();
-        let factor = 1e-3 * WHOLE.youngs_modulus_of(1.0);
+        let found = Experiment::new(&readings, &SPRING).unwrap();
+        let factor = 1e-3 * SPRING.youngs_modulus_of(1.0);
         assert!((found.at_zero_pa.value / (200.0 * factor) - 1.0).abs() < 1e-6);
         assert!((found.per_volt_pa.value / (0.2 * factor) - 1.0).abs() < 1e-6);
         assert!((found.reach_ratio.value - 1.6).abs() < 1e-5);
     }
 
     #[test]
-    fn a_bad_table_is_one_line_with_its_place() {
-        for (text, expected) in [
-            ("force_un_0v\n1\n", "t: no column `displacement_mm`"),
-            ("displacement_mm\n1\n", "t: no column `force_un_<V>v`"),
-            ("displacement_mm,force_un_0v\n1,x\n", "t, line 2, column force_un_0v: `x` is not a finite number"),
-            ("displacement_mm,force_un_0v\nNaN,1\n", "t, line 2, column displacement_mm: `NaN`"),
+    fn too_little_is_bad_input() {
+        let parse = |text: &str| Experiment::new(&parse("t", text).unwrap(), &SPRING);
+        for text in [
+            "displacement_mm,force_un_0v\n1,1\n2,2\n3,3\n",
+            "displacement_mm,force_un_0v,force_un_9v\n1,1,2\n",
+            "displacement_mm,force_un_0v,force_un_9v\n1e300,1,2\n2,4,5\n3,7,7\n",
         ] {
-            let error = parse("t", text).unwrap_err();
-            assert!(error.is::<BadInput>() && error.to_string().starts_with(expected), "{error}");
+            assert!(parse(text).unwrap_err().is::<BadInput>(), "{text}");
         }
-        let one = parse("t", "displacement_mm,force_un_0v\n1,1\n2,2\n3,3\n").unwrap();
-        assert!(Experiment::new(&one, &WHOLE).unwrap_err().is::<BadInput>());
+    }
+
+    /// Readings without any scatter, and a reading that stands alone, accuse nobody.
+    #[test]
+    fn readings_without_scatter_are_in_line() {
+        for text in [
+            "displacement_mm,force_un_0v,force_un_9v\n1,100,150\n2,200,300\n3,300,450\n",
+            "displacement_mm,force_un_0v,force_un_9v,force_un_12v\n1,100,150,160\n2,200,300,320\n3,300,450,480\n",
+            "displacement_mm,force_un_0v,force_un_9v\n0,0,0\n2,410,560\n",
+            "displacement_mm,force_un_0v,force_un_9v\n1,0,0\n2,0,0\n3,0,0\n",
+        ] {
+            let found = Experiment::new(&parse("t", text).unwrap(), &SPRING).unwrap();
+            assert!(found.out_of_line.is_empty(), "{text}: {found:?}");
+            assert!(found.straight_chance.is_none_or(|chance| (0.0..=1.0).contains(&chance)), "{found:?}");
+        }
     }
 }

@@ -14,8 +14,10 @@
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};
 
-use super::check;
+use super::element::{GAUSS, Shapes};
+use super::limits::section_ends;
 use super::stack::Stack;
+use crate::bad_input::check;
 
 /// Elements that give the tip displacement of the report's spring to better than 0.01 %.
 pub const ELEMENTS: usize = 24;
@@ -38,8 +40,10 @@ impl Bent {
     }
 }
 
-/// Stiffest interlayer that is solved for; far beyond bonded.
-pub const STIFFEST_PA_PER_M: f64 = 1e18;
+/// An interlayer as good as bonded.
+pub const BONDED_PA_PER_M: f64 = 1e14;
+/// Stiffest interlayer that is solved for.
+const STIFFEST_PA_PER_M: f64 = 1e18;
 
 /// Bends a stack by `tip_n` at its tip; `interlayer_pa_per_m` is `K`.
 ///
@@ -81,48 +85,6 @@ pub fn bend(stack: &Stack, interlayer_pa_per_m: f64, tip_n: f64, elements: usize
 /// As [`bend`].
 pub fn spring_constant_n_per_m(stack: &Stack, interlayer_pa_per_m: f64, elements: usize) -> Result<f64> {
     Ok(1.0 / bend(stack, interlayer_pa_per_m, 1.0, elements)?.tip_m())
-}
-
-/// The same in closed form where nothing slips: plane sections, `1 / integral of (L - x)^2 / EI(x)`.
-pub fn bonded_n_per_m(stack: &Stack) -> f64 {
-    by_section(stack, |axial, bending, heights| {
-        let total: f64 = axial.iter().sum();
-        let neutral = axial.iter().zip(heights).map(|(axial, height)| axial * height).sum::<f64>() / total;
-        let steiner: f64 = axial.iter().zip(heights).map(|(axial, height)| axial * (height - neutral).powi(2)).sum();
-        bending.iter().sum::<f64>() + steiner
-    })
-}
-
-/// The same in closed form where everything slides: the layers bend side by side.
-pub fn sliding_n_per_m(stack: &Stack) -> f64 {
-    by_section(stack, |_, bending, _| bending.iter().sum())
-}
-
-/// Spring constant by the bending stiffness of each section, from axial and bending stiffness and height of its layers.
-fn by_section(stack: &Stack, bending_stiffness: impl Fn(&[f64], &[f64], &[f64]) -> f64) -> f64 {
-    let length = stack.length_m();
-    let heights = stack.heights_m();
-    let ends = section_ends(stack);
-    let compliance: f64 = ends
-        .windows(2)
-        .map(|ends| {
-            let here = || stack.layers().iter().zip(&heights).filter(|(layer, _)| layer.length_m >= ends[1]);
-            let axial: Vec<f64> = here().map(|(layer, _)| layer.axial_n()).collect();
-            let bending: Vec<f64> = here().map(|(layer, _)| layer.bending_n_m2()).collect();
-            let heights: Vec<f64> = here().map(|(_, &height)| height).collect();
-            let arm = |x: f64| (length - x).powi(3) / 3.0;
-            (arm(ends[0]) - arm(ends[1])) / bending_stiffness(&axial, &bending, &heights)
-        })
-        .sum();
-    1.0 / compliance
-}
-
-/// The clamp and where layers end, ascending.
-fn section_ends(stack: &Stack) -> Vec<f64> {
-    let mut ends: Vec<f64> = stack.layers().iter().map(|layer| layer.length_m).chain([0.0]).collect();
-    ends.sort_by(f64::total_cmp);
-    ends.dedup();
-    ends
 }
 
 /// Nodes and the numbers of the unknowns.
@@ -216,42 +178,11 @@ fn add(matrix: &mut DMatrix<f64>, stiffness: f64, terms: &[(usize, f64)]) {
     }
 }
 
-/// Gauss points on 0 to 1 with their weights: half of sqrt 0.6 off the middle.
-const GAUSS: [(f64, f64); 3] =
-    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
-
-/// Shape functions at one place of an element.
-struct Shapes {
-    /// First derivative of the cubic (Hermite) functions.
-    slope: [f64; 4],
-    /// Second.
-    curvature: [f64; 4],
-    /// Quadratic functions of start, middle, end.
-    axial: [f64; 3],
-    /// Their derivative.
-    strain: [f64; 3],
-}
-
-impl Shapes {
-    fn at(t: f64, h: f64) -> Self {
-        Self {
-            slope: [6.0 * t * (t - 1.0) / h, (1.0 - t) * (1.0 - 3.0 * t), 6.0 * t * (1.0 - t) / h, t * (3.0 * t - 2.0)],
-            curvature: [
-                (12.0 * t - 6.0) / (h * h),
-                (6.0 * t - 4.0) / h,
-                (6.0 - 12.0 * t) / (h * h),
-                (6.0 * t - 2.0) / h,
-            ],
-            axial: [(1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0)],
-            strain: [(4.0 * t - 3.0) / h, (4.0 - 8.0 * t) / h, (4.0 * t - 1.0) / h],
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::limits::{bonded_n_per_m, sliding_n_per_m};
     use super::super::stack::Layer;
     use super::*;
 

@@ -38,7 +38,7 @@ pub struct Reading {
 }
 
 /// How often a table may be accused wrongly.
-const FALSE_ALARM: f64 = 0.05;
+pub const FALSE_ALARM: f64 = 0.05;
 
 impl Interval {
     /// True if it holds `value`.
@@ -61,7 +61,7 @@ impl Fit {
     /// Fits `values` by the columns of `rows`.
     ///
     /// # Errors
-    /// If there are fewer than two readings more than coefficients, or the columns depend on each other.
+    /// If there are no more readings than coefficients, or the columns depend on each other.
     pub fn new(rows: &[Vec<f64>], values: &[f64]) -> Result<Self> {
         let columns = rows.first().map_or(0, Vec::len);
         let design = DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column]);
@@ -71,18 +71,22 @@ impl Fit {
         let inverse = (design.transpose() * &design).cholesky().context("readings do not determine the fit")?.inverse();
         let coefficients = &inverse * design.transpose() * &values;
         let residuals = &values - &design * &coefficients;
-        let squares = residuals.norm_squared();
+        // What scatters by less is not told from the computer's own rounding.
+        let rounding = (1e-12 * values.amax()).powi(2);
+        let squares = residuals.norm_squared().max(rounding);
         let leverage: Vec<f64> = design.row_iter().map(|row| (row * &inverse * row.transpose())[0]).collect();
 
         let mut readings = Vec::new();
         if degrees_of_freedom > 1 {
             for ((&value, &residual), &leverage) in values.iter().zip(&residuals).zip(&leverage) {
+                // A reading that alone determines a coefficient is contradicted by none.
+                let alone = 1.0 - leverage < 1e-9;
                 // What the fit without this reading would be, without making it.
-                let missed = residual / (1.0 - leverage);
-                let variance = (squares - residual * missed).max(0.0) / (degrees_of_freedom - 1) as f64;
-                let deviation = (variance / (1.0 - leverage)).sqrt();
+                let missed = if alone { 0.0 } else { residual / (1.0 - leverage) };
+                let variance = (squares - residual * missed).max(rounding) / (degrees_of_freedom - 1) as f64;
+                let deviation = if alone { f64::INFINITY } else { (variance / (1.0 - leverage)).sqrt() };
                 let expected = Interval::around(value - missed, deviation, degrees_of_freedom - 1)?;
-                let chance = 2.0 * student(degrees_of_freedom - 1)?.cdf(-(missed / deviation).abs());
+                let chance = chance_beyond(missed / deviation, degrees_of_freedom - 1)?;
                 readings.push(Reading { expected, chance });
             }
         }
@@ -120,6 +124,18 @@ impl Fit {
         let (index, worst) =
             self.readings.iter().enumerate().min_by(|(_, one), (_, other)| one.chance.total_cmp(&other.chance))?;
         (worst.chance * (self.readings.len() as f64) < FALSE_ALARM).then_some(index)
+    }
+}
+
+/// Two-sided chance of lying so many standard errors off; 1 where nothing scatters and nothing is off.
+///
+/// # Errors
+/// If Student's distribution does not exist: without a degree of freedom.
+pub fn chance_beyond(standard_errors: f64, degrees_of_freedom: usize) -> Result<f64> {
+    match standard_errors.abs() {
+        off if off.is_nan() => Ok(1.0),
+        off if off.is_infinite() => Ok(0.0),
+        off => Ok(2.0 * student(degrees_of_freedom)?.cdf(-off)),
     }
 }
 

@@ -12,7 +12,8 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
 use super::experiment::Experiment;
-use super::layered::{ELEMENTS, bonded_n_per_m, sliding_n_per_m, spring_constant_n_per_m};
+use super::layered::{BONDED_PA_PER_M, ELEMENTS, spring_constant_n_per_m};
+use super::limits::{bonded_n_per_m, sliding_n_per_m};
 use super::regression::Interval;
 use super::stack::{ACTIVE, Stack, active_modulus_pa};
 use crate::bad_input;
@@ -50,19 +51,20 @@ pub fn tips() -> Result<Vec<Tip>> {
 ///
 /// # Errors
 /// [`crate::BadInput`] if no slip gives it: it must lie between free sliding and bonding.
-pub fn identify_pa_per_m(stack: &Stack, spring_constant_n_per_m_: f64) -> Result<f64> {
+pub fn identify_pa_per_m(stack: &Stack, measured_n_per_m: f64) -> Result<f64> {
     let (sliding, bonded) = (sliding_n_per_m(stack), bonded_n_per_m(stack));
     // Nearly bonded, the interlayer stiffness means nothing any more.
-    if !(spring_constant_n_per_m_ > sliding && spring_constant_n_per_m_ < 0.99 * bonded) {
+    let highest = 0.99 * bonded;
+    if !(measured_n_per_m > sliding && measured_n_per_m < highest) {
         bad_input!(
-            "a spring constant of {spring_constant_n_per_m_} N/m: expected {sliding:.4} N/m (layers slide) to {bonded:.4} \
-             N/m (bonded)"
+            "a spring constant of {measured_n_per_m} N/m: expected {sliding:.4} N/m (layers slide) to {highest:.4} N/m \
+             (nearly bonded)"
         );
     }
-    let (mut low, mut high) = (1.0f64, 1e14f64);
+    let (mut low, mut high) = (1.0, BONDED_PA_PER_M);
     for _ in 0..50 {
         let middle = (low * high).sqrt();
-        let softer = spring_constant_n_per_m(stack, middle, ELEMENTS)? < spring_constant_n_per_m_;
+        let softer = spring_constant_n_per_m(stack, middle, ELEMENTS)? < measured_n_per_m;
         if softer { low = middle } else { high = middle }
     }
     Ok((low * high).sqrt())
@@ -81,7 +83,7 @@ pub struct Identified {
     pub highest_v: f64,
     /// Spring constants in uN/mm, one row a voltage of the experiment.
     pub lines: Vec<Line>,
-    /// Displacements of section 4.1.4: never used for the identification.
+    /// Displacements that were measured apart: never used for the identification.
     pub tips: Vec<Predicted>,
     /// Young's modulus, in Pa, that the active layer would need at the highest voltage to explain it alone; `None` if none.
     pub active_alone_pa: Option<f64>,
@@ -133,11 +135,11 @@ impl Identified {
         (low + (high - low) * (here - lowest) / (highest - lowest)).max(0.0)
     }
 
-    /// Identifies slip on an experiment.
+    /// Identifies slip on an experiment; `tips` were measured apart, and are only compared.
     ///
     /// # Errors
     /// [`crate::BadInput`] if no slip explains it.
-    pub fn new(stack: &Stack, experiment: &Experiment) -> Result<Self> {
+    pub fn new(stack: &Stack, experiment: &Experiment, tips: &[Tip]) -> Result<Self> {
         let at = |voltage_v: f64| stack.with_modulus(ACTIVE, active_modulus_pa(voltage_v)?);
         let (lowest, highest) =
             (experiment.lines.first().context("a line")?, experiment.lines.last().context("a line")?);
@@ -171,7 +173,7 @@ impl Identified {
                 used: line.voltage_v == lowest.voltage_v || line.voltage_v == highest.voltage_v,
             })
         });
-        let tips = tips()?.into_iter().map(|printed| {
+        let tips = tips.iter().map(|&printed| {
             let stack = at(printed.voltage_v)?;
             // uN by N/m is um.
             let mm = |newton_per_metre: f64| 1e-3 * printed.force_un / newton_per_metre;
@@ -208,7 +210,6 @@ fn active_alone(stack: &Stack, interlayer_pa_per_m: f64, n_per_m: f64) -> Result
 
 #[cfg(test)]
 mod tests {
-    use super::super::experiment::{WHOLE, table1};
     use super::*;
 
     #[test]
@@ -227,8 +228,7 @@ mod tests {
     /// Identified at 0 and 700 V, checked at 400 V: growing with the voltage it comes out within 2 %, with the square not.
     #[test]
     fn the_line_between_decides_how_the_coupling_grows() {
-        let experiment = Experiment::new(&table1().unwrap(), &WHOLE).unwrap();
-        let found = Identified::new(&Stack::paper().unwrap(), &experiment).unwrap();
+        let found = Identified::new(&Stack::paper().unwrap(), &Experiment::paper().unwrap(), &[]).unwrap();
         let [low, between, high] = &found.lines[..] else { panic!("three voltages") };
         for used in [low, high] {
             assert!(used.used && (used.linear / used.measured - 1.0).abs() < 1e-6);

@@ -1,10 +1,10 @@
 //! The layers of the spring, bottom to top, all clamped at the same end.
 
 use anyhow::{Context, Result};
-use serde::Deserialize;
 
-use super::check;
 use crate::bad_input;
+use crate::bad_input::check;
+use crate::csv_table::Table;
 
 /// Table 2 as it was printed.
 pub const TABLE2: &str = include_str!("../../../data/table2_layers.csv");
@@ -37,7 +37,7 @@ pub struct Stack {
 }
 
 /// A kind of layer as tables list it.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Kind {
     /// Name.
     pub material: String,
@@ -56,18 +56,28 @@ pub struct Kind {
 /// Reads the kinds of layers from CSV text.
 ///
 /// # Errors
-/// [`crate::BadInput`] with file, line and what was expected.
+/// [`crate::BadInput`] with file, line, column and what was expected.
 pub fn kinds(name: &str, text: &str) -> Result<Vec<Kind>> {
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+    const COLUMNS: [&str; 6] = ["material", "youngs_modulus_gpa", "length_mm", "width_mm", "thickness_um", "count"];
+    let mut table = Table::new(name, text)?;
+    let mut at = [0; 6];
+    for (place, column) in at.iter_mut().zip(COLUMNS) {
+        *place = table.require(column, &COLUMNS.join(", "))?;
+    }
+    let [material, youngs_modulus, length, width, thickness, count] = at;
     let mut kinds = Vec::new();
-    for kind in reader.deserialize() {
-        match kind {
-            Ok(kind) => kinds.push(kind),
-            Err(error) => bad_input!(
-                "{name}: {error}; expected the columns material, youngs_modulus_gpa, length_mm, width_mm, thickness_um, \
-                 count"
-            ),
-        }
+    while let Some(row) = table.next()? {
+        kinds.push(Kind {
+            material: row.text(material).to_owned(),
+            youngs_modulus_gpa: row.number(youngs_modulus)?,
+            length_mm: row.number(length)?,
+            width_mm: row.number(width)?,
+            thickness_um: row.number(thickness)?,
+            count: row.whole(count)?,
+        });
+    }
+    if kinds.is_empty() {
+        bad_input!("{name}: 0 rows of data; expected one a kind of layer");
     }
     Ok(kinds)
 }
@@ -230,7 +240,14 @@ mod tests {
         ] {
             assert!(found.starts_with(expected), "{found}");
         }
-        let error = super::kinds("k", "material\nPET\n").unwrap_err();
-        assert!(error.is::<crate::BadInput>() && error.to_string().contains("missing field"), "{error}");
+        for (table, expected) in [
+            ("material\nPET\n".to_owned(), "k, line 1: no column `youngs_modulus_gpa`"),
+            (TABLE2.replace(",20,1", ",20,-1"), "k, line 4, column count: `-1` is not a whole number"),
+            (TABLE2.replace("PVdF,0.4", "PVdF,soft"), "k, line 6, column youngs_modulus_gpa: `soft`"),
+            (TABLE2.lines().take(2).collect::<Vec<_>>().join("\n"), "k: 0 rows of data"),
+        ] {
+            let error = super::kinds("k", &table).unwrap_err();
+            assert!(error.is::<crate::BadInput>() && error.to_string().starts_with(expected), "{error}");
+        }
     }
 }

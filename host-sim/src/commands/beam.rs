@@ -1,17 +1,19 @@
 //! `vsj beam`: the leaf spring's statics.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::BadInput;
 use host_sim::beam::cantilever::{Beam, Load};
-use host_sim::beam::report::{ELEMENTS, Question, Report};
-use host_sim::beam::stack::{self, ORDER, Stack};
-use host_sim::beam::{experiment, stack::TABLE2};
+use host_sim::beam::layered::ELEMENTS;
+use host_sim::beam::readings;
+use host_sim::beam::report::{Question, Report};
+use host_sim::beam::slip::tips;
+use host_sim::beam::stack::{self, ORDER, Stack, TABLE2};
+use host_sim::csv_table::read;
 use host_sim::output::files::Files;
 
-use super::print;
+use super::{named, print, wrote};
 
 /// The leaf spring's statics: beam experiment, deflection small and large, layers that slip
 #[derive(Args, Debug)]
@@ -78,18 +80,18 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let question = question(arguments)?;
-    let report = Report::new(&question).map_err(named)?;
+    let report = Report::new(&question).map_err(|error| named(error, OPTIONS))?;
     let text = report.text();
-    let mut wrote = String::new();
+    let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("beam.txt", |out| out.write_all(text.as_bytes()))?;
         for (name, svg) in report.figures(&question.readings) {
             files.add(name, |out| out.write_all(svg.as_bytes()))?;
         }
-        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+        written = wrote(&files.finish()?);
     }
-    if arguments.json { print(&format!("{}\n", serde_json::to_string(&report)?)) } else { print(&(text + &wrote)) }
+    if arguments.json { print(&format!("{}\n", serde_json::to_string(&report)?)) } else { print(&(text + &written)) }
 }
 
 fn question(arguments: &Arguments) -> Result<Question> {
@@ -100,13 +102,17 @@ fn question(arguments: &Arguments) -> Result<Question> {
         youngs_modulus_pa: 1e9 * arguments.modulus_gpa,
         density_kg_per_m3: arguments.density,
     };
-    let beam = beam.checked().map_err(named)?;
     let load = Load { tip_n: 1e-6 * arguments.force_un, gravity_m_per_s2: arguments.gravity };
-    let readings = arguments.experiment.as_deref().map_or_else(experiment::table1, experiment::open)?;
+    let readings = match &arguments.experiment {
+        None => readings::table1()?,
+        Some(path) => readings::parse(&path.display().to_string(), &read(path)?)?,
+    };
     let kinds = match &arguments.layers {
         None => stack::kinds("Table 2", TABLE2)?,
         Some(path) => stack::kinds(&path.display().to_string(), &read(path)?)?,
     };
+    // Section 4.1.4 speaks of the report's spring alone.
+    let reports_own = arguments.experiment.is_none() && arguments.layers.is_none() && arguments.stack == ORDER;
     let at_m = if arguments.at_mm.is_empty() {
         [0.25, 0.5, 0.75, 1.0].map(|part| part * beam.length_m).to_vec()
     } else {
@@ -114,9 +120,10 @@ fn question(arguments: &Arguments) -> Result<Question> {
     };
     Ok(Question {
         readings,
+        tips: if reports_own { tips()? } else { Vec::new() },
         stack: Stack::in_order(&kinds, &arguments.stack)?,
         beam,
-        load: load.checked().map_err(named)?,
+        load,
         tolerance: arguments.tolerance,
         at_m,
         voltage_v: arguments.voltage_v,
@@ -125,28 +132,18 @@ fn question(arguments: &Arguments) -> Result<Question> {
     })
 }
 
-fn read(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path)
-        .map_err(|error| BadInput(format!("{}: cannot be read: {error}", path.display())).into())
-}
-
-/// Says which option sets the field that an error begins with.
-fn named(error: anyhow::Error) -> anyhow::Error {
-    let text = error.to_string();
-    let option = match text.split(' ').next().unwrap_or_default() {
-        "length_m" => "--length-mm",
-        "width_m" => "--width-mm",
-        "thickness_m" => "--thickness-um",
-        "youngs_modulus_pa" => "--modulus-gpa",
-        "density_kg_per_m3" => "--density",
-        "tip_n" => "--force-un",
-        "gravity_m_per_s2" => "--gravity",
-        "interlayer_pa_per_m" => "--interlayer",
-        "tolerance" => "--tolerance",
-        "voltage_v" => "--voltage-v",
-        "elements" => "--elements",
-        "at_mm" => "--at-mm",
-        _ => return error,
-    };
-    BadInput(format!("{option}: {text}")).into()
-}
+/// The option of each field that an error may begin with.
+const OPTIONS: &[(&str, &str)] = &[
+    ("length_m", "--length-mm"),
+    ("width_m", "--width-mm"),
+    ("thickness_m", "--thickness-um"),
+    ("youngs_modulus_pa", "--modulus-gpa"),
+    ("density_kg_per_m3", "--density"),
+    ("tip_n", "--force-un"),
+    ("gravity_m_per_s2", "--gravity"),
+    ("interlayer_pa_per_m", "--interlayer"),
+    ("tolerance", "--tolerance"),
+    ("voltage_v", "--voltage-v"),
+    ("elements", "--elements"),
+    ("at_mm", "--at-mm"),
+];

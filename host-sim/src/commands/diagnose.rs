@@ -11,7 +11,7 @@ use host_sim::plant_file;
 use host_sim::record::{MEASURED, Record};
 use indicatif::ProgressBar;
 
-use super::print;
+use super::{print, wrote};
 
 /// Show what the simulation gets wrong on measured data, name the cause, measure the gain of the cure
 ///
@@ -92,7 +92,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if arguments.json {
         print(&format!("{}\n", serde_json::to_string(&diagnosis.report)?))
     } else {
-        let wrote: String = paths.iter().map(|path| format!("wrote {}\n", path.display())).collect();
-        print(&(text::text(&record.name, &diagnosis.report) + &wrote))
+        print(&(text::text(&record.name, &diagnosis.report) + &wrote(&paths)))
     }
 }

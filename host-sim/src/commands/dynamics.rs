@@ -4,15 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::BadInput;
 use host_sim::dynamics::input::Input;
-use host_sim::dynamics::mapping::PlantGains;
+use host_sim::dynamics::plant::PlantGains;
 use host_sim::dynamics::report::{Model, Question, Report};
 use host_sim::dynamics::zener::{Changes, Start, Zener};
 use host_sim::output::files::Files;
 use host_sim::schedule::Between;
 
-use super::print;
+use super::{named, print, wrote};
 
 /// Run one of the report's dynamic models, and say what it is in terms of the others
 #[derive(Args, Debug)]
@@ -88,34 +87,29 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         start: if arguments.settled { Start::Settled } else { Start::Unloaded },
         every_s: arguments.every,
     };
-    let report = Report::new(&question).map_err(named)?;
-    let mut wrote = String::new();
+    let report = Report::new(&question).map_err(|error| named(error, OPTIONS))?;
+    let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("response.csv", |out| out.write_all(report.csv().as_bytes()))?;
         files.add("response.svg", |out| out.write_all(report.figure().as_bytes()))?;
-        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+        written = wrote(&files.finish()?);
     }
     if arguments.json {
         print(&format!("{}\n", serde_json::to_string(&report)?))
     } else {
-        print(&(report.text() + &wrote))
+        print(&(report.text() + &written))
     }
 }
 
-/// Says which option sets the field that an error begins with.
-fn named(error: anyhow::Error) -> anyhow::Error {
-    let text = error.to_string();
-    let option = match text.split(' ').next().unwrap_or_default() {
-        "k1_n_per_m" => "--k1",
-        "k2_n_per_m" => "--k2",
-        "damper_n_s_per_m" => "--damper",
-        "force_n" => "--force",
-        "length_m" => "--length",
-        "proportional" => "--kp",
-        "integral_per_s" => "--ki",
-        "every_s" => "--every",
-        _ => return error,
-    };
-    BadInput(format!("{option}: {text}")).into()
-}
+/// The option of each field that an error may begin with.
+const OPTIONS: &[(&str, &str)] = &[
+    ("k1_n_per_m", "--k1"),
+    ("k2_n_per_m", "--k2"),
+    ("damper_n_s_per_m", "--damper"),
+    ("force_n", "--force"),
+    ("length_m", "--length"),
+    ("proportional", "--kp"),
+    ("integral_per_s", "--ki"),
+    ("every_s", "--every"),
+];

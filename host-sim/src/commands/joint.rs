@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::BadInput;
 use host_sim::beam::cantilever::Beam;
-use host_sim::joint::{Joint, OuterEnd, Report, Requirement};
+use host_sim::joint::report::{Report, Requirement};
+use host_sim::joint::{Joint, OuterEnd};
 use host_sim::output::files::Files;
 use host_sim::plant_file;
 use host_sim::reference::Loop;
 
-use super::print;
+use super::{named, print, wrote};
 
 /// Joint stiffness of springs set radially between two rings, against what the report requires
 #[derive(Args, Debug)]
@@ -99,34 +99,31 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         range_v: (0.0, arguments.limit_v),
         slew_v_per_s: arguments.slew_v_per_s.unwrap_or(f64::INFINITY),
     };
-    let report = Report::new(joint, requirement, &beam, &system, arguments.stiffness).map_err(named)?;
+    let report =
+        Report::new(joint, requirement, &beam, &system, arguments.stiffness).map_err(|error| named(error, OPTIONS))?;
     let (json, text) = (format!("{}\n", serde_json::to_string(&report)?), report.text());
-    let mut wrote = String::new();
+    let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("joint.json", |out| out.write_all(json.as_bytes()))?;
         files.add("joint.txt", |out| out.write_all(text.as_bytes()))?;
-        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+        written = wrote(&files.finish()?);
     }
-    print(&if arguments.json { json } else { text + &wrote })
+    print(&if arguments.json { json } else { text + &written })
 }
 
-/// Says which option sets the field that an error begins with.
-fn named(error: anyhow::Error) -> anyhow::Error {
-    let text = error.to_string();
-    let option = match text.split(' ').next().unwrap_or_default() {
-        "inner_radius_m" => "--inner-radius-mm",
-        "spring_length_m" | "length_m" => "--length-mm",
-        "width_m" => "--width-mm",
-        "thickness_m" => "--thickness-um",
-        "springs" => "--springs",
-        "low_n_m_per_rad" => "--low",
-        "high_n_m_per_rad" => "--high",
-        "within_s" => "--within-s",
-        "limit_v" => "--limit-v",
-        "slew_v_per_s" => "--slew-v-per-s",
-        "stiffness_n_m_per_rad" => "--stiffness",
-        _ => return error,
-    };
-    BadInput(format!("{option}: {text}")).into()
-}
+/// The option of each field that an error may begin with.
+const OPTIONS: &[(&str, &str)] = &[
+    ("inner_radius_m", "--inner-radius-mm"),
+    ("spring_length_m", "--length-mm"),
+    ("length_m", "--length-mm"),
+    ("width_m", "--width-mm"),
+    ("thickness_m", "--thickness-um"),
+    ("springs", "--springs"),
+    ("low_n_m_per_rad", "--low"),
+    ("high_n_m_per_rad", "--high"),
+    ("within_s", "--within-s"),
+    ("limit_v", "--limit-v"),
+    ("slew_v_per_s", "--slew-v-per-s"),
+    ("stiffness_n_m_per_rad", "--stiffness"),
+];

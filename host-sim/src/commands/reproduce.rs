@@ -7,7 +7,7 @@ use clap::Args;
 use host_sim::output::files::Files;
 use host_sim::reproduce::reproduce;
 
-use super::print;
+use super::{print, wrote};
 
 /// Compute every printed number of the source report again, and say which do not come out and why
 #[derive(Args, Debug)]
@@ -30,15 +30,15 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let report = reproduce()?;
-    let mut wrote = String::new();
+    let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("README.md", |out| out.write_all(report.page().as_bytes()))?;
-        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+        written = wrote(&files.finish()?);
     }
     if arguments.json {
         print(&format!("{}\n", serde_json::to_string(&report)?))
     } else {
-        print(&(report.text() + &wrote))
+        print(&(report.text() + &written))
     }
 }

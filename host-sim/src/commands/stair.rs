@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::print;
+use super::{print, wrote};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::bad_input;
@@ -191,8 +191,7 @@ fn run_plant<P: Judged>(
     if arguments.json {
         print(&format!("{}\n", serde_json::to_string(&report)?))
     } else {
-        let wrote: String = paths.iter().map(|path| format!("wrote {}\n", path.display())).collect();
-        print(&(terminal::text(&report) + &wrote))
+        print(&(terminal::text(&report) + &wrote(&paths)))
     }
 }
 

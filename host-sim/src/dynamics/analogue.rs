@@ -22,8 +22,7 @@ pub fn response(zener: &Zener, input: &Input, start: Start, every_s: f64) -> Res
     input.check_positive()?;
     input.check_pace(every_s, zener.damper_n_s_per_m / zener.springs_at(input.highest())[1])?;
     let volt = zener.force_n;
-    let first = input.pieces().next().map_or(1.0, |piece| piece.from);
-    let charge = if start == Start::Settled { volt / zener.springs_at(first)[1] } else { 0.0 };
+    let charge = if start == Start::Settled { volt / zener.springs_at(input.first())[1] } else { 0.0 };
 
     let mut failed = None;
     // The damped capacitor's charge passes from step to step.
@@ -37,7 +36,7 @@ pub fn response(zener: &Zener, input: &Input, start: Start, every_s: f64) -> Res
             Component::Capacitor(2, 0, &damped),
         ];
         let mut circuit = Circuit::new(components, vec![0.0, volt * series(t), 0.0, charge]);
-        let fastest = zener.springs_at(piece.from.max(piece.to))[1] / zener.damper_n_s_per_m;
+        let fastest = zener.springs_at(piece.from_v.max(piece.to_v))[1] / zener.damper_n_s_per_m;
         let parts = (h * fastest * 100.0).ceil().max(STEPS as f64);
         let part = h / parts;
         let mut done = circuit.find_currents(t, 1e-5 * part);

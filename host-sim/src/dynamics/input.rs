@@ -1,13 +1,15 @@
 //! What drives a model: a level over time, straight pieces with jumps between them.
+//!
+//! A schedule whose voltage is the level.
 
 use std::path::Path;
 
 use anyhow::Result;
 
 use crate::bad_input;
-use crate::beam::check;
+use crate::bad_input::check;
 use crate::record::{MEASURED, Record};
-use crate::schedule::{Between, Schedule};
+use crate::schedule::{Between, Piece, Schedule};
 
 /// The report's parameters of section 8.2.1.
 const REPORT: &str = include_str!("../../../data/section821_input.csv");
@@ -20,33 +22,14 @@ pub struct Input {
     schedule: Schedule,
 }
 
-/// A piece of time in which the level is straight. Never empty.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
-    /// In s.
-    pub start_s: f64,
-    /// In s.
-    pub end_s: f64,
-    /// Level at the start.
-    pub from: f64,
-    /// Level towards the end.
-    pub to: f64,
-}
-
-impl Piece {
-    /// The level at a moment of the piece.
-    pub fn at(&self, time_s: f64) -> f64 {
-        self.from + (self.to - self.from) * (time_s - self.start_s) / (self.end_s - self.start_s)
-    }
-}
-
 impl Input {
     /// The report's levels 1, 4, 7 and 1, 30 s each.
     ///
     /// # Errors
     /// If the file that was built in is damaged.
     pub fn report() -> Result<Self> {
-        Self::of("section 8.2.1", &Record::parse("data/section821_input.csv", REPORT, MEASURED)?, Between::Linear)
+        let record = Record::parse("data/section821_input.csv", REPORT, MEASURED)?;
+        Ok(Self { name: "section 8.2.1".to_owned(), schedule: Schedule::from_record(&record, Between::Linear) })
     }
 
     /// `report`, `stair`, or a file with columns `time_s,voltage_v`.
@@ -57,37 +40,26 @@ impl Input {
         match name {
             "report" => Self::report(),
             "stair" => Ok(Self { name: "the stair".to_owned(), schedule: Schedule::stair() }),
-            file => Self::of(file, &Record::open(Path::new(file), MEASURED)?, between),
+            file => {
+                let record = Record::open(Path::new(file), MEASURED)?;
+                Ok(Self { name: file.to_owned(), schedule: Schedule::from_record(&record, between) })
+            }
         }
     }
 
-    /// Levels that jump, each held until the next moment; the last moment ends it.
-    ///
-    /// # Errors
-    /// [`crate::BadInput`] for fewer than two moments.
-    pub fn held(moments: &[(f64, f64)]) -> Result<Self> {
-        let rows: Vec<String> = moments.iter().map(|(time, level)| format!("{time:?},{level:?}\n")).collect();
-        let record = Record::parse("levels", &format!("time_s,voltage_v\n{}", rows.concat()), MEASURED)?;
-        Self::of("levels", &record, Between::Hold)
-    }
-
-    fn of(name: &str, record: &Record, between: Between) -> Result<Self> {
-        Ok(Self { name: name.to_owned(), schedule: Schedule::from_record(record, between) })
-    }
-
-    /// The schedule, in V.
-    pub fn schedule(&self) -> &Schedule {
-        &self.schedule
+    /// Levels that jump, each held until the next moment; the last of at least two moments ends it.
+    pub fn held(moments: &[(f64, f64)]) -> Self {
+        Self { name: "levels".to_owned(), schedule: Schedule::new(moments.to_vec(), Between::Hold) }
     }
 
     /// The straight pieces, in order.
-    pub fn pieces(&self) -> impl Iterator<Item = Piece> {
-        self.schedule.pieces().iter().map(|piece| Piece {
-            start_s: piece.start_s,
-            end_s: piece.end_s,
-            from: piece.from_v,
-            to: piece.to_v,
-        })
+    pub fn pieces(&self) -> &[Piece] {
+        self.schedule.pieces()
+    }
+
+    /// The first level.
+    pub fn first(&self) -> f64 {
+        self.pieces().first().map_or(0.0, |piece| piece.from_v)
     }
 
     /// Checks that a model whose fastest change takes `shortest_s` can be followed, a row every `every_s`.
@@ -115,7 +87,7 @@ impl Input {
 
     /// The highest level.
     pub fn highest(&self) -> f64 {
-        self.pieces().flat_map(|piece| [piece.from, piece.to]).fold(f64::NEG_INFINITY, f64::max)
+        self.pieces().iter().flat_map(|piece| [piece.from_v, piece.to_v]).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Checks that every level can be a stiffness.
@@ -124,7 +96,7 @@ impl Input {
     /// [`crate::BadInput`] names the first level that is not positive.
     pub fn check_positive(&self) -> Result<()> {
         for piece in self.pieces() {
-            for (time, level) in [(piece.start_s, piece.from), (piece.end_s, piece.to)] {
+            for (time, level) in [(piece.start_s, piece.from_v), (piece.end_s, piece.to_v)] {
                 if level.is_nan() || level <= 0.0 {
                     bad_input!(
                         "{}: level {level} at {time} s is no stiffness; expected more than 0 (or the model pi-plant)",
@@ -137,14 +109,12 @@ impl Input {
     }
 }
 
-impl Piece {
-    /// Steps through the piece: start and length of each, all but the last `every_s` long.
-    pub(crate) fn steps(&self, every_s: f64) -> impl Iterator<Item = (f64, f64)> {
-        let (start, end) = (self.start_s, self.end_s);
-        let count = ((end - start) / every_s - 1e-9).ceil().max(1.0) as usize;
-        let at = move |index: usize| if index < count { start + every_s * index as f64 } else { end };
-        (0..count).map(move |index| (at(index), at(index + 1) - at(index)))
-    }
+/// Steps through a piece: start and length of each, all but the last `every_s` long.
+fn steps(piece: &Piece, every_s: f64) -> impl Iterator<Item = (f64, f64)> {
+    let (start, end) = (piece.start_s, piece.end_s);
+    let count = ((end - start) / every_s - 1e-9).ceil().max(1.0) as usize;
+    let at = move |index: usize| if index < count { start + every_s * index as f64 } else { end };
+    (0..count).map(move |index| (at(index), at(index + 1) - at(index)))
 }
 
 /// Follows a state `y` through an input: `step(piece, t, y, h)` makes one step. Returns the moments asked for, which are
@@ -157,12 +127,12 @@ pub(crate) fn follow(
 ) -> Vec<(f64, f64, f64)> {
     let (mut found, mut y) = (Vec::new(), start);
     for piece in input.pieces() {
-        let jumps = |&(_, level, _): &(f64, f64, f64)| (level - piece.from).abs() > 1e-12 * (1.0 + level.abs());
+        let jumps = |&(_, level, _): &(f64, f64, f64)| (level - piece.from_v).abs() > 1e-12 * (1.0 + level.abs());
         if found.last().is_none_or(jumps) {
-            found.push((piece.start_s, piece.from, y));
+            found.push((piece.start_s, piece.from_v, y));
         }
-        for (t, h) in piece.steps(every_s) {
-            y = step(&piece, t, y, h);
+        for (t, h) in steps(piece, every_s) {
+            y = step(piece, t, y, h);
             found.push((t + h, piece.at(t + h), y));
         }
     }

@@ -13,43 +13,21 @@
 
 use anyhow::Result;
 use model::Plant;
-use serde::Serialize;
 
 use super::input::Input;
+use super::plant::PlantGains;
 use super::zener::{Changes, Start, Zener};
-use crate::beam::check;
-
-/// Gains of the proportional-integral plant.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PlantGains {
-    /// Kp.
-    pub proportional: f64,
-    /// Ki, in 1/s.
-    pub integral_per_s: f64,
-}
+use crate::bad_input::check;
 
 impl PlantGains {
-    /// Of a plant by instantaneous share and time constant.
-    pub fn of(plant: &Plant) -> Self {
-        let proportional = plant.share / (1.0 - plant.share);
-        Self { proportional, integral_per_s: (1.0 + proportional) / plant.time_constant_s }
-    }
-
-    /// Instantaneous share and time constant.
-    pub fn plant(&self) -> Plant {
-        let sum = 1.0 + self.proportional;
-        Plant { share: self.proportional / sum, time_constant_s: sum / self.integral_per_s }
-    }
-
     /// The Zener model that is this plant, by its damped spring at level 1.
     ///
     /// # Errors
     /// [`crate::BadInput`] for gains that are not positive.
     pub fn zener(&self, k2_n_per_m: f64, force_n: f64) -> Result<Zener> {
-        check("proportional", self.proportional, 1e-9..=1e9, "")?;
-        check("integral_per_s", self.integral_per_s, 1e-9..=1e9, "1/s")?;
+        let Self { proportional, .. } = self.checked()?;
         let zener = Zener {
-            k1_n_per_m: k2_n_per_m / self.proportional,
+            k1_n_per_m: k2_n_per_m / proportional,
             k2_n_per_m,
             damper_n_s_per_m: self.plant().time_constant_s * k2_n_per_m,
             force_n,
@@ -76,7 +54,7 @@ pub fn stand_in_error(zener: &Zener, ratio: f64) -> Result<f64> {
     let both = Zener { changes: Changes::Both, damper_n_s_per_m: zener.k2_n_per_m, ..*zener };
     let Plant { share, time_constant_s: tau } = plant_of(&both).plant();
     let end_s = 8.0 * tau * ratio.recip().max(1.0);
-    let input = Input::held(&[(0.0, 1.0), (tau, ratio), (tau + end_s, ratio)])?;
+    let input = Input::held(&[(0.0, 1.0), (tau, ratio), (tau + end_s, ratio)]);
     let samples = both.response(&input, Start::Settled, tau / 200.0)?;
     let before = samples[0].stiffness;
     let part = |stiffness: f64| (stiffness / before - 1.0) / (ratio - 1.0);
@@ -88,7 +66,7 @@ pub fn stand_in_error(zener: &Zener, ratio: f64) -> Result<f64> {
     Ok(after.map(error).fold(0.0, f64::max))
 }
 
-/// The largest ratio of stiffness, upwards, by which the springs may change before the plant is off by `tolerance`.
+/// The largest ratio of stiffness, upwards and at most 100, by which the springs may change before the plant is off by `tolerance`.
 ///
 /// # Errors
 /// [`crate::BadInput`] for a tolerance that is not between 0.0001 and 0.2.

@@ -6,15 +6,15 @@
 //! | [`zener`] | spring in series with spring and damper (sections 3.2.3 and 8.1.5) |
 //! | [`spring_damper`] | the same without the series spring (8.1.6) |
 //! | [`circuit`], [`analogue`] | the electrical analogue (8.1.7), by nodal analysis |
+//! | [`plant`] | the proportional-integral plant (4.2.2) |
 //! | [`mapping`] | which Zener model is the proportional-integral plant, and when the plant cannot stand in for it |
 //! | [`report`] | what `vsj dynamics` says |
-//!
-//! The proportional-integral plant itself (4.2.2) is [`crate::reference::Loop`] without a controller.
 
 pub mod analogue;
 pub mod circuit;
 pub mod input;
 pub mod mapping;
+pub mod plant;
 pub mod report;
 pub mod spring_damper;
 pub mod zener;

@@ -7,12 +7,12 @@ use model::Plant;
 use serde::Serialize;
 
 use super::analogue::{self, largest_difference};
-use super::input::{Input, follow};
-use super::mapping::{PlantGains, plant_of, stand_in_error, stand_in_limit};
+use super::input::Input;
+use super::mapping::{plant_of, stand_in_error, stand_in_limit};
+use super::plant::PlantGains;
 use super::spring_damper::SpringDamper;
 use super::zener::{Changes, Sample, Start, Zener};
-use crate::beam::experiment::{Experiment, table1};
-use crate::beam::{cantilever::Beam, check};
+use crate::beam::experiment::Experiment;
 use crate::output::figure::Figure;
 
 /// The models by name.
@@ -66,7 +66,7 @@ pub struct Report {
     pub zener_of_plant: Zener,
     /// Where the plant stands in for a Zener model whose springs change.
     pub stand_in: StandIn,
-    /// Largest difference between Zener model and circuit over this input, by the largest elongation; where both can run.
+    /// Largest difference between Zener model and circuit over this input, by the largest elongation, if one of them was asked for.
     pub analogue_difference: Option<f64>,
     #[serde(skip)]
     curves: Vec<(&'static str, Vec<Sample>)>,
@@ -75,7 +75,7 @@ pub struct Report {
 /// How well the plant stands in when both springs change by one ratio under a constant force.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct StandIn {
-    /// Largest ratio for which the plant is off by at most 1 % of the change.
+    /// Largest ratio, up to 100, for which the plant is off by at most 1 % of the change.
     pub ratio_at_1_percent: f64,
     /// The same for 5 %.
     pub ratio_at_5_percent: f64,
@@ -96,23 +96,20 @@ impl Report {
         let zener = question.zener.checked()?;
         let plant = plant_of(&zener);
         let Plant { share, time_constant_s: tau_s } = plant.plant();
-        let curve_every_s = question.every_s.min(0.5);
-        let run = |model: Model, every_s: f64| run(question, model, every_s);
-        let rows = run(question.model, question.every_s)?;
-        let mechanical = question.input.check_positive().is_ok();
-        let analogue_difference = match (mechanical, question.model) {
-            (true, Model::Zener | Model::Analogue) => {
-                Some(largest_difference(&run(Model::Zener, curve_every_s)?, &run(Model::Analogue, curve_every_s)?))
-            }
-            _ => None,
-        };
-        let mut curves = vec![(name(question.model), run(question.model, curve_every_s)?)];
+        let zener_of_plant = question.gains.zener(zener.k2_n_per_m, zener.force_n)?;
+        let rows = run(question, question.model, question.every_s)?;
+        let curve =
+            |model: Model| Ok::<_, anyhow::Error>((name(model), run(question, model, question.every_s.min(0.5))?));
+        let mut curves = vec![curve(question.model)?];
         match question.model {
-            Model::Zener => curves.push((name(Model::Analogue), run(Model::Analogue, curve_every_s)?)),
-            Model::Analogue => curves.push((name(Model::Zener), run(Model::Zener, curve_every_s)?)),
+            Model::Zener => curves.push(curve(Model::Analogue)?),
+            Model::Analogue => curves.push(curve(Model::Zener)?),
             Model::SpringDamper | Model::PiPlant => {}
         }
-        let zener_of_plant = question.gains.zener(zener.k2_n_per_m, zener.force_n)?;
+        let analogue_difference = match &curves[..] {
+            [(_, one), (_, other)] => Some(largest_difference(one, other)),
+            _ => None,
+        };
         Ok(Self {
             model: question.model,
             input: question.input.name.clone(),
@@ -221,36 +218,12 @@ fn run(question: &Question, model: Model, every_s: f64) -> Result<Vec<Sample>> {
             SpringDamper { k_n_per_m: k2_n_per_m, damper_n_s_per_m, length_m: *length_m, force_n }
                 .response(input, *start, every_s)
         }
-        Model::PiPlant => plant_response(gains, input, *start, every_s),
+        Model::PiPlant => gains.response(input, *start, every_s),
     }
 }
 
-/// The plant, solved exactly.
-fn plant_response(gains: &PlantGains, input: &Input, start: Start, every_s: f64) -> Result<Vec<Sample>> {
-    check("proportional", gains.proportional, 0.0..=1e9, "")?;
-    check("integral_per_s", gains.integral_per_s, 1e-9..=1e9, "1/s")?;
-    // Solved exactly, whatever its time constant.
-    input.check_pace(every_s, f64::INFINITY)?;
-    let Plant { share, time_constant_s: tau } = gains.plant();
-    let first = input.pieces().next().map_or(0.0, |piece| piece.from);
-    let relaxed = if start == Start::Settled { first } else { 0.0 };
-    let states = follow(input, every_s, relaxed, |piece, t, relaxed, h| {
-        // dw/dt = (u - w) / tau with u straight.
-        let slope = (piece.to - piece.from) / (piece.end_s - piece.start_s);
-        let lag = slope * tau;
-        piece.at(t) + slope * h - lag + (relaxed - piece.at(t) + lag) * (-h / tau).exp()
-    });
-    let sample = |(time_s, level, relaxed): (f64, f64, f64)| {
-        let output = relaxed + share * (level - relaxed);
-        Sample { time_s, level, elongation_m: None, stiffness: output }
-    };
-    Ok(states.into_iter().map(sample).collect())
-}
-
 fn stand_in(zener: &Zener) -> Result<StandIn> {
-    // Only the ratio is used, which no dimension changes.
-    let any = Beam { length_m: 1.0, width_m: 1.0, thickness_m: 1.0, youngs_modulus_pa: 1.0, density_kg_per_m3: 0.0 };
-    let material_ratio = Experiment::new(&table1()?, &any)?.reach_ratio.value;
+    let material_ratio = Experiment::paper()?.reach_ratio.value;
     let zener = Zener { changes: Changes::Both, ..*zener };
     Ok(StandIn {
         ratio_at_1_percent: stand_in_limit(&zener, 0.01)?,
@@ -267,23 +240,5 @@ fn name(model: Model) -> &'static str {
         Model::SpringDamper => "spring and damper",
         Model::Analogue => "electrical analogue",
         Model::PiPlant => "proportional-integral plant",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::table3;
-
-    /// The plant on the stair is the column "without controller" of Table 3, to the last digit but one number.
-    #[test]
-    fn the_plant_gives_table_3() {
-        let gains = PlantGains { proportional: 0.1, integral_per_s: 0.2 };
-        let samples =
-            plant_response(&gains, &Input::open("stair", Default::default()).unwrap(), Start::Unloaded, 0.1).unwrap();
-        for row in table3::rows().unwrap() {
-            let at = samples.iter().rfind(|sample| (sample.time_s - row.time_s).abs() < 1e-6).unwrap();
-            assert!((-1e-4..0.01).contains(&(at.stiffness - row.without)), "{row:?} {at:?}");
-        }
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::input::{Input, follow};
 use super::runge_kutta;
 use super::zener::{Sample, Start};
-use crate::beam::check;
+use crate::bad_input::check;
 
 /// Spring, whose stiffness is the level times `k_n_per_m`, and damper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -38,10 +38,9 @@ impl SpringDamper {
         check("force_n", force, 1e-12..=1e12, "N")?;
         input.check_positive()?;
         input.check_pace(every_s, damper / (k_n_per_m * input.highest()))?;
-        let first = input.pieces().next().map_or(1.0, |piece| piece.from);
-        let x = if start == Start::Settled { length - force / (first * k_n_per_m) } else { length };
+        let x = if start == Start::Settled { length - force / (input.first() * k_n_per_m) } else { length };
         let states = follow(input, every_s, x, |piece, t, x, h| {
-            let fastest = k_n_per_m * piece.from.max(piece.to) / damper;
+            let fastest = k_n_per_m * piece.from_v.max(piece.to_v) / damper;
             let parts = (h * fastest / 0.02).ceil().max(1.0);
             let h = h / parts;
             let slope = |t: f64, x: f64| (k_n_per_m * piece.at(t) * (length - x) - force) / damper;

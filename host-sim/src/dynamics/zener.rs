@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::input::{Input, follow};
 use super::runge_kutta;
-use crate::beam::check;
+use crate::bad_input::check;
 
 /// A Zener model. What changes with the level is the level times what is given here.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -96,11 +96,10 @@ impl Zener {
         let Self { damper_n_s_per_m: damper, force_n: force, .. } = self.checked()?;
         input.check_positive()?;
         input.check_pace(every_s, damper / self.springs_at(input.highest())[1])?;
-        let first = input.pieces().next().map_or(1.0, |piece| piece.from);
-        let y = if start == Start::Settled { force / self.springs_at(first)[1] } else { 0.0 };
+        let y = if start == Start::Settled { force / self.springs_at(input.first())[1] } else { 0.0 };
         let states = follow(input, every_s, y, |piece, t, y, h| {
             // Short against the fastest time constant of the piece.
-            let fastest = self.springs_at(piece.from.max(piece.to))[1] / damper;
+            let fastest = self.springs_at(piece.from_v.max(piece.to_v))[1] / damper;
             let parts = (h * fastest / 0.02).ceil().max(1.0);
             let h = h / parts;
             let slope = |t: f64, y: f64| (force - self.springs_at(piece.at(t))[1] * y) / damper;
@@ -126,7 +125,7 @@ mod tests {
     /// Held levels have a closed form.
     #[test]
     fn a_step_of_the_damped_spring() {
-        let input = Input::held(&[(0.0, 1.0), (30.0, 4.0), (60.0, 4.0)]).unwrap();
+        let input = Input::held(&[(0.0, 1.0), (30.0, 4.0), (60.0, 4.0)]);
         for sample in PAPER.response(&input, Start::Settled, 0.5).unwrap() {
             let y = if sample.time_s <= 30.0 { 10.0 } else { 2.5 + 7.5 * (-(sample.time_s - 30.0) / 2.5).exp() };
             assert!((sample.elongation_m.unwrap() - 1.0 - y).abs() < 1e-7, "{sample:?}");
@@ -136,7 +135,7 @@ mod tests {
     #[test]
     fn a_step_of_the_series_spring_comes_at_once() {
         let zener = Zener { changes: Changes::K1, ..PAPER };
-        let input = Input::held(&[(0.0, 1.0), (5.0, 2.0), (9.0, 2.0)]).unwrap();
+        let input = Input::held(&[(0.0, 1.0), (5.0, 2.0), (9.0, 2.0)]);
         for sample in zener.response(&input, Start::Settled, 1.0).unwrap() {
             let series = if sample.level == 1.0 { 1.0 } else { 0.5 };
             assert!((sample.elongation_m.unwrap() - 10.0 - series).abs() < 1e-9, "{sample:?}");
@@ -155,7 +154,7 @@ mod tests {
             let error = zener.response(&input, Start::Unloaded, 1.0).unwrap_err();
             assert!(error.is::<crate::BadInput>() && error.to_string().starts_with(field), "{error}");
         }
-        let zero = Input::held(&[(0.0, 1.0), (1.0, 0.0), (2.0, 0.0)]).unwrap();
+        let zero = Input::held(&[(0.0, 1.0), (1.0, 0.0), (2.0, 0.0)]);
         let error = PAPER.response(&zero, Start::Unloaded, 1.0).unwrap_err().to_string();
         assert!(error.contains("level 0 at 1 s"), "{error}");
     }
@@ -165,8 +164,8 @@ mod tests {
         /// Force scales elongation, and not stiffness; times scale with the damper.
         #[test]
         fn scales(force in 0.1..100.0f64, slow in 0.2..5.0f64) {
-            let input = Input::held(&[(0.0, 1.0), (10.0, 3.0), (20.0, 3.0)]).unwrap();
-            let slowly = Input::held(&[(0.0, 1.0), (10.0 * slow, 3.0), (20.0 * slow, 3.0)]).unwrap();
+            let input = Input::held(&[(0.0, 1.0), (10.0, 3.0), (20.0, 3.0)]);
+            let slowly = Input::held(&[(0.0, 1.0), (10.0 * slow, 3.0), (20.0 * slow, 3.0)]);
             let other = Zener { force_n: force, damper_n_s_per_m: slow * PAPER.damper_n_s_per_m, ..PAPER };
             let one = PAPER.response(&input, Start::Unloaded, 1.0).unwrap();
             let two = other.response(&slowly, Start::Unloaded, slow).unwrap();

@@ -5,7 +5,7 @@ use model::{Gains, Plant};
 
 use super::compute::Inputs;
 use crate::beam::cantilever::{Beam, Load};
-use crate::beam::layered::bonded_n_per_m;
+use crate::beam::limits::bonded_n_per_m;
 use crate::beam::stack::{Layer, Stack};
 use crate::experiment::reference_at;
 use crate::reference::Loop;
@@ -55,7 +55,8 @@ fn system(controller: &str) -> Result<Loop> {
     Ok(free(Plant::PAPER, gains))
 }
 
-fn free(plant: Plant, gains: Option<(f64, f64)>) -> Loop {
+/// A loop whose amplifier has no limits.
+pub(super) fn free(plant: Plant, gains: Option<(f64, f64)>) -> Loop {
     let Plant { share, time_constant_s } = plant;
     let everything = (f64::NEG_INFINITY, f64::INFINITY);
     Loop { share, time_constant_s, gains, range_v: everything, slew_v_per_s: f64::INFINITY }

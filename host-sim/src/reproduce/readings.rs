@@ -7,7 +7,8 @@ use model::Plant;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::compute::{Inputs, Outcome};
-use crate::beam::experiment::{Reading, lines, table1 as readings, voltages};
+use crate::beam::experiment::{lines, voltages};
+use crate::beam::readings::{Reading, table1 as readings};
 use crate::beam::regression::Fit;
 use crate::beam::slip::tips;
 use crate::experiment::reference_at;

@@ -1,0 +1,137 @@
+//! A table as CSV: one header row, columns by name in any order, lines that start with `#` are comments.
+//!
+//! Whatever is wrong is one line that names file, line, column and what was expected.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use anyhow::Result;
+use csv::StringRecord;
+
+use crate::bad_input;
+use crate::bad_input::BadInput;
+
+/// The text of a file.
+///
+/// # Errors
+/// [`BadInput`] if it cannot be read.
+pub fn read(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path)
+        .map_err(|error| BadInput(format!("{}: cannot be read: {error}", path.display())).into())
+}
+
+/// A table, read row by row.
+pub(crate) struct Table<'a> {
+    name: &'a str,
+    header: StringRecord,
+    reader: csv::Reader<&'a [u8]>,
+    record: StringRecord,
+    lines: Lines<'a>,
+}
+
+/// A row of it.
+pub(crate) struct Row<'t> {
+    name: &'t str,
+    header: &'t StringRecord,
+    record: &'t StringRecord,
+    /// Line of the file, from 1.
+    pub(crate) line: usize,
+}
+
+impl<'a> Table<'a> {
+    /// Starts with the header; `name` is what messages call the table.
+    pub(crate) fn new(name: &'a str, text: &'a str) -> Result<Self> {
+        let mut reader =
+            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+        let mut lines = Lines { text, byte: 0, line: 1 };
+        let header = reader.headers().map_err(|error| unreadable(name, &mut lines, &error))?.clone();
+        Ok(Self { name, header, reader, record: StringRecord::new(), lines })
+    }
+
+    /// Names of the columns, in order.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = &str> {
+        self.header.iter()
+    }
+
+    /// The place of a column.
+    pub(crate) fn find(&self, column: &str) -> Option<usize> {
+        self.columns().position(|name| name == column)
+    }
+
+    /// The same of a column that must be there; `expected` says what the header should have.
+    pub(crate) fn require(&mut self, column: &str, expected: &str) -> Result<usize> {
+        let Some(index) = self.find(column) else {
+            let (line, found) = (self.lines.at(self.header.position()), self.columns().collect::<Vec<_>>().join(","));
+            bad_input!(
+                "{}, line {line}: no column `{column}`; expected a header with {expected}, found `{found}`",
+                self.name
+            )
+        };
+        Ok(index)
+    }
+
+    /// The next row.
+    pub(crate) fn next(&mut self) -> Result<Option<Row<'_>>> {
+        match self.reader.read_record(&mut self.record) {
+            Ok(false) => Ok(None),
+            Ok(true) => {
+                let line = self.lines.at(self.record.position());
+                Ok(Some(Row { name: self.name, header: &self.header, record: &self.record, line }))
+            }
+            Err(error) => Err(unreadable(self.name, &mut self.lines, &error).into()),
+        }
+    }
+}
+
+fn unreadable(name: &str, lines: &mut Lines<'_>, error: &csv::Error) -> BadInput {
+    let line = lines.at(error.position());
+    BadInput(match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{name}, line {line}: {len} field(s); expected {expected_len} as in the header")
+        }
+        _ => format!("{name}, line {line}: {error}; expected CSV"),
+    })
+}
+
+impl Row<'_> {
+    /// A cell as it is.
+    pub(crate) fn text(&self, column: usize) -> &str {
+        &self.record[column]
+    }
+
+    /// A finite number.
+    pub(crate) fn number(&self, column: usize) -> Result<f64> {
+        self.value(column, "a finite number", |number: &f64| number.is_finite())
+    }
+
+    /// A whole number.
+    pub(crate) fn whole(&self, column: usize) -> Result<usize> {
+        self.value(column, "a whole number", |_| true)
+    }
+
+    fn value<T: FromStr>(&self, column: usize, what: &str, fits: impl Fn(&T) -> bool) -> Result<T> {
+        let Some(value) = self.text(column).parse().ok().filter(fits) else {
+            let Self { name, line, .. } = self;
+            bad_input!("{name}, line {line}, column {}: `{}` is not {what}", &self.header[column], self.text(column))
+        };
+        Ok(value)
+    }
+}
+
+/// Finds the lines of records, in order.
+struct Lines<'a> {
+    text: &'a str,
+    byte: usize,
+    line: usize,
+}
+
+impl Lines<'_> {
+    /// The line of a record. Its position is where the reader stood before comments and blank lines.
+    fn at(&mut self, position: Option<&csv::Position>) -> usize {
+        let start = position.map_or(0, |at| at.byte() as usize).clamp(self.byte, self.text.len());
+        self.line += self.text[self.byte..start].matches('\n').count();
+        self.byte = start;
+        let skipped = self.text[start..].lines().take_while(|line| line.trim().is_empty() || line.starts_with('#'));
+        self.line + skipped.count()
+    }
+}
