@@ -7,17 +7,14 @@ use model::Plant;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::compute::{Inputs, Outcome};
-use crate::beam::experiment::{lines, voltages};
+use super::models::free;
+use crate::beam::experiment::{in_line, lines, voltages};
 use crate::beam::readings::{Reading, table1 as readings};
-use crate::beam::regression::Fit;
+use crate::beam::regression::{FALSE_ALARM, Fit};
 use crate::beam::slip::tips;
 use crate::experiment::reference_at;
-use crate::reference::Loop;
 use crate::schedule::Schedule;
 use crate::table3 as printed;
-
-/// How often a table may be accused wrongly.
-const FALSE_ALARM: f64 = 0.05;
 
 /// The slope through the origin of one voltage of Table 1, from all of its readings.
 pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
@@ -26,6 +23,10 @@ pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
     let fit = lines(&of_voltage, &[voltage])?;
     let error = 1.0 / fit.standard_errors_from(0, fit.coefficients[0] + 1.0);
     let mut evidence = format!("the readings give {:.2} with a standard error of {error:.2}", fit.coefficients[0]);
+    let single = of_voltage.iter().map(|r| r.force_un / r.displacement_mm);
+    let (least, most) = single.fold((f64::INFINITY, 0.0f64), |(least, most), one| (least.min(one), most.max(one)));
+    // Any line through the origin is a mean of these.
+    evidence += &format!("; one by one, {least:.2} to {most:.2}");
     for (index, reading) in of_voltage.iter().enumerate() {
         let mut others = of_voltage.clone();
         others.remove(index);
@@ -72,16 +73,12 @@ fn widening(fit: &Fit, numbers: usize) -> Result<f64> {
 /// A displacement of section 4.1.4, expected from Table 1: force by slope, with the scatter of a force reading.
 pub(crate) fn tip_by_table1_mm(inputs: &Inputs<'_>) -> Result<Outcome> {
     let (voltage, force) = (inputs.number("voltage_v")?, inputs.number("force_un")?);
-    let mut kept = readings()?;
-    let voltages = voltages(&kept);
-    let mut fit = lines(&kept, &voltages)?;
-    while let Some(index) = fit.out_of_line() {
-        kept.remove(index);
-        fit = lines(&kept, &voltages)?;
-    }
+    let all = readings()?;
+    let voltages = voltages(&all);
+    let (_, fit, _) = in_line(&all, &voltages)?;
     let index = voltages.iter().position(|&v| v == voltage).context("Table 1 has no such voltage")?;
     let slope = fit.coefficients[index];
-    // As far as a reading in the middle of the table scatters.
+    // As far as the least certain reading of Table 1 scatters.
     let spread = fit.readings.iter().map(|r| r.expected.high - r.expected.value).fold(0.0, f64::max);
     let half = spread * widening(&fit, tips()?.len())? / slope;
     let value = force / slope;
@@ -96,10 +93,7 @@ pub(crate) fn tip_by_table1_mm(inputs: &Inputs<'_>) -> Result<Outcome> {
 pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
     let time = inputs.number("time_s")?;
     let rows = printed::rows()?;
-    let Plant { share, time_constant_s } = Plant::PAPER;
-    let everything = (f64::NEG_INFINITY, f64::INFINITY);
-    let alone = Loop { share, time_constant_s, gains: None, range_v: everything, slew_v_per_s: f64::INFINITY };
-    let simulated = reference_at(alone, &Schedule::stair(), rows.iter().map(|row| row.time_s));
+    let simulated = reference_at(free(Plant::PAPER, None), &Schedule::stair(), rows.iter().map(|row| row.time_s));
     let off: Vec<f64> = rows.iter().zip(&simulated).map(|(row, simulated)| row.measured - simulated).collect();
     let jumps: Vec<f64> = off.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let index =
@@ -108,22 +102,26 @@ pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
     let deviation = 1.4826 * median(jumps.iter().map(|jump| jump.abs()).collect());
     let half = Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_ALARM / jumps.len() as f64) * deviation;
     let value = simulated[index] + off[index - 1];
-    let sign = if off[index - 1] < 0.0 { -1.0 } else { 1.0 };
-    let run = off[1..index].iter().rev().take_while(|off| **off * sign > 0.0).count();
+    let side = |off: f64| if off < 0.0 { "below" } else { "above" };
+    let run = off[1..index].iter().rev().take_while(|earlier| side(**earlier) == side(off[index - 1])).count();
+    let lasts = off
+        .get(index + 1)
+        .is_some_and(|next| (next - off[index]).abs() <= half && (next - off[index - 1]).abs() > half);
     let evidence = format!(
         "from the reading before ({} at {} s) the spring's relaxation leads to {value:.0} +- {half:.0}; the jump of {:+.0} is \
          {:.1} times the usual scatter ({deviation:.0}) between neighbours. The {run} readings before lie {} the simulation, \
-         the last by {:.0}; this one lies {:.0} {} it: what was measured shifted between the two",
+         the last by {:.0}; this one lies {:.0} {} it{}",
         rows[index - 1].measured,
         rows[index - 1].time_s,
         jumps[index - 1],
         (jumps[index - 1] / deviation).abs(),
-        if sign < 0.0 { "below" } else { "above" },
+        side(off[index - 1]),
         off[index - 1].abs(),
         off[index].abs(),
-        if off[index] < 0.0 { "below" } else { "above" },
+        side(off[index]),
+        if lasts { ", and the next goes on from there: what was measured shifted between the two" } else { "" },
     );
-    Ok(near(value, half, evidence))
+    Ok(Outcome { lasts, ..near(value, half, evidence) })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

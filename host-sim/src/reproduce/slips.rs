@@ -56,28 +56,43 @@ pub(super) fn slip_of_the_pen(number: &Judged, used_again: bool) -> Option<Strin
     None
 }
 
-/// A reading that one digit would put in line.
+/// A reading that one digit would put in line, and how much that says.
 pub(super) fn digit_of_a_reading(number: &Judged) -> Option<String> {
-    // Well within: half of what is tolerated.
     let (low, high) = number.outcome.expected?;
-    let (low, high) = (0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high);
+    // Well within: half of what is tolerated.
+    let half = 0.25 * (high - low);
+    let fits = |digits: &(String, f64), expected: f64| (digits.1 - expected).abs() <= half;
+    let misread = misread(number)?;
+    let fitting: Vec<&str> =
+        misread.iter().filter(|one| fits(one, 0.5 * (low + high))).map(|(text, _)| text.as_str()).collect();
+    if fitting.is_empty() {
+        return Some("no single digit changed puts it in line".to_owned());
+    }
+    // Had anything else been expected, up to twice as far off: how often would a digit have been found?
+    let (printed, off) = (number.printed.value, number.printed.value - number.outcome.value);
+    let elsewhere = (-1000..=1000).map(|part| printed + 2e-3 * f64::from(part) * off);
+    let found = elsewhere.filter(|&expected| misread.iter().any(|one| fits(one, expected))).count();
+    Some(format!(
+        "one digit misread would explain it: {} (by chance one fits in {:.0} %)",
+        fitting.join(" or "),
+        1e2 * found as f64 / 2001.0
+    ))
+}
+
+/// All numbers that differ from a printed one in one digit: their digits and value.
+fn misread(number: &Judged) -> Option<Vec<(String, f64)>> {
     let digits: Vec<char> = number.printed.digits().chars().collect();
-    let mut fitting: Vec<String> = Vec::new();
+    let mut others = Vec::new();
     for (place, old) in digits.iter().enumerate().filter(|(_, old)| old.is_ascii_digit()) {
         for new in ('0'..='9').filter(|new| new != old) {
             let mut other = digits.clone();
             other[place] = new;
             let text: String = other.into_iter().collect();
             let value = text.parse::<f64>().ok()? * 10f64.powi(number.printed.exponent);
-            if (low..=high).contains(&value) {
-                fitting.push(text);
-            }
+            others.push((text, value));
         }
     }
-    match &fitting[..] {
-        [] => Some("no single digit changed puts it in line".to_owned()),
-        fitting => Some(format!("one digit misread would explain it: {}", fitting.join(" or "))),
-    }
+    Some(others)
 }
 
 /// A small whole number times what is computed, to all of at least three digits.
