@@ -2,6 +2,8 @@
 //!
 //! Whatever is wrong is one line that names file, line, column and what was expected.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -11,13 +13,25 @@ use csv::StringRecord;
 use crate::bad_input;
 use crate::bad_input::BadInput;
 
+/// Longer files are refused: a row of a record takes 40 bytes, its diagnosis 500.
+const MOST_ROWS: usize = 1_000_000;
+
 /// The text of a file.
 ///
 /// # Errors
-/// [`BadInput`] if it cannot be read.
+/// [`BadInput`] if it cannot be read, or has more than a million lines behind the first.
 pub fn read(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path)
-        .map_err(|error| BadInput(format!("{}: cannot be read: {error}", path.display())).into())
+    let name = path.display();
+    let unreadable = |error| BadInput(format!("{name}: cannot be read: {error}"));
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let mut text = String::new();
+    // Only once, for it may be a pipe, and no more of it than is allowed.
+    for _ in 0..MOST_ROWS + 2 {
+        if file.read_line(&mut text).map_err(unreadable)? == 0 {
+            return Ok(text);
+        }
+    }
+    bad_input!("{name}: more than {MOST_ROWS} lines; expected fewer: keep every tenth row, or a part of it")
 }
 
 /// A table, read row by row.

@@ -1,6 +1,5 @@
 //! Records of an experiment as CSV: `time_s`, `voltage_v` and perhaps a measured column.
 
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use anyhow::Result;
@@ -29,9 +28,6 @@ pub struct Record {
     /// The rows in order of time.
     pub rows: Vec<Row>,
 }
-
-/// Longer files are refused: a row takes 40 bytes, its diagnosis 500.
-pub const MOST_ROWS: usize = 1_000_000;
 
 /// The measured column unless another is asked for.
 pub const MEASURED: &str = "stiffness";
@@ -67,17 +63,7 @@ impl Record {
     /// # Errors
     /// [`crate::BadInput`] with file, line, column and what was expected.
     pub fn open(path: &Path, measured: &str) -> Result<Self> {
-        let name = path.display().to_string();
-        if let Ok(file) = std::fs::File::open(path) {
-            // Counted without keeping them.
-            let lines = BufReader::new(file).split(b'\n').take(MOST_ROWS + 2).take_while(Result::is_ok).count();
-            if lines > MOST_ROWS + 1 {
-                bad_input!(
-                    "{name}: more than {MOST_ROWS} lines; expected fewer: keep every tenth row, or a part of it"
-                );
-            }
-        }
-        Self::parse(&name, &read(path)?, measured)
+        Self::parse(&path.display().to_string(), &read(path)?, measured)
     }
 
     /// Reads the text of a file; `name` is what messages call it.

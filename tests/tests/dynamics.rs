@@ -68,6 +68,17 @@ fn the_plant_and_its_zener_model() {
     assert!(number(stand_in, "/material_up_percent") > 5.0);
 }
 
+/// A week at a row an hour: what is drawn must not be finer than what a model can follow.
+#[test]
+fn a_long_input() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("week.csv"), "time_s,voltage_v\n0,100\n604800,100\n").unwrap();
+    let arguments = ["dynamics", "pi-plant", "--json", "--input", "week.csv", "--every", "3600", "--out", "made"];
+    let week = json(folder.path(), &arguments);
+    assert_eq!(week["rows"].as_array().unwrap().len(), 169);
+    assert!((number(at(&week, 604_800.0), "/stiffness") - 100.0).abs() < 1e-9);
+}
+
 #[test]
 fn files_and_documentation() {
     let folder = tempdir().unwrap();

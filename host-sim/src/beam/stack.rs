@@ -15,6 +15,9 @@ pub const ACTIVE: &str = "PVdF";
 /// Young's modulus of the active layer against voltage (section 4.1.2), as printed.
 const ACTIVE_LAW: &str = include_str!("../../../data/section412_active_layer.csv");
 
+/// More would take minutes and gigabytes to bend.
+const MOST_LAYERS: usize = 20;
+
 /// One layer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
@@ -101,6 +104,9 @@ impl Stack {
     /// [`crate::BadInput`] that names layer and field.
     pub fn new(layers: Vec<Layer>) -> Result<Self> {
         let Some(first) = layers.first() else { bad_input!("the stack has no layers; expected at least one") };
+        if layers.len() > MOST_LAYERS {
+            bad_input!("the stack has {} layers; expected at most {MOST_LAYERS}", layers.len());
+        }
         for (index, layer) in layers.iter().enumerate() {
             let field = |name: &str| format!("layer {} ({}): {name}", index + 1, layer.material);
             check(&field("youngs_modulus_pa"), layer.youngs_modulus_pa, 1.0..=1e14, "Pa")?;
@@ -229,6 +235,7 @@ mod tests {
             change(&mut changed);
             Stack::in_order(&changed, ORDER).unwrap_err().to_string()
         };
+        let thin = Stack::paper().unwrap().layers()[0].clone();
         for (found, expected) in [
             (with(|k| k[0].thickness_um = 0.0), "layer 2 (aluminium): thickness_m = 0 is not allowed"),
             (with(|k| k[2].width_mm = -1.0), "layer 1 (PET): width_m = -0.001 is not allowed"),
@@ -237,6 +244,7 @@ mod tests {
             (with(|k| k.truncate(3)), "the stack lists `PVdF`, which is not among the layers"),
             (Stack::in_order(&kinds, "PET,PVdF,PET").unwrap_err().to_string(), "the stack has 0 layer(s) of aluminium"),
             (Stack::new(Vec::new()).unwrap_err().to_string(), "the stack has no layers"),
+            (Stack::new(vec![thin; 21]).unwrap_err().to_string(), "the stack has 21 layers; expected at most 20"),
         ] {
             assert!(found.starts_with(expected), "{found}");
         }

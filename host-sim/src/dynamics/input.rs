@@ -57,6 +57,11 @@ impl Input {
         self.schedule.pieces()
     }
 
+    /// From the first moment to the last, in s.
+    pub fn duration_s(&self) -> f64 {
+        self.schedule.end_s() - self.schedule.start_s()
+    }
+
     /// The first level.
     pub fn first(&self) -> f64 {
         self.pieces().first().map_or(0.0, |piece| piece.from_v)
@@ -68,7 +73,7 @@ impl Input {
     /// [`crate::BadInput`] for more than a million rows, or a change faster than a hundred thousandth of the input.
     pub fn check_pace(&self, every_s: f64, shortest_s: f64) -> Result<()> {
         check("every_s", every_s, 1e-6..=1e6, "s")?;
-        let duration = self.schedule.end_s() - self.schedule.start_s();
+        let duration = self.duration_s();
         if duration / every_s > 1e6 {
             bad_input!(
                 "every_s = {every_s} is not allowed: expected at least a millionth of the {duration} s of {}",

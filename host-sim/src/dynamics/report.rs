@@ -98,8 +98,9 @@ impl Report {
         let Plant { share, time_constant_s: tau_s } = plant.plant();
         let zener_of_plant = question.gains.zener(zener.k2_n_per_m, zener.force_n)?;
         let rows = run(question, question.model, question.every_s)?;
-        let curve =
-            |model: Model| Ok::<_, anyhow::Error>((name(model), run(question, model, question.every_s.min(0.5))?));
+        // Close enough for the eye, however long the input.
+        let curve_every_s = question.every_s.min(f64::max(0.5, 1e-5 * question.input.duration_s()));
+        let curve = |model: Model| Ok::<_, anyhow::Error>((name(model), run(question, model, curve_every_s)?));
         let mut curves = vec![curve(question.model)?];
         match question.model {
             Model::Zener => curves.push(curve(Model::Analogue)?),

@@ -6,7 +6,9 @@ use model::{Gains, Plant};
 use super::compute::Inputs;
 use crate::beam::cantilever::{Beam, Load};
 use crate::beam::limits::bonded_n_per_m;
+use crate::beam::regression::Fit;
 use crate::beam::stack::{Layer, Stack};
+use crate::dynamics::plant::PlantGains;
 use crate::experiment::reference_at;
 use crate::reference::Loop;
 use crate::schedule::{Change, Schedule};
@@ -93,9 +95,9 @@ pub(crate) fn time_to(controller: &str, inputs: &Inputs<'_>) -> Result<f64> {
     let ticks = ((change.end_s - change.start_s) * 1e3) as usize;
     let made = parts(controller, &change, (0..ticks).map(|tick| 1e-3 * tick as f64))?;
     let Some(after) = made.iter().position(|&made| made >= part) else { return Ok(f64::INFINITY) };
-    let before = after.saturating_sub(1);
-    let missing = (made[after] - part) / (made[after] - made[before]).max(f64::MIN_POSITIVE);
-    Ok(1e-3 * (after as f64 - missing.min(1.0)))
+    let Some(before) = after.checked_sub(1) else { return Ok(0.0) };
+    let missing = (made[after] - part) / (made[after] - made[before]);
+    Ok(1e-3 * (after as f64 - missing))
 }
 
 /// Percent of a step that is made after some seconds.
@@ -115,9 +117,8 @@ pub(crate) fn settled_after_s(part: f64) -> f64 {
 /// Gauss and Newton's method with differences, from a plant that has none of the answer in it.
 pub(crate) fn plant_gain(inputs: &Inputs<'_>) -> Result<f64> {
     let rows = table3::rows()?;
-    let misses = |[proportional, integral]: [f64; 2]| -> Vec<f64> {
-        let sum = 1.0 + proportional;
-        let plant = Plant { share: proportional / sum, time_constant_s: sum / integral };
+    let misses = |[proportional, integral_per_s]: [f64; 2]| -> Vec<f64> {
+        let plant = PlantGains { proportional, integral_per_s }.plant();
         let found = reference_at(free(plant, None), &Schedule::stair(), rows.iter().map(|row| row.time_s));
         found.iter().zip(&rows).map(|(found, row)| found - row.without).collect()
     };
@@ -130,11 +131,8 @@ pub(crate) fn plant_gain(inputs: &Inputs<'_>) -> Result<f64> {
             let step = moved[index] - gains[index];
             misses(moved).iter().zip(&here).map(|(there, here)| (there - here) / step).collect::<Vec<f64>>()
         });
-        let dot = |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
-        let [a, b, d] = [dot(&slopes[0], &slopes[0]), dot(&slopes[0], &slopes[1]), dot(&slopes[1], &slopes[1])];
-        let [p, q] = [dot(&slopes[0], &here), dot(&slopes[1], &here)];
-        let determinant = a * d - b * b;
-        let change = [(d * p - b * q) / determinant, (a * q - b * p) / determinant];
+        let design: Vec<Vec<f64>> = slopes[0].iter().zip(&slopes[1]).map(|(&p, &i)| vec![p, i]).collect();
+        let change = Fit::new(&design, &here)?.coefficients;
         // Gains stay positive.
         gains = [0, 1].map(|index| (gains[index] - change[index]).max(0.2 * gains[index]));
         if change.iter().zip(&gains).all(|(change, gain)| change.abs() < 1e-9 * gain) {
