@@ -286,3 +286,28 @@ fn the_page_on_table_3_is_up_to_date() {
     );
     assert_eq!(today["verdict"], "unexplained");
 }
+
+/// Readings shifted within a single held-out stretch are named, but no other stretch could have foretold them.
+#[test]
+fn what_one_stretch_alone_shows_is_no_gain_on_unseen_ones() {
+    let mut csv = "time_s,voltage_v,stiffness\n".to_owned();
+    let (mut relaxed, mut noise) = (0.0, 1u32);
+    for row in 0..1200u32 {
+        let voltage = [0.0, 400.0, 150.0, 500.0][row as usize / 100 % 4];
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let error = f64::from(noise) / f64::from(u32::MAX) - 0.5;
+        let shift = if (633..655).contains(&row) { 40.0 } else { 0.0 };
+        writeln!(csv, "{},{voltage},{}", 0.1 * f64::from(row), relaxed + (voltage - relaxed) / 11.0 + error + shift)
+            .expect("a string takes anything");
+        relaxed += (voltage - relaxed) * (1.0 - (-0.1f64 / 5.5).exp());
+    }
+    let folder = folder();
+    fs::write(folder.path().join("record.csv"), csv).expect("a file");
+    let found = json(folder.path(), &["diagnose", "--json", "record.csv"]);
+    assert_eq!(found["findings"][0]["cause"], "reading-offset", "{found}");
+    let number = |path: &str| found.pointer(path).and_then(Value::as_f64).expect("a number");
+    assert!(number("/extended/rmse") < 0.4, "{found}");
+    assert!(number("/extended/held_out_rmse") > 0.9 * number("/baseline/held_out_rmse"), "{found}");
+    let printed = text(&run(folder.path(), &["diagnose", "record.csv"]).stdout);
+    assert!(printed.contains("no other part of the record foretells it"), "{printed}");
+}

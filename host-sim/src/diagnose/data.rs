@@ -1,5 +1,7 @@
 //! A record made ready: what was commanded as a signal, what was read, and which stretches a fit may not see.
 
+use std::iter;
+
 use crate::record::Record;
 use crate::schedule::{Between, Schedule};
 
@@ -21,8 +23,11 @@ pub enum Input {
 pub const FOLDS: usize = 5;
 /// Stretches of a long record. Short beside most effects in place, long beside the noise's memory.
 const STRETCHES: usize = 40;
-/// Records with fewer rows are held out stair by stair.
+/// Shortest stretch, in rows.
+const SHORTEST_STRETCH: usize = 3;
+/// Records with fewer rows are held out stair by stair, if they have so many.
 const FEW_ROWS: usize = 200;
+const FEWEST_STAIRS: usize = 4;
 
 /// The record, as every fit sees it.
 #[derive(Clone, Debug)]
@@ -88,20 +93,37 @@ impl Data {
     }
 }
 
-/// Which fold each row belongs to: whole stairs of a short record, stretches in turn of a long one.
+/// Which fold each row belongs to: whole stairs of a short record that has some, else stretches in turn.
 fn folds(voltage_v: &[f64]) -> Vec<u8> {
     let rows = voltage_v.len();
     if rows < FEW_ROWS {
-        let mut stair = 0u8;
-        let mut fold = vec![0];
-        for pair in voltage_v.windows(2) {
-            stair = stair.saturating_add(u8::from(pair[0] != pair[1]));
-            fold.push(stair);
+        let stairs: Vec<usize> = voltage_v.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
+        let longest = stairs.iter().copied().max().unwrap_or(0);
+        // One that holds half of the record leaves too little to learn from; rows of a sweep are no stairs.
+        if stairs.len() >= FEWEST_STAIRS && 2 * stairs.len() <= rows && 2 * longest <= rows {
+            let most = 2 * FOLDS;
+            let of_stair = |(stair, &length): (usize, &usize)| iter::repeat_n((stair % most) as u8, length);
+            return stairs.iter().enumerate().flat_map(of_stair).collect();
         }
-        // Many small stairs are as good as stretches.
-        let most = FOLDS as u8 * 2;
-        return fold.into_iter().map(|stair| stair % most).collect();
     }
-    let length = rows.div_ceil(STRETCHES);
+    let length = rows.div_ceil(STRETCHES).max(SHORTEST_STRETCH);
     (0..rows).map(|row| ((row / length) % FOLDS) as u8).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_rows_are_held_out_stair_by_stair_if_they_are_stairs() {
+        let stair: Vec<f64> = (0..18).map(|row| f64::from(row / 3)).collect();
+        let expected: Vec<u8> = (0..18).map(|row| row / 3).collect();
+        assert_eq!(folds(&stair), expected);
+        // A sweep, and a single step: stretches of neighbours, none of which holds all that there is to learn.
+        for record in [(0..60).map(f64::from).collect::<Vec<_>>(), [[0.0; 10], [1.0; 10], [1.0; 10]].concat()] {
+            let fold = folds(&record);
+            assert!(fold.chunk_by(|a, b| a == b).all(|stretch| stretch.len() == SHORTEST_STRETCH), "{fold:?}");
+            assert_eq!(fold.iter().max(), Some(&(FOLDS as u8 - 1)));
+        }
+    }
 }

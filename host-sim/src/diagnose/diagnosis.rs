@@ -63,7 +63,7 @@ pub(super) fn diagnose(
 ) -> Diagnosis {
     let baseline = engine.at(Model::default());
     if !informative(engine) {
-        let unseen = engine.held_out(&baseline).residual;
+        let unseen = baseline.residual.clone();
         let report = insufficient(&data, &baseline, engine, &unseen);
         return Diagnosis {
             report,
@@ -90,7 +90,7 @@ pub(super) fn diagnose(
     let standings = standing::standings(engine, contenders);
     let readings = reading_findings(&data, observed, &best.fit);
     let left = leftover::test(engine, &best.fit).filter(|left| left.significant);
-    let held_out = [&baseline, &best.fit].map(|fit| engine.held_out(fit).residual);
+    let held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
     let quality_before = quality(engine, &baseline, &held_out[0], false);
     let quality_after = quality(engine, &best.fit, &held_out[1], true);
     let mut findings: Vec<Finding> =
@@ -319,6 +319,11 @@ fn finding(engine: &mut Engine, best: &Scored, effect: usize, without: &Scored) 
     let (before, after) = (rms(engine, &without.fit), rms(engine, &best.fit));
     let others: Vec<&str> = effects(&without.fit.model).into_iter().map(|other| EFFECTS[other].cause()).collect();
     let against = if others.is_empty() { "the simulation as it was".to_owned() } else { others.join(" and ") };
+    let better = if best.fit.model.searched(effect, engine.data) {
+        format!("the readings are {odds:.1} nats likelier, all places that were searched charged,")
+    } else {
+        format!("on held-out stretches this is {odds:.1} nats better")
+    };
     Finding {
         cause: EFFECTS[effect].cause(),
         probability: 1.0 / (1.0 + (-odds.clamp(-40.0, 40.0)).exp()),
@@ -326,7 +331,7 @@ fn finding(engine: &mut Engine, best: &Scored, effect: usize, without: &Scored) 
         rmse_before: before.max(after),
         rmse_after: after,
         evidence: format!(
-            "{}: on held-out stretches this is {odds:.1} nats better than the best without it ({against}, {before:.3} V)",
+            "{}: {better} than the best without it ({against}, {before:.3} V)",
             EFFECTS[effect].meaning()
         ),
     }

@@ -75,7 +75,7 @@ impl Quantity {
 pub struct Scene<'a> {
     /// The record.
     pub data: &'a Data,
-    /// What the model without the effect leaves, in V.
+    /// What the model without the effect leaves, in V; NaN in rows that [`Effect::polish`] must not look at.
     pub residual: &'a [f64],
     /// The noise's scale, in V.
     pub sigma: f64,

@@ -83,7 +83,7 @@ impl<'a> Engine<'a> {
     fn polished(&mut self, mut model: Model) -> Model {
         for index in 0..model.blocks.len() {
             let block = model.blocks[index].0;
-            if block.coordinates(self.data).iter().all(|coordinate| coordinate.fitted) {
+            if !block.searched(self.data) {
                 continue;
             }
             let residual = self.residual(&model.without(block.effect));

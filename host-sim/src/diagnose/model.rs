@@ -31,6 +31,11 @@ impl Block {
     pub fn coordinates(&self, data: &Data) -> Vec<Coordinate> {
         self.effect().coordinates(self.form, data)
     }
+
+    /// True if a search alone can place it.
+    pub fn searched(&self, data: &Data) -> bool {
+        self.coordinates(data).iter().any(|coordinate| !coordinate.fitted)
+    }
 }
 
 /// Blocks in the chain's order, each with its point.
@@ -62,6 +67,11 @@ impl Model {
     /// The point of an effect, if it is there.
     pub fn point(&self, effect: usize) -> Option<&[f64]> {
         self.blocks.iter().find(|(block, _)| block.effect == effect).map(|(_, point)| point.as_slice())
+    }
+
+    /// True if an effect is in it that only a search can place.
+    pub fn searched(&self, effect: usize, data: &Data) -> bool {
+        self.blocks.iter().any(|(block, _)| block.effect == effect && block.searched(data))
     }
 
     /// Effects and forms, as a key.

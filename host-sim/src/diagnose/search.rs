@@ -345,7 +345,7 @@ impl<'e, 'a> Search<'e, 'a> {
     }
 
     fn judged(&mut self, fit: Fit) -> Scored {
-        let held_out = self.engine.held_out(&fit).log_likelihood;
+        let held_out = self.engine.judged_unseen(&fit);
         let score = held_out - self.prices(&fit.model);
         let scored = Scored { fit, held_out, score };
         self.seen.insert(scored.fit.model.structure(), scored.clone());

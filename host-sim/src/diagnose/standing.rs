@@ -35,7 +35,7 @@ pub(super) fn standings(engine: &mut Engine, contenders: Vec<Scored>) -> Vec<Sta
     let standing = |scored: Scored| Standing {
         causes: effects(&scored.fit.model).into_iter().map(|effect| EFFECTS[effect].cause()).collect(),
         score: scored.score,
-        held_out_rmse: scale_of_squares(&engine.held_out(&scored.fit).residual),
+        held_out_rmse: scale_of_squares(&engine.foretold(&scored.fit)),
     };
     contenders.into_iter().map(standing).collect()
 }

@@ -5,6 +5,9 @@ use std::fmt::Write;
 use super::effects::{EFFECTS, index_of};
 use super::report::{Finding, Report, Verdict};
 
+/// A gain below this is none.
+const FORETOLD: f64 = 0.005;
+
 /// What goes to the terminal.
 pub fn text(name: &str, report: &Report) -> String {
     let mut text = String::new();
@@ -58,13 +61,22 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         Verdict::Ambiguous | Verdict::Explained => format!("The simulation is wrong on {name}: {}.", causes.join("; ")),
     }];
     if !report.findings.is_empty() {
-        sentences.push(format!(
-            "With {} in the model, the error on stretches that no fit has seen falls from {:.3} to {:.3} V, by {:.1} %.",
-            if causes.len() == 1 { "it" } else { "them" },
-            report.baseline.held_out_rmse,
-            report.extended.quality.held_out_rmse,
-            100.0 * report.extended.gain
-        ));
+        let it = if causes.len() == 1 { "it" } else { "them" };
+        let (before, after) = (&report.baseline, &report.extended.quality);
+        sentences.push(if report.extended.gain > FORETOLD {
+            format!(
+                "With {it} in the model, the error on stretches that no fit has seen falls from {:.3} to {:.3} V, by {:.1} %.",
+                before.held_out_rmse,
+                after.held_out_rmse,
+                100.0 * report.extended.gain
+            )
+        } else {
+            format!(
+                "With {it} in the model, the error falls from {:.3} to {:.3} V, but not on stretches that no fit has seen: no \
+                 other part of the record foretells it.",
+                before.rmse, after.rmse
+            )
+        });
     }
     if !report.alternatives.is_empty() {
         let rivals: Vec<String> = report

@@ -16,15 +16,20 @@ fn rows(point: &[f64], rows: usize) -> std::ops::Range<usize> {
     (point[0] as usize).min(to)..to
 }
 
-/// The run whose shift explains most: by sums over runs of growing length.
+/// The run whose shift explains most: by sums over runs of growing length. Unseen rows neither count nor cost.
 fn best_run(Scene { residual, sigma, .. }: &Scene) -> Option<Vec<f64>> {
     let rows = residual.len();
     let bound = CLIP * sigma;
-    let mut sums = vec![0.0];
-    for value in *residual {
-        sums.push(sums[sums.len() - 1] + value.clamp(-bound, bound));
+    let (mut sums, mut counts) = (vec![0.0], vec![0]);
+    for (row, value) in residual.iter().enumerate() {
+        let clipped = if value.is_nan() { 0.0 } else { value.clamp(-bound, bound) };
+        sums.push(sums[row] + clipped);
+        counts.push(counts[row] + usize::from(!value.is_nan()));
     }
-    let gain = |from: usize, to: usize| (sums[to] - sums[from]).powi(2) / (to - from) as f64;
+    let gain = |from: usize, to: usize| match counts[to] - counts[from] {
+        seen if seen < SHORTEST => 0.0,
+        seen => (sums[to] - sums[from]).powi(2) / seen as f64,
+    };
     let longest = rows / 2;
     let mut best = (0.0, 0, 0);
     let mut length = SHORTEST;
@@ -39,7 +44,7 @@ fn best_run(Scene { residual, sigma, .. }: &Scene) -> Option<Vec<f64>> {
     }
     let (_, from, to) = refined(best.1, best.2, rows, &gain)?;
     // A typical reading, not the mean: it may hold an outlier.
-    let mut run = residual[from..to].to_vec();
+    let mut run: Vec<f64> = residual[from..to].iter().copied().filter(|value| !value.is_nan()).collect();
     run.sort_by(f64::total_cmp);
     Some(vec![from as f64, to as f64, run[run.len() / 2]])
 }
