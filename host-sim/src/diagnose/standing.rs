@@ -1,7 +1,10 @@
 //! How the best sets of causes stand beside each other: what they score, and what they foretell.
 
+use super::data::Data;
+use super::effect::Quantity;
 use super::effects::EFFECTS;
 use super::fit::Engine;
+use super::model::{Block, Model};
 use super::noise::scale_of_squares;
 use super::search::{Scored, Search, effects};
 
@@ -10,8 +13,12 @@ use super::search::{Scored, Search, effects};
 pub struct Standing {
     /// The causes, in the chain's order; none for the simulation as it was.
     pub causes: Vec<&'static str>,
+    /// Where a fit to all rows puts their parameters.
+    pub values: String,
     /// Held-out log-likelihood less the price of the blocks, in nats.
     pub score: f64,
+    /// Error on the rows that it was fitted to, in V.
+    pub rmse: f64,
     /// Error on stretches that no fit has seen, in V.
     pub held_out_rmse: f64,
 }
@@ -34,8 +41,17 @@ pub(super) fn contenders(search: &Search, best: &Scored) -> Vec<Scored> {
 pub(super) fn standings(engine: &mut Engine, contenders: Vec<Scored>) -> Vec<Standing> {
     let standing = |scored: Scored| Standing {
         causes: effects(&scored.fit.model).into_iter().map(|effect| EFFECTS[effect].cause()).collect(),
+        values: values(engine.data, &scored.fit.model),
         score: scored.score,
+        rmse: scale_of_squares(&scored.fit.residual),
         held_out_rmse: scale_of_squares(&engine.foretold(&scored.fit)),
     };
     contenders.into_iter().map(standing).collect()
+}
+
+fn values(data: &Data, model: &Model) -> String {
+    let of_block = |(block, point): &(Block, Vec<f64>)| block.effect().quantities(block.form, point, data);
+    let quantities = model.blocks.iter().flat_map(of_block);
+    let said = |Quantity { name, unit, value }| format!("{name} = {value:.4} {unit}").trim_end().to_owned();
+    quantities.map(said).collect::<Vec<_>>().join(", ")
 }

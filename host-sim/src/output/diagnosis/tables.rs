@@ -53,14 +53,16 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
         }
         div.scroll { table {
             thead { tr {
-                th { "causes" } th.number { "behind [nats]" } th { "" } th.number { "held-out RMSE [V]" } th { "" }
+                th { "causes" } th.number { "behind [nats]" } th { "" } th.number { "RMSE [V]" }
+                th.number { "held-out RMSE [V]" } th { "" }
             } }
             tbody {
                 @for (place, standing) in standings.iter().enumerate() {
                     tr.best[place == 0] {
-                        td.set { (set(&standing.causes)) }
+                        td.set { (set(&standing.causes)) div.small.note { (standing.values) } }
                         td.number { (format!("{:.1}", behind(standing))) }
                         td.bar { i style=(width(behind(standing))) {} }
+                        td.number { (number(standing.rmse)) }
                         td.number { (number(standing.held_out_rmse)) }
                         td.small.note { (note(standings, place)) }
                     }
@@ -197,7 +199,13 @@ mod tests {
 
     #[test]
     fn a_rival_is_noted_for_the_first_cause_it_lacks_and_no_later_one_is() {
-        let standing = |causes: &[&'static str]| Standing { causes: causes.to_vec(), score: 0.0, held_out_rmse: 1.0 };
+        let standing = |causes: &[&'static str]| Standing {
+            causes: causes.to_vec(),
+            values: String::new(),
+            score: 0.0,
+            rmse: 1.0,
+            held_out_rmse: 1.0,
+        };
         let standings = [standing(&["hum", "drift"]), standing(&["drift"]), standing(&["hum"]), standing(&[])];
         let notes: Vec<String> = (0..4).map(|place| note(&standings, place)).collect();
         assert_eq!(notes, ["the best", "the best without hum", "the best without drift", ""]);
