@@ -2,48 +2,55 @@
 
 use super::base::Base;
 use super::data::Data;
-use super::effect::Stage;
 use super::fit::Engine;
 use super::model::Model;
+use super::signal::Signal;
 use crate::open_loop;
 use crate::plant_file::PlantFile;
+use crate::record::{Record, Row};
+use crate::schedule::{Between, Schedule};
 
 /// The rate at which the tick is tried, in Hz.
 const RATE_HZ: f64 = 1000.0;
 /// Longer records are not run tick by tick, in s.
 const LONGEST_S: f64 = 5000.0;
-/// Causes of the spring that no table of a plant file holds, or that act before the tick.
-const NOT_IN_THE_TICK: [&str; 4] = ["drift", "resonance", "delay", "amplifier-slew"];
+/// What goes beyond, in V, is said to be no small thing.
+pub const SMALL_ERROR_V: f64 = 1.0;
 
 /// The extended spring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cure {
     /// As a file for `vsj stair --plant`.
     pub file: PlantFile,
-    /// Largest difference between the fixed-point tick and the fit, over the record, in V: of the blocks that the tick
-    /// runs. `None` if the tick refuses the spring, or the record's voltage is not held between rows.
+    /// Largest difference between the fixed-point tick on that file and the fitted spring, in V: both from rest, under
+    /// the voltages that the fitted amplifier puts out at the record's rows, each held until the next. What the file
+    /// only mentions is in neither. `None` if the tick refuses the spring, or the record's voltage is not held.
     pub fixed_point_error_v: Option<f64>,
 }
 
 /// Of a fitted model.
-pub(super) fn of(engine: &mut Engine, model: &Model, held: bool) -> Cure {
+pub(super) fn of(engine: &Engine, model: &Model, held: bool) -> Cure {
     let (data, base) = (engine.data, engine.simulator.base);
     let file = model.extend(base, data);
     let runs = held && data.duration_s() < LONGEST_S && file.check().is_ok();
-    let fixed_point_error_v = runs.then(|| error(engine, model, base, data)).flatten();
+    let fixed_point_error_v = runs.then(|| error(model, base, data, &file)).flatten();
     Cure { file, fixed_point_error_v }
 }
 
-fn error(engine: &mut Engine, model: &Model, base: &Base, data: &Data) -> Option<f64> {
-    let mut ticked = model.clone();
-    ticked
-        .blocks
-        .retain(|(block, _)| block.effect().stage() != Stage::Reading && !NOT_IN_THE_TICK.contains(&block.cause()));
-    let file = ticked.extend(base, data);
-    let limit = file.amplifier.as_ref().and_then(|amplifier| amplifier.limit_v).unwrap_or(f64::INFINITY);
-    let voltage: Vec<f64> = data.voltage_v.iter().map(|voltage| voltage.min(limit)).collect();
-    let fixed = open_loop::simulate(&file.extended(), RATE_HZ, &data.time_s, &voltage).ok()?;
-    let fitted = engine.residual(&ticked);
-    let difference = |((reading, left), fixed): ((&f64, &f64), &f64)| (reading - left - fixed).abs();
-    Some(data.reading.iter().zip(&fitted).zip(&fixed).map(difference).fold(0.0, f64::max))
+fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f64> {
+    let mut applied = data.command.clone();
+    model.chain(base, data).amplify(&mut applied);
+    let row = |(&time_s, voltage_v)| Row { line: 0, time_s, voltage_v, measured: None };
+    let rows: Vec<Row> = data.time_s.iter().zip(applied.at_rows()).map(row).collect();
+    let voltage_v: Vec<f64> = rows.iter().map(|row| row.voltage_v).collect();
+    let fixed = open_loop::simulate(&file.extended(), RATE_HZ, &data.time_s, &voltage_v).ok()?;
+
+    let schedule = Schedule::from_record(&Record { name: String::new(), rows }, Between::Hold);
+    let mut fitted = Signal::new(&schedule, &data.time_s, 0.0);
+    let mut written = model.clone();
+    for (block, _) in &model.unmodelled(base, data).blocks {
+        written = written.without(block.effect);
+    }
+    written.chain(base, data).respond(&mut fitted, &mut Vec::new());
+    Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (fitted - fixed).abs()).fold(0.0, f64::max))
 }

@@ -7,10 +7,9 @@
 //! An effect acts at one place of the chain (it overrides one of the hooks below), by parameters that a fit may move. It
 //! may come in several *forms*: the same cause, another law. A new effect is one file in `effects/` and its line there.
 
+use super::chain::Chain;
 use super::data::Data;
-use super::relaxation::Relaxation;
 use super::signal::Signal;
-use crate::plant_file::PlantFile;
 
 /// Where in the chain an effect acts. Two effects of one stage are harder to tell apart than two of different stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -127,23 +126,23 @@ pub trait Effect: Sync {
         Vec::new()
     }
 
-    /// Writes itself into a plant file, whose tables say what the tick runs; what no table holds is kept as unmodelled.
-    fn extend(&self, form: usize, point: &[f64], data: &Data, file: &mut PlantFile) {
-        let values =
-            self.quantities(form, point, data).into_iter().map(|quantity| (quantity.name, quantity.value.into()));
-        let table = toml::Value::Table(values.collect());
-        file.unmodelled.get_or_insert_default().insert(self.cause().to_owned(), table);
+    /// Changes the chain, as far as a plant file can say it.
+    fn change<'a>(&self, _form: usize, _point: &'a [f64], _data: &'a Data, _chain: &mut Chain<'a>) {}
+
+    /// What no table of a plant file holds of it, for the whole chain that it is in: a table of its own, or a remark.
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, _chain: &Chain) -> Option<toml::Value> {
+        Some(table(self, form, point, data))
     }
-
-    /// Acts on the voltage before it reaches the relaxation, in V.
-    fn drive(&self, _form: usize, _point: &[f64], _data: &Data, _signal: &mut Signal) {}
-
-    /// Changes the relaxation's parameters.
-    fn relax(&self, _form: usize, _point: &[f64], _relaxation: &mut Relaxation) {}
 
     /// Acts on the stiffness, in V.
     fn respond(&self, _form: usize, _point: &[f64], _data: &Data, _signal: &mut Signal) {}
 
     /// Acts on the readings at each row, in V.
     fn read(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}
+}
+
+/// The user's parameters, as a plant file keeps what it does not model.
+pub fn table<E: Effect + ?Sized>(effect: &E, form: usize, point: &[f64], data: &Data) -> toml::Value {
+    let quantities = effect.quantities(form, point, data).into_iter();
+    toml::Value::Table(quantities.map(|quantity| (quantity.name, quantity.value.into())).collect())
 }

@@ -7,6 +7,7 @@
 //! | module | what it is |
 //! | --- | --- |
 //! | [`base`] | the simulation that is judged |
+//! | [`chain`], [`bank`], [`law`] | command to stiffness: what a plant file says and effects change; runs and writes itself |
 //! | [`data`], [`observed`] | the record made ready; what its readings say before any model |
 //! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
@@ -20,7 +21,9 @@ use anyhow::Result;
 use crate::bad_input;
 use crate::record::Record;
 
+pub mod bank;
 pub mod base;
+pub mod chain;
 pub mod cure;
 pub mod data;
 pub mod diagnosis;
@@ -28,6 +31,7 @@ pub mod effect;
 pub mod effects;
 pub mod fit;
 pub mod held_out;
+pub mod law;
 pub mod leftover;
 pub mod model;
 pub mod noise;

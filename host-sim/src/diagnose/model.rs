@@ -1,8 +1,9 @@
 //! A model: the paper's chain with some effects in it, and what it predicts for a record.
 
 use super::base::Base;
+use super::chain::Chain;
 use super::data::Data;
-use super::effect::{Coordinate, Effect, Stage};
+use super::effect::{Coordinate, Effect};
 use super::effects::EFFECTS;
 use super::signal::Signal;
 use crate::plant_file::PlantFile;
@@ -114,16 +115,35 @@ pub struct Simulator<'a> {
 }
 
 impl Model {
+    /// The base's chain, changed by the model's blocks.
+    pub fn chain<'a>(&'a self, base: &'a Base, data: &'a Data) -> Chain<'a> {
+        let mut chain = base.chain();
+        for (block, point) in &self.blocks {
+            block.effect().change(block.form, point, data, &mut chain);
+        }
+        chain
+    }
+
     /// The base with the model's blocks in it, as a plant file.
     pub fn extend(&self, base: &Base, data: &Data) -> PlantFile {
         let mut file = base.file().clone();
-        let mut relaxation = base.relaxation;
+        let chain = self.chain(base, data);
+        chain.write(&mut file, data.full_scale_v);
         for (block, point) in &self.blocks {
-            block.effect().relax(block.form, point, &mut relaxation);
-            block.effect().extend(block.form, point, data, &mut file);
+            if let Some(value) = block.effect().unmodelled(block.form, point, data, &chain) {
+                file.unmodelled.get_or_insert_default().insert(block.cause().to_owned(), value);
+            }
         }
-        relaxation.extend(&mut file);
         file
+    }
+
+    /// The blocks that the model's plant file only mentions.
+    pub fn unmodelled(&self, base: &Base, data: &Data) -> Self {
+        let chain = self.chain(base, data);
+        let mentioned = |(block, point): &&(Block, Vec<f64>)| {
+            block.effect().unmodelled(block.form, point, data, &chain).is_some_and(|value| value.is_table())
+        };
+        Self { blocks: self.blocks.iter().filter(mentioned).cloned().collect() }
     }
 }
 
@@ -138,24 +158,9 @@ impl<'a> Simulator<'a> {
         self.runs += 1;
         let (data, signal) = (self.data, &mut self.signal);
         signal.clone_from(&data.command);
-        let mut relaxation = self.base.relaxation;
-        for (block, point) in &model.blocks {
-            block.effect().relax(block.form, point, &mut relaxation);
-        }
-        let amplifier = model.blocks.partition_point(|(block, _)| block.effect().stage() == Stage::Amplifier);
-        let drive = |blocks: &[(Block, Vec<f64>)], signal: &mut Signal| {
-            for (block, point) in blocks {
-                block.effect().drive(block.form, point, data, signal);
-            }
-        };
-        self.base.amplify(signal);
-        drive(&model.blocks[..amplifier], signal);
-        if relaxation.varies() {
-            signal.middles(&mut self.levels_v);
-        }
-        self.base.drive(signal);
-        drive(&model.blocks[amplifier..], signal);
-        relaxation.pass(signal, &self.levels_v);
+        let chain = model.chain(self.base, data);
+        chain.amplify(signal);
+        chain.respond(signal, &mut self.levels_v);
         for (block, point) in &model.blocks {
             block.effect().respond(block.form, point, data, signal);
         }

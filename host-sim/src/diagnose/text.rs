@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::cure::SMALL_ERROR_V;
 use super::effects::{EFFECTS, index_of};
 use super::report::{Finding, Report, Verdict};
 
@@ -31,9 +32,19 @@ pub fn text(name: &str, report: &Report) -> String {
         let _ = writeln!(text, "{what:22} {before:12.3} {after:12.3}");
     }
     if let Some(error) = report.extended.fixed_point_error_v {
-        let _ = writeln!(text, "The fixed-point tick runs the extended spring within {error:.3} V of the fit.");
+        let _ = writeln!(text, "{}", in_fixed_point(error));
     }
     text
+}
+
+fn in_fixed_point(error_v: f64) -> String {
+    if error_v <= SMALL_ERROR_V {
+        return format!("The fixed-point tick runs the extended spring within {error_v:.3} V of the fit.");
+    }
+    format!(
+        "The extended spring as written is NOT the fitted one: in the fixed-point tick it departs by up to {error_v:.3} V, \
+         more than {SMALL_ERROR_V} V."
+    )
 }
 
 /// What is wrong; what the cure is worth; what to do next.

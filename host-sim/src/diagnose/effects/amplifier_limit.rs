@@ -1,9 +1,8 @@
-//! The real voltage stops below the commanded one: `u = min(command, limit)`.
+//! The real voltage stops below the commanded one: `|u| = min(|command|, limit)`.
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::Signal;
-use crate::plant_file::PlantFile;
 
 pub(super) struct AmplifierLimit;
 
@@ -39,11 +38,11 @@ impl Effect for AmplifierLimit {
         vec![Quantity::new("limit_v", "V", point[0])]
     }
 
-    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
-        file.amplifier.get_or_insert_default().limit_v = Some(point[0]);
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
     }
 
-    fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
-        signal.map(|voltage| voltage.min(point[0]));
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.limit_v = chain.limit_v.min(point[0]);
     }
 }

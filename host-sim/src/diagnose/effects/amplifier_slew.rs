@@ -1,9 +1,8 @@
 //! The real voltage changes at a bounded rate: `|du/dt| <= slew`. Its lag grows with the step; a delay's does not.
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::Signal;
-use crate::plant_file::PlantFile;
 
 pub(super) struct AmplifierSlew;
 
@@ -45,11 +44,11 @@ impl Effect for AmplifierSlew {
         vec![Quantity::new("slew_v_per_s", "V/s", point[0].exp())]
     }
 
-    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
-        file.amplifier.get_or_insert_default().slew_v_per_s = Some(point[0].exp());
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
     }
 
-    fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
-        *signal = signal.slewed(point[0].exp());
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.slew_v_per_s = chain.slew_v_per_s.min(point[0].exp());
     }
 }

@@ -7,10 +7,10 @@
 //!
 //! Leakage lowers the settled value by `share`; creep keeps it, and drift follows the clock.
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::{Lag, Signal};
-use crate::plant_file::{Leakage, PlantFile};
+use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
+use crate::plant_file::Leakage;
 
 pub(super) struct ChargeLeakage;
 
@@ -51,16 +51,12 @@ impl Effect for ChargeLeakage {
         vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
     }
 
-    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
-        file.leakage = Some(Leakage { share: point[0], tau_s: point[1].exp() });
+    /// A plant file holds one.
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
+        (chain.leakages.len() > 1).then(|| table(self, form, point, data))
     }
 
-    fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
-        let mut lag = Lag::at(point[1].exp(), signal.before);
-        signal.before *= 1.0 - point[0];
-        signal.pass(|piece| {
-            let (start, end) = lag.pass(piece);
-            (piece.from - point[0] * start, piece.to - point[0] * end)
-        });
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.leakages.push(Leakage { share: point[0], tau_s: point[1].exp() });
     }
 }

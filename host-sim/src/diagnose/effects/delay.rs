@@ -1,9 +1,8 @@
 //! The response starts late: `u(t) = command(t - delay)`.
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::Signal;
-use crate::plant_file::PlantFile;
 
 pub(super) struct Delay;
 
@@ -51,11 +50,11 @@ impl Effect for Delay {
         (longest(data) / data.sample_s).clamp(1.0, 5.0).ln()
     }
 
-    fn extend(&self, _: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
-        file.amplifier.get_or_insert_default().delay_s = Some(point[0]);
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
     }
 
-    fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
-        *signal = signal.delayed(point[0]);
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.delay_s += point[0];
     }
 }

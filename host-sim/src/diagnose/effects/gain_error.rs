@@ -1,10 +1,8 @@
 //! The static gain is not 1: `f = gain u`.
 
-use crate::diagnose::base::extend_law;
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::Signal;
-use crate::plant_file::PlantFile;
 
 pub(super) struct GainError;
 
@@ -41,11 +39,11 @@ impl Effect for GainError {
         vec![Quantity::new("gain", "", point[0])]
     }
 
-    fn extend(&self, _: usize, point: &[f64], data: &Data, file: &mut PlantFile) {
-        extend_law(file, data.full_scale_v, 2, |stiffness| point[0] * stiffness);
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
     }
 
-    fn drive(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
-        signal.map(|voltage| point[0] * voltage);
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.law.push(|voltage| point[0] * voltage);
     }
 }

@@ -1,11 +1,6 @@
 //! Rate-independent memory: the branches up and down differ.
 //!
-//! A bank of play operators (the Prandtl-Ishlinskii model; Brokate and Sprekels, *Hysteresis and Phase Transitions*,
-//! 1996), each with a threshold `r`:
-//!
-//! ```text
-//! play: z' = clamp(z, u - r, u + r)        f = gain ((1 - sum weights) u + sum weight play)
-//! ```
+//! A [`Bank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
 //!
 //! | form | plays | coordinates |
 //! | --- | --- | --- |
@@ -14,10 +9,10 @@
 //! | bank | three, at r / 3, r and 3 r | r, weights |
 //! | part with gain, bank with gain | the same, with the gain of the loop's mean line | and the gain |
 
+use crate::diagnose::bank::Bank;
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::Signal;
-use crate::plant_file::{Memory, PlantFile};
+use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
 
 pub(super) struct Hysteresis;
 
@@ -25,70 +20,18 @@ const WHOLE: usize = 0;
 /// Number of plays and own gain, by form.
 const FORMS: [(usize, bool); 5] = [(1, false), (1, false), (3, false), (1, true), (3, true)];
 
-/// A bank of play operators.
-#[derive(Clone, Debug)]
-struct Bank {
-    gain: f64,
-    direct: f64,
-    plays: [Play; 3],
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Play {
-    threshold: f64,
-    weight: f64,
-    value: f64,
-}
-
-impl Bank {
-    fn new(form: usize, point: &[f64]) -> Self {
-        let (count, own_gain) = FORMS[form];
-        let threshold = point[0].exp();
-        let mut plays = [Play::default(); 3];
-        if count == 1 {
-            plays[0] = Play { threshold, weight: if form == WHOLE { 1.0 } else { point[1] }, value: 0.0 };
-        } else {
-            for ((play, &weight), factor) in plays.iter_mut().zip(&point[1..4]).zip([1.0 / 3.0, 1.0, 3.0]) {
-                *play = Play { threshold: threshold * factor, weight, value: 0.0 };
-            }
-        }
-        let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
-        Self { gain, direct: 1.0 - plays.iter().map(|play| play.weight).sum::<f64>(), plays }
-    }
-
-    fn at(&mut self, voltage: f64) -> f64 {
-        let mut sum = self.direct * voltage;
-        for play in &mut self.plays {
-            play.value = play.value.clamp(voltage - play.threshold, voltage + play.threshold);
-            sum += play.weight * play.value;
-        }
-        self.gain * sum
-    }
-
-    /// Largest distance along the voltage axis between the branches of a slow loop from 0 to `top` and back, in V.
-    fn width(mut self, top: f64) -> f64 {
-        const STEPS: usize = 400;
-        let voltage = |step: usize| top * step as f64 / STEPS as f64;
-        // Once around first, so that the loop closes.
-        for step in (0..=STEPS).chain((0..STEPS).rev()) {
-            self.at(voltage(step));
-        }
-        let up: Vec<f64> = (0..=STEPS).map(|step| self.at(voltage(step))).collect();
-        let mut down: Vec<f64> = (0..=STEPS).rev().map(|step| self.at(voltage(step))).collect();
-        down.reverse();
-        // Both rise with the voltage: the voltage of the branch up at the same stiffness, by interpolation.
-        let mut at = 0;
-        let mut widest = 0.0f64;
-        for (step, &value) in down.iter().enumerate() {
-            while at + 1 < STEPS && up[at + 1] < value {
-                at += 1;
-            }
-            let rise = up[at + 1] - up[at];
-            let part = if rise > 0.0 { ((value - up[at]) / rise).clamp(0.0, 1.0) } else { 1.0 };
-            widest = widest.max(voltage(at) + part * top / STEPS as f64 - voltage(step));
-        }
-        widest
-    }
+/// The bank of a form at a point.
+fn bank(form: usize, point: &[f64]) -> Bank {
+    let (count, own_gain) = FORMS[form];
+    let threshold = point[0].exp();
+    let plays: Vec<(f64, f64)> = match (form, count) {
+        (WHOLE, _) => vec![(threshold, 1.0)],
+        (_, 1) => vec![(threshold, point[1])],
+        _ => [1.0 / 3.0, 1.0, 3.0].iter().zip(&point[1..4]).map(|(part, &weight)| (threshold * part, weight)).collect(),
+    };
+    let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
+    let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();
+    Bank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)))
 }
 
 impl Effect for Hysteresis {
@@ -141,34 +84,15 @@ impl Effect for Hysteresis {
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("width_v", "V", Bank::new(form, point).width(data.full_scale_v))]
+        vec![Quantity::new("width_v", "V", bank(form, point).width(data.full_scale_v))]
     }
 
-    fn extend(&self, form: usize, point: &[f64], _: &Data, file: &mut PlantFile) {
-        let Bank { gain, direct, plays } = Bank::new(form, point);
-        let plays = plays.into_iter().filter(|play| play.weight != 0.0);
-        let (thresholds_v, weights) = plays.map(|play| (play.threshold, gain * play.weight)).unzip();
-        file.memory = Some(Memory { direct: gain * direct, thresholds_v, weights });
+    /// A plant file holds so many plays.
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
+        (!chain.memory.fits()).then(|| table(self, form, point, data))
     }
 
-    fn drive(&self, form: usize, point: &[f64], _: &Data, signal: &mut Signal) {
-        let mut bank = Bank::new(form, point);
-        signal.before = bank.at(signal.before);
-        signal.pass(|piece| {
-            let from = bank.at(piece.from);
-            (from, if piece.to == piece.from { from } else { bank.at(piece.to) })
-        });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// One play of weight 1 lags by its threshold on both branches.
-    #[test]
-    fn a_whole_play_is_twice_its_threshold_wide() {
-        let width = Bank::new(WHOLE, &[20f64.ln()]).width(500.0);
-        assert!((width - 40.0).abs() < 0.5, "{width}");
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.memory = bank(form, point).behind(&chain.memory);
     }
 }

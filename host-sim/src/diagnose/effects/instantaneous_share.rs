@@ -1,9 +1,8 @@
 //! The immediate part of a step is not 1/11.
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::relaxation::Relaxation;
-use crate::plant_file::PlantFile;
 
 pub(super) struct InstantaneousShare;
 
@@ -36,10 +35,11 @@ impl Effect for InstantaneousShare {
         vec![Quantity::new("share", "", point[0])]
     }
 
-    /// The relaxation is written as a whole, by [`Relaxation::extend`].
-    fn extend(&self, _: usize, _: &[f64], _: &Data, _: &mut PlantFile) {}
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
+    }
 
-    fn relax(&self, _: usize, point: &[f64], relaxation: &mut Relaxation) {
-        relaxation.share = point[0];
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.relaxation.share = point[0];
     }
 }

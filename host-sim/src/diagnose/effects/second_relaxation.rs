@@ -5,10 +5,9 @@
 //! of everything:  y = (1 - creep) (share q + (1 - share) lag(tau; q)) + creep lag(slow; q)
 //! ```
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::relaxation::Relaxation;
-use crate::plant_file::PlantFile;
 
 pub(super) struct SecondRelaxation;
 
@@ -53,14 +52,15 @@ impl Effect for SecondRelaxation {
         vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
     }
 
-    /// The relaxation is written as a whole, by [`Relaxation::extend`].
-    fn extend(&self, _: usize, _: &[f64], _: &Data, _: &mut PlantFile) {}
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
+    }
 
-    fn relax(&self, form: usize, point: &[f64], relaxation: &mut Relaxation) {
-        relaxation.creep = point[0];
-        relaxation.creep_tau_s = point[1].exp();
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.relaxation.creep = point[0];
+        chain.relaxation.creep_tau_s = point[1].exp();
         if form != OF_THE_REST {
-            relaxation.share *= 1.0 - point[0];
+            chain.relaxation.share *= 1.0 - point[0];
         }
     }
 }

@@ -7,11 +7,9 @@
 //! | exponential with gain | `g` times that |
 //! | quadratic, cubic, quintic | `g + a x`, `+ b x^2`, `+ c x^3 + d x^4`: the gain is its own |
 
-use crate::diagnose::base::extend_law;
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::Signal;
-use crate::plant_file::PlantFile;
 
 pub(super) struct StaticNonlinearity;
 
@@ -21,8 +19,6 @@ const EXPONENTIAL_WITH_GAIN: usize = 2;
 /// Coefficients of the polynomials, by form.
 const COEFFICIENTS: [usize; 6] = [0, 0, 0, 2, 3, 5];
 
-/// Points of the law that the tick takes, the first at 0 V.
-const LAW_POINTS: u32 = 9;
 /// Points of the curve that are reported.
 const POINTS: u32 = 5;
 
@@ -100,13 +96,11 @@ impl Effect for StaticNonlinearity {
             .collect()
     }
 
-    fn extend(&self, form: usize, point: &[f64], data: &Data, file: &mut PlantFile) {
-        extend_law(file, data.full_scale_v, LAW_POINTS, |stiffness| {
-            stiffness * secant(form, point, stiffness.abs() / data.full_scale_v)
-        });
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
     }
 
-    fn drive(&self, form: usize, point: &[f64], data: &Data, signal: &mut Signal) {
-        signal.map(|voltage| voltage * secant(form, point, voltage.abs() / data.full_scale_v));
+    fn change<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
+        chain.law.push(move |voltage| voltage * secant(form, point, voltage.abs() / data.full_scale_v));
     }
 }

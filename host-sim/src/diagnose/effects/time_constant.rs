@@ -1,9 +1,8 @@
 //! The relaxation time is not 5.5 s.
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::relaxation::Relaxation;
-use crate::plant_file::PlantFile;
 
 pub(super) struct TimeConstant;
 
@@ -40,12 +39,13 @@ impl Effect for TimeConstant {
         vec![Quantity::new("tau_s", "s", point[0].exp())]
     }
 
-    /// The relaxation is written as a whole, by [`Relaxation::extend`].
-    fn extend(&self, _: usize, _: &[f64], _: &Data, _: &mut PlantFile) {}
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
+    }
 
-    fn relax(&self, _: usize, point: &[f64], relaxation: &mut Relaxation) {
-        let factor = point[0].exp() / relaxation.tau_s;
-        relaxation.tau_s *= factor;
-        relaxation.tau_high_s *= factor;
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        let factor = point[0].exp() / chain.relaxation.tau_s;
+        chain.relaxation.tau_s *= factor;
+        chain.relaxation.tau_high_s *= factor;
     }
 }

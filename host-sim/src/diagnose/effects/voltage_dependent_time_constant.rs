@@ -1,9 +1,8 @@
 //! The relaxation time changes with the voltage: straight or geometric from `tau_low` at 0 V to `tau_high` at 500 V.
 
+use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::relaxation::Relaxation;
-use crate::plant_file::PlantFile;
 
 pub(super) struct VoltageDependentTimeConstant;
 
@@ -45,17 +44,14 @@ impl Effect for VoltageDependentTimeConstant {
         vec![Quantity::new("tau_low_s", "s", point[0].exp()), Quantity::new("tau_high_s", "s", point[1].exp())]
     }
 
-    /// The relaxation is written as a whole, by [`Relaxation::extend`]; the tick's time constant is straight between both ends.
-    fn extend(&self, form: usize, _: &[f64], _: &Data, file: &mut PlantFile) {
-        if form == GEOMETRIC {
-            let note = "fitted as geometric between its ends, written as straight";
-            file.unmodelled.get_or_insert_default().insert(self.cause().to_owned(), note.into());
-        }
+    /// The tick's time constant is straight between both ends.
+    fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        (form == GEOMETRIC).then(|| "fitted as geometric between its ends, written as straight".into())
     }
 
-    fn relax(&self, form: usize, point: &[f64], relaxation: &mut Relaxation) {
-        relaxation.tau_s = point[0].exp();
-        relaxation.tau_high_s = point[1].exp();
-        relaxation.geometric = form == GEOMETRIC;
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.relaxation.tau_s = point[0].exp();
+        chain.relaxation.tau_high_s = point[1].exp();
+        chain.relaxation.geometric = form == GEOMETRIC;
     }
 }

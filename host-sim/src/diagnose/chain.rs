@@ -1,0 +1,109 @@
+//! The chain from the command to the stiffness, in the order of [`model::extended`]:
+//!
+//! ```text
+//! command -> limit -> slew -> delay -> memory -> law -> leakage -> relaxation -> stiffness
+//! ```
+//!
+//! A plant file says what it is at first, effects change it; it runs, and writes itself into a plant file. So what is
+//! fitted is what is written: a second limit is the lower one, a second slew the slower, delays add up, memories and laws
+//! stand one behind the other, the relaxation's numbers are replaced.
+
+use super::bank::Bank;
+use super::law::Law;
+use super::relaxation::Relaxation;
+use super::signal::{Lag, Signal};
+use crate::plant_file::{Amplifier, Leakage, PlantFile};
+
+/// Everything between the command and the stiffness that a plant file can hold.
+pub struct Chain<'a> {
+    /// Largest voltage of the amplifier, either way, in V.
+    pub limit_v: f64,
+    /// Its fastest change, in V/s.
+    pub slew_v_per_s: f64,
+    /// How late it answers, in s.
+    pub delay_s: f64,
+    /// Hysteresis.
+    pub memory: Bank,
+    /// The static law.
+    pub law: Law<'a>,
+    /// Losses of charge; a plant file holds the first.
+    pub leakages: Vec<Leakage>,
+    /// What comes at once, and what later.
+    pub relaxation: Relaxation,
+}
+
+/// A jump that falls on a row's moment counts as before it, however sums of times are rounded: parts of the delay.
+const ROUNDING: f64 = 1e-5;
+
+impl<'a> Chain<'a> {
+    /// Of a plant file, whose relaxation is given.
+    pub fn of(file: &'a PlantFile, relaxation: Relaxation) -> Self {
+        let amplifier = file.amplifier.as_ref();
+        let number = |of: fn(&Amplifier) -> Option<f64>, else_value| amplifier.and_then(of).unwrap_or(else_value);
+        Self {
+            limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
+            slew_v_per_s: number(|amplifier| amplifier.slew_v_per_s, f64::INFINITY),
+            delay_s: number(|amplifier| amplifier.delay_s, 0.0),
+            memory: Bank::of(file.memory.as_ref()),
+            law: Law::of(file.law.as_ref()),
+            leakages: file.leakage.iter().cloned().collect(),
+            relaxation,
+        }
+    }
+
+    /// Writes itself into a plant file, for a record up to `full_scale_v`.
+    pub fn write(&self, file: &mut PlantFile, full_scale_v: f64) {
+        let amplifier = Amplifier {
+            limit_v: Some(self.limit_v).filter(|limit| limit.is_finite()),
+            slew_v_per_s: Some(self.slew_v_per_s).filter(|slew| slew.is_finite()),
+            delay_s: Some(self.delay_s).filter(|delay| *delay > 0.0),
+        };
+        file.amplifier = (amplifier != Amplifier::default()).then_some(amplifier);
+        if self.memory.fits() {
+            file.memory = self.memory.table();
+        }
+        file.law = self.law.table(full_scale_v);
+        file.leakage = self.leakages.first().cloned();
+        self.relaxation.extend(file);
+    }
+
+    /// From the command to the spring's electrodes.
+    pub fn amplify(&self, signal: &mut Signal) {
+        if self.limit_v.is_finite() {
+            signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
+        }
+        if self.slew_v_per_s.is_finite() {
+            *signal = signal.slewed(self.slew_v_per_s);
+        }
+        if self.delay_s > 0.0 {
+            *signal = signal.delayed(self.delay_s * (1.0 - ROUNDING));
+        }
+    }
+
+    /// From the electrodes to the stiffness; `levels_v` is room to work in.
+    pub fn respond(&self, signal: &mut Signal, levels_v: &mut Vec<f64>) {
+        if self.relaxation.varies() {
+            signal.middles(levels_v);
+        }
+        let mut memory = self.memory.clone();
+        if memory.table().is_some() {
+            signal.before = memory.at(signal.before);
+            signal.pass(|piece| {
+                let from = memory.at(piece.from);
+                (from, if piece.to == piece.from { from } else { memory.at(piece.to) })
+            });
+        }
+        if !self.law.is_none() {
+            signal.map(|voltage| self.law.at(voltage));
+        }
+        for Leakage { share, tau_s } in &self.leakages {
+            let mut lag = Lag::at(*tau_s, signal.before);
+            signal.before *= 1.0 - share;
+            signal.pass(|piece| {
+                let (start, end) = lag.pass(piece);
+                (piece.from - share * start, piece.to - share * end)
+            });
+        }
+        self.relaxation.pass(signal, levels_v);
+    }
+}
