@@ -3,7 +3,7 @@
 //! Whatever is wrong is one line that names file, line, column and what was expected.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -15,6 +15,8 @@ use crate::bad_input::BadInput;
 
 /// Longer files are refused: a row of a record takes 40 bytes, its diagnosis 500.
 const MOST_ROWS: usize = 1_000_000;
+/// And so are longer texts, in bytes: a line may have no end.
+const MOST_BYTES: u64 = 1 << 29;
 
 /// The text of a file.
 ///
@@ -23,11 +25,17 @@ const MOST_ROWS: usize = 1_000_000;
 pub fn read(path: &Path) -> Result<String> {
     let name = path.display();
     let unreadable = |error| BadInput(format!("{name}: cannot be read: {error}"));
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?).take(MOST_BYTES);
     let mut text = String::new();
     // Only once, for it may be a pipe, and no more of it than is allowed.
     for _ in 0..MOST_ROWS + 2 {
         if file.read_line(&mut text).map_err(unreadable)? == 0 {
+            if file.limit() == 0 {
+                bad_input!(
+                    "{name}: more than {} MiB; expected less: keep every tenth row, or a part of it",
+                    MOST_BYTES >> 20
+                );
+            }
             return Ok(text);
         }
     }
@@ -116,6 +124,12 @@ impl Row<'_> {
     /// A finite number.
     pub(crate) fn number(&self, column: usize) -> Result<f64> {
         self.value(column, "a finite number", |number: &f64| number.is_finite())
+    }
+
+    /// A finite number of at most that magnitude.
+    pub(crate) fn number_within(&self, column: usize, most: f64) -> Result<f64> {
+        self.number(column)?;
+        self.value(column, &format!("a number from -{most} to {most}"), |number: &f64| number.abs() <= most)
     }
 
     /// A whole number.

@@ -106,7 +106,10 @@ fn the_campaign_believes_one_who_knows() {
         let outcomes = part::run(&jobs, &oracle, &ProgressBar::hidden());
         assert_eq!(tables::wrong(&jobs, &outcomes), "");
         let summary = Summary::of("all", &outcomes.iter().collect::<Vec<_>>());
-        assert!(summary.all_named == 1.0 && summary.nothing_extra == 1.0, "{summary:?}");
+        assert!(
+            summary.all_named == 1.0 && summary.nothing_extra == 1.0 && summary.verdict_right == 1.0,
+            "{summary:?}"
+        );
         assert!(summary.parameters.iter().all(|a| a.median_error < 0.02 && a.covered == 1.0), "{summary:?}");
         assert!((summary.held_out_ratio.unwrap() - 1.0).abs() < 1e-9);
         // One who is always wrong is never believed.

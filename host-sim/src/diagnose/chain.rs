@@ -80,8 +80,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// From the electrodes to the stiffness; `levels_v` is room to work in.
-    pub fn respond(&self, signal: &mut Signal, levels_v: &mut Vec<f64>) {
+    /// From the electrodes to the stiffness, from `ahead_v` of where the lags would be at rest; `levels_v` is room to work in.
+    pub fn respond(&self, signal: &mut Signal, ahead_v: f64, levels_v: &mut Vec<f64>) {
         if self.relaxation.varies() {
             signal.middles(levels_v);
         }
@@ -104,6 +104,7 @@ impl<'a> Chain<'a> {
                 (piece.from - share * start, piece.to - share * end)
             });
         }
+        signal.before += ahead_v;
         self.relaxation.pass(signal, levels_v);
     }
 }

@@ -2,6 +2,8 @@
 
 use std::iter;
 
+use model::Plant;
+
 use crate::record::Record;
 use crate::schedule::{Between, Schedule};
 
@@ -29,6 +31,11 @@ const SHORTEST_STRETCH: usize = 3;
 const FEW_ROWS: usize = 200;
 const FEWEST_STAIRS: usize = 4;
 
+/// Fewest readings at rest that tell whether the spring is at rest too.
+const FEWEST_AT_REST: usize = 8;
+/// A decay so many standard deviations high is one, also where noise has a memory.
+const CLEAR: f64 = 20.0;
+
 /// The record, as every fit sees it.
 #[derive(Clone, Debug)]
 pub struct Data {
@@ -44,6 +51,10 @@ pub struct Data {
     pub full_scale_v: f64,
     /// Median time between rows, in s.
     pub sample_s: f64,
+    /// Readings are equally far apart.
+    pub even: bool,
+    /// The record begins in mid-course: how far the spring has come by then, its readings have to tell.
+    pub begun: bool,
     /// The fold that each row is held out in.
     pub fold: Vec<u8>,
     /// Number of folds.
@@ -71,15 +82,17 @@ impl Data {
         let mut gaps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         gaps.sort_by(f64::total_cmp);
         let sample_s = gaps.get(gaps.len() / 2).copied().unwrap_or(1.0);
-        // A record that begins under voltage begins settled, or at the moment of the step: its first reading tells.
-        let before = match (voltage_v.first(), reading.first()) {
-            (Some(&voltage), Some(&reading)) if (reading - voltage).abs() < (reading - 0.1 * voltage).abs() => voltage,
-            _ => 0.0,
-        };
+        let even =
+            gaps.last().zip(gaps.first()).is_some_and(|(longest, shortest)| longest - shortest < 0.01 * sample_s);
+        // A record that begins under voltage had it before, or begins at the moment of the step.
+        let (first_v, first) = (voltage_v.first().copied().unwrap_or(0.0), reading.first().copied().unwrap_or(0.0));
+        let stepped = first / first_v < 2.0 * Plant::PAPER.share;
+        let before = if stepped { 0.0 } else { first_v };
+        let begun = first_v != 0.0 || still_falling(&time_s, &voltage_v, &reading);
         let command = Signal::new(&schedule, &time_s, before);
         let fold = folds(&voltage_v);
         let folds = fold.iter().max().map_or(1, |&last| usize::from(last) + 1);
-        Self { time_s, voltage_v, reading, command, full_scale_v, sample_s, fold, folds }
+        Self { time_s, voltage_v, reading, command, full_scale_v, sample_s, even, begun, fold, folds }
     }
 
     /// Number of readings.
@@ -91,6 +104,24 @@ impl Data {
     pub fn duration_s(&self) -> f64 {
         self.time_s.last().unwrap_or(&0.0) - self.time_s.first().unwrap_or(&0.0)
     }
+}
+
+/// True if the readings at rest, before the first voltage, fall from another stiffness to their rest as the spring does.
+fn still_falling(time_s: &[f64], voltage_v: &[f64], reading: &[f64]) -> bool {
+    let rest = voltage_v.iter().take_while(|voltage| **voltage == 0.0).count();
+    if rest < FEWEST_AT_REST {
+        return false;
+    }
+    // Least squares on a constant and the spring's decay.
+    let decay: Vec<f64> =
+        time_s[..rest].iter().map(|time| (-(time - time_s[0]) / Plant::PAPER.time_constant_s).exp()).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / rest as f64;
+    let (mean_decay, mean_reading) = (mean(&decay), mean(&reading[..rest]));
+    let pairs = || decay.iter().zip(reading).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
+    let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
+    let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
+    let left: f64 = pairs().map(|(decay, reading)| (reading - height * decay).powi(2)).sum();
+    height.abs() > CLEAR * (left / rest as f64 / power).sqrt()
 }
 
 /// Which fold each row belongs to: whole stairs of a short record that has some, else stretches in turn.

@@ -31,14 +31,16 @@ pub struct Coordinate {
     pub lowest: f64,
     /// Largest value allowed.
     pub highest: f64,
-    /// False for what is found by search alone, such as the rows of a run.
+    /// False for what a fit cannot move.
     pub fitted: bool,
+    /// True for what is found by search alone, such as the rows of a run.
+    pub searched: bool,
 }
 
 impl Coordinate {
     /// One that the fit moves between two bounds.
     pub fn new(lowest: f64, highest: f64) -> Self {
-        Self { lowest, highest, fitted: true }
+        Self { lowest, highest, fitted: true, searched: false }
     }
 
     /// The logarithm of a quantity between two bounds.
@@ -46,9 +48,14 @@ impl Coordinate {
         Self::new(lowest.ln(), highest.ln())
     }
 
+    /// One that stays where a start has put it.
+    pub fn kept(lowest: f64, highest: f64) -> Self {
+        Self { fitted: false, ..Self::new(lowest, highest) }
+    }
+
     /// One that only [`Effect::polish`] moves.
     pub fn searched(lowest: f64, highest: f64) -> Self {
-        Self { lowest, highest, fitted: false }
+        Self { searched: true, ..Self::kept(lowest, highest) }
     }
 }
 

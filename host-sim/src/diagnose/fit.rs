@@ -10,6 +10,7 @@ use super::effect::Scene;
 use super::model::{Model, Simulator};
 use super::noise::{Noise, Term, scale};
 use super::observed::Observed;
+use super::start;
 
 /// A model with its points fitted.
 #[derive(Clone, Debug)]
@@ -57,10 +58,19 @@ impl<'a> Engine<'a> {
         Self { data, observed, simulator, predicted: Vec::new() }
     }
 
-    /// Readings less a model's prediction, in V.
+    /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
     pub fn residual(&mut self, model: &Model) -> Vec<f64> {
         self.simulator.run(model, &mut self.predicted);
-        self.data.reading.iter().zip(&self.predicted).map(|(reading, predicted)| reading - predicted).collect()
+        let left = |(reading, predicted): (&f64, &f64)| reading - predicted;
+        let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
+        if self.data.begun {
+            self.simulator.run_from(self.data.full_scale_v, model, &mut self.predicted);
+            let moved = self.data.reading.iter().zip(&self.predicted).map(left);
+            let kernel: Vec<f64> = residual.iter().zip(moved).map(|(here, there)| here - there).collect();
+            let ahead = start::likeliest(&residual, &kernel);
+            residual.iter_mut().zip(&kernel).for_each(|(left, kernel)| *left -= ahead * kernel);
+        }
+        residual
     }
 
     /// A model at the point that it has, with the noise that suits it.

@@ -10,6 +10,7 @@
 //! | [`chain`], [`bank`], [`law`] | command to stiffness: what a plant file says and effects change; runs and writes itself |
 //! | [`data`], [`observed`] | the record made ready; what its readings say before any model |
 //! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
+//! | `start` | how far the spring has come where a record begins in mid-course |
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
@@ -42,6 +43,7 @@ pub mod search;
 pub mod signal;
 pub mod spectrum;
 pub mod standing;
+mod start;
 pub mod text;
 
 pub use data::Input;

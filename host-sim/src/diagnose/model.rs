@@ -35,7 +35,7 @@ impl Block {
 
     /// True if a search alone can place it.
     pub fn searched(&self, data: &Data) -> bool {
-        self.coordinates(data).iter().any(|coordinate| !coordinate.fitted)
+        self.coordinates(data).iter().any(|coordinate| coordinate.searched)
     }
 }
 
@@ -155,12 +155,17 @@ impl<'a> Simulator<'a> {
 
     /// What a model predicts for each row, in V.
     pub fn run(&mut self, model: &Model, readings: &mut Vec<f64>) {
+        self.run_from(0.0, model, readings);
+    }
+
+    /// The same from lags that are `ahead_v` of where they would be at rest under the first voltage.
+    pub fn run_from(&mut self, ahead_v: f64, model: &Model, readings: &mut Vec<f64>) {
         self.runs += 1;
         let (data, signal) = (self.data, &mut self.signal);
         signal.clone_from(&data.command);
         let chain = model.chain(self.base, data);
         chain.amplify(signal);
-        chain.respond(signal, &mut self.levels_v);
+        chain.respond(signal, ahead_v, &mut self.levels_v);
         for (block, point) in &model.blocks {
             block.effect().respond(block.form, point, data, signal);
         }

@@ -127,6 +127,12 @@ impl Outcome {
         self.failure.is_none() && self.hidden.iter().all(|name| self.found.iter().any(|found| found == name))
     }
 
+    /// The verdict fits what is hidden: nothing, or something that has a name.
+    pub fn verdict_is_right(&self) -> bool {
+        let right: &[&str] = if self.hidden.is_empty() { &["consistent"] } else { &["explained", "ambiguous"] };
+        right.contains(&self.verdict.as_str())
+    }
+
     /// Nothing was found that isn't there.
     pub fn nothing_extra(&self) -> bool {
         self.failure.is_none() && self.found.iter().all(|found| self.hidden.contains(&found.as_str()))
@@ -171,7 +177,9 @@ mod tests {
         let (gain, _) = hidden.true_value(Cause::GainError, "gain").unwrap();
         let right = json!({"gain": {"value": gain * 1.02, "low": gain * 1.01, "high": gain * 1.03}});
         let outcome = Outcome::of(&hidden, &|_| Ok(report("gain-error", right.clone())));
-        assert!(outcome.first_is_right() && outcome.all_named() && outcome.nothing_extra());
+        assert!(
+            outcome.first_is_right() && outcome.all_named() && outcome.nothing_extra() && outcome.verdict_is_right()
+        );
         assert!((outcome.parameters[0].error - 0.02).abs() < 1e-9 && !outcome.parameters[0].covered);
         assert!((outcome.held_out_ratio.unwrap() - 1.0).abs() < 0.1);
 
@@ -180,7 +188,10 @@ mod tests {
         let outcome = Outcome::of(&hidden, &|_| Ok(report("gain-error", json!({}))));
         assert!(outcome.parameters[0].error.is_infinite(), "a parameter that is missing is no estimate");
         let outcome = Outcome::of(&hidden, &|_| anyhow::bail!("no"));
-        assert!(!outcome.all_named() && !outcome.nothing_extra() && outcome.verdict == "failed");
+        assert!(!outcome.all_named() && !outcome.nothing_extra() && !outcome.verdict_is_right());
+        let null = Recipe::of(&[]).draw(1);
+        let unsure = Outcome::of(&null, &|_| Ok(json!({"verdict": "unexplained", "findings": []})));
+        assert!(unsure.nothing_extra() && !unsure.verdict_is_right());
     }
 
     #[test]
@@ -190,5 +201,7 @@ mod tests {
         let curve = json!({"at_250_v": {"value": at, "low": at - 1.0, "high": at + 1.0}});
         let outcome = Outcome::of(&hidden, &|_| Ok(report("static-nonlinearity", curve.clone())));
         assert!(outcome.parameters[0].error < 1e-9 && outcome.parameters[0].covered);
+        let truth = hidden.effects[0].law().unwrap().at(99.8);
+        assert_eq!(hidden.true_value(Cause::StaticNonlinearity, "at_99.8_v"), Some((truth, truth)));
     }
 }

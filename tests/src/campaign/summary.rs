@@ -20,6 +20,8 @@ pub struct Summary {
     pub all_named: f64,
     /// No finding that isn't there, in parts of 1.
     pub nothing_extra: f64,
+    /// The verdict fits, in parts of 1.
+    pub verdict_right: f64,
     /// Ambiguous with the truth among the alternatives, in parts of 1.
     pub truth_among_alternatives: f64,
     /// Verdicts and their number.
@@ -78,6 +80,7 @@ impl Summary {
             first: share(Outcome::first_is_right),
             all_named: share(Outcome::all_named),
             nothing_extra: share(Outcome::nothing_extra),
+            verdict_right: share(Outcome::verdict_is_right),
             truth_among_alternatives: share(|outcome| outcome.truth_among_alternatives),
             verdicts,
             parameters: accuracies(outcomes),

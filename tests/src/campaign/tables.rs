@@ -39,6 +39,7 @@ pub fn named(what: &str, jobs: &[Job], outcomes: &[Outcome]) -> String {
             hidden(s.first),
             hidden(s.all_named),
             percent(s.nothing_extra),
+            percent(s.verdict_right),
             verdicts.join(", "),
             number(s.held_out_ratio),
             number(s.held_out_ratio_95),
@@ -52,6 +53,7 @@ pub fn named(what: &str, jobs: &[Job], outcomes: &[Outcome]) -> String {
             "first right",
             "all named",
             "nothing extra",
+            "verdict right",
             "verdicts",
             "error to floor",
             "95 %",
@@ -143,7 +145,7 @@ pub fn noise(climbs: &[Climb]) -> String {
 pub fn wrong(jobs: &[Job], outcomes: &[Outcome]) -> String {
     let mut text = String::new();
     for (job, outcome) in jobs.iter().zip(outcomes) {
-        if !outcome.all_named() || !outcome.nothing_extra() {
+        if !outcome.all_named() || !outcome.nothing_extra() || !outcome.verdict_is_right() {
             let Outcome { seed, hidden, verdict, found, failure, .. } = outcome;
             let found = failure.clone().unwrap_or_else(|| found.join(", "));
             let _ = writeln!(text, "{}, seed {seed}: hidden [{}], {verdict} [{found}]", job.group, hidden.join(", "));

@@ -12,7 +12,7 @@
 //! | charge leakage | share 0.08 to 0.3, 12 s to a third of the record (at most 60 s) |
 //! | drift | 5 to 20 % over the record, either way |
 //! | resonance | 0.04 to 0.25 of the sampling rate but at least 0.3 Hz, zeta 0.03 to 0.2 |
-//! | delay | 1.2 to 6 rows, at least 0.05 s |
+//! | delay | 1.2 to 6 rows, at least 0.05 s; or 1 to 6 whole rows (less 1 ns, so that rounding does not matter) |
 //! | amplifier limit | 60 to 93 % of full scale |
 //! | amplifier slew | 100 V take 3 to 15 rows |
 //! | sensor saturation | at 60 to 93 % of the largest stiffness |
@@ -64,6 +64,7 @@ impl Effect {
                 let lowest = (0.04 / every).max(0.3);
                 vec![between(lowest, (0.25 / every).max(1.2 * lowest)), between(0.03, 0.2), 1.0]
             }
+            Cause::Delay if between(0.0, 1.0) < 0.5 => vec![every * between(0.5, 6.5).round() - 1e-9],
             Cause::Delay => vec![(every * between(1.2, 6.0)).max(0.05)],
             Cause::AmplifierLimit => {
                 shrinking = vec![(0, full_v)];

@@ -53,7 +53,7 @@ impl Hidden {
     pub fn true_value(&self, cause: Cause, parameter: &str) -> Option<(f64, f64)> {
         let index = self.effects.iter().position(|effect| effect.cause == cause)?;
         if let Some(law) = self.effects[index].law() {
-            let volts = parameter.split(|c: char| !c.is_ascii_digit()).find_map(|digits| digits.parse::<f64>().ok())?;
+            let volts = parameter.strip_prefix("at_")?.strip_suffix("_v")?.parse().ok()?;
             let settled = law.at(volts);
             return (settled != 0.0).then_some((settled, settled));
         }

@@ -1,4 +1,8 @@
 //! The response starts late: `u(t) = command(t - delay)`.
+//!
+//! Of an even record, the rows see a jump of the command later by a whole row where the delay passes a multiple of their
+//! distance: there the prediction jumps, in between it is smooth. So the delay is whole rows, which a start chooses, and
+//! a part above 0 and up to 1 row, which a fit moves; a delay of whole rows, the usual one, is an end that it reaches.
 
 use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
@@ -8,6 +12,13 @@ pub(super) struct Delay;
 
 fn longest(data: &Data) -> f64 {
     (0.1 * data.duration_s()).max(2.0 * data.sample_s)
+}
+
+/// Whole rows, and what is left above 0, in s.
+fn split(data: &Data, delay_s: f64) -> Vec<f64> {
+    let rows = if data.even { (delay_s / data.sample_s - 1e-6).ceil() - 1.0 } else { 0.0 };
+    let whole = rows.max(0.0) * data.sample_s;
+    vec![whole, delay_s - whole]
 }
 
 impl Effect for Delay {
@@ -28,22 +39,27 @@ impl Effect for Delay {
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        vec![Coordinate::new(1e-3 * data.sample_s, longest(data))]
+        let most = if data.even { data.sample_s } else { longest(data) };
+        vec![Coordinate::kept(0.0, longest(data)), Coordinate::new(1e-3 * data.sample_s, most)]
     }
 
-    /// Between whole samples: a delay across one makes the prediction jump, and no fit gets over it.
     fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
-        let mut samples = 0.5;
+        let mut whole = 0.0;
         let mut starts = Vec::new();
-        while samples * data.sample_s < longest(data) {
-            starts.push(vec![samples * data.sample_s]);
-            samples += f64::max(1.0, (0.08 * samples).floor());
+        while whole * data.sample_s < longest(data) {
+            starts.extend([0.5, 1.0].map(|part| split(data, (whole + part) * data.sample_s)));
+            whole += f64::max(1.0, (0.08 * whole).floor());
         }
         starts
     }
 
+    /// As wholes and parts of this record's rows: it may come from one with fewer.
+    fn polish(&self, _: usize, point: &mut [f64], Scene { data, .. }: &Scene) {
+        point.copy_from_slice(&split(data, point[0] + point[1]));
+    }
+
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("delay_s", "s", point[0])]
+        vec![Quantity::new("delay_s", "s", point[0] + point[1])]
     }
 
     fn places(&self, data: &Data) -> f64 {
@@ -55,6 +71,6 @@ impl Effect for Delay {
     }
 
     fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        chain.delay_s += point[0];
+        chain.delay_s += point[0] + point[1];
     }
 }

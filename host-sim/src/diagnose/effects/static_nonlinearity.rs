@@ -86,14 +86,16 @@ impl Effect for StaticNonlinearity {
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        (1..=POINTS)
-            .map(|part| {
-                let x = f64::from(part) / f64::from(POINTS);
-                let voltage = x * data.full_scale_v;
-                let name = format!("at_{}_v", (voltage * 10.0).round() / 10.0);
-                Quantity::new(name, "V", voltage * secant(form, point, x))
-            })
-            .collect()
+        // At voltages of two digits' steps, so that the name says where exactly.
+        let step = data.full_scale_v / f64::from(POINTS);
+        let decimals = (1.0 - step.log10().floor()).clamp(-300.0, 300.0) as i32;
+        let unit = 10f64.powi(-decimals);
+        let at = |part: u32| {
+            let voltage = (step / unit).round() * unit * f64::from(part);
+            let name = format!("at_{voltage:.*}_v", decimals.max(0) as usize);
+            Quantity::new(name, "V", voltage * secant(form, point, voltage / data.full_scale_v))
+        };
+        (1..=POINTS).map(at).collect()
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
