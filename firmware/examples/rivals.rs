@@ -115,7 +115,7 @@ struct WholeTick {
 
 #[inline(never)]
 fn whole_tick(config: &Config, state: &mut State, target: Volts) -> Output {
-    config.tick(state, Input { target })
+    config.tick(state, Input { target, ..Input::default() })
 }
 
 impl Contender for WholeTick {

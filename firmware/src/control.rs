@@ -134,5 +134,5 @@ impl Control {
 /// The model's tick as one function: it is counted as it would be called.
 #[inline(never)]
 fn whole_tick(config: &Config, state: &mut State, target: Volts) -> Output {
-    config.tick(state, Input { target })
+    config.tick(state, Input { target, ..Input::default() })
 }

@@ -29,7 +29,7 @@ fn closed_loop(criterion: &mut Criterion) {
             let config = black_box(&config);
             let mut state = State::default();
             for (output, &target) in outputs.iter_mut().zip(black_box(&volts)) {
-                let now = config.tick(&mut state, Input { target });
+                let now = config.tick(&mut state, Input { target, ..Input::default() });
                 *output = (now.code.0, now.stiffness.0.to_bits());
             }
             black_box(&outputs);

@@ -125,7 +125,8 @@ fn one_loop<E: Estimator>(config: &Config<E>, targets: &[f64], mut progress: imp
             progress(tick);
         }
         let target = Volts::new(target).map_err(|error| BadInput(error.to_string()))?;
-        let Output { code, applied, stiffness, limits, .. } = config.tick(&mut state, Input { target });
+        let Output { code, applied, stiffness, limits, .. } =
+            config.tick(&mut state, Input { target, ..Input::default() });
         samples.push(Sample { code, applied, stiffness, limits, reference: 0.0 });
     }
     Ok(samples)

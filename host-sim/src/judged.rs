@@ -84,8 +84,8 @@ impl Judged for ExtendedPlant<'_> {
 
 /// The settings with another spring.
 pub fn with_plant<P, Q>(settings: &Settings<P>, plant: Q) -> Settings<Q> {
-    let Settings { rate_hz, compensation, amplifier, .. } = *settings;
-    Settings { rate_hz, plant, compensation, amplifier }
+    let Settings { rate_hz, compensation, amplifier, feedback, .. } = *settings;
+    Settings { rate_hz, plant, compensation, amplifier, feedback }
 }
 
 /// The settings as the reference takes them; the target is put out as it is where it cannot be led by gains.

@@ -117,7 +117,7 @@ impl Worst {
 fn disagreement(file: &PlantFile, rate_hz: f64) -> Worst {
     let of = |compensation, dac_bits, told| {
         let amplifier = Amplifier { dac_bits, ..Amplifier::PAPER };
-        of_loop(&Settings { rate_hz, plant: file.extended(), compensation, amplifier }, told)
+        of_loop(&Settings { rate_hz, plant: file.extended(), compensation, amplifier, feedback: None }, told)
     };
     let paper = Settings::PAPER.compensation;
     Worst {
@@ -136,7 +136,7 @@ fn of_loop(settings: &Settings<ExtendedPlant<'_>>, told: bool) -> f64 {
     for to in STAIR {
         for tick in 0..(6.0 * settings.rate_hz) as u32 {
             let target = from + (to - from) * (f64::from(tick) / (0.1 * settings.rate_hz)).min(1.0);
-            let output = config.tick(&mut fixed, Input { target: Volts::new(target).unwrap() });
+            let output = config.tick(&mut fixed, Input { target: Volts::new(target).unwrap(), ..Input::default() });
             let voltage = double.drive(&mut state, target);
             let stiffness = double.apply(&mut state, if told { output.applied.to_f64() } else { voltage });
             off = off.max((output.stiffness.to_f64() - stiffness).abs());

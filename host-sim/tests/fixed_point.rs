@@ -49,13 +49,13 @@ prop_compose! {
         let gains = Gains { proportional: 10f64.powf(proportional), integral_per_s: 10f64.powf(integral) };
         let plant = Plant { share, time_constant_s: 10f64.powf(time_constant) };
         let compensation = Compensation::ProportionalIntegral(gains);
-        Case { settings: Settings { rate_hz: 10f64.powf(rate), plant, compensation, amplifier }, stair }
+        Case { settings: Settings { rate_hz: 10f64.powf(rate), plant, compensation, amplifier, feedback: None }, stair }
     }
 }
 
 /// Largest differences of stiffness and voltage, in V; `None` if the settings are refused.
 fn disagreement(case: &Case) -> Option<(f64, f64)> {
-    let Settings { rate_hz, plant, compensation, amplifier } = case.settings;
+    let Settings { rate_hz, plant, compensation, amplifier, .. } = case.settings;
     let config = case.settings.check().ok()?;
     let Compensation::ProportionalIntegral(gains) = compensation else { return None };
     let (lowest, highest) = config.range();
@@ -72,7 +72,7 @@ fn disagreement(case: &Case) -> Option<(f64, f64)> {
     for &(level, ticks) in &case.stair {
         let target = Volts::new(range_v.0 + level * (range_v.1 - range_v.0)).ok()?;
         for _ in 0..ticks {
-            let output = config.tick(&mut fixed, Input { target });
+            let output = config.tick(&mut fixed, Input { target, ..Input::default() });
             let voltage = double.drive(&mut state, target.to_f64());
             let applied = output.applied.to_f64();
             let rounding = (applied - voltage).abs() / amplifier.volts_per_code();

@@ -7,6 +7,7 @@
 use crate::amplifier::{self, Amplifier, Limits};
 use crate::error::OutOfRange;
 use crate::estimator::{self, Estimator, Model, Plant};
+use crate::feedback::{self, Feedback, Reading, Sensor};
 use crate::pre_compensator::{self, Gains, ProportionalIntegral};
 use crate::time_optimal::{self, Approach, TimeOptimal};
 use crate::units::{DacCode, SampleTime, ScaledStiffness, Volts};
@@ -22,6 +23,8 @@ pub struct Settings<P = Plant> {
     pub compensation: Compensation,
     /// The amplifier and its limits.
     pub amplifier: Amplifier,
+    /// A stiffness sensor that corrects the estimate.
+    pub feedback: Option<Feedback>,
 }
 
 /// Which pre-compensator, in SI units.
@@ -42,6 +45,7 @@ impl Settings {
         plant: Plant::PAPER,
         compensation: Compensation::ProportionalIntegral(Gains::PAPER),
         amplifier: Amplifier::PAPER,
+        feedback: None,
     };
 }
 
@@ -65,7 +69,11 @@ impl<P: Model> Settings<P> {
                 PreCompensator::TimeOptimal(TimeOptimal::new(approach, inverse, sample_time)?)
             }
         };
-        Ok(Config { estimator, pre_compensator, amplifier })
+        let feedback = match &self.feedback {
+            None => None,
+            Some(feedback) => Some(feedback::Config::new(feedback, sample_time)?),
+        };
+        Ok(Config { estimator, pre_compensator, amplifier, feedback })
     }
 }
 
@@ -86,6 +94,7 @@ pub struct Config<E: Estimator = estimator::Config> {
     estimator: E,
     pre_compensator: PreCompensator<E::Inverse>,
     amplifier: amplifier::Config,
+    feedback: Option<feedback::Config>,
 }
 
 /// What the controller remembers from tick to tick; the default is a spring at rest without voltage.
@@ -95,6 +104,14 @@ pub struct State<S = estimator::State> {
     pre_compensator: pre_compensator::State,
     time_optimal: time_optimal::State,
     amplifier: amplifier::State,
+    feedback: feedback::State,
+}
+
+impl<S> State<S> {
+    /// What the sensor adds to the model, in V.
+    pub fn correction(&self) -> ScaledStiffness {
+        self.feedback.correction()
+    }
 }
 
 /// What a tick is told.
@@ -102,6 +119,8 @@ pub struct State<S = estimator::State> {
 pub struct Input {
     /// Static voltage of the desired stiffness.
     pub target: Volts,
+    /// What the stiffness sensor said last; nobody asks for it without [`Settings::feedback`].
+    pub measured: Option<Reading>,
 }
 
 /// What a tick says.
@@ -115,10 +134,12 @@ pub struct Output {
     pub code: DacCode,
     /// The voltage that `code` stands for.
     pub applied: Volts,
-    /// Stiffness with `applied` just put across the spring.
+    /// Stiffness with `applied` just put across the spring, as the model says and the sensor corrects.
     pub stiffness: ScaledStiffness,
     /// The limits that acted.
     pub limits: Limits,
+    /// Whether the stiffness sensor is trusted.
+    pub sensor: Sensor,
 }
 
 impl<E: Estimator> Config<E> {
@@ -131,23 +152,34 @@ impl<E: Estimator> Config<E> {
     #[inline(always)]
     pub fn tick(&self, state: &mut State<E::State>, input: Input) -> Output {
         let (target, moved) = self.amplifier.reachable(input.target);
+        let pursued = match &self.feedback {
+            None => target,
+            Some(feedback) => {
+                let corrected = feedback.hear(&mut state.feedback, target, input.measured);
+                self.amplifier.reachable(corrected).0
+            }
+        };
         let wanted = match &self.pre_compensator {
-            PreCompensator::None => target,
+            PreCompensator::None => pursued,
             PreCompensator::ProportionalIntegral(it) => {
-                it.voltage(&state.pre_compensator, target, self.estimator.pivot(&state.estimator))
+                it.voltage(&state.pre_compensator, pursued, self.estimator.pivot(&state.estimator))
             }
             PreCompensator::TimeOptimal(it) => {
                 let applied = self.amplifier.applied(&state.amplifier);
-                it.voltage(&mut state.time_optimal, target, &self.estimator, &state.estimator, applied)
+                it.voltage(&mut state.time_optimal, pursued, &self.estimator, &state.estimator, applied)
             }
         };
         let drive = self.amplifier.drive(&mut state.amplifier, wanted);
-        let stiffness = self.estimator.run(&mut state.estimator, drive.applied);
+        let model = self.estimator.run(&mut state.estimator, drive.applied);
         if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
             it.track(&mut state.pre_compensator, drive.voltage);
         }
+        let (stiffness, sensor) = match &self.feedback {
+            None => (model, Sensor::None),
+            Some(feedback) => (feedback.correct(&mut state.feedback, model), state.feedback.sensor()),
+        };
         let limits = drive.limits.with(Limits::TARGET, moved);
-        Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits }
+        Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits, sensor }
     }
 
     /// Takes over a running `state` without a bump: with the same `target`, the next voltage is the last one.
@@ -155,7 +187,9 @@ impl<E: Estimator> Config<E> {
     /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once, and
     /// without a pre-compensator the voltage goes to the target.
     pub fn adopt(&self, state: &mut State<E::State>, target: Volts) {
+        state.feedback.adopted_by(self.feedback.as_ref());
         let (target, _) = self.amplifier.reachable(target);
+        let (target, _) = self.amplifier.reachable(state.feedback.corrected(target));
         match &self.pre_compensator {
             PreCompensator::None => (),
             PreCompensator::ProportionalIntegral(it) => {

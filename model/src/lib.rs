@@ -6,8 +6,10 @@
 //!
 //! ```text
 //! target [V] -> pre-compensator -> amplifier limits -> DAC code
-//!                      ^                     |
-//!                      +---- estimator <-----+   (runs on the voltage really applied)
+//!      ^               ^                     |
+//!      |               +---- estimator <-----+   (runs on the voltage really applied)
+//!      +-- correction <------+
+//!               ^ measured stiffness, if there is a sensor
 //! ```
 //!
 //! A desired stiffness in Pa or N/m becomes a target in volts off the hot path, in [`stiffness`].
@@ -19,6 +21,7 @@
 //! | [`extended`] | the same for a spring with hysteresis, a static law, leakage and several relaxations |
 //! | [`pre_compensator`] | proportional-integral drive past the target and back |
 //! | [`time_optimal`] | the same, as fast as the amplifier allows |
+//! | [`feedback`] | a stiffness sensor that corrects the estimate, and when it is not believed |
 //! | [`amplifier`] | range, slew, rounding to a DAC code, and back to volts |
 //! | [`controller`] | the four in one tick; settings in SI, checked once |
 //! | [`supervisor`] | whether a voltage may leave at all |
@@ -35,6 +38,7 @@ pub mod controller;
 pub mod error;
 pub mod estimator;
 pub mod extended;
+pub mod feedback;
 pub mod pre_compensator;
 pub mod stiffness;
 pub mod supervisor;
@@ -46,6 +50,7 @@ pub use controller::{Compensation, Config, Input, Output, Settings, State};
 pub use error::OutOfRange;
 pub use estimator::Plant;
 pub use extended::ExtendedPlant;
+pub use feedback::{Feedback, Reading, Sensor};
 pub use pre_compensator::Gains;
 pub use stiffness::Spring;
 pub use time_optimal::Approach;

@@ -8,7 +8,7 @@ fn gains(proportional: f64, integral_per_s: f64) -> Compensation {
 }
 
 fn run(config: &Config, state: &mut State, target_v: f64, ticks: u32) -> Output {
-    let input = Input { target: Volts::new(target_v).unwrap() };
+    let input = Input { target: Volts::new(target_v).unwrap(), ..Input::default() };
     let mut output = config.tick(state, input);
     for _ in 1..ticks {
         output = config.tick(state, input);
@@ -24,7 +24,7 @@ fn ten_million_ticks_stay_within_one_code() {
     let mut state = State::default();
     let target = 333.3;
     run(&config, &mut state, target, 1_000_000);
-    let input = Input { target: Volts::new(target).unwrap() };
+    let input = Input { target: Volts::new(target).unwrap(), ..Input::default() };
     let (mut lowest, mut highest, mut sum) = (u16::MAX, 0, 0.0);
     for _ in 0..10_000_000 {
         let output = config.tick(&mut state, input);
@@ -128,6 +128,7 @@ proptest! {
                     dac_bits,
                     ..Amplifier::up_to(full_scale_v)
                 },
+                feedback: None,
             };
             let Ok(config) = settings.check() else { continue };
             let (lowest, highest) = config.range();

@@ -32,8 +32,8 @@ const PLAIN: ExtendedPlant<'_> = ExtendedPlant {
 type Running = State<extended::State>;
 
 fn settings<P: Model>(plant: P) -> Settings<P> {
-    let Settings { rate_hz, compensation, amplifier, .. } = Settings::PAPER;
-    Settings { rate_hz, plant, compensation, amplifier }
+    let Settings { rate_hz, compensation, amplifier, feedback, .. } = Settings::PAPER;
+    Settings { rate_hz, plant, compensation, amplifier, feedback }
 }
 
 fn gains(proportional: f64, integral_per_s: f64) -> Compensation {
@@ -41,7 +41,7 @@ fn gains(proportional: f64, integral_per_s: f64) -> Compensation {
 }
 
 fn run(config: &Config<extended::Config>, state: &mut Running, target_v: f64, ticks: u32) -> model::Output {
-    let input = Input { target: Volts::new(target_v).unwrap() };
+    let input = Input { target: Volts::new(target_v).unwrap(), ..Input::default() };
     let mut output = config.tick(state, input);
     for _ in 1..ticks {
         output = config.tick(state, input);
@@ -58,7 +58,7 @@ fn nothing_extended_is_the_plain_spring() {
     let (mut state, mut other) = (State::default(), Running::default());
     for target_v in [100.0, 500.0, 333.3, 0.0] {
         for _ in 0..5000 {
-            let input = Input { target: Volts::new(target_v).unwrap() };
+            let input = Input { target: Volts::new(target_v).unwrap(), ..Input::default() };
             let (one, two) = (plain.tick(&mut state, input), extended.tick(&mut other, input));
             let off = (one.stiffness.to_f64() - two.stiffness.to_f64()).abs();
             // One code of 0.17 V, where both are half-way between two.

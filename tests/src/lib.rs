@@ -1,6 +1,8 @@
-//! Helpers of the end-to-end tests, and the campaign that hides effects in records and asks for their names.
+//! Helpers of the end-to-end tests, the campaign that hides effects in records and asks for their names, and the loop that
+//! a controller closes around a spring with a hidden effect.
 
 pub mod campaign;
+pub mod closed_loop;
 pub mod defmt;
 pub mod hidden;
 pub mod vsj;

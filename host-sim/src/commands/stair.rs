@@ -121,6 +121,7 @@ impl Arguments {
                 dac_bits: self.dac_bits,
                 ..Amplifier::up_to(self.limit_v)
             },
+            feedback: None,
         }
     }
 

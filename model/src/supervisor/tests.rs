@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::amplifier::Limits;
+use crate::feedback::Sensor;
 use crate::units::ScaledStiffness;
 use proptest::prelude::*;
 
@@ -37,6 +38,7 @@ fn output(applied_v: f64) -> Output {
         applied,
         stiffness: ScaledStiffness::default(),
         limits: Limits::NONE,
+        sensor: Sensor::None,
     }
 }
 

@@ -26,7 +26,8 @@ impl Aim {
         Self { what: what.into(), low, high: f64::INFINITY, found }
     }
 
-    fn at_most(what: impl Into<String>, high: f64, found: f64) -> Self {
+    /// Found at most `high`.
+    pub fn at_most(what: impl Into<String>, high: f64, found: f64) -> Self {
         Self { what: what.into(), low: f64::NEG_INFINITY, high, found }
     }
 

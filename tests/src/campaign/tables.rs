@@ -9,7 +9,7 @@ use super::summary::{Accuracy, Summary};
 use crate::hidden::Cause;
 
 /// A table: header, then rows.
-fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
     let owned: Vec<String> = header.iter().map(|&cell| cell.to_owned()).collect();
     let rule: Vec<String> = header.iter().map(|_| "---".to_owned()).collect();

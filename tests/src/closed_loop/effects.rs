@@ -1,0 +1,109 @@
+//! Every hidden effect in closed loop, with a sensor and without.
+
+use model::{OutOfRange, Sensor, Settings};
+use rayon::prelude::*;
+
+use super::run::{Sample, Scene, fresh};
+use super::stair::{self, Step};
+use crate::hidden::Cause;
+
+/// What became of an effect, over all its seeds.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// None: the paper's spring.
+    pub cause: Option<Cause>,
+    /// Without a sensor.
+    pub without: Figures,
+    /// With one.
+    pub with: Figures,
+    /// What part of the time it was trusted.
+    pub trusted: f64,
+}
+
+/// Of one way to run the loop, over all steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figures {
+    /// Root mean square of the steps' steady errors, in V.
+    pub steady_v: f64,
+    /// Median over the steps of 100 V upward, in s; none if most of them never get to 97 %.
+    pub t97_s: Option<f64>,
+    /// Largest overshoot of these, in percent.
+    pub overshoot_percent: f64,
+}
+
+/// No effect, then one after the other.
+///
+/// # Errors
+/// Settings that the model refuses.
+pub fn all(settings: &Settings, seeds: u64, first_seed: u64) -> Result<Vec<Outcome>, OutOfRange> {
+    let causes: Vec<_> = std::iter::once(None).chain(Cause::ALL.map(Some)).collect();
+    causes.par_iter().map(|&cause| one(settings, cause, first_seed..first_seed + seeds)).collect()
+}
+
+/// One effect; `None`: none.
+///
+/// # Errors
+/// Settings that the model refuses.
+pub fn one(settings: &Settings, cause: Option<Cause>, seeds: std::ops::Range<u64>) -> Result<Outcome, OutOfRange> {
+    let alone = Settings { feedback: None, ..*settings };
+    let (mut without, mut with, mut trusted) = (Vec::new(), Vec::new(), 0);
+    let mut ticks = 0;
+    for seed in seeds {
+        let scene = cause.map_or_else(|| Scene::nothing(seed), |cause| Scene::of(cause, seed));
+        without.extend(steps(&scene.run(&alone, |_, _| None)?, settings.rate_hz));
+        let run = scene.run(settings, |_, read| fresh(read))?;
+        with.extend(steps(&run, settings.rate_hz));
+        trusted += run.iter().filter(|sample| sample.sensor == Sensor::Trusted).count();
+        ticks += run.len();
+    }
+    let trusted = trusted as f64 / ticks as f64;
+    Ok(Outcome { cause, without: Figures::of(&without), with: Figures::of(&with), trusted })
+}
+
+fn steps(run: &[Sample], rate_hz: f64) -> Vec<Step> {
+    stair::steps(&run.iter().map(|sample| sample.truth).collect::<Vec<_>>(), rate_hz)
+}
+
+impl Figures {
+    fn of(steps: &[Step]) -> Self {
+        let mean_square = steps.iter().map(|step| step.steady_v.powi(2)).sum::<f64>() / steps.len() as f64;
+        let up: Vec<_> = steps.iter().filter(|step| step.up).collect();
+        let mut times: Vec<f64> = up.iter().map(|step| step.t97_s.unwrap_or(f64::INFINITY)).collect();
+        times.sort_by(f64::total_cmp);
+        Self {
+            steady_v: mean_square.sqrt(),
+            t97_s: Some(times[times.len() / 2]).filter(|time| time.is_finite()),
+            overshoot_percent: up.iter().map(|step| step.overshoot_percent).fold(0.0, f64::max),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tables::MADE_GOOD;
+    use super::*;
+    use model::{Amplifier, Approach, Compensation, Feedback};
+
+    /// Whatever the model gets wrong of the static stiffness: with a sensor it is right to within the noise.
+    #[test]
+    fn a_sensor_makes_a_wrong_model_good() {
+        let fast = Settings {
+            compensation: Compensation::TimeOptimal(Approach::DEAD_BEAT),
+            amplifier: Amplifier::up_to(1000.0),
+            feedback: Some(Feedback::TYPICAL),
+            ..Settings::PAPER
+        };
+        let noise_v = Feedback::TYPICAL.noise_v;
+        for cause in MADE_GOOD {
+            let Outcome { without, with, trusted, .. } = one(&fast, Some(cause), 21..22).unwrap();
+            assert!(without.steady_v > 3.0 * noise_v, "{cause} does nothing: {without:?}");
+            assert!(with.steady_v < noise_v, "{cause}: {with:?}, without {without:?}");
+            assert!(trusted > 0.99, "{cause} is taken for a fault of the sensor: {trusted}");
+        }
+        // What excites itself is calmed.
+        for cause in [Cause::Resonance, Cause::Delay] {
+            let with = one(&fast, Some(cause), 21..22).unwrap().with;
+            assert!(with.steady_v < noise_v, "{cause}: {with:?}");
+        }
+    }
+}
