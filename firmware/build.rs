@@ -15,7 +15,8 @@ fn main() {
         (true, false) => "0x08000000",
         (false, true) => "0x00000000",
     };
-    fs::write(out.join("flash.x"), format!("MEMORY {{ FLASH : ORIGIN = {flash}, LENGTH = 512K }}\n")).unwrap();
+    // The last two pages of 512 KB are the store's.
+    fs::write(out.join("flash.x"), format!("MEMORY {{ FLASH : ORIGIN = {flash}, LENGTH = 508K }}\n")).unwrap();
     // link.x includes the work tree's memory.x by its bare name.
     let memory = package.join("../memory.x");
     fs::copy(&memory, out.join("memory.x")).unwrap_or_else(|e| panic!("cannot copy {}: {e}", memory.display()));

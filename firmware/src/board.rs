@@ -3,6 +3,7 @@
 //! A board also has a `kill()` of its own, outside of this trait because a panic has no board in its hands: zero volts and
 //! amplifier off, by register, from any context, even before anything is set up.
 
+use model::Volts;
 use model::supervisor::{Drive, Monitors};
 
 /// Where the voltage goes. A simulated plant can stand behind it as well as a converter.
@@ -12,6 +13,11 @@ pub trait Amplifier {
 
     /// The amplifier's own view of the last tick; `None` without monitors.
     fn monitors(&mut self) -> Option<Monitors> {
+        None
+    }
+
+    /// What the spring's stiffness sensor read since the last tick, on the scale of volts; `None` without sensor.
+    fn measured(&mut self) -> Option<Volts> {
         None
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! Pure: no clock, no pin, no log. The same bits on the host and on the MCU.
 
+use link::WireModel;
+use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Command, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
-use model::{Compensation, Config, Input, OutOfRange, Output, SampleTime, Settings, State, Volts};
+use model::{Config, Input, OutOfRange, Output, SampleTime, Settings, State, Volts, estimator, extended};
 
 /// What the host ordered since the last tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,6 +29,8 @@ pub struct Senses {
     pub monitors: Option<Monitors>,
     /// A fault that somebody else found.
     pub fault: Option<Fault>,
+    /// The stiffness sensor's reading, on the scale of volts.
+    pub measured: Option<Volts>,
 }
 
 /// What a tick says.
@@ -36,6 +40,8 @@ pub struct Tick {
     pub drive: Drive,
     /// The controller's view, zero volts while nothing may leave.
     pub output: Output,
+    /// The reading that came before it.
+    pub measured: Option<Volts>,
 }
 
 /// Looks at a clock before and after the model's tick.
@@ -60,13 +66,24 @@ impl Stopwatch for Untimed {
 /// Controller and supervisor with all that they remember.
 #[derive(Clone, Debug)]
 pub struct Control {
-    config: Config,
-    /// The same spring at zero volts at once, whatever slew and range: the amplifier is off.
-    rest: Config,
-    state: State,
+    spring: Spring,
     supervisor: Supervisor,
     target: Volts,
     ticks_since_host: u32,
+}
+
+/// The controller for either kind of spring: the plain one's tick is the leaner.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is no heap, and only one")]
+enum Spring {
+    Plain(Loop<estimator::Config>),
+    Extended(Loop<extended::Config>),
+}
+
+#[derive(Clone, Debug)]
+struct Loop<E: Estimator> {
+    config: Config<E>,
+    state: State<E::State>,
 }
 
 impl Control {
@@ -79,16 +96,51 @@ impl Control {
         supervision: &supervisor::Settings,
         last_fault: Option<Fault>,
     ) -> Result<Self, OutOfRange> {
-        let amplifier = model::Amplifier { min_v: 0.0, slew_v_per_s: None, ..settings.amplifier };
-        let rest = Settings { compensation: Compensation::None, amplifier, ..*settings };
         Ok(Self {
-            config: settings.check()?,
-            rest: rest.check()?,
-            state: State::default(),
+            spring: Spring::Plain(Loop { config: config(settings)?, state: State::default() }),
             supervisor: Supervisor::new(supervision.check(SampleTime::from_rate(settings.rate_hz)?)?, last_fault),
             target: Volts::ZERO,
             ticks_since_host: u32::MAX,
         })
+    }
+
+    /// Before the first tick: `found` replaces the settings' spring, and what its amplifier cannot do counts.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names what is wrong with it; then the spring stays.
+    pub fn take_on(&mut self, settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
+        let Settings { rate_hz, compensation, feedback, .. } = *settings;
+        let (plant, amplifier) = (found.plant(), found.behind(settings.amplifier));
+        // In place, and one copy at a time: the stack is small.
+        match plant.plain() {
+            Some(plant) => {
+                let config = config(&Settings { rate_hz, plant, compensation, amplifier, feedback })?;
+                self.spring = Spring::Plain(Loop { config, state: State::default() });
+            }
+            None => {
+                let config = config(&Settings { rate_hz, plant, compensation, amplifier, feedback })?;
+                self.spring = Spring::Extended(Loop { config, state: State::default() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a controller can be built for this model.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names what is wrong with it.
+    pub fn check(settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
+        let Settings { rate_hz, compensation, feedback, .. } = *settings;
+        let (plant, amplifier) = (found.plant(), found.behind(settings.amplifier));
+        match plant.plain() {
+            Some(plant) => config(&Settings { rate_hz, plant, compensation, amplifier, feedback }).map(drop),
+            None => config(&Settings { rate_hz, plant, compensation, amplifier, feedback }).map(drop),
+        }
+    }
+
+    /// Before the first tick: nothing may leave until this is acknowledged.
+    pub fn fault(&mut self, fault: Fault) {
+        self.supervisor.fail(fault);
     }
 
     /// The supervisor, for logs and answers to the host.
@@ -110,16 +162,26 @@ impl Control {
             monitors: senses.monitors,
             fault: senses.fault,
         });
-        let output = match decision {
-            Decision::Rest => whole_tick(&self.rest, &mut self.state, Volts::ZERO),
+        let output = match &mut self.spring {
+            Spring::Plain(spring) => spring.follow(decision, stopwatch),
+            Spring::Extended(spring) => spring.follow(decision, stopwatch),
+        };
+        Tick { drive: self.supervisor.release(&output), output, measured: senses.measured }
+    }
+}
+
+impl<E: Estimator> Loop<E> {
+    #[inline(always)]
+    fn follow(&mut self, decision: Decision, stopwatch: &mut impl Stopwatch) -> Output {
+        match decision {
+            Decision::Rest => self.config.rest(&mut self.state),
             Decision::Start(target) => {
                 // From zero volts, as if zero had been asked for until now.
                 self.config.adopt(&mut self.state, Volts::ZERO);
                 self.timed(target, stopwatch)
             }
             Decision::Pursue(target) => self.timed(target, stopwatch),
-        };
-        Tick { drive: self.supervisor.release(&output), output }
+        }
     }
 
     #[inline(always)]
@@ -131,8 +193,14 @@ impl Control {
     }
 }
 
+/// Not inlined: what it needs on the stack is not to stay there.
+#[inline(never)]
+fn config<P: Model>(settings: &Settings<P>) -> Result<Config<P::Config>, OutOfRange> {
+    settings.check()
+}
+
 /// The model's tick as one function: it is counted as it would be called.
 #[inline(never)]
-fn whole_tick(config: &Config, state: &mut State, target: Volts) -> Output {
+pub(crate) fn whole_tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, target: Volts) -> Output {
     config.tick(state, Input { target, ..Input::default() })
 }

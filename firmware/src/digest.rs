@@ -1,5 +1,7 @@
 //! One number for a whole run: FNV-1a, 64 bits, over every DAC code and every estimate, little end first.
 
+use model::Output;
+
 use crate::control::Tick;
 
 /// The digest so far.
@@ -17,6 +19,12 @@ impl Digest {
     pub fn add(&mut self, tick: &Tick) {
         self.bytes(&tick.drive.code().0.to_le_bytes());
         self.bytes(&tick.output.stiffness.0.to_bits().to_le_bytes());
+    }
+
+    /// The same of a controller alone.
+    pub fn add_output(&mut self, output: &Output) {
+        self.bytes(&output.code.0.to_le_bytes());
+        self.bytes(&output.stiffness.0.to_bits().to_le_bytes());
     }
 
     /// The number.

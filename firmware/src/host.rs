@@ -7,18 +7,21 @@ use cortex_m::singleton;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, with_timeout};
+use embassy_time::{Duration, Timer, with_timeout};
 use link::reply::Firmware;
-use link::{About, Desk, Step, Telemetry, View};
+use link::{About, Desk, Keep, ModelId, Reason, Step, Telemetry, View};
 use model::stiffness::{Cantilever, YoungsModulus};
-use model::supervisor::{Fault, State};
+use model::supervisor::State;
 use model::{OutOfRange, Spring};
 
 use crate::RATE_HZ;
 use crate::control::{Control, Orders, Tick};
 use crate::post::{Letter, Post};
 use crate::roll_call::Member;
-use crate::script::{SETTINGS, SUPERVISION};
+use crate::script::SUPERVISION;
+use crate::start::{self, Start};
+use crate::stop;
+use crate::store::{Pages, Store};
 use crate::tasks::{ROLL_CALL, Source};
 
 /// Longest wait for a byte: so often is looked whether telemetry is due.
@@ -30,6 +33,11 @@ const SPEAK: Duration = Duration::from_millis(20);
 static POST: Mutex<CriticalSectionRawMutex, Cell<Post>> = Mutex::new(Cell::new(Post::EMPTY));
 /// The view of the tick that took an order out.
 static DONE: Signal<CriticalSectionRawMutex, View> = Signal::new();
+
+/// For the store of models.
+static KEEP: Mutex<CriticalSectionRawMutex, Cell<Option<Keep>>> = Mutex::new(Cell::new(None));
+/// What came of it.
+static KEPT: Signal<CriticalSectionRawMutex, Result<Option<ModelId>, Reason>> = Signal::new();
 
 fn with_post<T>(work: impl FnOnce(&mut Post) -> T) -> T {
     POST.lock(|cell| {
@@ -67,6 +75,18 @@ pub async fn talk(line: &mut impl Line, desk: &mut Desk) -> ! {
                     let after = hand_over(Letter { order, made_in: view.state }, heard).await;
                     say(line, desk.settle(&after)).await;
                 }
+                Some(Step::Keep(keep)) => {
+                    KEPT.reset();
+                    KEEP.lock(|cell| cell.set(Some(keep)));
+                    let kept = KEPT.wait().await;
+                    say(line, desk.kept(kept, &view)).await;
+                }
+                Some(Step::Restart(bytes)) => {
+                    say(line, bytes).await;
+                    // Until the last bytes have left.
+                    Timer::after(SPEAK).await;
+                    stop::restart()
+                }
             }
             if desk.take_heard() {
                 with_post(|post| post.hear(true));
@@ -78,6 +98,16 @@ pub async fn talk(line: &mut impl Line, desk: &mut Desk) -> ! {
             say(line, bytes).await;
         }
     }
+}
+
+/// Keeps what the host's task wants kept. The thread below all tasks does it, again and again: erasing takes long, and
+/// checking a model takes a deep stack.
+pub fn keep<P: Pages>(store: &mut Store<P>) {
+    let Some(keep) = KEEP.lock(Cell::take) else { return };
+    KEPT.signal(match keep {
+        Keep::Part(number, bytes) => store.part(number, &bytes).map(|()| None),
+        Keep::End { length, checksum } => store.end(length, checksum, start::check).map(Some),
+    });
 }
 
 async fn say(line: &mut impl Line, bytes: &[u8]) {
@@ -96,14 +126,14 @@ async fn hand_over(letter: Letter, heard: bool) -> View {
     DONE.wait().await
 }
 
-/// The desk, for the settings of [`crate::script`]; `None` if somebody has it already. Not inlined: what it needs on the
+/// The desk; `None` if somebody has it already. Not inlined: what it needs on the
 /// stack is not to stay there.
 ///
 /// # Errors
 /// [`OutOfRange`] names the setting.
 #[inline(never)]
-pub fn desk(last_fault: Option<Fault>) -> Result<Option<&'static mut Desk>, OutOfRange> {
-    let amplifier = SETTINGS.amplifier;
+pub fn desk(start: &Start) -> Result<Option<&'static mut Desk>, OutOfRange> {
+    let amplifier = &start.amplifier;
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, amplifier.min_v, amplifier.max_v)?;
     let part = |text: &str| text.parse().unwrap_or(0);
     let revision = env!("GIT_REVISION").get(..8).and_then(|digits| u32::from_str_radix(digits, 16).ok());
@@ -117,7 +147,8 @@ pub fn desk(last_fault: Option<Fault>) -> Result<Option<&'static mut Desk>, OutO
         firmware,
         rate_hz: RATE_HZ,
         silence_limit_ticks: (SUPERVISION.host_timeout_s * f64::from(RATE_HZ)) as u32,
-        last_fault: last_fault.map_or(link::Fault::NONE, link::Fault::from),
+        last_fault: start.last_fault.map_or(link::Fault::NONE, link::Fault::from),
+        model: start.model,
     };
     Ok(singleton!(: Desk = Desk::new(spring, about)))
 }
@@ -155,7 +186,7 @@ impl Source for Host {
             target: output.target.into(),
             applied: output.applied.into(),
             estimate: output.stiffness.into(),
-            measured: None,
+            measured: tick.measured.map(Into::into),
             code: tick.drive.code().0,
             limits: supervisor.limits(output).bits(),
         };

@@ -14,6 +14,8 @@ use model::supervisor::Fault;
 const MARK: u32 = 0x7673_6a31;
 /// Code for "running".
 const ALIVE: u32 = 0;
+/// Code for "restarts as it was told".
+const TOLD: u32 = u32::MAX;
 
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -39,6 +41,8 @@ pub enum Legacy {
     None,
     /// It was running until a reset that it did not cause.
     Silent,
+    /// It was told to.
+    Told,
     /// It stopped itself at this tick.
     Stopped(Fault, u32),
 }
@@ -53,6 +57,7 @@ pub fn take() -> Legacy {
     }
     match u8::try_from(record.code).ok().and_then(Fault::from_code) {
         Some(fault) => Legacy::Stopped(fault, record.tick),
+        None if record.code == TOLD => Legacy::Told,
         None => Legacy::Silent,
     }
 }
@@ -60,6 +65,11 @@ pub fn take() -> Legacy {
 /// Leaves `fault` for the next run.
 pub fn leave(fault: Fault, tick: u32) {
     write(u32::from(fault.code()), tick);
+}
+
+/// Leaves word that the reset which follows was ordered.
+pub fn leave_in_order() {
+    write(TOLD, 0);
 }
 
 fn write(code: u32, tick: u32) {

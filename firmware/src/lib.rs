@@ -2,17 +2,20 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
+//! | [`blocks`] | the tick of each kind of spring under each controller, to be counted |
 //! | [`board`] | what a board must be able to do |
 //! | [`control`] | one control tick: supervisor, model, supervisor |
 //! | [`pace`] | when the next tick is due, and how many were missed |
 //! | [`post`] | between the host's task and the tick: an order made before a fault never acknowledges it |
 //! | [`roll_call`] | the watchdog is fed only when every task has checked in |
+//! | [`store`] | the model that outlives a power cut |
 //! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
 //! | [`digest`] | one number for a whole run |
 //! | `last_words`, `stop` | what survives a reset; panic and hard fault |
 //! | `hang_guard` | a control task that hangs is stopped |
 //! | `stack_guard` | an overflow of the stack is a fault |
 //! | `log` | every log line, in one place |
+//! | `start` | the controller, from what is stored |
 //! | `tasks` | the control task and the housekeeping below it |
 //! | `host` | the host's task, and its orders as the control task sees them |
 //! | `mps2` | the emulated board |
@@ -25,6 +28,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod blocks;
 pub mod board;
 pub mod control;
 pub mod digest;
@@ -32,6 +36,7 @@ pub mod pace;
 pub mod post;
 pub mod roll_call;
 pub mod script;
+pub mod store;
 
 #[cfg(feature = "mcu")]
 pub mod hang_guard;
@@ -47,6 +52,8 @@ pub mod mps2;
 pub mod nucleo;
 #[cfg(feature = "mcu")]
 pub mod stack_guard;
+#[cfg(feature = "mcu")]
+pub mod start;
 #[cfg(feature = "mcu")]
 pub mod stop;
 #[cfg(feature = "mcu")]

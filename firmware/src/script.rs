@@ -3,10 +3,12 @@
 //! | name | what it is |
 //! | --- | --- |
 //! | `stair` | the report's stair: 70 s, from 20 s on every 10 s up by 100 V in 0.1 s |
+//! | `up-down` | 95 s: every 10 s up by 100 V to 500 V, then down to 100 V; the emulated board has a spring at its amplifier port |
 //! | `random SEED` | 100 000 ticks of arming, disarming, target jumps, an interlock that opens, a host that falls silent |
 //! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `silence` | fault drills |
 //! | (after a reset by a fault) | the aftermath: nothing may leave until the fault is acknowledged |
 
+use link::WireModel;
 use model::supervisor::Command;
 use model::{Settings, Volts, supervisor};
 
@@ -20,8 +22,12 @@ pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 
 /// Ticks of the stair, 70 s.
 pub const STAIR_TICKS: u32 = 70_000;
+/// Ticks of the way up and down, 95 s.
+pub const UP_DOWN_TICKS: u32 = 95_000;
 /// Ticks of a random run, 100 s.
 pub const RANDOM_TICKS: u32 = 100_000;
+/// Name of the way up and down.
+pub const UP_DOWN: &str = "up-down";
 /// When a drill arms.
 pub const ARM_TICK: u32 = 10;
 /// When a drill's mishap happens.
@@ -101,6 +107,8 @@ pub enum Script {
     /// See the module.
     Stair,
     /// See the module.
+    UpDown,
+    /// See the module.
     Random(Random),
     /// See the module.
     Drill(Mishap),
@@ -121,6 +129,9 @@ impl Script {
         if name == "stair" {
             return Some(Self::Stair);
         }
+        if name == UP_DOWN {
+            return Some(Self::UpDown);
+        }
         if let Some(seed) = name.strip_prefix("random ") {
             return seed.parse().ok().map(Self::random);
         }
@@ -131,6 +142,7 @@ impl Script {
     pub const fn ticks(&self) -> u32 {
         match self {
             Self::Stair => STAIR_TICKS,
+            Self::UpDown => UP_DOWN_TICKS,
             Self::Random(_) => RANDOM_TICKS,
             Self::Drill(_) => 1500,
             Self::Aftermath => 200,
@@ -144,6 +156,7 @@ impl Script {
         }
         Some(match self {
             Self::Stair => calm(arm_at(tick, 0), stair_v(tick)),
+            Self::UpDown => calm(arm_at(tick, 0), up_down_v(tick)),
             Self::Random(random) => random.step(tick),
             Self::Drill(mishap) => drill(*mishap, tick),
             Self::Aftermath => calm(aftermath(tick), 300),
@@ -155,6 +168,12 @@ impl Script {
 fn stair_v(tick: u32) -> i32 {
     let starts: [u32; 5] = [20_000, 30_000, 40_000, 50_000, 60_000];
     starts.iter().map(|start| tick.saturating_sub(*start).min(100) as i32).sum()
+}
+
+/// Up and down: from 5 s on every 10 s, a volt a tick on its ramps.
+pub fn up_down_v(tick: u32) -> i32 {
+    let risen = |step: u32| tick.saturating_sub(5_000 + step * 10_000).min(100) as i32;
+    (0..5).map(risen).sum::<i32>() - (5..9).map(risen).sum::<i32>()
 }
 
 fn volts(volts: i32) -> Volts {
@@ -241,8 +260,23 @@ impl Random {
 ///
 /// # Errors
 /// Never with the settings above.
-pub fn rehearse(mut script: Script, mut each: impl FnMut(&Control, &Tick)) -> Result<Digest, model::OutOfRange> {
+pub fn rehearse(script: Script, each: impl FnMut(&Control, &Tick)) -> Result<Digest, model::OutOfRange> {
+    rehearse_with(script, None, each)
+}
+
+/// As [`rehearse`], with a model that was found.
+///
+/// # Errors
+/// [`model::OutOfRange`] for a model that cannot be run.
+pub fn rehearse_with(
+    mut script: Script,
+    found: Option<&WireModel>,
+    mut each: impl FnMut(&Control, &Tick),
+) -> Result<Digest, model::OutOfRange> {
     let mut control = Control::new(&SETTINGS, &SUPERVISION, None)?;
+    if let Some(found) = found {
+        control.take_on(&SETTINGS, found)?;
+    }
     let mut digest = Digest::default();
     let mut number = 0;
     while let Some(step) = script.step(number) {
@@ -273,6 +307,12 @@ mod tests {
         for (tick, volts) in [(0, 0), (20_000, 0), (20_050, 50), (20_100, 100), (45_000, 300), (69_999, 500)] {
             assert_eq!(stair_v(tick), volts, "{tick}");
         }
+    }
+
+    #[test]
+    fn up_goes_down_again() {
+        let seen = [0, 5_000, 5_050, 14_999, 50_000, 55_050, 60_000, 85_050, 85_100, 94_999].map(up_down_v);
+        assert_eq!(seen, [0, 0, 50, 100, 500, 450, 400, 150, 100, 100]);
     }
 
     /// A random run that never armed would agree with anything.

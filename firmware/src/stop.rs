@@ -37,6 +37,14 @@ pub fn stop(fault: Fault, panic: Option<&PanicInfo<'_>>) -> ! {
     SCB::sys_reset()
 }
 
+/// Restarts because it was told to, while no voltage may leave.
+pub fn restart() -> ! {
+    cortex_m::interrupt::disable();
+    board::kill();
+    last_words::leave_in_order();
+    SCB::sys_reset()
+}
+
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     stop(Fault::Panic, Some(info))

@@ -49,6 +49,7 @@ pub async fn control<B: Board>(
             missed_ticks: arrival.missed_ticks,
             monitors: board.amplifier().monitors(),
             fault: (absent > ROLL_CALL_TICKS).then_some(Fault::Watchdog),
+            measured: board.amplifier().measured(),
         };
         let tick = control.tick(&orders, &senses, stopwatch);
         board.amplifier().put(tick.drive);

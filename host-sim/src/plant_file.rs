@@ -10,6 +10,7 @@ mod place;
 use std::path::Path;
 
 use anyhow::Result;
+use link::WireModel;
 use model::estimator::Model;
 use model::{ExtendedPlant, OutOfRange, Plant, SampleTime, extended};
 use serde::{Deserialize, Serialize};
@@ -139,6 +140,17 @@ impl PlantFile {
                 time_constant_high_s: self.relaxation.tau_high_s,
             },
         }
+    }
+
+    /// As it is sent to the MCU.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] as [`PlantFile::check`]: what that accepts can be sent.
+    pub fn wire(&self) -> Result<WireModel, OutOfRange> {
+        self.check()?;
+        let amplifier = self.amplifier.clone().unwrap_or_default();
+        let wire = WireModel::new(&self.extended(), amplifier.limit_v, amplifier.slew_v_per_s);
+        wire.ok_or(OutOfRange { field: "lists", value: f64::NAN, lowest: 0.0, highest: 9.0, unit: "numbers" })
     }
 
     /// Whether the tick can run it: at the fastest rate; a slower one may refuse a short time constant later.

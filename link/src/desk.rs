@@ -4,7 +4,8 @@
 //!
 //! 1. Each byte goes into [`Desk::on_byte`] with the latest [`View`]. [`Step::Send`]: send it. [`Step::Order`]: hand the
 //!    order to the control tick, wait until that tick has run, then send what [`Desk::settle`] gives for the new view. No
-//!    further byte before that.
+//!    further byte before that. [`Step::Keep`]: the same with the store of models and [`Desk::kept`]. [`Step::Restart`]:
+//!    send it and start anew.
 //! 2. Whenever [`Desk::take_heard`] is true, tell the control tick that the host was heard.
 //! 3. Once in a while, send what [`Desk::telemetry`] gives.
 //!
@@ -15,10 +16,11 @@ use model::supervisor::{self, Refusal};
 
 use crate::fault::Fault;
 use crate::order::Order;
-use crate::reply::{Firmware, Reason, Reply, Status, Telemetry};
+use crate::reply::{Firmware, Models, Reason, Reply, Status, Telemetry};
 use crate::request::Request;
 use crate::session::{Action, Counters, Session};
 use crate::value::WireVolts;
+use crate::wire_model::{ModelId, PART};
 
 /// What the control tick shows of itself, all of one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +46,8 @@ pub struct About {
     pub silence_limit_ticks: u32,
     /// The fault that caused the last reset.
     pub last_fault: Fault,
+    /// The model that runs.
+    pub model: ModelId,
 }
 
 /// What to do after a byte.
@@ -53,6 +57,24 @@ pub enum Step<'a> {
     Order(Order),
     /// Send this.
     Send(&'a [u8]),
+    /// Hand this to the store of models, then [`Desk::kept`].
+    Keep(Keep),
+    /// Send this, then start anew.
+    Restart(&'a [u8]),
+}
+
+/// For the store of models.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Keep {
+    /// See [`Request::ModelPart`].
+    Part(u8, [u8; PART]),
+    /// See [`Request::ModelEnd`].
+    End {
+        /// Of the payload, in bytes.
+        length: u16,
+        /// CRC-32C of the payload.
+        checksum: u32,
+    },
 }
 
 /// The MCU's end of the link.
@@ -61,13 +83,14 @@ pub struct Desk {
     session: Session,
     spring: Spring,
     about: About,
+    stored: ModelId,
     ordered: Option<Request>,
 }
 
 impl Desk {
     /// A desk that has heard nobody; `spring` says which stiffness is in reach.
     pub const fn new(spring: Spring, about: About) -> Self {
-        Self { session: Session::new(about.silence_limit_ticks), spring, about, ordered: None }
+        Self { session: Session::new(about.silence_limit_ticks), spring, about, stored: about.model, ordered: None }
     }
 
     /// Takes a byte from the wire.
@@ -75,6 +98,18 @@ impl Desk {
         if let Action::Apply(request) = self.session.on_byte(byte, view.sample.tick)? {
             let reply = match request {
                 Request::Hello | Request::Status => Reply::Status(self.status(view)),
+                Request::Model => Reply::Model(Models { active: self.about.model, stored: self.stored }),
+                Request::ModelPart { .. } | Request::ModelEnd { .. } | Request::Restart
+                    if view.state != supervisor::State::Disarmed =>
+                {
+                    Reply::Refused(match Fault::of(view.state) {
+                        Fault::NONE => Reason::Armed,
+                        fault => Reason::Faulted(fault),
+                    })
+                }
+                Request::ModelPart { number, bytes } => return Some(Step::Keep(Keep::Part(number, bytes))),
+                Request::ModelEnd { length, checksum } => return Some(Step::Keep(Keep::End { length, checksum })),
+                Request::Restart => return Some(Step::Restart(self.session.answer(&done(view)))),
                 request => match Order::new(request, view.state, &self.spring) {
                     Err(reason) => Reply::Refused(reason),
                     Ok(order) if order == Order::default() => done(view),
@@ -105,6 +140,18 @@ impl Desk {
         self.session.answer(&refused.map_or(done(view), Reply::Refused))
     }
 
+    /// The answer to what was to be kept: the model that is stored now, if there is a new one.
+    pub fn kept(&mut self, kept: Result<Option<ModelId>, Reason>, view: &View) -> &[u8] {
+        let reply = match kept {
+            Err(reason) => Reply::Refused(reason),
+            Ok(stored) => {
+                self.stored = stored.unwrap_or(self.stored);
+                done(view)
+            }
+        };
+        self.session.answer(&reply)
+    }
+
     /// The next sample to push, if the host wants one now.
     pub fn telemetry(&mut self, view: &View) -> Option<&[u8]> {
         let now = view.sample.tick;
@@ -122,7 +169,7 @@ impl Desk {
     }
 
     fn status(&self, view: &View) -> Status {
-        let About { firmware, rate_hz, silence_limit_ticks, last_fault } = self.about;
+        let About { firmware, rate_hz, silence_limit_ticks, last_fault, .. } = self.about;
         let (lowest, highest) = self.spring.reach_v();
         Status {
             lowest: WireVolts::from_f64(lowest),
@@ -184,7 +231,8 @@ mod tests {
                     order = Some(ordered);
                     answer = Some(reply(desk.settle(after)));
                 }
-                Some(Step::Send(bytes)) => answer = Some(reply(bytes)),
+                Some(Step::Send(bytes) | Step::Restart(bytes)) => answer = Some(reply(bytes)),
+                Some(Step::Keep(_)) => answer = Some(reply(desk.kept(Ok(None), after))),
                 None => {}
             }
         }
@@ -234,6 +282,23 @@ mod tests {
         let (order, Reply::Status(status)) = talk(Request::Status, &FAULTED, &FAULTED) else { panic!() };
         assert_eq!((status.lowest.to_f64(), status.highest.to_f64()), (0.0, 700.0));
         assert_eq!((order, status.overruns, status.fault, status.counters.accepted), (None, 3, Fault(6), 2));
+    }
+
+    #[test]
+    fn a_model_is_taken_while_disarmed_only() {
+        let monitor = Fault::from(Cause::Monitor);
+        for request in [
+            Request::ModelPart { number: 0, bytes: [1; PART] },
+            Request::ModelEnd { length: 9, checksum: 7 },
+            Request::Restart,
+        ] {
+            let answer = |view| talk(request, &view, &view).1;
+            assert_eq!(answer(DISARMED), Reply::Ack { state: State::Disarmed, target: WireVolts(7) }, "{request:?}");
+            assert_eq!(answer(ARMED), Reply::Refused(Reason::Armed), "{request:?}");
+            assert_eq!(answer(FAULTED), Reply::Refused(Reason::Faulted(monitor)), "{request:?}");
+        }
+        let models = Models::default();
+        assert_eq!(talk(Request::Model, &ARMED, &ARMED).1, Reply::Model(models));
     }
 
     #[test]

@@ -39,6 +39,11 @@ const CHECKSUM: usize = 4;
 
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
+/// CRC-32C of anything.
+pub fn checksum(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
 /// A request or a reply.
 pub trait Message: Serialize + DeserializeOwned {
     /// Tells the two directions apart: a host that hears its own echo must not take it for an answer.
@@ -90,7 +95,7 @@ impl Frame {
         packet.get_mut(..HEADER)?.copy_from_slice(&[version, M::KIND, low, high]);
         let room = packet.get_mut(HEADER..MAX_PACKET - CHECKSUM)?;
         let end = HEADER + postcard::to_slice(message, room).ok()?.len();
-        let checksum = CRC.checksum(packet.get(..end)?);
+        let checksum = checksum(packet.get(..end)?);
         packet.get_mut(end..end + CHECKSUM)?.copy_from_slice(&checksum.to_le_bytes());
         self.0.push(DELIMITER).ok()?;
         stuffing::encode(packet.get(..end + CHECKSUM)?, &mut self.0)?;
@@ -133,7 +138,7 @@ impl<'a> Packet<'a> {
         let (&[version, kind, low, high], message) = checked.split_first_chunk::<HEADER>()?;
         let checksum = u32::from_le_bytes(*checksum);
         let sequence = Sequence(u16::from_le_bytes([low, high]));
-        (CRC.checksum(checked) == checksum).then_some(Self { version, kind, sequence, message, checksum })
+        (self::checksum(checked) == checksum).then_some(Self { version, kind, sequence, message, checksum })
     }
 
     /// The message.

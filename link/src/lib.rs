@@ -11,7 +11,8 @@
 //! | --- | --- |
 //! | [`request`], [`reply`] | the messages |
 //! | [`value`] | voltages and desired stiffness as they travel |
-//! | [`fault`] | codes of what went wrong in the MCU |
+//! | [`wire_model`] | a spring's model as it is sent and stored |
+//! | [`fault`], [`field`] | codes of what went wrong in the MCU, and of what is wrong with a model |
 //! | [`frame`] | message to bytes, and a checked packet back to a message |
 //! | [`receiver`] | bytes to checked packets; finds its way back after damage |
 //! | [`sequence`] | which of two sequence numbers is newer |
@@ -26,6 +27,7 @@ extern crate std;
 
 pub mod desk;
 pub mod fault;
+pub mod field;
 pub mod frame;
 pub mod order;
 pub mod receiver;
@@ -35,17 +37,20 @@ pub mod sequence;
 pub mod session;
 mod stuffing;
 pub mod value;
+pub mod wire_model;
 
-pub use desk::{About, Desk, Step, View};
+pub use desk::{About, Desk, Keep, Step, View};
 pub use fault::Fault;
+pub use field::Field;
 pub use frame::{Frame, Message, Packet, Unreadable};
 pub use order::Order;
 pub use receiver::Receiver;
-pub use reply::{Reason, Reply, State, Status, Telemetry};
+pub use reply::{Models, Reason, Reply, State, Status, Telemetry};
 pub use request::Request;
 pub use sequence::Sequence;
 pub use session::{Action, Session};
 pub use value::{Desired, WireVolts};
+pub use wire_model::{ModelId, WireModel};
 
 /// Version of the protocol. Any change of a golden frame in `tests/golden.rs` needs a new one.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;

@@ -7,8 +7,10 @@ use model::supervisor::{self, Supervisor};
 use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
+use crate::field::Field;
 use crate::session::Counters;
 use crate::value::WireVolts;
+use crate::wire_model::ModelId;
 
 /// A reply. It carries the sequence number of its request; telemetry, which nobody waits for, counts its own.
 ///
@@ -28,6 +30,17 @@ pub enum Reply {
     Status(Status),
     /// One sample of the loop.
     Telemetry(Telemetry),
+    /// What runs, and what will.
+    Model(Models),
+}
+
+/// The models of an MCU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Models {
+    /// The one that runs.
+    pub active: ModelId,
+    /// The one that the next start will find.
+    pub stored: ModelId,
 }
 
 /// Whether voltage may leave.
@@ -77,6 +90,23 @@ pub enum Reason {
     OtherFault(Fault),
     /// The host had been silent for too long when it armed.
     HostSilent,
+    /// Only a disarmed MCU does this.
+    Armed,
+    /// Parts of the model are missing; the one that is expected next.
+    PartMissing(u8),
+    /// The model's checksum is wrong, or its payload is none of this version's.
+    ModelDamaged,
+    /// The model was checked and cannot be run.
+    BadModel {
+        /// What is wrong with it.
+        field: Field,
+        /// Lowest value allowed.
+        lowest: f64,
+        /// Highest value allowed.
+        highest: f64,
+    },
+    /// The memory did not take the model; the old one stays.
+    NotStored,
 }
 
 /// The whole state of the MCU.
@@ -182,6 +212,11 @@ impl Reason {
             Self::InterlockOpen => 8,
             Self::OtherFault(_) => 9,
             Self::HostSilent => 10,
+            Self::Armed => 11,
+            Self::PartMissing(_) => 12,
+            Self::ModelDamaged => 13,
+            Self::BadModel { .. } => 14,
+            Self::NotStored => 15,
         }
     }
 }
@@ -202,7 +237,21 @@ impl fmt::Display for Reason {
             Self::InterlockOpen => f.write_str("the interlock is open"),
             Self::OtherFault(fault) => write!(f, "the fault is another one: {fault}"),
             Self::HostSilent => f.write_str("the host had been silent for too long"),
+            Self::Armed => f.write_str("armed; disarm it first"),
+            Self::PartMissing(expected) => write!(f, "a part of the model is missing; part {expected} was expected"),
+            Self::ModelDamaged => f.write_str("the model arrived damaged, or the MCU does not know its format"),
+            Self::BadModel { field, lowest, highest } => {
+                write!(f, "the model cannot be run: {field} has to lie within {lowest} to {highest}")
+            }
+            Self::NotStored => f.write_str("the memory did not take the model; the old one stays"),
         }
+    }
+}
+
+impl Reason {
+    /// What the model's own check says of a model.
+    pub fn of_model(error: &OutOfRange) -> Self {
+        Self::BadModel { field: Field::named(error.field), lowest: error.lowest, highest: error.highest }
     }
 }
 

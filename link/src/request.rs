@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
 use crate::value::Desired;
+use crate::wire_model::PART;
 
 /// A request. Each is answered by exactly one [`crate::Reply`] with the request's own sequence number.
 ///
@@ -29,6 +30,25 @@ pub enum Request {
         /// Ticks between two samples.
         every_ticks: u16,
     },
+    /// Answered with the models: the one that runs and the one that is stored.
+    Model,
+    /// A part of a model's payload. Number 0 begins anew; refused out of order, and unless disarmed.
+    ModelPart {
+        /// From 0.
+        number: u8,
+        /// The last part is filled up with zeros.
+        bytes: [u8; PART],
+    },
+    /// The payload is complete: check it, and store it if it is sound. It runs from the next start on. Refused unless
+    /// disarmed.
+    ModelEnd {
+        /// Of the payload, in bytes.
+        length: u16,
+        /// CRC-32C of the payload.
+        checksum: u32,
+    },
+    /// Start anew, with the stored model. Refused unless disarmed.
+    Restart,
 }
 
 impl Request {

@@ -6,7 +6,10 @@ mod by_hand;
 use by_hand::by_hand;
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{Desired, Fault, Frame, Message, Reason, Reply, Request, Sequence, State, Status, Telemetry, WireVolts};
+use link::{
+    Desired, Fault, Field, Frame, Message, ModelId, Models, Reason, Reply, Request, Sequence, State, Status, Telemetry,
+    WireVolts,
+};
 
 fn check<M: Message>(message: &M, kind: u8, golden: &str) {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
@@ -14,7 +17,7 @@ fn check<M: Message>(message: &M, kind: u8, golden: &str) {
         (0..golden.len() / 2).map(|at| u8::from_str_radix(&golden[2 * at..2 * at + 2], 16).unwrap()).collect();
     // Neither 0 nor symmetric, so that a swap shows.
     let frame = Frame::new(Sequence(0x0102), message);
-    assert_eq!(hex(frame.as_bytes()), hex(&by_hand(1, kind, 0x0102, &bytes)), "expected message {golden}");
+    assert_eq!(hex(frame.as_bytes()), hex(&by_hand(link::VERSION, kind, 0x0102, &bytes)), "expected message {golden}");
 }
 
 #[test]
@@ -30,6 +33,10 @@ fn requests() {
         (Request::Acknowledge(Fault(4)), "0504"),
         (Request::Heartbeat, "06"),
         (Request::Stream { every_ticks: 300 }, "07ac02"),
+        (Request::Model, "08"),
+        (Request::ModelPart { number: 12, bytes: [0xa5; 32] }, &format!("090c{}", "a5".repeat(32))),
+        (Request::ModelEnd { length: 300, checksum: 128 }, "0aac028001"),
+        (Request::Restart, "0b"),
     ] {
         check(&request, b'Q', golden);
     }
@@ -83,9 +90,24 @@ fn replies() {
         (Reply::Refused(Reason::InterlockOpen), "0108"),
         (Reply::Refused(Reason::OtherFault(Fault(1))), "010901"),
         (Reply::Refused(Reason::HostSilent), "010a"),
+        (Reply::Refused(Reason::Armed), "010b"),
+        (Reply::Refused(Reason::PartMissing(3)), "010c03"),
+        (Reply::Refused(Reason::ModelDamaged), "010d"),
+        (
+            Reply::Refused(Reason::BadModel { field: Field::named("leakage.share"), lowest: 0.0, highest: 1.0 }),
+            "010e050000000000000000000000000000f03f",
+        ),
+        (Reply::Refused(Reason::NotStored), "010f"),
         (Reply::Status(status), "02010203f8acd19101e807f4030a0c040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
         (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f09"),
         (Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }), "03f0a20401808080ac0201040106ff1f09"),
+        (
+            Reply::Model(Models {
+                active: ModelId { number: 1, format: 2, length: 300, checksum: 4 },
+                stored: ModelId { number: 5, format: 6, length: 7, checksum: 8 },
+            }),
+            "040102ac020405060708",
+        ),
     ] {
         check(&reply, b'A', golden);
         if let Reply::Refused(reason) = reply {
@@ -98,8 +120,8 @@ fn replies() {
 #[test]
 fn a_whole_frame() {
     let frame = Frame::new(Sequence(1), &Request::Hello);
-    assert_eq!(frame.as_bytes(), by_hand(1, b'Q', 1, &[0]));
-    assert_eq!(frame.as_bytes(), [0, 4, 1, b'Q', 1, 1, 5, 0x85, 0xcf, 0xa5, 0x47, 0]);
+    assert_eq!(frame.as_bytes(), by_hand(link::VERSION, b'Q', 1, &[0]));
+    assert_eq!(frame.as_bytes(), [0, 4, 2, b'Q', 1, 1, 5, 0x71, 0x7f, 0x96, 0x0f, 0]);
 }
 
 #[test]

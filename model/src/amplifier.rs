@@ -36,6 +36,15 @@ impl Amplifier {
         Self { full_scale_v, min_v: 0.0, max_v: full_scale_v, slew_v_per_s: None, dac_bits: 12 }
     }
 
+    /// The stricter of this one's highest voltage and slew, and those that were found on the real one.
+    pub fn found_with(self, limit_v: Option<f64>, slew_v_per_s: Option<f64>) -> Self {
+        Self {
+            max_v: limit_v.map_or(self.max_v, |limit| limit.min(self.max_v)),
+            slew_v_per_s: [self.slew_v_per_s, slew_v_per_s].into_iter().flatten().reduce(f64::min),
+            ..self
+        }
+    }
+
     /// Volts between two neighbouring codes.
     pub fn volts_per_code(&self) -> f64 {
         self.full_scale_v / f64::from((1u32 << self.dac_bits) - 1)

@@ -182,6 +182,23 @@ impl<E: Estimator> Config<E> {
         Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits, sensor }
     }
 
+    /// One tick with the amplifier off: zero volts at once, whatever slew and range. The integrator waits for
+    /// [`Config::adopt`].
+    pub fn rest(&self, state: &mut State<E::State>) -> Output {
+        state.amplifier = amplifier::State::default();
+        let stiffness = self.estimator.run(&mut state.estimator, Volts::ZERO);
+        let (zero, code) = (Volts::ZERO, DacCode(0));
+        Output {
+            target: zero,
+            voltage: zero,
+            code,
+            applied: zero,
+            stiffness,
+            limits: Limits::NONE,
+            sensor: Sensor::None,
+        }
+    }
+
     /// Takes over a running `state` without a bump: with the same `target`, the next voltage is the last one.
     ///
     /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once, and

@@ -364,8 +364,8 @@ impl Supervisor {
         if self.state == State::Armed { output.limits } else { Limits::NONE }
     }
 
-    /// The first fault stays.
-    fn fail(&mut self, fault: Fault) {
+    /// Takes the voltage away; the first fault stays.
+    pub fn fail(&mut self, fault: Fault) {
         if !matches!(self.state, State::Faulted(_)) {
             self.state = State::Faulted(fault);
         }

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use firmware::script::{self, Script};
+use link::WireModel;
 use serde_json::{Value, json};
 
 use crate::emulator::{self, Run, SAFE, Written};
 use crate::image::{self, Board, Opt};
-use crate::{rivals, setup};
+use crate::{blocks, rivals, setup};
 
 /// Options of `cargo xtask emulate`.
 #[derive(clap::Args)]
@@ -22,6 +23,9 @@ pub(crate) struct Args {
     /// Count instructions a tick of this controller beside those of other crates and of double precision
     #[arg(long, conflicts_with = "link")]
     rivals: bool,
+    /// Count instructions a tick for each kind of spring under each controller
+    #[arg(long, conflicts_with_all = ["link", "rivals"])]
+    blocks: bool,
     /// What the optimiser aims at
     #[arg(long, value_enum, default_value = "s")]
     opt: Opt,
@@ -32,6 +36,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
     if args.rivals {
         return rivals::run(args.opt, args.json);
+    }
+    if args.blocks {
+        return blocks::run(args.opt, args.json);
     }
     let elf = image::build(Board::Mps2, args.opt)?;
     if let Some(socket) = &args.link {
@@ -65,10 +72,15 @@ pub(crate) struct Comparison {
 impl Comparison {
     /// Rehearses `name` on this machine.
     pub(crate) fn new(name: &str, run: &Run) -> Result<Self> {
+        Self::with(name, None, run)
+    }
+
+    /// As [`Comparison::new`], with a model that was found.
+    pub(crate) fn with(name: &str, found: Option<&WireModel>, run: &Run) -> Result<Self> {
         let Some(script) = Script::parse(name) else { bail!("no script `{name}`") };
         // The board writes zero once before its first tick.
         let mut expected = vec![SAFE];
-        let digest = script::rehearse(script, |_, tick| {
+        let digest = script::rehearse_with(script, found, |_, tick| {
             expected.push(Written { code: tick.drive.code().0, enabled: tick.drive.enabled() });
         })?;
         let different = expected.iter().zip(&run.dac).position(|(host, target)| host != target);

@@ -64,9 +64,10 @@ pub(crate) fn text(line: &Line) -> String {
     format!("{level:<5} {}", line.message)
 }
 
-/// QEMU on an image: `host` is the chardev of the host's line, `clock` the rest of `-icount`.
-fn start(elf: &Path, script: &str, host: &str, wire: &Path, clock: &str) -> Result<Child> {
+/// QEMU on an image, in `folder`: `host` is the chardev of the host's line, `clock` the rest of `-icount`.
+fn start(folder: &Path, elf: &Path, script: &str, host: &str, wire: &Path, clock: &str) -> Result<Child> {
     shell::command(QEMU)
+        .current_dir(folder)
         .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", host])
         .args(["-serial", &format!("file:{}", wire.display())])
         .args(["-icount", clock])
@@ -91,11 +92,22 @@ pub(crate) fn obey<T>(
     show: impl FnMut(&str) + Send,
     work: impl FnOnce() -> Result<T>,
 ) -> Result<(T, Run)> {
+    obey_in(shell::root(), elf, socket, show, work)
+}
+
+/// As [`obey`], with the board's files in `folder`.
+pub(crate) fn obey_in<T>(
+    folder: &Path,
+    elf: &Path,
+    socket: &Path,
+    show: impl FnMut(&str) + Send,
+    work: impl FnOnce() -> Result<T>,
+) -> Result<(T, Run)> {
     let formats = Formats::parse(&image::read(elf)?)?;
     let wire = elf.with_file_name(format!("dac-{}-link", std::process::id()));
     let begin = Instant::now();
     let host = format!("unix:{},server=on,wait=off", socket.display());
-    let mut child = start(elf, LINK, &host, &wire, &format!("shift={SHIFT},align=on"))?;
+    let mut child = start(folder, elf, LINK, &host, &wire, &format!("shift={SHIFT},align=on"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let (result, log) = thread::scope(|scope| {
         let reader = scope.spawn(|| decode(formats, &mut output, show));
@@ -116,7 +128,7 @@ pub(crate) fn obey<T>(
 pub(crate) fn serve(elf: &Path, socket: &Path, show: impl FnMut(&str)) -> Result<()> {
     let formats = Formats::parse(&image::read(elf)?)?;
     let host = format!("unix:{},server=on,wait=off", socket.display());
-    let mut child = start(elf, LINK, &host, Path::new("/dev/null"), &format!("shift={SHIFT},align=on"))?;
+    let mut child = start(shell::root(), elf, LINK, &host, Path::new("/dev/null"), &format!("shift={SHIFT},align=on"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let ended = decode(formats, &mut output, show);
     child.wait()?;
@@ -125,10 +137,21 @@ pub(crate) fn serve(elf: &Path, socket: &Path, show: impl FnMut(&str)) -> Result
 
 /// Plays `script`; `show` hears of every line of the log as it comes.
 pub(crate) fn play(elf: &Path, script: &str, shift: u32, show: impl FnMut(&str) + Send) -> Result<Run> {
+    play_in(shell::root(), elf, script, shift, show)
+}
+
+/// As [`play`], with the board's files in `folder`.
+pub(crate) fn play_in(
+    folder: &Path,
+    elf: &Path,
+    script: &str,
+    shift: u32,
+    show: impl FnMut(&str) + Send,
+) -> Result<Run> {
     let formats = Formats::parse(&image::read(elf)?)?;
     let wire = elf.with_file_name(format!("dac-{}-{}", std::process::id(), script.replace(' ', "-")));
     let begin = Instant::now();
-    let mut child = start(elf, script, "null", &wire, &format!("shift={shift},sleep=off"))?;
+    let mut child = start(folder, elf, script, "null", &wire, &format!("shift={shift},sleep=off"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let over = AtomicBool::new(false);
     let (log, status) = thread::scope(|scope| {

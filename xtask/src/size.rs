@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 use crate::image::{self, Board, Opt};
 use crate::{elf, stack};
 
-/// Bytes of flash that an image may take.
-const MOST_FLASH: u32 = 64 << 10;
+/// Bytes of flash that an image may take, of 512 KB.
+const MOST_FLASH: u32 = 128 << 10;
 /// Bytes of RAM, stack included.
 const MOST_RAM: u32 = 16 << 10;
 

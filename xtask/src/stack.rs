@@ -1,9 +1,12 @@
 //! How deep the stack can get, from the image itself: the frame of every function, and the deepest chain of calls.
 //!
 //! Interrupts nest, so the deepest handler of each level comes on top of the thread, each with the registers that the
-//! processor saves. A call through a register (an executor polls a task, a task wakes another) may lead to any function
-//! that nobody calls by name; that such calls are nested at most two deep, a task and below it anything but a task (an
-//! executor polls one after the other), is an assumption, the rest is counted.
+//! processor saves. A call through a register may lead to any function that nobody calls by name: from a handler's own
+//! code (an executor's) to a task, from anywhere else (a waker, a formatter) to anything but a task. That is an
+//! assumption, as is that such a call is not followed by another one of its kind; the rest is counted.
+//!
+//! Who stops the program turns interrupts off first: nothing nests above that, so it is counted once for all levels, and
+//! once more for a panic meanwhile.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,6 +25,8 @@ const SAVED: u32 = 104 + 4;
 const DRILL: &str = "deeper";
 /// What every panic goes through.
 const PANIC: &str = "core::panicking";
+/// Turns interrupts off, says why, resets.
+const STOP: &str = "firmware::stop::stop";
 /// Starts again from the stack's top.
 const FRESH: &str = "firmware::stop::on_fresh_stack";
 /// Interrupt levels that can nest, deepest handlers first: SysTick, alarm, control, line, tasks below, NMI.
@@ -43,26 +48,34 @@ pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
         .collect();
     let (polls, others): (Vec<u32>, Vec<u32>) =
         free.into_iter().partition(|address| name(&functions, *address).contains(POLL));
-    let mut behind_register = 0;
-    for candidates in [others, polls] {
-        let depths = Depths { shapes: &shapes, functions: &functions, behind_register };
-        let deepest = candidates.iter().map(|address| depths.of(*address, &mut Vec::new()));
-        behind_register = behind_register.max(deepest.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0));
-    }
-    let depths = Depths { shapes: &shapes, functions: &functions, behind_register };
+    let deepest = |depths: &Depths<'_>, addresses: &[u32]| {
+        let all = addresses.iter().map(|address| depths.of(*address, &mut Vec::new())).collect::<Result<Vec<_>>>()?;
+        anyhow::Ok(all.into_iter().max().unwrap_or(0))
+    };
+    let mut depths = Depths { shapes: &shapes, functions: &functions, behind_register: 0 };
+    depths.behind_register = deepest(&depths, &others)?;
+    let task = deepest(&depths, &polls)?;
     let reset = code.word(elf::symbol(elf, "__RESET_VECTOR")?)? & !1;
     let thread = depths.of(reset, &mut Vec::new())?;
     let mut handlers = vectors
         .iter()
         .filter(|address| **address != reset && shapes.contains_key(address))
-        .map(|address| depths.of(*address, &mut Vec::new()))
+        .map(|address| {
+            let own = depths.of(*address, &mut Vec::new())?;
+            let shape = &shapes[address];
+            Ok(own.max(if shape.calls_by_register { shape.frame + task } else { 0 }))
+        })
         .collect::<Result<Vec<_>>>()?;
     handlers.sort_unstable_by(|a, b| b.cmp(a));
     let again = functions.iter().filter(|f| f.name.contains(PANIC)).map(|f| depths.of(f.address, &mut Vec::new()));
     let again = again.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0);
+    let depth_of = |name: &str| {
+        let found = functions.iter().find(|f| f.name == name).with_context(|| format!("no function {name}"))?;
+        depths.of(found.address, &mut Vec::new())
+    };
+    let stopping = 2 * depth_of(STOP)?;
     let nested = thread + again + handlers.iter().take(LEVELS).map(|depth| depth + SAVED).sum::<u32>();
-    let fresh = functions.iter().find(|f| f.name == FRESH).context("nothing starts from a fresh stack")?;
-    Ok(nested.max(depths.of(fresh.address, &mut Vec::new())?))
+    Ok(nested.max(depth_of(FRESH)?) + stopping)
 }
 
 /// Everything that the processor may start.
@@ -81,7 +94,7 @@ impl Depths<'_> {
     fn of(&self, address: u32, path: &mut Vec<u32>) -> Result<u32> {
         // Not a function with a size: a few lines of assembly without a frame.
         let Some(shape) = self.shapes.get(&address) else { return Ok(0) };
-        if self.name(address) == FRESH && !path.is_empty() {
+        if [FRESH, STOP].contains(&self.name(address)) && !path.is_empty() {
             return Ok(0);
         }
         if path.contains(&address) {

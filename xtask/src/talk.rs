@@ -159,7 +159,8 @@ fn hostility(name: &str) -> Result<String> {
     ))
 }
 
-fn open(name: &str) -> Result<Port> {
+/// Opens the board's line, as soon as the emulator has it.
+pub(crate) fn open(name: &str) -> Result<Port> {
     let begin = Instant::now();
     loop {
         match Port::open(name, 115_200) {

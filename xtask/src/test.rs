@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 
-use crate::{boot, proof, setup, shell};
+use crate::{boot, proof, setup, shell, story};
 
 /// One call of cargo.
 struct Step {
@@ -38,23 +38,25 @@ pub(crate) fn help() -> String {
         let env = env.map(|(key, value)| format!("{key}={value} ")).unwrap_or_default();
         let _ = writeln!(help, "  {name:<10} {env}cargo {}", args.join(" "));
     }
-    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot\n"
+    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot\n  story      cargo xtask story, as approved\n"
 }
 
 /// `cargo xtask test`.
 pub(crate) fn run() -> Result<()> {
     let start = Instant::now();
-    let total = STEPS.len() + 3;
+    let total = STEPS.len() + 4;
     eprintln!("[1/{total}] setup");
     setup::run()?;
     for (number, Step { name, args, env }) in (2..).zip(STEPS) {
         eprintln!("[{number}/{total}] {name}");
         shell::run(shell::cargo().args(*args).envs(*env))?;
     }
-    eprintln!("[{}/{total}] firmware", total - 1);
+    eprintln!("[{}/{total}] firmware", total - 2);
     proof::run()?;
-    eprintln!("[{total}/{total}] boot");
+    eprintln!("[{}/{total}] boot", total - 1);
     boot::run()?;
+    eprintln!("[{total}/{total}] story");
+    story::check()?;
     eprintln!("all {total} steps passed in {} s", start.elapsed().as_secs());
     Ok(())
 }

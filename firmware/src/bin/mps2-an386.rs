@@ -6,16 +6,20 @@
 
 use cortex_m::peripheral::Peripherals;
 use defmt_semihosting as _;
+use firmware::board::Board;
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::log::{self, Done, Event};
 use firmware::mps2::actor::{self, Actor};
+use firmware::mps2::flash::Flash;
 use firmware::mps2::instructions::Counter;
 use firmware::mps2::registers::CLOCK_HZ;
 use firmware::mps2::uart::Uart;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
 use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
-use firmware::script::{SETTINGS, SUPERVISION, Script};
+use firmware::script::Script;
+use firmware::start;
+use firmware::store::Store;
 use firmware::{hang_guard, stack_guard, tasks};
 use link::Desk;
 
@@ -23,6 +27,8 @@ use core::sync::atomic::Ordering;
 
 /// The emulator was not told a script.
 const EXIT_NO_SCRIPT: u32 = 2;
+/// There is no spring in the emulator's folder.
+const EXIT_NO_SPRING: u32 = 5;
 /// Name of the run that a host commands.
 const LINK: &str = "link";
 
@@ -34,7 +40,7 @@ enum Mode {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let board = Mps2::init();
+    let mut board = Mps2::init();
     let (reset, last_fault) = reset_cause();
     log::boot(reset, last_fault.map_or(0, |fault| fault.code()));
 
@@ -46,9 +52,16 @@ fn main() -> ! {
         (None, Some(script)) => Mode::Play(script),
         (None, None) => semihosting::exit(EXIT_NO_SCRIPT),
     };
-    let control = Control::new(&SETTINGS, &SUPERVISION, last_fault);
-    let (control, desk) = match control.and_then(|control| Ok((control, host::desk(last_fault)?))) {
-        Ok(both) => both,
+    if matches!(mode, Mode::Play(Script::UpDown)) && !board.amplifier().connect() {
+        semihosting::exit(EXIT_NO_SPRING);
+    }
+    let mut store = Store::new(Flash::init());
+    let started = start::control(&store, last_fault);
+    let (control, desk) = match started
+        .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start)?))).transpose())
+    {
+        Ok(Some(both)) => both,
+        Ok(None) => semihosting::exit(1),
         Err(error) => {
             log::refused(error.field);
             semihosting::exit(1)
@@ -88,7 +101,9 @@ fn main() -> ! {
             }
             // Never asleep: while the processor sleeps the emulator's clock may jump with ours, over ticks; while it runs,
             // instructions alone make the time.
-            actor::hang()
+            loop {
+                host::keep(&mut store);
+            }
         }
     }
     loop {
@@ -97,18 +112,18 @@ fn main() -> ! {
 }
 
 #[embassy_executor::task]
-async fn play(mut board: Mps2, mut control: Control, script: Script) {
+async fn play(mut board: Mps2, control: &'static mut Control, script: Script) {
     let mut actor = Actor::new(script);
     let mut counter = Counter::begin();
-    let (ticks, missed) = tasks::control(&mut board, &mut control, &mut actor, &mut counter).await;
+    let (ticks, missed) = tasks::control(&mut board, control, &mut actor, &mut counter).await;
     let (digest, instructions) = (actor.digest(), counter.instructions());
     log::queue(Event::Done(Done { ticks, missed, digest, instructions }));
 }
 
 #[embassy_executor::task]
-async fn obey(mut board: Mps2, mut control: Control) {
-    let mut host = Host::new(&control);
-    tasks::control(&mut board, &mut control, &mut host, &mut Untimed).await;
+async fn obey(mut board: Mps2, control: &'static mut Control) {
+    let mut host = Host::new(control);
+    tasks::control(&mut board, control, &mut host, &mut Untimed).await;
 }
 
 #[embassy_executor::task]

@@ -14,7 +14,8 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
-use firmware::script::{SETTINGS, SUPERVISION};
+use firmware::start;
+use firmware::store::Store;
 use firmware::tasks;
 use firmware::{hang_guard, last_words, log, stack_guard};
 use link::Desk;
@@ -41,7 +42,7 @@ unsafe fn FMAC() {
 fn main() -> ! {
     kill();
     let (reset, last_fault) = reset_cause();
-    let (board, line) = Nucleo::init(embassy_stm32::init(clocks::config()));
+    let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
     log::boot(reset, last_fault.map_or(0, Fault::code));
     if let Some(mut core) = Peripherals::take() {
         stack_guard::set(&mut core.MPU);
@@ -52,9 +53,12 @@ fn main() -> ! {
     interrupt::FMAC.set_priority(Priority::P12);
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
-    let control = Control::new(&SETTINGS, &SUPERVISION, last_fault);
-    match control.and_then(|control| Ok((control, host::desk(last_fault)?))) {
-        Ok((control, desk)) => {
+    let mut store = Store::new(flash);
+    let started = start::control(&store, last_fault);
+    match started.and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start)?))).transpose()) {
+        // Built once.
+        Ok(None) => {}
+        Ok(Some((control, desk))) => {
             if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control)) {
                 low.spawn(housekeeping);
                 high.spawn(control);
@@ -71,14 +75,15 @@ fn main() -> ! {
         }
     }
     loop {
+        host::keep(&mut store);
         cortex_m::asm::wfi();
     }
 }
 
 #[embassy_executor::task]
-async fn run(mut board: Nucleo, mut control: Control) {
-    let mut host = Host::new(&control);
-    tasks::control(&mut board, &mut control, &mut host, &mut Untimed).await;
+async fn run(mut board: Nucleo, control: &'static mut Control) {
+    let mut host = Host::new(control);
+    tasks::control(&mut board, control, &mut host, &mut Untimed).await;
     // Returning would drop the DAC, and the pin would float.
     pending().await
 }

@@ -7,23 +7,58 @@
 //! 1 E c c c c c c   E: enabled, c: code, upper 6 bits
 //! 0 0 c c c c c c   lower 6 bits
 //! ```
+//!
+//! [`Dac::connect`] puts a spring behind it, in lock step: every code also goes into a pipe, and the next tick waits for
+//! what the spring's sensor makes of it. None of the board's time passes meanwhile, so that a run is the same each time.
+//!
+//! ```text
+//! to the spring:   code (2 bytes, low first), bit 15: enabled
+//! from the spring: reading in 2^-20 V (4 bytes, low first), the smallest number: none
+//! ```
 
+use model::Volts;
 use model::supervisor::Drive;
+use model::units::Signal;
 
 use super::registers::{FAULT_STATUS, UART_1_CONTROL, UART_1_DATA, UART_1_DIVIDER};
-use super::semihosting;
+use super::semihosting::{self, File, Mode};
 use crate::board::Amplifier;
 
+/// The spring does not answer.
+const EXIT_SPRING_GONE: u32 = 4;
 /// See `floats_are_free`.
 const EXIT_LAZY_SAVE_FAILED: u32 = 3;
 
-/// The wire.
-#[derive(Debug)]
-pub struct Dac;
+/// The wire, and the spring behind it.
+#[derive(Debug, Default)]
+pub struct Dac {
+    spring: Option<(File, File)>,
+    measured: Option<Volts>,
+}
+
+impl Dac {
+    /// Waits for the spring at the pipes `to-spring` and `from-spring` in the emulator's folder. True if it is there.
+    pub fn connect(&mut self) -> bool {
+        self.spring = File::open(c"to-spring", Mode::Write).zip(File::open(c"from-spring", Mode::Read));
+        self.spring.is_some()
+    }
+}
 
 impl Amplifier for Dac {
     fn put(&mut self, drive: Drive) {
         send(u32::from(drive.code().0), drive.enabled());
+        let Some((to, from)) = &mut self.spring else { return };
+        let mut reading = [0; 4];
+        let sent = to.write(&(drive.code().0 | u16::from(drive.enabled()) << 15).to_le_bytes());
+        if !sent || !from.read(&mut reading) {
+            semihosting::exit(EXIT_SPRING_GONE);
+        }
+        let bits = i32::from_le_bytes(reading);
+        self.measured = (bits != i32::MIN).then_some(Volts(Signal::from_bits(bits)));
+    }
+
+    fn measured(&mut self) -> Option<Volts> {
+        self.measured
     }
 }
 

@@ -10,12 +10,14 @@
 //! | [`watchdog`] | the CMSDK watchdog: interrupt, then reset |
 //! | [`instructions`] | SysTick as a counter of instructions |
 //! | [`actor`] | plays a script: orders, interlock, mishaps |
-//! | [`semihosting`] | which script, and the way out |
+//! | [`flash`] | two pages for the store, kept in a file |
+//! | [`semihosting`] | which script, files, and the way out |
 
 #![allow(unsafe_code)]
 
 pub mod actor;
 pub mod dac;
+pub mod flash;
 pub mod instructions;
 pub mod registers;
 pub mod semihosting;
@@ -47,7 +49,7 @@ impl Mps2 {
         kill();
         time::init();
         watchdog::init();
-        Self { dac: dac::Dac }
+        Self { dac: dac::Dac::default() }
     }
 }
 
@@ -71,6 +73,7 @@ impl Board for Mps2 {
 pub fn reset_cause() -> (&'static str, Option<Fault>) {
     match last_words::take() {
         Legacy::None => ("power-on", None),
+        Legacy::Told => ("software", None),
         Legacy::Silent => ("watchdog", Some(Fault::Watchdog)),
         Legacy::Stopped(Fault::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
         Legacy::Stopped(fault, _) => ("software", Some(fault)),

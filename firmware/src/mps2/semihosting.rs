@@ -1,7 +1,13 @@
-//! Two calls to the emulator: which script is to be played, and the way out.
+//! Calls to the emulator: which script is to be played, files of the machine that it runs on, and the way out.
+//!
+//! A call happens between two instructions: none of the board's time passes, however long it takes.
 
 use core::arch::asm;
 
+const OPEN: u32 = 0x01;
+const WRITE: u32 = 0x05;
+const READ: u32 = 0x06;
+const SEEK: u32 = 0x0a;
 const GET_COMMAND_LINE: u32 = 0x15;
 const EXIT_EXTENDED: u32 = 0x20;
 const APPLICATION_EXIT: u32 = 0x2_0026;
@@ -12,6 +18,46 @@ pub fn command_line(buffer: &mut [u8]) -> &str {
     let failed = call(GET_COMMAND_LINE, block.as_mut_ptr() as u32) != 0;
     let length = if failed { 0 } else { block[1] as usize };
     buffer.get(..length).and_then(|bytes| core::str::from_utf8(bytes).ok()).unwrap_or("").trim_end_matches('\0')
+}
+
+/// How a file is opened, by the number of its mode in C.
+#[derive(Clone, Copy, Debug)]
+#[repr(u32)]
+pub enum Mode {
+    /// "rb"
+    Read = 1,
+    /// "r+b": only if it is there.
+    Update = 3,
+    /// "wb"
+    Write = 5,
+}
+
+/// A file or pipe in the emulator's folder.
+#[derive(Debug)]
+pub struct File(u32);
+
+impl File {
+    /// `None` if it cannot be opened. `name` ends with a zero.
+    pub fn open(name: &'static core::ffi::CStr, mode: Mode) -> Option<Self> {
+        let block = [name.as_ptr() as u32, mode as u32, name.count_bytes() as u32];
+        let handle = call(OPEN, block.as_ptr() as u32);
+        (handle != u32::MAX).then_some(Self(handle))
+    }
+
+    /// Goes to a byte from its beginning.
+    pub fn seek(&mut self, at: usize) -> bool {
+        call(SEEK, [self.0, at as u32].as_ptr() as u32) == 0
+    }
+
+    /// True if all of `bytes` was written.
+    pub fn write(&mut self, bytes: &[u8]) -> bool {
+        call(WRITE, [self.0, bytes.as_ptr() as u32, bytes.len() as u32].as_ptr() as u32) == 0
+    }
+
+    /// True if all of `bytes` was read.
+    pub fn read(&mut self, bytes: &mut [u8]) -> bool {
+        call(READ, [self.0, bytes.as_mut_ptr() as u32, bytes.len() as u32].as_ptr() as u32) == 0
+    }
 }
 
 /// Ends the emulator.

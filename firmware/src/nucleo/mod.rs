@@ -14,10 +14,12 @@
 //! | [`clocks`] | 170 MHz without a crystal |
 //! | [`amplifier`] | DAC, enable, monitors |
 //! | [`uart`] | the host's line |
+//! | [`flash`] | two pages for the store |
 //! | [`reset`] | why the chip was reset |
 
 pub mod amplifier;
 pub mod clocks;
+pub mod flash;
 pub mod reset;
 pub mod uart;
 
@@ -43,8 +45,9 @@ pub struct Nucleo {
 }
 
 impl Nucleo {
-    /// Sets everything up, voltage first; the host's line apart, because another task owns it. `None` without one.
-    pub fn init(p: Peripherals) -> (Self, Option<uart::Uart>) {
+    /// Sets everything up, voltage first; the host's line and the flash apart, because another task owns them. `None`
+    /// without a line.
+    pub fn init(p: Peripherals) -> (Self, Option<uart::Uart>, flash::Flash) {
         let amplifier = amplifier::Amplifier::new(p.DAC1, p.PA4, p.PB5, p.ADC1, p.PA0, p.PA1);
         let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
         watchdog.unleash();
@@ -54,7 +57,7 @@ impl Nucleo {
             watchdog,
             led: Output::new(p.PA5, Level::Low, Speed::Low),
         };
-        (board, uart::Uart::new(p.LPUART1, p.PA3, p.PA2))
+        (board, uart::Uart::new(p.LPUART1, p.PA3, p.PA2), flash::Flash::new(p.FLASH))
     }
 }
 

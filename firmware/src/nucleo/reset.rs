@@ -11,7 +11,7 @@ pub fn reset_cause() -> (&'static str, Option<Fault>) {
     RCC.csr().modify(|w| w.set_rmvf(true));
     let fault = match last_words::take() {
         Legacy::Stopped(fault, _) => Some(fault),
-        Legacy::None | Legacy::Silent => None,
+        Legacy::None | Legacy::Silent | Legacy::Told => None,
     };
     // A brown-out sets the pin's flag as well, and so does every other reset: the most telling one first.
     if flags.borrstf() {

@@ -1,5 +1,6 @@
 //! `vsj link`: the MCU over its serial link.
 
+mod model;
 mod record;
 mod watch;
 
@@ -13,7 +14,7 @@ use host_sim::link::{Client, Failure, Patience, Port, StatusReport};
 use link::{Desired, Fault, Reason, Request, State, Status, WireVolts};
 use serde::Serialize;
 
-/// Talk to the MCU over its serial link: status, set, arm, disarm, watch, record
+/// Talk to the MCU over its serial link: status, set, arm, disarm, watch, record, model
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -22,6 +23,7 @@ Examples:
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
   vsj link unix:/tmp/mcu.sock watch                  the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
+  vsj link /dev/ttyACM0 model out/diagnosis/plant.toml   run, and keep, what a diagnosis found
 
 The MCU leads the voltage down when it has not heard the host for longer than its limit (see `status`): a target lives as \
 long as a command that keeps talking, --keep, watch or record. Each request is sent every 0.1 s until it is answered, for \
@@ -69,6 +71,8 @@ enum Command {
     Watch(watch::Arguments),
     /// Record time, voltage and stiffness as CSV, as `vsj diagnose` reads them
     Record(record::Arguments),
+    /// Which model of the spring the MCU runs; with a plant file, send it, have it checked and stored, and restart
+    Model(model::Arguments),
 }
 
 #[derive(Args, Debug)]
@@ -135,6 +139,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         arguments.check()?;
     }
 
+    let model = match &arguments.command {
+        Command::Model(arguments) => arguments.read()?,
+        _ => None,
+    };
+
     let port = Port::open(&arguments.port, arguments.baud)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
     let mut talk = Talk { client, status, json };
@@ -168,6 +177,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         }
         Command::Watch(arguments) => watch::run(&mut talk, arguments),
         Command::Record(arguments) => record::run(&mut talk, arguments),
+        Command::Model(arguments) => model::run(&mut talk, arguments, model.as_ref()),
     }
 }
 

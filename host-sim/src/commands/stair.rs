@@ -106,7 +106,6 @@ impl Arguments {
     /// The settings of a plant file's spring, behind the stricter of its amplifier and the options'.
     fn settings<'a>(&self, file: &'a PlantFile) -> Settings<ExtendedPlant<'a>> {
         let recorded = file.amplifier.clone().unwrap_or_default();
-        let slews = [self.slew_v_per_s, recorded.slew_v_per_s];
         Settings {
             rate_hz: self.rate_hz,
             plant: file.extended(),
@@ -116,11 +115,11 @@ impl Arguments {
             },
             amplifier: Amplifier {
                 min_v: self.min_v,
-                max_v: recorded.limit_v.map_or(self.limit_v, |limit| limit.min(self.limit_v)),
-                slew_v_per_s: slews.into_iter().flatten().reduce(f64::min),
+                slew_v_per_s: self.slew_v_per_s,
                 dac_bits: self.dac_bits,
                 ..Amplifier::up_to(self.limit_v)
-            },
+            }
+            .found_with(recorded.limit_v, recorded.slew_v_per_s),
             feedback: None,
         }
     }

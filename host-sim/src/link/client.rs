@@ -8,7 +8,8 @@ use std::fmt;
 use std::io;
 use std::time::{Duration, Instant, SystemTime};
 
-use link::{Frame, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry, Unreadable};
+use link::wire_model::PART;
+use link::{Frame, Models, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry, Unreadable, WireModel};
 
 use crate::link::Port;
 
@@ -127,6 +128,35 @@ impl Client {
             Reply::Ack { state, target } => Ok((state, target)),
             other => Err(Failure::Unexpected(Box::new(other))),
         }
+    }
+
+    /// The model that runs, and the one that the next start will find.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn models(&mut self) -> Result<Models, Failure> {
+        match self.ask(Request::Model)? {
+            Reply::Model(models) => Ok(models),
+            other => Err(Failure::Unexpected(Box::new(other))),
+        }
+    }
+
+    /// Has a model checked and stored, restarts the MCU, and greets it anew.
+    ///
+    /// # Errors
+    /// [`Failure`]; refused, the old model stays.
+    pub fn install(&mut self, model: &WireModel) -> Result<Models, Failure> {
+        // What does not fit is not sent, and refused as incomplete.
+        let payload = model.payload().unwrap_or_default();
+        for (number, part) in (0..).zip(payload.chunks(PART)) {
+            let mut bytes = [0; PART];
+            bytes[..part.len()].copy_from_slice(part);
+            self.order(Request::ModelPart { number, bytes })?;
+        }
+        self.order(Request::ModelEnd { length: payload.len() as u16, checksum: link::frame::checksum(&payload) })?;
+        self.order(Request::Restart)?;
+        self.status_by(Request::Hello)?;
+        self.models()
     }
 
     /// The telemetry that has come, after listening for `wait`.

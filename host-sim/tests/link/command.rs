@@ -66,7 +66,7 @@ fn a_session(mcu: &Mcu) {
     let port = &mcu.port;
     let status = json(port, &["status"]);
     assert_eq!((&status["sample"]["state"], &status["fault"]), (&"disarmed".into(), &"none".into()));
-    assert_eq!((&status["protocol"], &status["rate_hz"]), (&1.into(), &1000.into()));
+    assert_eq!((&status["protocol"], &status["rate_hz"]), (&link::VERSION.into(), &1000.into()));
     assert_eq!((&status["firmware"], &status["silence_limit_s"]), (&"0.1.0 (0000abcd)".into(), &5.0.into()));
     assert!(good(port, &["status"]).contains("disarmed, fault none"));
 
@@ -269,7 +269,7 @@ fn another_version_and_a_wrong_baud_rate_are_named() {
         let sequence = request.iter().find_map(|&byte| receiver.on_byte(byte).map(|packet| packet.sequence));
         Frame::with_version(7, sequence.unwrap(), &Reply::Status(Status::default())).as_bytes().to_vec()
     });
-    assert!(bad(1, &port, &["status"]).contains("the MCU speaks version 7 of the protocol, this program 1"));
+    assert!(bad(1, &port, &["status"]).contains("the MCU speaks version 7 of the protocol, this program 2"));
     let port = fake(&folder.path().join("baud"), |_| vec![0xf3; 90]);
     assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no sound answer to 2 requests, but 90 bytes"));
     // A line that echoes.
@@ -300,4 +300,40 @@ fn bad_arguments_send_nothing() {
     }
     bad(2, &mcu.port, &["record", "/nonexistent/x.csv"]);
     assert!(mcu.with(|shared| shared.ordered.is_empty()));
+}
+
+#[test]
+fn a_model_is_sent_checked_stored_and_run() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    assert!(good(&mcu.port, &["model"]).starts_with("runs    the one that is built in\n"));
+
+    let spring = file("spring.toml", include_str!("../../../docs/plant.toml"));
+    let output = run(&mcu.port, &["model", &spring]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("not run by the MCU: amplifier.delay_s, drift"));
+    assert!(stdout(&output).starts_with("runs    number 1, format 1, 229 bytes, CRC "), "{output:?}");
+    let models = json(&mcu.port, &["model"]);
+    assert_eq!((&models["active"], &models["active"]["number"]), (&models["stored"], &Value::from(1)));
+
+    // Fine at the fastest rate, but too prompt for the gains that are built in: the MCU's own check says so.
+    let steep = file(
+        "steep.toml",
+        "schema = 1\n[law]\nvoltage_v = [0, 100]\nstiffness = [0, 900]\n[relaxation]\nshare = 0.1\ntau_s = 0.004\n",
+    );
+    let text = bad(2, &mcu.port, &["model", &steep]);
+    assert!(text.contains("steep.toml: the model cannot be run: proportional_gain has to lie within"), "{text}");
+    good(&mcu.port, &["arm"]);
+    let text = bad(1, &mcu.port, &["model", "paper"]);
+    assert!(text.contains("refused: armed; disarm it first"), "{text}");
+    good(&mcu.port, &["disarm"]);
+    assert_eq!(json(&mcu.port, &["model"]), models, "what is refused changes nothing");
+
+    assert!(good(&mcu.port, &["model", "paper"]).starts_with("runs    number 2, format 1, 25 bytes, CRC "));
+    let text = bad(2, &mcu.port, &["model", "nowhere.toml"]);
+    assert!(text.contains("nowhere.toml: cannot be read"), "{text}");
 }

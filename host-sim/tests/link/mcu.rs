@@ -11,9 +11,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use firmware::control::{Control, Orders, Senses, Untimed};
+use firmware::store::{PAGE, Pages, Side, Store, WORD, Worn};
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{About, Desk, Fault, Order, State, Step, Telemetry, View};
+use link::{About, Desk, Fault, Keep, Order, Reason, State, Step, Telemetry, View, WireModel};
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Settings, Spring, supervisor};
 use serialport::{SerialPort, TTYPort};
@@ -51,6 +52,34 @@ pub(crate) struct Shared {
     pub(crate) interlock_open: bool,
     /// Restart at the next tick.
     pub(crate) restart: bool,
+    /// What outlives a restart.
+    pub(crate) flash: Flash,
+}
+
+/// Two pages.
+#[derive(Clone, Debug)]
+pub(crate) struct Flash([[u8; PAGE]; 2]);
+
+impl Default for Flash {
+    fn default() -> Self {
+        Self([[0xff; PAGE]; 2])
+    }
+}
+
+impl Pages for Flash {
+    fn bytes(&self, side: Side) -> &[u8; PAGE] {
+        &self.0[side as usize]
+    }
+
+    fn erase(&mut self, side: Side) -> Result<(), Worn> {
+        self.0[side as usize].fill(0xff);
+        Ok(())
+    }
+
+    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), Worn> {
+        self.0[side as usize][at..at + WORD].copy_from_slice(&word);
+        Ok(())
+    }
 }
 
 /// A running MCU; it ends with the test.
@@ -196,6 +225,7 @@ struct Chip {
     shared: Arc<Mutex<Shared>>,
     desk: Desk,
     control: Control,
+    store: Store<Flash>,
     view: View,
 }
 
@@ -203,17 +233,24 @@ impl Chip {
     fn new(setup: Setup, shared: Arc<Mutex<Shared>>) -> Self {
         let host_timeout_s = f64::from(setup.silence_ms) / 1000.0;
         let supervision = supervisor::Settings { host_timeout_s, ..supervisor::Settings::DEFAULT };
-        let control = Control::new(&Settings::PAPER, &supervision, None).unwrap();
+        let store = Store::new(shared.lock().unwrap().flash.clone());
+        let stored = store.newest().map(|(id, payload)| (id, WireModel::read(payload).unwrap()));
+        let (model, found) = stored.unzip();
+        let mut control = Control::new(&Settings::PAPER, &supervision, None).unwrap();
+        if let Some(found) = found {
+            control.take_on(&Settings::PAPER, &found).unwrap();
+        }
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
         let about = About {
             firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd },
             rate_hz: 1000,
             silence_limit_ticks: setup.silence_ms,
             last_fault: Fault::NONE,
+            model: model.unwrap_or_default(),
         };
         let view =
             View { sample: Telemetry::default(), state: supervisor::State::Disarmed, refusal: None, overruns: 0 };
-        let mut chip = Self { setup, shared, desk: Desk::new(spring, about), control, view };
+        let mut chip = Self { setup, shared, desk: Desk::new(spring, about), control, store, view };
         chip.tick(Orders::default());
         chip
     }
@@ -247,9 +284,27 @@ impl Chip {
                 out.extend_from_slice(self.desk.settle(&self.view));
             }
             Some(Step::Send(bytes)) => out.extend_from_slice(bytes),
+            Some(Step::Keep(keep)) => {
+                let kept = match keep {
+                    Keep::Part(number, bytes) => self.store.part(number, &bytes).map(|()| None),
+                    Keep::End { length, checksum } => self.store.end(length, checksum, check).map(Some),
+                };
+                out.extend_from_slice(self.desk.kept(kept, &self.view));
+            }
+            Some(Step::Restart(bytes)) => {
+                out.extend_from_slice(bytes);
+                let mut shared = self.shared.lock().unwrap();
+                (shared.restart, shared.flash) = (true, self.store.pages().clone());
+            }
             None => {}
         }
     }
+}
+
+/// As the firmware's.
+fn check(payload: &[u8]) -> Result<(), Reason> {
+    let found = WireModel::read(payload).ok_or(Reason::ModelDamaged)?;
+    Control::check(&Settings::PAPER, &found).map_err(|error| Reason::of_model(&error))
 }
 
 /// A bad line, always bad in the same way.

@@ -2,7 +2,7 @@
 
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{Desired, Fault, Reason, Reply, Request, State, Status, Telemetry, WireVolts};
+use link::{Desired, Fault, Field, ModelId, Models, Reason, Reply, Request, State, Status, Telemetry, WireVolts};
 use proptest::prelude::*;
 
 /// Any finite or infinite number. NaN is left out because it does not equal itself; it has its own test.
@@ -30,6 +30,10 @@ pub(crate) fn request() -> impl Strategy<Value = Request> {
         fault().prop_map(Request::Acknowledge),
         Just(Request::Heartbeat),
         any::<u16>().prop_map(|every_ticks| Request::Stream { every_ticks }),
+        Just(Request::Model),
+        any::<(u8, [u8; 32])>().prop_map(|(number, bytes)| Request::ModelPart { number, bytes }),
+        any::<(u16, u32)>().prop_map(|(length, checksum)| Request::ModelEnd { length, checksum }),
+        Just(Request::Restart),
     ]
 }
 
@@ -50,6 +54,15 @@ fn reason() -> impl Strategy<Value = Reason> {
         Just(Reason::InterlockOpen),
         fault().prop_map(Reason::OtherFault),
         Just(Reason::HostSilent),
+        Just(Reason::Armed),
+        any::<u8>().prop_map(Reason::PartMissing),
+        Just(Reason::ModelDamaged),
+        (any::<u8>(), number(), number()).prop_map(|(field, lowest, highest)| Reason::BadModel {
+            field: Field(field),
+            lowest,
+            highest
+        }),
+        Just(Reason::NotStored),
     ]
 }
 
@@ -89,11 +102,21 @@ fn status() -> impl Strategy<Value = Status> {
     )
 }
 
+fn model() -> impl Strategy<Value = ModelId> {
+    any::<(u32, u8, u16, u32)>().prop_map(|(number, format, length, checksum)| ModelId {
+        number,
+        format,
+        length,
+        checksum,
+    })
+}
+
 pub(crate) fn reply() -> impl Strategy<Value = Reply> {
     prop_oneof![
         (state(), volts()).prop_map(|(state, target)| Reply::Ack { state, target }),
         reason().prop_map(Reply::Refused),
         status().prop_map(Reply::Status),
         telemetry().prop_map(Reply::Telemetry),
+        (model(), model()).prop_map(|(active, stored)| Reply::Model(Models { active, stored })),
     ]
 }

@@ -1,0 +1,176 @@
+//! Power cuts at every step of storing a model, each in every way in which a step can be cut.
+
+use std::vec::Vec;
+
+use super::*;
+
+/// Flash whose power fails.
+#[derive(Clone, Debug)]
+struct Flash {
+    pages: [[u8; PAGE]; 2],
+    /// Steps until the power fails; `None`: never.
+    steps: Option<usize>,
+    torn: Torn,
+}
+
+/// What the step leaves during which the power fails.
+#[derive(Clone, Copy, Debug)]
+enum Torn {
+    /// As if it had not begun.
+    Nothing,
+    /// As if it had just ended.
+    All,
+    /// Some of the bits, by this pattern.
+    Some(u64),
+}
+
+const TORN: [Torn; 8] = [
+    Torn::Nothing,
+    Torn::All,
+    Torn::Some(0x5555_5555_5555_5555),
+    Torn::Some(0xaaaa_aaaa_aaaa_aaaa),
+    Torn::Some(0x0000_0000_ffff_ffff),
+    Torn::Some(0xffff_ffff_0000_0000),
+    Torn::Some(0x0123_4567_89ab_cdef),
+    Torn::Some(0x8000_0000_0000_0001),
+];
+
+impl Flash {
+    const BLANK: Self = Self { pages: [[0xff; PAGE]; 2], steps: None, torn: Torn::Nothing };
+
+    /// What of the bits of this step is done; and whether it is the last.
+    fn power(&mut self) -> Result<(u64, bool), Worn> {
+        match &mut self.steps {
+            None => Ok((u64::MAX, true)),
+            Some(0) => Err(Worn),
+            Some(steps) => {
+                *steps -= 1;
+                let done = match (*steps, self.torn) {
+                    (1.., _) | (0, Torn::All) => u64::MAX,
+                    (0, Torn::Nothing) => 0,
+                    (0, Torn::Some(bits)) => bits,
+                };
+                Ok((done, *steps > 0))
+            }
+        }
+    }
+}
+
+impl Pages for Flash {
+    fn bytes(&self, side: Side) -> &[u8; PAGE] {
+        &self.pages[side as usize]
+    }
+
+    fn erase(&mut self, side: Side) -> Result<(), Worn> {
+        let (done, whole) = self.power()?;
+        for word in self.pages[side as usize].as_chunks_mut::<WORD>().0 {
+            *word = (u64::from_le_bytes(*word) | done).to_le_bytes();
+        }
+        if whole { Ok(()) } else { Err(Worn) }
+    }
+
+    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), Worn> {
+        let (done, whole) = self.power()?;
+        let place = &mut self.pages[side as usize].as_chunks_mut::<WORD>().0[at / WORD];
+        assert!(*place == [0xff; WORD] || self.steps.is_some(), "a word is written once");
+        *place = (u64::from_le_bytes(*place) & (u64::from_le_bytes(word) | !done)).to_le_bytes();
+        if whole { Ok(()) } else { Err(Worn) }
+    }
+}
+
+fn payload(seed: u8) -> Vec<u8> {
+    (0..100 + u32::from(seed)).map(|i| (i as u8).wrapping_mul(31).wrapping_add(seed)).collect()
+}
+
+fn store(flash: &Flash, payload: &[u8], check: Result<(), Reason>) -> (Flash, Result<ModelId, Reason>) {
+    let mut store = Store::new(flash.clone());
+    let mut sent = Ok(());
+    for (number, part) in (0..).zip(payload.chunks(PART)) {
+        let mut bytes = [0; PART];
+        bytes[..part.len()].copy_from_slice(part);
+        sent = sent.and_then(|()| store.part(number, &bytes));
+    }
+    let ended = sent.and_then(|()| store.end(payload.len() as u16, frame::checksum(payload), |_| check));
+    (store.pages, ended)
+}
+
+fn newest(flash: &Flash) -> Option<Vec<u8>> {
+    Store::new(flash.clone()).newest().map(|(_, payload)| payload.to_vec())
+}
+
+#[test]
+fn the_newest_counts() {
+    let mut flash = Flash::BLANK;
+    assert_eq!(newest(&flash), None);
+    for number in 1..6 {
+        let (after, stored) = store(&flash, &payload(number), Ok(()));
+        assert_eq!(stored.unwrap().number, u32::from(number));
+        assert_eq!(newest(&after), Some(payload(number)));
+        flash = after;
+    }
+}
+
+#[test]
+fn a_power_cut_leaves_the_old_one_or_the_new_one() {
+    let mut before = Flash::BLANK;
+    let (mut cuts, mut old_ones, mut new_ones) = (0, 0, 0);
+    for number in 1..4 {
+        let (old, new) = (newest(&before), payload(number));
+        let (after, _) = store(&before, &new, Ok(()));
+        // One erase, the parts' words, the header's two.
+        let steps = 1 + new.len().div_ceil(PART) * PART / WORD + 2;
+        for (cut, torn) in (1..=steps).flat_map(|cut| TORN.map(|torn| (cut, torn))) {
+            let (cut_off, stored) = store(&Flash { steps: Some(cut), torn, ..before.clone() }, &new, Ok(()));
+            assert!(stored.is_err(), "nothing is said to be stored without power");
+            let again = Flash { steps: None, ..cut_off };
+            let found = newest(&again);
+            assert!(found == old || found.as_ref() == Some(&new), "step {cut}, {torn:?}: {found:?}");
+            assert!(cut == steps || found == old, "only the last step makes it count");
+            (cuts, old_ones, new_ones) =
+                (cuts + 1, old_ones + u32::from(found == old), new_ones + u32::from(found != old));
+            // And the next attempt finds a sound memory.
+            let (repaired, stored) = store(&again, &new, Ok(()));
+            assert!(stored.is_ok() && newest(&repaired).as_ref() == Some(&new), "step {cut}, {torn:?}");
+        }
+        before = after;
+    }
+    assert!(cuts > 400 && new_ones >= 3 && old_ones > new_ones, "{cuts} {old_ones} {new_ones}");
+}
+
+#[test]
+fn what_is_not_sound_is_not_stored() {
+    let (flash, _) = store(&Flash::BLANK, &payload(1), Ok(()));
+    let bad = Reason::ModelDamaged;
+    let (after, stored) = store(&flash, &payload(2), Err(bad));
+    assert_eq!((stored, newest(&after)), (Err(bad), Some(payload(1))), "refused by its check");
+
+    let mut store = Store::new(flash);
+    assert_eq!(store.part(1, &[0; PART]), Err(Reason::PartMissing(0)), "the first part is missing");
+    store.part(0, &[0; PART]).unwrap();
+    assert_eq!(store.part(2, &[0; PART]), Err(Reason::PartMissing(1)), "a part is missing");
+    assert_eq!(store.part(13, &[0; PART]), Err(Reason::PartMissing(1)), "beyond the longest");
+    assert_eq!(store.end(40, 0, |_| Ok(())), Err(Reason::PartMissing(1)), "the end is missing");
+    store.part(0, &[0; PART]).unwrap();
+    assert_eq!(store.end(20, 1, |_| Ok(())), Err(Reason::ModelDamaged), "another checksum");
+    assert_eq!(store.end(20, 1, |_| Ok(())), Err(Reason::PartMissing(0)), "an end without parts");
+    assert_eq!(store.newest().map(|(id, _)| id.number), Some(1));
+}
+
+/// Whatever a page holds: no panic, and no model.
+#[test]
+fn noise_is_no_model() {
+    let mut bits = 1u32;
+    for round in 0..200 {
+        let mut flash = Flash::BLANK;
+        for byte in flash.pages.iter_mut().flatten() {
+            bits ^= bits << 13;
+            bits ^= bits >> 17;
+            bits ^= bits << 5;
+            *byte = bits as u8;
+        }
+        if round % 2 == 0 {
+            flash.pages[0][..4].copy_from_slice(&MARK.to_le_bytes());
+        }
+        assert_eq!(newest(&flash), None);
+    }
+}

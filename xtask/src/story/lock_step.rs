@@ -1,0 +1,74 @@
+//! The emulated board and a hidden spring at its amplifier port, in lock step: see the firmware's `mps2::dac`.
+//!
+//! The board waits in a semihosting call, between two instructions, until the spring has answered. So none of its time
+//! passes, and a run is the same each time, however busy the machine is.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::path::Path;
+use std::thread;
+
+use anyhow::{Context, Result, anyhow};
+use end_to_end::hidden::live::Live;
+use firmware::script::{SETTINGS, UP_DOWN};
+
+use crate::emulator::{self, Run};
+use crate::shell;
+
+/// From the board, and to it.
+const PIPES: [&str; 2] = ["to-spring", "from-spring"];
+/// Between two ticks, in s.
+const TICK_S: f64 = 1.0 / SETTINGS.rate_hz;
+
+/// A tick, as the spring saw it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moment {
+    /// What the amplifier was told, in V.
+    pub(super) commanded_v: f64,
+    /// What the spring's stiffness really was, in V.
+    pub(super) stiffness_v: f64,
+    /// What its sensor made of it, in V.
+    pub(super) read_v: f64,
+}
+
+/// Runs the way up and down in `folder`; the run, and every tick of the spring.
+pub(super) fn run(elf: &Path, folder: &Path, spring: Live) -> Result<(Run, Vec<Moment>)> {
+    for pipe in PIPES.map(|name| folder.join(name)) {
+        match fs::remove_file(&pipe) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
+            _ => shell::output(shell::command("mkfifo").arg(&pipe))?,
+        };
+    }
+    thread::scope(|scope| {
+        let beside = scope.spawn(|| serve(folder, spring));
+        let run = emulator::play_in(folder, elf, UP_DOWN, emulator::SHIFT, |_| {});
+        // If the board never came, whoever waits for it does so no longer.
+        for pipe in PIPES {
+            drop(OpenOptions::new().read(true).write(true).open(folder.join(pipe)));
+        }
+        let moments = beside.join().map_err(|_| anyhow!("the spring's thread stopped"))?;
+        Ok((run?, moments?))
+    })
+}
+
+fn serve(folder: &Path, mut spring: Live) -> Result<Vec<Moment>> {
+    let [to, from] = PIPES.map(|name| folder.join(name));
+    let mut to = File::open(&to).with_context(|| format!("cannot open {}", to.display()))?;
+    let mut from =
+        OpenOptions::new().write(true).open(&from).with_context(|| format!("cannot open {}", from.display()))?;
+    let mut moments = Vec::new();
+    let mut word = [0; 2];
+    loop {
+        match to.read_exact(&mut word) {
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(moments),
+            read => read?,
+        }
+        let word = u16::from_le_bytes(word);
+        let code = if word >> 15 == 1 { word & 0xfff } else { 0 };
+        let commanded_v = f64::from(code) * SETTINGS.amplifier.volts_per_code();
+        let (stiffness_v, reading) = spring.hold(commanded_v, TICK_S);
+        moments.push(Moment { commanded_v, stiffness_v, read_v: reading.read });
+        let bits = (reading.read * f64::from(1 << 20)) as i32;
+        from.write_all(&bits.to_le_bytes())?;
+    }
+}
