@@ -11,7 +11,7 @@ use model::{
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
-pub use crate::judged::{Judged, continuous, reference_at, with_plant};
+pub use crate::judged::{Judged, StartsFrom, continuous, reference_at, with_plant};
 use crate::schedule::Schedule;
 
 /// More ticks than this are refused: a run keeps 48 bytes of each.
@@ -117,7 +117,11 @@ pub fn paper_spring() -> Result<Spring> {
 }
 
 /// The fixed-point loop over one target a tick; its reference is not known yet.
-fn one_loop<E: Estimator>(config: &Config<E>, targets: &[f64], mut progress: impl FnMut(usize)) -> Result<Vec<Sample>> {
+pub(crate) fn one_loop<E: Estimator>(
+    config: &Config<E>,
+    targets: &[f64],
+    mut progress: impl FnMut(usize),
+) -> Result<Vec<Sample>> {
     let mut state = State::default();
     let mut samples = Vec::with_capacity(targets.len());
     for (tick, &target) in targets.iter().enumerate() {

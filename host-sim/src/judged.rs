@@ -6,10 +6,23 @@
 use model::estimator::Model;
 use model::{Compensation, ExtendedPlant, Plant, Settings};
 
+use serde::Serialize;
+
+use crate::bound::{from_where_it_is, shortest_time};
 use crate::experiment::{Run, Sample};
 use crate::reference::{Loop, Moment};
 use crate::sampled::{Controller, SampledLoop, Spring};
-use crate::schedule::Schedule;
+use crate::schedule::{Change, Schedule};
+
+/// Where the fastest drive starts that a step is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StartsFrom {
+    /// At the old value, settled.
+    Settled,
+    /// Where the loop has brought the spring.
+    Reached,
+}
 
 /// A spring whose fixed-point run is laid beside a reference.
 pub trait Judged: Model {
@@ -28,8 +41,11 @@ pub trait Judged: Model {
         times_s: &[f64],
     ) -> Vec<f64>;
 
-    /// The loop in continuous time, where it can be solved exactly.
-    fn exact(settings: &Settings<Self>) -> Option<Loop>;
+    /// The shortest time, in s, in which any controller could make 97 % of each change, from the state that is meant.
+    fn bounds(settings: &Settings<Self>, run: &Run, samples: &[Sample], changes: &[Change]) -> Vec<Option<f64>>;
+
+    /// The state that is meant.
+    fn bounds_from(settings: &Settings<Self>) -> StartsFrom;
 }
 
 impl Judged for Plant {
@@ -57,8 +73,13 @@ impl Judged for Plant {
         }
     }
 
-    fn exact(settings: &Settings) -> Option<Loop> {
-        Some(continuous(settings))
+    fn bounds(settings: &Settings, _: &Run, _: &[Sample], changes: &[Change]) -> Vec<Option<f64>> {
+        let system = continuous(settings);
+        changes.iter().map(|change| shortest_time(&system, change.from_v, change.to_v, 0.97)).collect()
+    }
+
+    fn bounds_from(_: &Settings) -> StartsFrom {
+        StartsFrom::Settled
     }
 }
 
@@ -77,8 +98,15 @@ impl Judged for ExtendedPlant<'_> {
         at_last_ticks(run, samples, times_s)
     }
 
-    fn exact(settings: &Settings<Self>) -> Option<Loop> {
-        settings.plant.plain().map(|plant| continuous(&with_plant(settings, plant)))
+    fn bounds(settings: &Settings<Self>, run: &Run, samples: &[Sample], changes: &[Change]) -> Vec<Option<f64>> {
+        match settings.plant.plain() {
+            Some(plant) => Plant::bounds(&with_plant(settings, plant), run, samples, changes),
+            None => from_where_it_is(&SampledLoop::from(settings), run, samples, changes, 0.97),
+        }
+    }
+
+    fn bounds_from(settings: &Settings<Self>) -> StartsFrom {
+        if settings.plant.plain().is_some() { StartsFrom::Settled } else { StartsFrom::Reached }
     }
 }
 

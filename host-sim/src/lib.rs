@@ -9,7 +9,8 @@
 //! | [`experiment`], [`judged`] | fixed point and reference side by side over a schedule |
 //! | [`open_loop`] | the fixed-point spring alone over a record |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the fastest any controller could be |
-//! | [`stair`] | what a run says |
+//! | [`stair`], [`comparison`] | what a run says, and what each controller makes of the same steps |
+//! | [`tune`] | gains and settings for a spring, and what an error of its model costs |
 //! | [`table3`], [`misprint`] | the report's table, and why a printed number is not reproduced |
 //! | [`plant_file`] | the spring as a file |
 //! | [`beam`], [`dynamics`], [`mod@joint`] | the report's models: leaf spring, how its stiffness changes, springs in a joint |
@@ -21,6 +22,7 @@
 pub mod bad_input;
 pub mod beam;
 pub mod bound;
+pub mod comparison;
 pub mod csv_table;
 pub mod diagnose;
 pub mod dynamics;
@@ -42,5 +44,6 @@ pub mod sampled;
 pub mod schedule;
 pub mod stair;
 pub mod table3;
+pub mod tune;
 
 pub use bad_input::BadInput;

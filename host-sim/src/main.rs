@@ -25,6 +25,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Beam(commands::beam::Arguments),
+    Compare(commands::compare::Arguments),
     Diagnose(commands::diagnose::Arguments),
     Dynamics(commands::dynamics::Arguments),
     Joint(commands::joint::Arguments),
@@ -32,6 +33,7 @@ enum Command {
     Log(commands::log::Arguments),
     Reproduce(commands::reproduce::Arguments),
     Stair(commands::stair::Arguments),
+    Tune(commands::tune::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
     };
     let done = match cli.command {
         Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
+        Some(Command::Compare(arguments)) => commands::compare::run(&arguments),
         Some(Command::Diagnose(arguments)) => commands::diagnose::run(&arguments),
         Some(Command::Dynamics(arguments)) => commands::dynamics::run(&arguments),
         Some(Command::Joint(arguments)) => commands::joint::run(&arguments),
@@ -48,6 +51,7 @@ fn main() -> ExitCode {
         Some(Command::Log(arguments)) => commands::log::run(&arguments),
         Some(Command::Reproduce(arguments)) => commands::reproduce::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
+        Some(Command::Tune(arguments)) => commands::tune::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),
     };
     match done {

@@ -183,6 +183,12 @@ impl PlantFile {
         Ok(())
     }
 
+    /// An amplifier with the limit and slew that the file records, where they are stricter.
+    pub fn behind(&self, amplifier: model::Amplifier) -> model::Amplifier {
+        let Some(Amplifier { limit_v, slew_v_per_s, .. }) = self.amplifier else { return amplifier };
+        amplifier.found_with(limit_v, slew_v_per_s)
+    }
+
     /// What the file says of the record that neither the tick nor its amplifier stage runs, by name.
     pub fn left_out(&self) -> Vec<String> {
         let delayed = self.amplifier.as_ref().is_some_and(|amplifier| amplifier.delay_s.is_some());

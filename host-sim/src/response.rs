@@ -22,8 +22,9 @@ pub struct Response {
     pub overshoot_percent: f64,
     /// The voltage that goes farthest in the direction of the change, in V.
     pub peak_v: f64,
-    /// The shortest `t97_s` that any controller could reach within the amplifier's limits, from a settled spring and an
-    /// ideal step; `None` if out of reach, and for an extended spring, where it is not known.
+    /// The shortest `t97_s` that any controller could reach within the amplifier's limits, with an ideal step: from a
+    /// settled spring, or for an extended one from the state that this loop has brought it to (see [`crate::bound`]).
+    /// `None` if out of reach.
     pub bound_t97_s: Option<f64>,
 }
 

@@ -82,13 +82,14 @@ impl SampledLoop {
     fn leading_to(&self, spring: &spring::State, target: f64, approach_s: f64) -> f64 {
         let now = self.spring.stiffness(spring);
         let part = if approach_s > 0.0 { -(-self.sample_s / approach_s).exp_m1() } else { 1.0 };
-        let aim = now + part * (target - now);
-        let missed = |volts: f64| {
+        let ahead = |volts: f64| {
             let mut tried = spring.clone();
             self.spring.apply(&mut tried, volts);
             self.spring.hold(&mut tried, self.sample_s);
-            self.spring.stiffness(&tried) - aim
+            self.spring.stiffness(&tried)
         };
+        let aim = self.braked(now, ahead(spring.voltage()), target, now + part * (target - now));
+        let missed = |volts: f64| ahead(volts) - aim;
         let (mut low, mut high) = self.range_v;
         let (mut at_low, mut at_high) = (missed(low), missed(high));
         if at_low >= 0.0 || at_high <= 0.0 {
@@ -116,6 +117,23 @@ impl SampledLoop {
             }
         }
         0.5 * (low + high)
+    }
+
+    /// What of an aim for the end of the tick leaves the slew time to stop at the target; the stiffness is `now`, and
+    /// `then` at the end of the tick if the voltage stays. While the voltage turns back at the slew, each tick takes the
+    /// same from the drift, and the relaxation its part.
+    fn braked(&self, now: f64, then: f64, target: f64, aim: f64) -> f64 {
+        let step = self.slew_v_per_s * self.sample_s;
+        let (sign, drift) = ((then - now).signum(), (then - now).abs());
+        let spring::Turning { within_a_tick, in_each_later, relaxed } = self.spring.turning(self.sample_s);
+        let beyond = drift - within_a_tick * step;
+        if beyond <= 0.0 || step.is_infinite() {
+            return aim;
+        }
+        let slower = in_each_later * step + relaxed * (drift + within_a_tick * step) / 2.0;
+        let allowed = (2.0 * slower * (sign * (target - then)).max(0.0)).sqrt();
+        let braked = then + sign * within_a_tick / in_each_later * (allowed - beyond);
+        if sign > 0.0 { aim.min(braked) } else { aim.max(braked) }
     }
 
     /// Second half: `applied` volts are put across the spring and held; returns the stiffness just after, in V.

@@ -4,8 +4,7 @@ use anyhow::Result;
 use model::{Compensation, Limits, Settings};
 use serde::Serialize;
 
-use crate::bound::shortest_time;
-use crate::experiment::{Experiment, Judged, Run, Sample, max_fixed_point_error};
+use crate::experiment::{Experiment, Judged, Run, Sample, StartsFrom, max_fixed_point_error};
 use crate::misprint::Pair;
 use crate::record::Record;
 use crate::response::{Response, measure};
@@ -19,6 +18,8 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// One a change of the target.
     pub steps: Vec<Response>,
+    /// Where the fastest drive of `bound_t97_s` starts.
+    pub bound_from: StartsFrom,
     /// Largest difference between fixed point and reference over every tick of the controlled loop, in V.
     pub max_fixed_point_error: f64,
     /// The same of the spring left alone: nothing there corrects the rounding of the DAC.
@@ -95,15 +96,10 @@ impl Report {
         let mut rows = rows(experiment, run, source)?;
         let (printed_compared, printed_agree) = if compared { explain(&mut rows) } else { (0, 0) };
         let samples = if controlled { &run.with } else { &run.without };
-        let exact = P::exact(&experiment.settings);
-        let step = |change: &Change| {
-            let bound = exact.and_then(|system| shortest_time(&system, change.from_v, change.to_v, 0.97));
-            measure(run, samples, change, bound)
-        };
-        let steps = experiment.schedule.changes().iter().map(step).collect();
         Ok(Self {
             rows,
-            steps,
+            steps: responses(experiment, run, samples),
+            bound_from: P::bounds_from(&experiment.settings),
             max_fixed_point_error: max_fixed_point_error(&run.with),
             max_fixed_point_error_without: max_fixed_point_error(&run.without),
             limited_ticks: LimitedTicks::of(samples),
@@ -111,6 +107,14 @@ impl Report {
             printed_agree,
         })
     }
+}
+
+/// The answer of one loop of a run to each change of its target.
+pub fn responses<P: Judged>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> Vec<Response> {
+    let changes = experiment.schedule.changes();
+    let bounds = P::bounds(&experiment.settings, run, samples, &changes);
+    let each = |(change, bound): (&Change, _)| measure(run, samples, change, bound);
+    changes.iter().zip(bounds).map(each).collect()
 }
 
 /// Rows at the moments of a table or file: the reference at the very moment, fixed point at the last tick before.

@@ -36,6 +36,11 @@ pub trait Model: Copy {
     /// How much of a change of voltage shows how soon, at the most.
     fn promptness(&self, sample_time: SampleTime) -> Promptness;
 
+    /// The same at the least, in the direction that the voltage turns to.
+    fn least_promptness(&self, sample_time: SampleTime) -> Promptness {
+        self.promptness(sample_time)
+    }
+
     /// The way back, from a stiffness to a voltage whose `resolution_v` is that of the amplifier's converter.
     ///
     /// # Errors
@@ -82,14 +87,14 @@ pub(crate) fn demanded(within_a_tick: f64) -> f64 {
     (1.0 / within_a_tick).min(MOST_DEMANDED)
 }
 
-/// Upper bounds of what one volt more does, in V/V.
+/// Bounds of what one volt more does, in V/V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promptness {
     /// At once.
     pub at_once: f64,
     /// Later, by one more tick.
     pub in_a_tick: f64,
-    /// What part of its distance the fastest relaxation makes in a tick.
+    /// What part of its distance the relaxation makes in a tick.
     pub relaxed: f64,
 }
 

@@ -99,6 +99,18 @@ impl Model for ExtendedPlant<'_> {
         Promptness { at_once: steepness * at_once, in_a_tick: steepness * in_a_tick, relaxed }
     }
 
+    fn least_promptness(&self, sample_time: SampleTime) -> Promptness {
+        let memory = self.memory.map_or(1.0, |memory| memory.turning());
+        let steepness = memory * self.law.map_or(1.0, |law| law.flattest());
+        let Promptness { at_once, in_a_tick, relaxed } = self.relaxation.least_promptness(sample_time);
+        let (lost, lost_in_mean) = self.leakage.map_or((0.0, 0.0), |leakage| leakage.lost_in_a_tick(sample_time));
+        Promptness {
+            at_once: steepness * at_once * (1.0 - lost),
+            in_a_tick: steepness * in_a_tick * (1.0 - lost_in_mean),
+            relaxed,
+        }
+    }
+
     fn inverse(&self, sample_time: SampleTime, resolution_v: f64) -> Result<Inverse, OutOfRange> {
         Inverse::new(self, sample_time, resolution_v)
     }

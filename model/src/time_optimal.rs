@@ -15,13 +15,18 @@
 //!   every limit and of the DAC's rounding; there is no integrator.
 //! - **Smooth.** `u` is a continuous function of state and target. At the target it falls back with the time constant
 //!   `share * tau` of the spring's inverse, 0.5 s for the report's.
-//! - **Without a bump.** [`TimeOptimal::align`] moves the target to where the last voltage leads; the difference fades.
+//! - **Without a bump.** `align` moves the target to where the last voltage leads; the difference fades.
+//!
+//! - **Slew.** Where the amplifier cannot bring its voltage back as fast as that, it begins earlier: `braking`.
 //!
 //! The same for every [`Estimator`]; what differs is how it inverts itself, [`Estimator::voltage_for`].
 
+mod braking;
+
+use self::braking::Braking;
 use crate::coefficient::{Rate, Weight, saturated, upper};
 use crate::error::OutOfRange;
-use crate::estimator::{Estimator, Outlook};
+use crate::estimator::{Estimator, Outlook, Promptness};
 use crate::units::{Accumulator, SampleTime, Volts};
 
 /// How fast the difference fades that a change of settings leaves, in s.
@@ -46,7 +51,11 @@ pub struct TimeOptimal<I> {
     inverse: I,
     /// Part of the way to the target that is made in a tick.
     reach: Weight,
+    /// Part of what rounding to a code took from the last voltage that is asked for again: a long approach asks for less
+    /// than a code in a tick, and would otherwise stay where it is.
+    kept: Weight,
     fading: Rate,
+    braking: Option<Braking>,
 }
 
 /// Where the target is pursued from after a change of settings, less the target, in V.
@@ -56,16 +65,28 @@ pub struct State {
 }
 
 impl<I: Copy> TimeOptimal<I> {
+    /// `spring` is as prompt as this; `slew` has the spring's least promptness, and the volts that the amplifier makes in a tick, where that is a limit.
+    ///
     /// # Errors
     /// [`OutOfRange`] names `approach_s`.
-    pub(crate) fn new(approach: &Approach, inverse: I, sample_time: SampleTime) -> Result<Self, OutOfRange> {
+    pub(crate) fn new(
+        approach: &Approach,
+        inverse: I,
+        spring: &Promptness,
+        slew: Option<(Promptness, f64)>,
+        sample_time: SampleTime,
+    ) -> Result<Self, OutOfRange> {
         let time_constant = OutOfRange::check("approach_s", approach.time_constant_s, 0.0..=1.0, "s")?;
         let part = |time_constant: f64| -libm::expm1(-sample_time.seconds() / time_constant);
         let reach = if time_constant > 0.0 { part(time_constant) } else { 1.0 };
-        Ok(Self { inverse, reach: Weight::new(reach), fading: Rate::new(part(HANDOVER_S)) })
+        let braking = slew.map(|(least, step_v)| Braking::new(&least, step_v));
+        let at_once = spring.at_once / (spring.at_once + spring.in_a_tick).max(1e-9);
+        let kept = Weight::new((1.0 - reach) * at_once);
+        Ok(Self { inverse, reach: Weight::new(reach), kept, fading: Rate::new(part(HANDOVER_S)), braking })
     }
 
-    /// The voltage that this law asks for, before the amplifier's limits; `applied` is the last one after them.
+    /// The voltage that this law asks for, before the amplifier's limits; `driven` is the last one after
+    /// them, and `applied` what rounding made of it.
     #[inline(always)]
     pub(crate) fn voltage<E: Estimator<Inverse = I>>(
         &self,
@@ -73,14 +94,20 @@ impl<I: Copy> TimeOptimal<I> {
         target: Volts,
         spring: &E,
         spring_state: &E::State,
+        driven: Volts,
         applied: Volts,
     ) -> Volts {
         let target = target.0.saturating_add(upper(state.handover));
         state.handover -= self.fading.step(upper(state.handover));
-        let Outlook { now, then } = spring.outlook(spring_state, applied);
+        let outlook = spring.outlook(spring_state, applied);
+        let Outlook { now, then } = outlook;
         let way = saturated(self.reach.of(target.saturating_sub(now)));
-        let change = way.saturating_sub(then.saturating_sub(now));
-        spring.voltage_for(spring_state, &self.inverse, applied, change)
+        let mut change = way.saturating_sub(then.saturating_sub(now));
+        if let Some(braking) = &self.braking {
+            change = braking.limit(change, target, outlook);
+        }
+        let wanted = spring.voltage_for(spring_state, &self.inverse, applied, change);
+        Volts(wanted.0.saturating_add(saturated(self.kept.of(driven.0.saturating_sub(applied.0)))))
     }
 
     /// Has the law ask for the `applied` voltage again.

@@ -7,6 +7,7 @@ use anyhow::Result;
 use host_sim::BadInput;
 
 pub(crate) mod beam;
+pub(crate) mod compare;
 pub(crate) mod diagnose;
 pub(crate) mod dynamics;
 pub(crate) mod joint;
@@ -14,6 +15,7 @@ pub(crate) mod link;
 pub(crate) mod log;
 pub(crate) mod reproduce;
 pub(crate) mod stair;
+pub(crate) mod tune;
 
 /// Prints to stdout; that nobody reads on, as in `vsj stair | head`, is no failure.
 fn print(text: &str) -> Result<()> {

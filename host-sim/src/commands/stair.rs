@@ -24,6 +24,7 @@ Examples:
   vsj stair --out out/stair                   with CSV and plots
   vsj stair --controller none --input step    the spring left alone, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7    another amplifier, other gains
+  vsj stair --controller fast --input step    as fast as the amplifier allows
   vsj stair --plant spring.toml               another spring: hysteresis, leakage, several relaxations ...
   vsj stair --input schedule.csv --json       any schedule with columns time_s,voltage_v")]
 pub(crate) struct Arguments {
@@ -105,7 +106,6 @@ impl Arguments {
 
     /// The settings of a plant file's spring, behind the stricter of its amplifier and the options'.
     fn settings<'a>(&self, file: &'a PlantFile) -> Settings<ExtendedPlant<'a>> {
-        let recorded = file.amplifier.clone().unwrap_or_default();
         Settings {
             rate_hz: self.rate_hz,
             plant: file.extended(),
@@ -113,13 +113,12 @@ impl Arguments {
                 Controller::Fast => Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s }),
                 _ => Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki }),
             },
-            amplifier: Amplifier {
+            amplifier: file.behind(Amplifier {
                 min_v: self.min_v,
                 slew_v_per_s: self.slew_v_per_s,
                 dac_bits: self.dac_bits,
                 ..Amplifier::up_to(self.limit_v)
-            }
-            .found_with(recorded.limit_v, recorded.slew_v_per_s),
+            }),
             feedback: None,
         }
     }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::experiment::StartsFrom;
 use crate::response::Response;
 use crate::stair::{LimitedTicks, Report, Row};
 
@@ -37,7 +38,7 @@ pub fn text(report: &Report) -> String {
         );
     }
     text.push('\n');
-    steps(&mut text, &report.steps);
+    steps(&mut text, &report.steps, report.bound_from);
     text
 }
 
@@ -71,7 +72,7 @@ fn rows(text: &mut String, rows: &[Row]) {
     }
 }
 
-fn steps(text: &mut String, steps: &[Response]) {
+fn steps(text: &mut String, steps: &[Response], bound_from: StartsFrom) {
     if steps.is_empty() {
         line(text, "No step between two plateaus of at least 1 s.");
         return;
@@ -95,20 +96,32 @@ fn steps(text: &mut String, steps: &[Response]) {
         );
     }
     if steps.iter().any(|step| step.bound_t97_s.is_some()) {
-        line(text, "Shortest possible: any controller within range and slew, from a spring settled at the old value.");
+        line(text, shortest_possible(bound_from));
+    }
+}
+
+/// What the bound says.
+pub(super) fn shortest_possible(from: StartsFrom) -> &'static str {
+    match from {
+        StartsFrom::Settled => {
+            "Shortest possible: any controller within range and slew, from a spring settled at the old value."
+        }
+        StartsFrom::Reached => {
+            "Shortest possible: any controller within range and slew, from where this loop has brought the spring."
+        }
     }
 }
 
 /// At most six decimals, none that are zero.
-fn tidy(value: f64) -> f64 {
+pub(super) fn tidy(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-fn optional(value: Option<f64>, decimals: usize) -> String {
+pub(super) fn optional(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
-fn line(text: &mut String, line: &str) {
+pub(super) fn line(text: &mut String, line: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{}", line.trim_end());
 }

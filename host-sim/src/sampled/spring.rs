@@ -37,6 +37,17 @@ pub struct State {
     lags: Vec<f64>,
 }
 
+/// What a change of the voltage does, in V/V.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turning {
+    /// At the end of the first tick.
+    pub within_a_tick: f64,
+    /// More, in each later tick.
+    pub in_each_later: f64,
+    /// What part of its distance the slowest lag makes in a tick.
+    pub relaxed: f64,
+}
+
 impl State {
     /// The voltage across the spring, in V.
     pub fn voltage(&self) -> f64 {
@@ -118,6 +129,30 @@ impl Spring {
         let slopes = self.law.windows(2).map(|pair| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0));
         let law = if self.law.is_empty() { 1.0 } else { slopes.fold(0.0, f64::max) };
         self.share * law * (self.direct.max(0.0) + plays)
+    }
+
+    /// What one volt less does at the least when the voltage turns back, in ticks of `seconds`.
+    pub fn turning(&self, seconds: f64) -> Turning {
+        let slopes = self.law.windows(2).map(|pair| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0));
+        let law = slopes.reduce(f64::min).unwrap_or(1.0);
+        let all: f64 = self.plays.iter().map(|(_, weight)| weight).sum::<f64>() + self.direct;
+        let slope = law * self.direct.max(all / 4.0);
+        let (loss, leak_tau) = self.leakage;
+        let made = |tau: f64| 1.0 - (-seconds / tau).exp();
+        let mean_loss = loss * (1.0 - made(leak_tau) * leak_tau / seconds);
+        let slowest = |index: usize, tau: f64| match self.high_s {
+            Some(high_s) if index == 0 => tau.max(varied(tau, high_s, 1000.0)),
+            _ => tau,
+        };
+        let lags: Vec<(f64, f64)> =
+            self.lags.iter().enumerate().map(|(index, &(tau, weight))| (made(slowest(index, tau)), weight)).collect();
+        let later: f64 = lags.iter().map(|(made, weight)| made * weight).sum();
+        let in_each_later = slope * (1.0 - mean_loss) * later;
+        Turning {
+            within_a_tick: slope * self.share * (1.0 - loss * made(leak_tau)) + in_each_later,
+            in_each_later,
+            relaxed: lags.iter().map(|lag| lag.0).fold(1.0, f64::min),
+        }
     }
 
     /// The law's answer to the memory of the voltage.

@@ -52,6 +52,17 @@ impl Relaxation<'_> {
         self.lags().enumerate().map(at)
     }
 
+    pub(super) fn least_promptness(&self, sample_time: SampleTime) -> Promptness {
+        let slowest = if self.varying().is_some_and(|tau| tau.at(1000.0) > tau.at(0.0)) { 1000.0 } else { 0.0 };
+        let mut promptness = Promptness { at_once: self.share, in_a_tick: 0.0, relaxed: 1.0 };
+        for (tau, weight) in self.lags_at(slowest) {
+            let part = relaxed_in(tau, sample_time);
+            promptness.in_a_tick += part * weight;
+            promptness.relaxed = promptness.relaxed.min(part);
+        }
+        promptness
+    }
+
     pub(crate) fn promptness(&self, sample_time: SampleTime) -> Promptness {
         let mut promptness = Promptness { at_once: self.share.max(0.0), in_a_tick: 0.0, relaxed: 0.0 };
         // At an end it is shortest.

@@ -30,8 +30,16 @@ pub struct Law<'a> {
 impl Law<'_> {
     /// The steepest line's slope, at least 0.
     pub(crate) fn steepest(&self) -> f64 {
-        let slopes = self.voltage_v.windows(2).zip(self.stiffness.windows(2)).map(|(v, f)| slope(v, f));
-        slopes.fold(0.0, f64::max)
+        self.slopes().fold(0.0, f64::max)
+    }
+
+    /// The flattest line's slope.
+    pub(super) fn flattest(&self) -> f64 {
+        self.slopes().fold(f64::INFINITY, f64::min)
+    }
+
+    fn slopes(&self) -> impl Iterator<Item = f64> {
+        self.voltage_v.windows(2).zip(self.stiffness.windows(2)).map(|(v, f)| slope(v, f))
     }
 }
 

@@ -35,6 +35,12 @@ pub struct Memory<'a> {
 }
 
 impl Memory<'_> {
+    /// How steep the bank is when the voltage turns, and all plays stay at first; but a quarter of what it is later, so
+    /// that a bank which does not answer at all at first is not thought never to answer.
+    pub(super) fn turning(&self) -> f64 {
+        self.direct.max(0.25 * (self.direct + self.weights.iter().sum::<f64>()))
+    }
+
     /// The steepest that the bank can be: all plays move.
     pub(crate) fn steepest(&self) -> f64 {
         self.direct.max(0.0) + self.weights.iter().map(|weight| weight.max(0.0)).sum::<f64>()

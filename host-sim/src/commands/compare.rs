@@ -1,0 +1,47 @@
+//! `vsj compare`: every controller on the same steps.
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::comparison::compare;
+use host_sim::output::comparison;
+use host_sim::plant_file;
+use model::Amplifier;
+
+use super::print;
+
+/// Compare all controllers on the stair of ideal steps, and with the fastest that any could be
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj compare                                  none, paper and fast at 700 V and 1000 V
+  vsj compare --limit-v 850 --slew-v-per-s 500
+  vsj compare --plant spring.toml --json       on another spring")]
+pub(crate) struct Arguments {
+    /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
+    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
+    plant: String,
+    /// Highest voltages of the amplifier, in V
+    #[arg(long, default_values_t = [700.0, 1000.0], value_delimiter = ',', value_name = "V,V", allow_negative_numbers = true)]
+    limit_v: Vec<f64>,
+    /// Fastest change of the amplifier, in V/s; without it, no limit
+    #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
+    slew_v_per_s: Option<f64>,
+    /// Ticks per second, 100 to 10 000
+    #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
+    rate_hz: f64,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let file = plant_file::load(&arguments.plant)?;
+    let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
+    let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
+    let comparison = compare(&file, arguments.rate_hz, &amplifiers)?;
+    if arguments.json {
+        return print(&format!("{}\n", serde_json::to_string(&comparison)?));
+    }
+    print(&comparison::text(&comparison))
+}

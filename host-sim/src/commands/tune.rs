@@ -1,0 +1,69 @@
+//! `vsj tune`: gains and settings for a spring and an amplifier.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::bad_input;
+use host_sim::output::files::Files;
+use host_sim::output::tuning;
+use host_sim::plant_file;
+use host_sim::tune::{Question, tune};
+use model::Amplifier;
+
+use super::print;
+
+/// Choose gains and settings for a spring and an amplifier, with margins, and what an error of the model costs
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj tune                                    the report's spring at 700 V
+  vsj tune --limit-v 1000 --overshoot-percent 1
+  vsj tune --plant spring.toml --out out/tune  with t97 and overshoot over +-50 % error of the model, plotted
+  vsj tune --json | jq .fast")]
+pub(crate) struct Arguments {
+    /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
+    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
+    plant: String,
+    /// Highest voltage of the amplifier, in V
+    #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
+    limit_v: f64,
+    /// Fastest change of the amplifier, in V/s; without it, no limit
+    #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
+    slew_v_per_s: Option<f64>,
+    /// Ticks per second, 100 to 10 000
+    #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
+    rate_hz: f64,
+    /// The most overshoot that a step may have, in percent
+    #[arg(long, default_value_t = 5.0, value_name = "PERCENT", allow_negative_numbers = true)]
+    overshoot_percent: f64,
+    /// Write tune.json, tune.txt, trade.csv, t97.svg and overshoot.svg to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let overshoot_percent = arguments.overshoot_percent;
+    if !(0.0..=100.0).contains(&overshoot_percent) {
+        bad_input!("--overshoot-percent {overshoot_percent}: expected 0 to 100");
+    }
+    let file = plant_file::load(&arguments.plant)?;
+    let amplifier =
+        file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
+    let answer = tune(&Question { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent })?;
+    let json = format!("{}\n", serde_json::to_string(&answer)?);
+    let text = tuning::text(&answer, &arguments.plant);
+    let mut wrote = String::new();
+    if let Some(folder) = &arguments.out {
+        let mut files = Files::new(folder)?;
+        files.add("tune.json", |out| out.write_all(json.as_bytes()))?;
+        files.add("tune.txt", |out| out.write_all(text.as_bytes()))?;
+        tuning::write(&mut files, &answer)?;
+        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+    }
+    print(&if arguments.json { json } else { text + &wrote })
+}

@@ -1,0 +1,286 @@
+//! The time-optimal pre-compensator over limits, moving targets and changes of its configuration, on plain and extended
+//! springs. Built with overflow checks: a wrap panics.
+
+use model::estimator::{Estimator, Model};
+use model::extended::{self, ExtendedPlant, Law, Leakage, Memory, Relaxation};
+use model::{Amplifier, Approach, Compensation, Config, Gains, Input, Output, Plant, Settings, State, Volts};
+use proptest::prelude::*;
+
+const FAST: Compensation = Compensation::TimeOptimal(Approach::DEAD_BEAT);
+/// Everything at once, on the scale of a real spring.
+const WHOLE: ExtendedPlant<'_> = ExtendedPlant {
+    memory: Some(Memory { direct: 0.8, thresholds_v: &[25.0, 10.0], weights: &[0.05, 0.15] }),
+    law: Some(Law { voltage_v: &[0.0, 100.0, 300.0, 500.0], stiffness: &[0.0, 80.0, 300.0, 500.0] }),
+    leakage: Some(Leakage { share: 0.1, time_constant_s: 40.0 }),
+    relaxation: Relaxation {
+        share: 0.0909,
+        time_constants_s: &[5.5, 40.0],
+        weights: &[0.8, 0.109],
+        time_constant_high_s: Some(8.0),
+    },
+};
+
+fn settings<P: Model>(plant: P, limit_v: f64) -> Settings<P> {
+    Settings { rate_hz: 1000.0, plant, compensation: FAST, amplifier: Amplifier::up_to(limit_v), feedback: None }
+}
+
+fn tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, target_v: f64) -> Output {
+    config.tick(state, Input { target: Volts::new(target_v).unwrap(), ..Input::default() })
+}
+
+/// Up and down: at most 1 % beyond, and held there.
+fn steps<P: Model>(settings: Settings<P>) {
+    let config = settings.check().unwrap();
+    let mut state = State::default();
+    let mut from = 0.0;
+    for to in [100.0, 300.0, 400.0, 350.0, 250.0, 300.0] {
+        let mut farthest = 0.0f64;
+        let mut last = 0.0;
+        for _ in 0..12_000 {
+            last = tick(&config, &mut state, to).stiffness.to_f64();
+            farthest = farthest.max((last - from) / (to - from));
+        }
+        assert!(farthest <= 1.01, "{from} to {to}: {farthest}");
+        // Half a code of 0.24 V, of which half comes at once.
+        assert!((last - to).abs() < 0.1, "{from} to {to} ends at {last}");
+        from = to;
+    }
+}
+
+#[test]
+fn steps_do_not_overshoot_and_stay() {
+    for limit_v in [700.0, 1000.0] {
+        steps(settings(Plant::PAPER, limit_v));
+        steps(settings(Plant { share: 0.0, ..Plant::PAPER }, limit_v));
+        steps(Settings { rate_hz: 10_000.0, ..settings(Plant { share: 0.5, ..Plant::PAPER }, limit_v) });
+    }
+    steps(settings(WHOLE, 1000.0));
+    for slew in [200.0, 500.0, 2000.0] {
+        let amplifier = Amplifier { slew_v_per_s: Some(slew), ..Amplifier::up_to(1000.0) };
+        steps(Settings { amplifier, ..settings(Plant::PAPER, 1000.0) });
+        steps(Settings { amplifier, ..settings(Plant { share: 0.02, ..Plant::PAPER }, 1000.0) });
+        steps(Settings { amplifier, ..settings(WHOLE, 1000.0) });
+    }
+}
+
+/// A bank without direct part answers a turn only after twice its threshold: that way is crossed at once, and not again
+/// for less than a code.
+#[test]
+fn a_memory_that_does_not_answer_a_turn_is_crossed_once() {
+    let memory = Some(Memory { direct: 0.0, thresholds_v: &[20.0], weights: &[1.0] });
+    let config = settings(ExtendedPlant { memory, law: None, leakage: None, ..WHOLE }, 700.0).check().unwrap();
+    let mut state = State::default();
+    let volts: Vec<f64> = (0..12_000).map(|_| tick(&config, &mut state, 200.0).voltage.to_f64()).collect();
+    let far = volts.windows(2).filter(|pair| (pair[1] - pair[0]).abs() > 20.0).count();
+    // To the end of the range, and back with a jump over the way without answer.
+    assert!((1..=2).contains(&far), "{far} jumps");
+}
+
+/// A robot's trajectory: the voltage is as smooth as the target.
+fn follows<P: Model>(settings: Settings<P>, codes: f64) {
+    let config = settings.check().unwrap();
+    let code_v = settings.amplifier.volts_per_code();
+    let mut state = State::default();
+    let target = |tick: i32| 200.0 - 15.0 * (f64::from(tick) * 1e-3 * 2.0).cos();
+    for tick_number in -20_000..0 {
+        tick(&config, &mut state, target(0).min(target(0) * f64::from(20_000 + tick_number) / 10_000.0));
+    }
+    let mut volts = Vec::new();
+    for tick_number in 0..8000 {
+        let output = tick(&config, &mut state, target(tick_number));
+        let off = output.stiffness.to_f64() - target(tick_number);
+        assert!(off.abs() < 0.5, "{tick_number}: {off}");
+        volts.push(output.voltage.to_f64());
+    }
+    for (tick_number, three) in volts.windows(3).enumerate() {
+        let bend = three[2] - 2.0 * three[1] + three[0];
+        assert!(bend.abs() < codes * code_v, "{tick_number}: {bend} V");
+    }
+}
+
+#[test]
+fn a_moving_target_is_followed_without_chatter() {
+    follows(settings(Plant::PAPER, 1000.0), 1.0);
+    follows(settings(Plant { share: 0.3, ..Plant::PAPER }, 1000.0), 1.0);
+    // Law and memory have corners; beyond them it is smooth.
+    let smooth = ExtendedPlant { memory: None, law: None, ..WHOLE };
+    follows(settings(smooth, 1000.0), 1.0);
+}
+
+/// At rest between two codes it does not hunt.
+#[test]
+fn at_rest_it_stays_within_one_code() {
+    let config = Settings { rate_hz: 10_000.0, ..settings(Plant::PAPER, 700.0) }.check().unwrap();
+    let mut state = State::default();
+    for _ in 0..300_000 {
+        tick(&config, &mut state, 333.3);
+    }
+    let codes: Vec<u16> = (0..1_000_000).map(|_| tick(&config, &mut state, 333.3).code.0).collect();
+    let (lowest, highest) = (codes.iter().min().unwrap(), codes.iter().max().unwrap());
+    assert!(highest - lowest <= 1, "codes {lowest} to {highest}");
+}
+
+#[test]
+fn it_takes_over_and_hands_over_without_a_bump() {
+    let paper = Settings::PAPER.check().unwrap();
+    let others = [
+        settings(Plant::PAPER, 700.0),
+        settings(Plant { share: 0.2, time_constant_s: 3.0 }, 700.0),
+        Settings {
+            compensation: Compensation::TimeOptimal(Approach { time_constant_s: 0.05 }),
+            ..settings(Plant::PAPER, 700.0)
+        },
+    ];
+    for other in others {
+        let fast = other.check().unwrap();
+        let mut state = State::default();
+        let last = (0..700).map(|_| tick(&paper, &mut state, 150.0)).last().unwrap().voltage.to_f64();
+        fast.adopt(&mut state, Volts::new(150.0).unwrap());
+        let first = tick(&fast, &mut state, 150.0).voltage.to_f64();
+        // Half a code: it starts from the voltage that was applied.
+        assert!((first - last).abs() < 0.1, "{other:?}: {last} {first}");
+        for _ in 0..8000 {
+            tick(&fast, &mut state, 150.0);
+        }
+        assert!((tick(&fast, &mut state, 150.0).stiffness.to_f64() - 150.0).abs() < 0.05);
+        let last = tick(&fast, &mut state, 150.0).voltage.to_f64();
+        paper.adopt(&mut state, Volts::new(150.0).unwrap());
+        assert!((tick(&paper, &mut state, 150.0).voltage.to_f64() - last).abs() < 1e-5);
+    }
+}
+
+/// A longer approach is slower, and asks for less voltage where the target jumps a little.
+#[test]
+fn an_approach_is_gentler() {
+    let peak = |time_constant_s| {
+        let compensation = Compensation::TimeOptimal(Approach { time_constant_s });
+        let config = Settings { compensation, ..settings(Plant::PAPER, 700.0) }.check().unwrap();
+        let mut state = State::default();
+        (0..3000).map(|_| tick(&config, &mut state, 5.0).voltage.to_f64()).fold(0.0, f64::max)
+    };
+    assert!(peak(0.0) > 54.0 && peak(0.1) < 40.0 && peak(0.5) < 30.0, "{} {} {}", peak(0.0), peak(0.1), peak(0.5));
+}
+
+#[test]
+fn what_cannot_be_inverted_is_named() {
+    let named = |plant: ExtendedPlant<'_>| {
+        // The other controllers take it.
+        assert!(Settings { compensation: Compensation::None, ..settings(plant, 700.0) }.check().is_ok());
+        settings(plant, 700.0).check().unwrap_err().field
+    };
+    let law = Law { voltage_v: &[0.0, 100.0, 200.0], stiffness: &[0.0, 100.0, 90.0] };
+    assert_eq!(named(ExtendedPlant { law: Some(law), ..WHOLE }), "law.stiffness");
+    let memory = Memory { direct: 0.5, thresholds_v: &[10.0], weights: &[-0.6] };
+    assert_eq!(named(ExtendedPlant { memory: Some(memory), ..WHOLE }), "memory.direct");
+    let leakage = Leakage { share: 1.0, time_constant_s: 40.0 };
+    assert_eq!(named(ExtendedPlant { leakage: Some(leakage), ..WHOLE }), "leakage.share");
+    for weights in [[1.2, -0.3], [0.0, 0.0]] {
+        let relaxation = Relaxation { share: 0.0, weights: &weights, ..WHOLE.relaxation };
+        assert_eq!(named(ExtendedPlant { relaxation, ..WHOLE }), "relaxation.weights");
+    }
+    for time_constant_s in [-1.0, 1.5, f64::NAN] {
+        let compensation = Compensation::TimeOptimal(Approach { time_constant_s });
+        assert_eq!(Settings { compensation, ..Settings::PAPER }.check().unwrap_err().field, "approach_s");
+    }
+}
+
+prop_compose! {
+    /// Up to the ends of what is accepted.
+    fn compensation()(kind in 0..3u8, approach in 0.0..=1.0f64, gain in -3.0..2.0f64, integral in -4.0..2.0f64) -> Compensation {
+        match kind {
+            0 => FAST,
+            1 => Compensation::TimeOptimal(Approach { time_constant_s: approach }),
+            _ => Compensation::ProportionalIntegral(Gains {
+                proportional: 10f64.powf(gain),
+                integral_per_s: 10f64.powf(integral),
+            }),
+        }
+    }
+}
+
+prop_compose! {
+    fn amplifier()(
+        full_scale_v in 50.0..=1000.0f64,
+        part in 0.3..=1.0f64,
+        dac_bits in 8u32..=16,
+        slew in prop::option::of(0.0..9.0f64),
+    ) -> Amplifier {
+        let max_v = (part * full_scale_v).max(10.0);
+        let slew_v_per_s = slew.map(|decades| 10f64.powf(decades));
+        Amplifier { max_v, slew_v_per_s, dac_bits, ..Amplifier::up_to(full_scale_v) }
+    }
+}
+
+/// Runs it over all targets from a state that others have left.
+fn stays_in_range<P: Model>(
+    settings: &Settings<P>,
+    state: &mut State<<P::Config as Estimator>::State>,
+    targets: &[f64],
+) -> Result<(), TestCaseError> {
+    let Ok(config) = settings.check() else { return Ok(()) };
+    let (lowest, highest) = config.range();
+    config.adopt(state, Volts::new(targets[0]).unwrap());
+    for &target in targets {
+        for _ in 0..50 {
+            let output = tick(&config, state, target);
+            prop_assert!(output.applied >= lowest && output.applied <= highest);
+            prop_assert!(output.voltage >= lowest && output.voltage <= highest);
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn nothing_wraps_on_a_plain_spring(
+        rate in 2.0..=4.0f64,
+        loops in prop::collection::vec((0.0..=0.9f64, -2.0..4.0f64, compensation(), amplifier()), 1..4),
+        targets in prop::collection::vec(-2000.0..2000.0f64, 1..20),
+    ) {
+        let mut state = State::default();
+        for (share, time_constant, compensation, amplifier) in loops {
+            let plant = Plant { share, time_constant_s: 10f64.powf(time_constant) };
+            let settings = Settings { rate_hz: 10f64.powf(rate), plant, compensation, amplifier, feedback: None };
+            stays_in_range(&settings, &mut state, &targets)?;
+        }
+    }
+
+    #[test]
+    fn nothing_wraps_on_an_extended_spring(
+        rate in 2.0..=4.0f64,
+        plays in prop::collection::vec((0.0..=1000.0f64, -0.5..=1.0f64), 0..=8),
+        direct in -0.5..=2.0f64,
+        lines in prop::collection::vec((0.001..125.0f64, 0.01..=10.0f64), 1..=8),
+        (lost, leak_tau) in (0.0..=0.95f64, 1.0..1e5f64),
+        share in 0.0..=5.0f64,
+        lags in prop::collection::vec((-1.39..4.0f64, 0.0..=1.2f64), 1..=4),
+        high in prop::option::of(-1.0..=1.0f64),
+        compensation in compensation(),
+        amplifier in amplifier(),
+        targets in prop::collection::vec(-2000.0..2000.0f64, 1..20),
+    ) {
+        let (mut voltage_v, mut stiffness) = (vec![0.0], vec![0.0]);
+        for (line, (width, slope)) in lines.into_iter().enumerate() {
+            voltage_v.push(voltage_v[line] + width + 1e-3);
+            stiffness.push(f64::min(stiffness[line] + 0.999 * slope * width, 2000.0));
+        }
+        let (thresholds_v, weights): (Vec<f64>, Vec<f64>) = plays.into_iter().unzip();
+        let (tau, by): (Vec<f64>, Vec<f64>) = lags.into_iter().map(|(tau, weight)| (10f64.powf(tau), weight)).unzip();
+        let plant = ExtendedPlant {
+            memory: Some(Memory { direct, thresholds_v: &thresholds_v, weights: &weights }),
+            law: Some(Law { voltage_v: &voltage_v, stiffness: &stiffness }),
+            leakage: Some(Leakage { share: lost, time_constant_s: leak_tau }),
+            relaxation: Relaxation {
+                share,
+                time_constants_s: &tau,
+                weights: &by,
+                time_constant_high_s: high.map(|decades| (tau[0] * 10f64.powf(decades)).clamp(0.041, 9000.0)),
+            },
+        };
+        let mut state = State::<extended::State>::default();
+        let settings = Settings { rate_hz: 10f64.powf(rate), plant, compensation, amplifier, feedback: None };
+        stays_in_range(&settings, &mut state, &targets)?;
+    }
+}
