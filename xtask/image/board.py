@@ -21,6 +21,7 @@ HARD_FAULT = 3
 FRAME = (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR)
 FLOATS = tuple(UC_ARM_REG_S0 + i for i in range(16))
 
+FLASH_OPTR = 0x4002_2020
 RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0800, 0x5000_0000
 GPIO = 0x4800_0000
 TIM15, TIM15_IRQ = 0x4001_4000, 24  # The time driver's.
@@ -65,7 +66,8 @@ class Board:
 
     def reset(self, cause):
         """`cause` is the flag in RCC_CSR. The memory keeps what it holds."""
-        self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF}
+        # Two banks of flash, as the chip is delivered: FLASH_OPTR.DBANK.
+        self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF, FLASH_OPTR: 1 << 22}
         self.timer = Timer()
         self.timer.at = self.now
         self.systick = SysTick()
