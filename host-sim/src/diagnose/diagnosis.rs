@@ -10,14 +10,16 @@ use super::effect::{Quantity, Scene};
 use super::effects::{EFFECTS, index_of};
 use super::fit::{Engine, Fit, normal_equations};
 use super::leftover::{self, Leftover};
-use super::model::Model;
+use super::model::{Block, Model};
 use super::noise::{Noise, scale_of_squares};
-use super::observed::Observed;
+use super::observed::{Kind, Observed};
 use super::report::{Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict};
 use super::search::{Scored, Search, effects};
 use super::standing::{self, Standing};
 use crate::plant_file::PlantFile;
 
+/// A model whose error is so many times that of the simulation as it was is none.
+const WORSE: f64 = 1.05;
 /// Odds under which a rival set counts as possible, in nats.
 const RIVAL: f64 = 3.0;
 /// Rivals that are listed.
@@ -50,6 +52,21 @@ pub struct Diagnosis {
     pub held_out: [Vec<f64>; 2],
     /// The best sets of causes beside each other, the best first.
     pub standings: Vec<Standing>,
+    /// What its readings say of themselves.
+    observed: Observed,
+}
+
+impl Diagnosis {
+    /// True if readings that stopped at a bound did so because the spring goes beyond it, where a lattice lets them seem to.
+    pub(super) fn believes_its_bounds(&self) -> bool {
+        let Some(step) = self.observed.step else { return true };
+        let beyond = |kind: Kind, sign: f64| {
+            let rows = self.observed.kinds.iter().zip(&self.extended.residual).filter(|(of, _)| **of == kind);
+            let beyond: Vec<f64> = rows.map(|(_, left)| -sign * left).collect();
+            beyond.is_empty() || beyond.iter().sum::<f64>() > 0.5 * step * beyond.len() as f64
+        };
+        beyond(Kind::AtLeast, 1.0) && beyond(Kind::AtMost, -1.0)
+    }
 }
 
 /// Runs the search and says what it found.
@@ -73,13 +90,19 @@ pub(super) fn diagnose(
             plant: engine.simulator.base.file().clone(),
             held_out: [unseen.clone(), unseen],
             standings: Vec::new(),
+            observed: observed.clone(),
         };
     }
     let mut search = Search::new(engine);
-    let best = match given {
+    let mut best = match given {
         None => search.run(progress),
         Some(models) => search.from(models, progress),
     };
+    // Likelier but farther off is no cure.
+    let [before, after] = [&baseline, &best.fit].map(|fit| scale_of_squares(&observed.errors(&fit.residual)));
+    if after > WORSE * before {
+        best = search.root();
+    }
     let rivals = rivals(&search, &best);
     let mut weights = Vec::new();
     for effect in effects(&best.fit.model) {
@@ -122,7 +145,11 @@ pub(super) fn diagnose(
         verdict,
         baseline: quality_before,
         extended: Extended {
-            gain: 1.0 - quality_after.held_out_rmse / quality_before.held_out_rmse.max(1e-12),
+            gain: if findings.is_empty() {
+                0.0
+            } else {
+                1.0 - quality_after.held_out_rmse / quality_before.held_out_rmse.max(1e-12)
+            },
             quality: quality_after,
             model: None,
             fixed_point_error_v: cure.fixed_point_error_v,
@@ -134,7 +161,16 @@ pub(super) fn diagnose(
         noise: noise_report(&best.fit.noise),
         residual: residual_report(&data, &best.fit),
     };
-    Diagnosis { report, data, baseline, extended: best.fit, plant: cure.file, held_out, standings }
+    Diagnosis {
+        report,
+        data,
+        baseline,
+        extended: best.fit,
+        plant: cure.file,
+        held_out,
+        standings,
+        observed: observed.clone(),
+    }
 }
 
 fn explained(finding: &Finding) -> f64 {
@@ -153,7 +189,7 @@ fn informative(engine: &mut Engine) -> bool {
         |model, effect| {
             let point =
                 if EFFECTS[effect].cause() == "gain-error" { 1.0 } else { engine.simulator.base.relaxation.tau_s.ln() };
-            model.with(super::model::Block { effect, form: 0 }, vec![point])
+            model.with(Block { effect, form: 0 }, vec![point])
         },
     );
     // The noise as it is at best, the information as it is where the search starts.
@@ -267,7 +303,7 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
             cause: "quantisation",
             probability: 1.0,
             parameters: single("step", step, step * (1.0 - 1e-6), step * (1.0 + 1e-6), "V"),
-            rmse_before: raw.max(step / 12f64.sqrt()),
+            rmse_before: raw,
             rmse_after: scale_of_squares(&after).min(raw),
             evidence: format!(
                 "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left",
@@ -382,7 +418,8 @@ fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> BTreeMap<String,
                     let slope = nalgebra::DVector::from_vec(slope);
                     (slope.transpose() * matrix * &slope)[(0, 0)].max(0.0).sqrt()
                 });
-                found.insert(name, interval(value, error, unit));
+                let reach = reach(block, point, data, index);
+                found.insert(name, interval(value, error, unit, reach));
             }
             let residual = engine.residual(&fit.model.without(effect));
             let scene = Scene { data, residual: &residual, sigma: fit.noise.sigma };
@@ -397,14 +434,34 @@ fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> BTreeMap<String,
     found
 }
 
-/// Symmetric, unless that would cross zero.
-fn interval(value: f64, error: f64, unit: &'static str) -> Parameter {
+/// Lowest and highest that a quantity can be: one coordinate after the other at its bounds.
+fn reach(block: &Block, point: &[f64], data: &Data, index: usize) -> (f64, f64) {
+    let mut reach = (f64::INFINITY, f64::NEG_INFINITY);
+    for (place, bounds) in block.coordinates(data).iter().enumerate() {
+        for bound in [bounds.lowest, point[place], bounds.highest] {
+            let mut moved = point.to_vec();
+            moved[place] = bound;
+            let value = block.effect().quantities(block.form, &moved, data)[index].value;
+            reach = (reach.0.min(value), reach.1.max(value));
+        }
+    }
+    reach
+}
+
+/// Symmetric, but for what is only a size: that never crosses zero. Within the quantity's reach, unless the value is its end:
+/// an amplitude of two parts is smallest between their bounds.
+fn interval(value: f64, error: f64, unit: &'static str, reach: (f64, f64)) -> Parameter {
     let error = if error.is_finite() { error } else { 10.0 * value.abs() };
-    let (low, high) = (value - Z * error, value + Z * error);
-    if value != 0.0 && low * value < 0.0 {
-        let factor = (Z * error / value.abs()).min(50.0).exp();
-        let (low, high) = (value / factor, value * factor);
-        return Parameter { value, low: low.min(high), high: low.max(high), unit };
+    let (mut low, mut high) = (value - Z * error, value + Z * error);
+    if value > 0.0 && low < 0.0 && reach.0 >= 0.0 {
+        let factor = (Z * error / value).min(50.0).exp();
+        (low, high) = (value / factor, value * factor);
+    }
+    if reach.0 < value {
+        low = low.max(reach.0);
+    }
+    if reach.1 > value {
+        high = high.min(reach.1);
     }
     Parameter { value, low, high, unit }
 }
@@ -426,7 +483,11 @@ fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -> Quality {
 }
 
 fn noise_report(noise: &Noise) -> NoiseReport {
-    NoiseReport { sigma: noise.sigma, tail: noise.nu.is_finite().then_some(noise.nu), memory_rows: noise.ar.len() }
+    NoiseReport {
+        sigma: noise.sigma,
+        tail: noise.nu.is_finite().then_some(noise.nu),
+        memory_rows: noise.memory.ar.len(),
+    }
 }
 
 fn residual_report(data: &Data, fit: &Fit) -> ResidualReport {

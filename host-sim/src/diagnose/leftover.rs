@@ -20,7 +20,7 @@ pub struct Leftover {
     pub share: f64,
     /// Root of the mean square of what they explain of the residual itself, in V.
     pub rms: f64,
-    /// True if chance would do as much once in ten thousand records.
+    /// True if chance would do as much once in ten thousand records, once in a hundred short ones.
     pub significant: bool,
 }
 
@@ -62,7 +62,11 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     let before = explained(&own_only, &target);
     let gain = explained(&everything, &target) - before;
     let total: f64 = target.iter().map(|value| value * value).sum();
-    let variance = (total - before - gain) / (data.rows() - everything.len()) as f64;
+    let mut variance = (total - before - gain) / (data.rows() - everything.len()) as f64;
+    if fit.noise.cell > 0.0 {
+        // Few rounded rows lie near an edge and tell anything; the others only lower the mean.
+        variance = variance.max(1.0);
+    }
     let most = groups.iter().max_by(|a, b| {
         let part = |group: &Group| {
             let with: Vec<&Vec<f64>> = own.iter().chain(&group.columns).collect();
@@ -71,10 +75,12 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
         part(a).total_cmp(&part(b))
     })?;
     let share = (gain / total.max(1e-300)).clamp(0.0, 1.0);
+    let rms = share.sqrt() * fit.noise.marginal;
     let leftover = Leftover {
         place: most.place.clone(),
-        share,
-        rms: (share.max(0.0)).sqrt() * fit.noise.marginal,
+        // What rounding hides is no matter.
+        share: if fit.noise.cell > 0.0 { share.min((rms / fit.noise.cell).powi(2) * 3.0) } else { share },
+        rms,
         significant: quantile(gain / variance, count as f64) > RARE,
     };
     Some(line(data, fit, &target, leftover))
@@ -82,7 +88,7 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
 
 /// A short record is asked only whether errors are like the ones before them (von Neumann's ratio).
 fn alike(fit: &Fit) -> Option<Leftover> {
-    let errors = &fit.residual;
+    let errors = &fit.noise.whitened(&fit.residual);
     let squares: f64 = errors.iter().map(|error| error * error).sum();
     let steps: f64 = errors.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     let share = 1.0 - 0.5 * steps / squares.max(1e-300);

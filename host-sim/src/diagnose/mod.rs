@@ -106,17 +106,36 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
+    let observed = Observed::new(&data);
+    let found = judged(record, options, &data, observed, &mut progress);
+    // A plateau on a lattice looks like a bound until a model is seen that does not go beyond it.
+    if found.believes_its_bounds() {
+        return Ok(found);
+    }
+    let observed = Observed::new(&data).without_bounds();
+    Ok(judged(record, options, &data, observed, &mut progress))
+}
+
+/// Searches, a long record in part first, and says what it found.
+fn judged(
+    record: &Record,
+    options: &Options,
+    data: &Data,
+    observed: Observed,
+    progress: &mut impl FnMut(&Scored),
+) -> Diagnosis {
     let every = data.rows().div_ceil(ROWS_TO_SEARCH);
     let given = (every > 1).then(|| {
         let thinned = Data::thinned(record, options.input, every);
+        let bounded = !observed.all_exact();
         let observed = Observed::new(&thinned);
+        let observed = if bounded { observed } else { observed.without_bounds() };
         let mut engine = Engine::new(&thinned, &observed, Simulator::new(&thinned, &options.base));
         let mut search = Search::new(&mut engine);
-        search.run(&mut progress);
+        search.run(&mut *progress);
         search.ranked().into_iter().take(LEADERS).map(|scored| scored.fit.model.clone()).collect()
     });
-    let observed = Observed::new(&data);
-    let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &options.base));
+    let mut engine = Engine::new(data, &observed, Simulator::new(data, &options.base));
     let held = options.input == Input::Hold;
-    Ok(diagnosis::diagnose(data.clone(), &observed, &mut engine, held, given, progress))
+    diagnosis::diagnose(data.clone(), &observed, &mut engine, held, given, progress)
 }

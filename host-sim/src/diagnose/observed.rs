@@ -29,10 +29,14 @@ pub struct Observed {
     pub upper: Option<f64>,
     /// As [`Observed::upper`], below.
     pub lower: Option<f64>,
+    /// True if the step is coarse beside what readings scatter from row to row.
+    pub coarse: bool,
 }
 
 /// Fewest readings at an extreme that are a bound, on a continuous scale.
 const FEWEST_TIES: usize = 3;
+/// A step coarser than this many of the noise's scales is a cell, a finer one is noise.
+pub const COARSE: f64 = 2.0;
 /// On a lattice, readings at a bound are this many times as many as on the next step.
 const PILE: usize = 6;
 
@@ -73,7 +77,13 @@ impl Observed {
                 Kind::Exact
             }
         });
-        Self { kinds: kinds.collect(), step, upper, lower }
+        let coarse = step.is_some_and(|step| step >= COARSE * scatter(&data.reading));
+        Self { kinds: kinds.collect(), step, upper, lower, coarse }
+    }
+
+    /// The same where no bound is believed: a spring that settles at its highest voltage also reads the same for long.
+    pub fn without_bounds(&self) -> Self {
+        Self { kinds: vec![Kind::Exact; self.kinds.len()], upper: None, lower: None, ..self.clone() }
     }
 
     /// What rows are off by at least: one that stopped at a bound is not off while the prediction is beyond it.
@@ -93,6 +103,17 @@ impl Observed {
     pub fn all_exact(&self) -> bool {
         self.upper.is_none() && self.lower.is_none()
     }
+}
+
+/// Scale of independent noise on readings, from their second differences: a slow signal has none.
+fn scatter(reading: &[f64]) -> f64 {
+    let mut bends: Vec<f64> =
+        reading.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs() / 6f64.sqrt()).collect();
+    if bends.is_empty() {
+        return f64::INFINITY;
+    }
+    let middle = bends.len() / 2;
+    *bends.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
 }
 
 /// The largest step of which all differences between values are multiples.

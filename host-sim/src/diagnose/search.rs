@@ -11,7 +11,7 @@ use super::effect::Scene;
 use super::effects::EFFECTS;
 use super::fit::{Engine, Fit, Jacobian};
 use super::model::{Block, Model};
-use super::noise::Noise;
+use super::noise::{Noise, Term};
 
 /// A structure with its fit and what it is worth.
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ impl<'e, 'a> Search<'e, 'a> {
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
         loop {
             let best = self.pass(&mut progress);
-            let caution = best.fit.noise.long_memory(&self.engine.observed.errors(&best.fit.residual));
+            let caution = long_memory(&self.engine.terms(&best.fit.noise, &best.fit.residual));
             if caution <= self.caution || best.fit.model.blocks.is_empty() {
                 return best;
             }
@@ -97,8 +97,7 @@ impl<'e, 'a> Search<'e, 'a> {
 
     /// The best structure when others, found on a part of the rows, are given: those are judged, and extended once more.
     pub fn from(&mut self, given: Vec<Model>, mut progress: impl FnMut(&Scored)) -> Scored {
-        let root = self.engine.at(Model::default());
-        let mut best = self.judged(root);
+        let mut best = self.root();
         for model in given {
             let scored = self.judge(model);
             if scored.score > best.score {
@@ -115,6 +114,11 @@ impl<'e, 'a> Search<'e, 'a> {
         self.pruned(best)
     }
 
+    /// The simulation as it was.
+    pub fn root(&mut self) -> Scored {
+        self.judge(Model::default())
+    }
+
     /// The best structure of each set of effects, the best set first.
     pub fn ranked(&self) -> Vec<&Scored> {
         let mut ranked: Vec<&Scored> = self.seen.values().collect();
@@ -127,8 +131,7 @@ impl<'e, 'a> Search<'e, 'a> {
 
     /// One search at the present caution.
     fn pass(&mut self, progress: &mut impl FnMut(&Scored)) -> Scored {
-        let root = self.engine.at(Model::default());
-        let root = self.judged(root);
+        let root = self.root();
         let mut best = root.clone();
         let mut beam = vec![root];
         let mut waited = 0;
@@ -140,7 +143,7 @@ impl<'e, 'a> Search<'e, 'a> {
                     let gain = child.score - node.score;
                     gain > -PATIENCE || child.fit.plain > node.fit.plain + PATIENCE
                 };
-                let alone = node.fit.noise.ar.is_empty();
+                let alone = node.fit.noise.memory.is_none();
                 let children = self.children(node).into_iter();
                 let children = children.filter(|child| child.score > node.score || !alone && patient(child));
                 next.extend(children);
@@ -165,7 +168,7 @@ impl<'e, 'a> Search<'e, 'a> {
                 progress(&best);
             } else {
                 waited += 1;
-                if waited > 1 || best.fit.noise.ar.is_empty() {
+                if waited > 1 || best.fit.noise.memory.is_none() {
                     break;
                 }
             }
@@ -275,7 +278,7 @@ impl<'e, 'a> Search<'e, 'a> {
         let rest = fits.split_off(JUDGED.min(fits.len()));
         let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.fit.plain).collect();
         plain.sort_by(|a, b| b.1.plain.total_cmp(&a.1.plain));
-        if !node.fit.noise.ar.is_empty() {
+        if !node.fit.noise.memory.is_none() {
             fits.extend(plain.into_iter().take(JUDGED_PLAIN));
         }
         fits.into_iter().map(|(_, fit)| self.judge_anew(fit)).collect()
@@ -285,7 +288,7 @@ impl<'e, 'a> Search<'e, 'a> {
     fn extensions(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Extension> {
         let fit = &node.fit;
         let mut metrics = vec![Metric::new(self.engine, fit, Noise::robust(&fit.residual))];
-        if !fit.noise.ar.is_empty() {
+        if !fit.noise.memory.is_none() {
             metrics.push(Metric::new(self.engine, fit, fit.noise.clone()));
         }
         let sigma = super::noise::scale(&fit.residual);
@@ -421,6 +424,28 @@ impl Metric {
         // The noise's scale would shrink along.
         -0.5 * self.residual.len() as f64 * (1.0 - part).ln()
     }
+}
+
+/// How much more the means of the rows' pulls over long stretches vary than independent ones would; 1 unless significant.
+///
+/// Where the noise's law has no memory for it (rounded readings), or too short a one, slow swings pass for a shift or a
+/// drift.
+fn long_memory(terms: &[Term]) -> f64 {
+    let pulls: Vec<f64> = terms.iter().map(|term| term.weight * term.residual).collect();
+    let variance = dot(&pulls, &pulls) / pulls.len().max(1) as f64;
+    let mut most = 1.0f64;
+    for parts in [5, 10, 20, 40, 80] {
+        let length = pulls.len() / parts;
+        if length < 5 || variance <= 0.0 {
+            continue;
+        }
+        let squares = pulls.chunks_exact(length).map(|chunk| chunk.iter().sum::<f64>().powi(2) / length as f64);
+        let ratio = squares.take(parts).sum::<f64>() / parts as f64 / variance;
+        if ratio > 1.0 + 2.0 * (2.0 / parts as f64).sqrt() {
+            most = most.max(ratio);
+        }
+    }
+    most
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -1,0 +1,195 @@
+//! What earlier errors foretell of the next.
+//!
+//! ```text
+//! phi(B) (1 - B)^power r = e,      B: one row back
+//! ```
+//!
+//! The autoregression `phi` is chosen by Schwarz's criterion (Levinson's recursion). Noise as strong in every octave (1/f, a
+//! sensor's flicker) has no finite autoregression: what is left of its slow swings passes for a drift or a shift. The
+//! fractional difference has just that memory, `1/f^(2 power)` (Granger and Joyeux 1980). It is run as first-order sections
+//! with zeros and poles in turn (Oustaloup 2000), from the record's length up to half a row.
+
+/// A filter that turns noise with a memory into independent innovations.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Memory {
+    /// Autoregression, lag 1 first.
+    pub ar: Vec<f64>,
+    /// Order of the fractional difference, 0 for none.
+    pub power: f64,
+    /// Zero and pole of each section.
+    sections: Vec<(f64, f64)>,
+}
+
+/// Longest autoregression, in rows, and rows of the record for each.
+const LONGEST: usize = 50;
+const ROWS_PER_LAG: usize = 12;
+/// And behind a fractional difference, which has the rest.
+const LONGEST_BESIDE: usize = 12;
+/// Shorter records have no memory that could be told from structure.
+const ROWS: usize = 24;
+/// Nor a power law in these.
+const ROWS_FOR_POWER: usize = 150;
+/// A section spans this ratio of frequencies.
+const SPAN: f64 = 4.0;
+/// Beyond these, in robust scales, a residual does not teach the memory.
+const CLIP: f64 = 4.0;
+/// What a fractional difference must be likelier by than an autoregression alone, in nats: structure that is not yet
+/// explained looks like it too.
+const PRICE_OF_POWER: f64 = 8.0;
+
+impl Memory {
+    /// Of a residual with a robust scale.
+    pub fn fitted(residual: &[f64], scale: f64) -> Self {
+        if residual.len() < ROWS {
+            return Self::default();
+        }
+        let clipped: Vec<f64> = residual.iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
+        let (ar, cost) = autoregression(&clipped, LONGEST.min(residual.len() / ROWS_PER_LAG));
+        if ar.is_empty() || residual.len() < ROWS_FOR_POWER {
+            return Self { ar, ..Self::default() };
+        }
+        let with_power = |power: f64| {
+            let mut memory = Self { power, ar: Vec::new(), sections: sections(power, residual.len()) };
+            let (ar, cost) = autoregression(&memory.whitened(&clipped), LONGEST_BESIDE);
+            memory.ar = ar;
+            (cost + PRICE_OF_POWER, memory)
+        };
+        let mut best = (cost, Self { ar, ..Self::default() });
+        let mut step = 0.2;
+        let mut tried: Vec<f64> = (1..=5).map(|part| step * f64::from(part)).collect();
+        while step > 0.02 {
+            for power in tried {
+                let other = with_power(power);
+                if other.0 < best.0 {
+                    best = other;
+                }
+            }
+            if best.1.power == 0.0 {
+                break;
+            }
+            step /= 2.0;
+            tried = vec![best.1.power - step, best.1.power + step];
+        }
+        best.1
+    }
+
+    /// True if errors foretell nothing.
+    pub fn is_none(&self) -> bool {
+        self.ar.is_empty() && self.power == 0.0
+    }
+
+    /// Numbers that were fitted.
+    pub fn parameters(&self) -> usize {
+        self.ar.len() + usize::from(self.power > 0.0)
+    }
+
+    /// What the memory does not foretell. Before the first row, everything is taken to have been as it is there.
+    pub fn whitened(&self, residual: &[f64]) -> Vec<f64> {
+        let mut rough = residual.to_vec();
+        for &(zero, pole) in &self.sections {
+            let mut before = rough.first().copied().unwrap_or(0.0);
+            let mut out = before * (1.0 - zero) / (1.0 - pole);
+            for value in &mut rough {
+                out = *value - zero * before + pole * out;
+                before = std::mem::replace(value, out);
+            }
+        }
+        let mut white = rough.clone();
+        for (lag, phi) in (1..).zip(&self.ar) {
+            let (early, rest) = white.split_at_mut(lag.min(rough.len()));
+            early.iter_mut().for_each(|white| *white -= phi * rough[0]);
+            for (white, earlier) in rest.iter_mut().zip(&rough) {
+                *white -= phi * earlier;
+            }
+        }
+        white
+    }
+}
+
+/// Zeros and poles of `(1 - B)^power`.
+fn sections(power: f64, rows: usize) -> Vec<(f64, f64)> {
+    let (lowest, highest) = (std::f64::consts::TAU / rows as f64, std::f64::consts::PI);
+    let count = ((highest / lowest).ln() / SPAN.ln()).ceil().max(1.0);
+    let span = (highest / lowest).powf(1.0 / count);
+    let section = |index: u32| {
+        let middle = lowest * span.powf(f64::from(index) + 0.5);
+        let apart = span.powf(power / 2.0);
+        ((-middle / apart).exp(), (-middle * apart).exp())
+    };
+    (0..count as u32).map(section).collect()
+}
+
+/// Autoregression of up to `longest` rows, and the negative log-likelihood it leaves, its own price in it, in nats.
+fn autoregression(values: &[f64], longest: usize) -> (Vec<f64>, f64) {
+    let rows = values.len() as f64;
+    let at = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / rows;
+    let correlation: Vec<f64> = (0..=longest).map(at).collect();
+    let mut error = correlation[0];
+    if error <= 0.0 {
+        return (Vec::new(), 0.0);
+    }
+    let (mut phi, mut best) = (Vec::new(), (Vec::new(), 0.5 * rows * error.ln()));
+    for order in 1..=longest {
+        let ahead: f64 = phi.iter().enumerate().map(|(k, p)| p * correlation[order - 1 - k]).sum();
+        let reflection = (correlation[order] - ahead) / error;
+        let reversed: Vec<f64> = phi.iter().rev().copied().collect();
+        phi.iter_mut().zip(&reversed).for_each(|(p, r)| *p -= reflection * r);
+        phi.push(reflection);
+        error *= 1.0 - reflection * reflection;
+        let cost = 0.5 * rows * error.max(1e-300).ln() + 0.5 * rows.ln() * order as f64;
+        if cost < best.1 {
+            best = (phi.clone(), cost);
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    fn white(rows: usize) -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        (0..rows).map(|_| (0..12).map(|_| random.random_range(-0.5..0.5)).sum()).collect()
+    }
+
+    #[test]
+    fn an_autoregression_is_recovered() {
+        let mut values = white(4000);
+        for row in 2..values.len() {
+            values[row] += 1.2 * values[row - 1] - 0.5 * values[row - 2];
+        }
+        let memory = Memory::fitted(&values, 2.0);
+        assert!(memory.power == 0.0 && memory.ar.len() == 2, "{memory:?}");
+        assert!((memory.ar[0] - 1.2).abs() < 0.05 && (memory.ar[1] + 0.5).abs() < 0.05, "{memory:?}");
+        assert!(Memory::fitted(&white(4000), 1.0).is_none());
+    }
+
+    /// Fractional noise by its definition: `(1 - B)^-d = sum psi_k B^k, psi_k = psi_(k-1) (k - 1 + d) / k`.
+    #[test]
+    fn a_power_law_is_recovered_and_whitened() {
+        let (rows, power) = (3000, 0.45);
+        let innovations = white(2 * rows);
+        let mut psi = vec![1.0];
+        for k in 1..rows {
+            psi.push(psi[k - 1] * (k as f64 - 1.0 + power) / k as f64);
+        }
+        let value = |row: usize| psi.iter().enumerate().map(|(k, psi)| psi * innovations[row - k]).sum::<f64>();
+        let values: Vec<f64> = (rows..2 * rows).map(value).collect();
+        let memory = Memory::fitted(&values, 1.5);
+        assert!((memory.power - power).abs() < 0.1, "{} {:?}", memory.power, memory.ar);
+        let left = memory.whitened(&values);
+        let off: f64 = left.iter().zip(&innovations[rows..]).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / rows as f64;
+        assert!(off < 0.05, "{off}");
+    }
+
+    #[test]
+    fn a_level_from_before_the_record_is_no_event() {
+        let memory = Memory { ar: vec![0.5, 0.2], power: 0.4, sections: sections(0.4, 500) };
+        let level = memory.whitened(&[1.0; 500]);
+        assert!(level.iter().all(|value| (value - level[499]).abs() < 1e-9 && value.abs() < 0.1), "{:?}", &level[..9]);
+    }
+}

@@ -1,0 +1,230 @@
+//! What the noise is, given what a model leaves: its memory, its scale, its tail.
+//!
+//! ```text
+//! memory(r) = e,      e ~ Student t of scale sigma and nu degrees of freedom (normal for nu = inf)
+//!                     or a mixture: a few readings with a much wider normal
+//! ```
+//!
+//! Without the autoregression, coloured noise passes for structure; without the heavy tail, a few readings do. Orders
+//! are chosen by Schwarz's criterion. Rounded and stopped readings have the probability of their cell.
+
+mod memory;
+mod reading;
+mod tail;
+
+pub use memory::Memory;
+
+use super::observed::{COARSE, Kind, Observed};
+use reading::{in_cell, stopped};
+use tail::tail_constant;
+
+/// The law of the noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    /// Scale of the innovations, in V.
+    pub sigma: f64,
+    /// Degrees of freedom of the tail.
+    pub nu: f64,
+    /// What earlier errors foretell.
+    pub memory: Memory,
+    /// Fraction of outliers, and their scale in V.
+    pub wide: Option<(f64, f64)>,
+    /// Half of the readings' step, where it is coarse beside the noise, in V.
+    pub cell: f64,
+    /// Scale of the residual itself, in V.
+    pub marginal: f64,
+    /// What of a row's log-density its residual does not change.
+    constant: f64,
+}
+
+/// One row's part in a fit: `weight (residual - J delta)^2`.
+#[derive(Clone, Copy, Debug)]
+pub struct Term {
+    /// Log-probability, up to what no parameter changes.
+    pub log: f64,
+    /// Working residual, in V.
+    pub residual: f64,
+    /// 1/V^2
+    pub weight: f64,
+}
+
+impl Noise {
+    /// Independent, with a moderately heavy tail, of any scale: for a first look at anything.
+    pub fn first_look() -> Self {
+        Self::robust(&[1.0])
+    }
+
+    /// As [`Noise::first_look`], with the scale of a residual.
+    pub fn robust(residual: &[f64]) -> Self {
+        let sigma = scale(residual);
+        let noise =
+            Self { sigma, nu: 5.0, memory: Memory::default(), wide: None, cell: 0.0, marginal: sigma, constant: 0.0 };
+        noise.with_tail(5.0, sigma)
+    }
+
+    /// The same with another tail and scale.
+    fn with_tail(&self, nu: f64, sigma: f64) -> Self {
+        let shape = if nu.is_finite() { tail_constant(nu) } else { -HALF_LN_TAU };
+        Self { nu, sigma, constant: shape - sigma.ln(), ..self.clone() }
+    }
+
+    /// The law that suits what a model leaves.
+    pub fn fitted(residual: &[f64], observed: &Observed) -> Self {
+        let residual = &*observed.errors(residual);
+        let mut noise = Self::robust(&exact(residual, observed));
+        if let Some(step) = observed.step
+            && (observed.coarse || step >= COARSE * rest_of(scale_of_squares(residual), step))
+        {
+            noise.cell = step / 2.0;
+            noise.nu = f64::INFINITY;
+            noise.sigma = rest_of(scale_of_squares(residual), step).max(0.05 * step);
+            noise.rescale_cells(residual, observed);
+            noise.marginal = noise.sigma;
+            return noise;
+        }
+        noise.memory = Memory::fitted(residual, noise.sigma);
+        let innovations: Vec<f64> = exact(&noise.whitened(residual), observed);
+        noise.fit_tail(&innovations);
+        noise.marginal = scale_of_squares(&exact(residual, observed)).max(noise.sigma);
+        noise
+    }
+
+    /// The same law with the scale that suits a residual.
+    pub fn rescaled(&self, residual: &[f64], observed: &Observed) -> Self {
+        let residual = &*observed.errors(residual);
+        let mut noise = self.clone();
+        if noise.cell > 0.0 {
+            noise.rescale_cells(residual, observed);
+        } else {
+            noise.fit_scale(&exact(&noise.whitened(residual), observed), 3);
+            noise.marginal *= noise.sigma / self.sigma;
+        }
+        noise
+    }
+
+    /// Innovations: what the noise's memory does not foretell.
+    pub fn whitened(&self, residual: &[f64]) -> Vec<f64> {
+        self.memory.whitened(residual)
+    }
+
+    /// The part of a row in a fit: `residual` as it is, `innovation` whitened.
+    pub fn term(&self, kind: Kind, residual: f64, innovation: f64) -> Term {
+        match kind {
+            Kind::AtLeast => stopped(residual, self.marginal),
+            Kind::AtMost => {
+                let term = stopped(-residual, self.marginal);
+                Term { residual: -term.residual, ..term }
+            }
+            Kind::Exact if self.cell > 0.0 => in_cell(residual, self.sigma, self.cell),
+            Kind::Exact => self.exact_term(innovation),
+        }
+    }
+
+    fn exact_term(&self, e: f64) -> Term {
+        let log = match self.wide {
+            Some(_) => self.densities(e).iter().sum::<f64>().max(1e-300).ln() - HALF_LN_TAU,
+            None if self.nu.is_infinite() => self.constant - 0.5 * (e / self.sigma).powi(2),
+            None => self.constant - 0.5 * (self.nu + 1.0) * ((e / self.sigma).powi(2) / self.nu).ln_1p(),
+        };
+        Term { log, residual: e, weight: self.weight(e) }
+    }
+
+    /// Minus the slope of the log-density over the innovation, in 1/V^2.
+    fn weight(&self, e: f64) -> f64 {
+        let variance = self.sigma * self.sigma;
+        if let Some((_, wide)) = self.wide {
+            let [narrow, far] = self.densities(e);
+            return (narrow / variance + far / (wide * wide)) / (narrow + far).max(1e-300);
+        }
+        if self.nu.is_infinite() {
+            return 1.0 / variance;
+        }
+        (self.nu + 1.0) / (self.nu * variance + e * e)
+    }
+
+    /// Of a usual reading and of an outlier, less a constant.
+    fn densities(&self, e: f64) -> [f64; 2] {
+        let (fraction, wide) = self.wide.unwrap_or((0.0, self.sigma));
+        let normal = |scale: f64| (-0.5 * (e / scale).powi(2)).exp() / scale;
+        [(1.0 - fraction) * normal(self.sigma), fraction * normal(wide)]
+    }
+
+    /// Log-likelihood of all rows.
+    pub fn log_likelihood(&self, residual: &[f64], observed: &Observed) -> f64 {
+        let plain = self.cell == 0.0 && self.wide.is_none() && observed.all_exact();
+        if !plain {
+            return self.logs(residual, observed).sum();
+        }
+        let white = self.whitened(residual);
+        let count = white.len() as f64 * self.constant;
+        let variance = self.sigma * self.sigma;
+        if self.nu.is_infinite() {
+            return count - 0.5 * white.iter().map(|e| e * e).sum::<f64>() / variance;
+        }
+        // The logarithm of a product is dear once, not eight times; eight factors cannot overflow below 1e38 each.
+        let factor = |e: &f64| (1.0 + e * e / (self.nu * variance)).min(1e38);
+        let logs: f64 = white.chunks(8).map(|chunk| chunk.iter().map(factor).product::<f64>().ln()).sum();
+        count - 0.5 * (self.nu + 1.0) * logs
+    }
+
+    /// Log-likelihood of each row.
+    pub fn logs<'a>(&'a self, residual: &'a [f64], observed: &'a Observed) -> impl Iterator<Item = f64> + 'a {
+        let white = self.whitened(&observed.errors(residual));
+        (0..residual.len()).map(move |row| self.term(observed.kinds[row], residual[row], white[row]).log)
+    }
+
+    /// What its parameters cost by Schwarz's criterion, in nats.
+    pub fn cost(&self, rows: usize) -> f64 {
+        let parameters = (self.memory.parameters() + usize::from(self.nu.is_finite())) as f64;
+        0.5 * (rows.max(2) as f64).ln() * parameters
+    }
+
+    /// The scale under which rounded readings are likeliest: golden section on its logarithm.
+    fn rescale_cells(&mut self, residual: &[f64], observed: &Observed) {
+        let log = |ln_sigma: f64| -> f64 {
+            let noise = Self { sigma: ln_sigma.exp(), marginal: ln_sigma.exp(), ..self.clone() };
+            residual.iter().zip(&observed.kinds).map(|(&r, &kind)| noise.term(kind, r, r).log).sum()
+        };
+        let (mut low, mut high) = ((0.02 * self.cell).ln(), (scale_of_squares(residual) + self.cell).ln());
+        const GOLDEN: f64 = 0.618_033_988_75;
+        for _ in 0..12 {
+            let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+            if log(a) > log(b) {
+                high = b;
+            } else {
+                low = a;
+            }
+        }
+        self.sigma = (0.5 * (low + high)).exp();
+        self.marginal = self.sigma;
+    }
+}
+
+const HALF_LN_TAU: f64 = 0.918_938_533_204_672_7;
+
+/// What is left of a scale when rounding to a step is taken off, in V.
+fn rest_of(scale: f64, step: f64) -> f64 {
+    (scale * scale - step * step / 12.0).max(0.0).sqrt()
+}
+
+/// Innovations of rows that were read as they are.
+fn exact(innovations: &[f64], observed: &Observed) -> Vec<f64> {
+    innovations.iter().zip(&observed.kinds).filter(|(_, kind)| **kind == Kind::Exact).map(|(e, _)| *e).collect()
+}
+
+/// Robust scale around zero: the median size, as a normal's standard deviation. Noise is never exactly zero; rows that
+/// are (a spring at rest, read without noise) say nothing of it.
+pub fn scale(residual: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).filter(|size| *size > 0.0).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / 0.6745).max(1e-9)
+}
+
+/// Root of the mean square.
+pub fn scale_of_squares(residual: &[f64]) -> f64 {
+    (residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64).sqrt()
+}

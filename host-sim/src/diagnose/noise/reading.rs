@@ -1,0 +1,39 @@
+//! What a reading that was rounded, or that stopped at a bound, says of the noise: the probability of its cell.
+
+use super::{HALF_LN_TAU, Term};
+
+fn density(z: f64) -> f64 {
+    (-0.5 * z * z - HALF_LN_TAU).exp()
+}
+
+/// Probability above `z`.
+fn above(z: f64) -> f64 {
+    0.5 * libm::erfc(z / std::f64::consts::SQRT_2)
+}
+
+/// A reading that stopped at a bound, which is `residual` above the prediction.
+pub(super) fn stopped(residual: f64, sigma: f64) -> Term {
+    let z = residual / sigma;
+    if z > 6.0 {
+        // Far below the bound the tail is nearly a normal's own.
+        return Term { log: -0.5 * z * z - z.ln(), residual, weight: 1.0 / (sigma * sigma) };
+    }
+    let tail = above(z);
+    let hazard = density(z) / tail;
+    let information = (hazard * (hazard - z)).max(1e-6);
+    Term { log: tail.ln(), residual: sigma * hazard / information, weight: information / (sigma * sigma) }
+}
+
+/// A reading that was rounded to a cell.
+pub(super) fn in_cell(residual: f64, sigma: f64, half: f64) -> Term {
+    // A cell is as likely on either side.
+    let side = if residual < 0.0 { -1.0 } else { 1.0 };
+    let (a, b) = ((residual.abs() - half) / sigma, (residual.abs() + half) / sigma);
+    if a > 6.0 {
+        return Term { log: -0.5 * a * a - a.ln(), residual: side * a * sigma, weight: 1.0 / (sigma * sigma) };
+    }
+    let probability = (above(a) - above(b)).max(1e-300);
+    let score = (density(a) - density(b)) / probability;
+    let information = (score * score + (b * density(b) - a * density(a)) / probability).max(1e-3);
+    Term { log: probability.ln(), residual: side * sigma * score / information, weight: information / (sigma * sigma) }
+}
