@@ -146,33 +146,27 @@ fn autoregression(values: &[f64], longest: usize) -> (Vec<f64>, f64) {
 
 #[cfg(test)]
 mod tests {
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
+    use crate::diagnose::noise::normals;
 
     use super::*;
 
-    fn white(rows: usize) -> Vec<f64> {
-        let mut random = ChaCha8Rng::seed_from_u64(3);
-        (0..rows).map(|_| (0..12).map(|_| random.random_range(-0.5..0.5)).sum()).collect()
-    }
-
     #[test]
     fn an_autoregression_is_recovered() {
-        let mut values = white(4000);
+        let mut values = normals(4000);
         for row in 2..values.len() {
             values[row] += 1.2 * values[row - 1] - 0.5 * values[row - 2];
         }
         let memory = Memory::fitted(&values, 2.0);
         assert!(memory.power == 0.0 && memory.ar.len() == 2, "{memory:?}");
         assert!((memory.ar[0] - 1.2).abs() < 0.05 && (memory.ar[1] + 0.5).abs() < 0.05, "{memory:?}");
-        assert!(Memory::fitted(&white(4000), 1.0).is_none());
+        assert!(Memory::fitted(&normals(4000), 1.0).is_none());
     }
 
     /// Fractional noise by its definition: `(1 - B)^-d = sum psi_k B^k, psi_k = psi_(k-1) (k - 1 + d) / k`.
     #[test]
     fn a_power_law_is_recovered_and_whitened() {
         let (rows, power) = (3000, 0.45);
-        let innovations = white(2 * rows);
+        let innovations = normals(2 * rows);
         let mut psi = vec![1.0];
         for k in 1..rows {
             psi.push(psi[k - 1] * (k as f64 - 1.0 + power) / k as f64);

@@ -228,3 +228,82 @@ pub fn scale(residual: &[f64]) -> f64 {
 pub fn scale_of_squares(residual: &[f64]) -> f64 {
     (residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64).sqrt()
 }
+
+/// Independent numbers, nearly normal: sums of twelve of splitmix64's.
+#[cfg(test)]
+pub(super) fn normals(rows: usize) -> Vec<f64> {
+    let mut state = 20_261_121u64;
+    let mut uniform = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    };
+    (0..rows).map(|_| (0..12).map(|_| uniform() - 0.5).sum()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn as_read(rows: usize) -> Observed {
+        Observed { kinds: vec![Kind::Exact; rows], step: None, upper: None, lower: None, coarse: false }
+    }
+
+    #[test]
+    fn a_tail_is_recovered() {
+        let normal = normals(4000);
+        let noise = Noise::fitted(&normal, &as_read(4000));
+        assert!(noise.nu.is_infinite() && (noise.sigma - 1.0).abs() < 0.05, "{noise:?}");
+        // A normal over the root of a chi-square over its degrees of freedom.
+        let parts = normals(5 * 4000);
+        let student = |five: &[f64]| five[0] / (five[1..].iter().map(|x| x * x).sum::<f64>() / 4.0).sqrt();
+        let heavy: Vec<f64> = parts.chunks(5).map(student).collect();
+        let noise = Noise::fitted(&heavy, &as_read(4000));
+        assert!((3.0..=6.0).contains(&noise.nu) && (noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
+    }
+
+    #[test]
+    fn outliers_are_a_mixture_and_one_wild_reading_is_one() {
+        let mut readings = normals(2000);
+        readings[700] = 1e6;
+        let noise = Noise::fitted(&readings, &as_read(2000));
+        assert!(noise.wide.is_some_and(|(fraction, _)| fraction < 0.002), "{noise:?}");
+        assert!((noise.sigma - 1.0).abs() < 0.05, "{noise:?}");
+        readings[700] = 0.0;
+        readings.iter_mut().step_by(50).for_each(|reading| *reading += 12.0);
+        let noise = Noise::fitted(&readings, &as_read(2000));
+        assert!(noise.wide.is_some_and(|(fraction, _)| (0.01..0.04).contains(&fraction)), "{noise:?}");
+    }
+
+    #[test]
+    fn rounding_is_taken_off_the_scale() {
+        let step = 5.0;
+        let off: Vec<f64> = normals(3000)
+            .iter()
+            .enumerate()
+            .map(|(row, noise)| {
+                // Wherever in a cell the truth lies.
+                let truth = 0.37 * row as f64;
+                ((truth + noise) / step).round() * step - truth
+            })
+            .collect();
+        let noise = Noise::fitted(&off, &Observed { step: Some(step), coarse: true, ..as_read(3000) });
+        assert!(noise.cell == 2.5 && (noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
+    }
+
+    /// The weight is minus the slope of the log-density over the innovation.
+    #[test]
+    fn a_weight_is_the_slope_of_its_density() {
+        let mut mixture = Noise::robust(&normals(100));
+        mixture.wide = Some((0.05, 8.0));
+        for noise in [Noise::robust(&normals(100)), mixture] {
+            for e in [0.3, 1.7, -4.0, 11.0] {
+                let log = |e| noise.exact_term(e).log;
+                let slope = (log(e + 1e-5) - log(e - 1e-5)) / 2e-5;
+                let term = noise.exact_term(e);
+                assert!((slope + term.weight * e).abs() < 1e-4 * slope.abs(), "{e} {slope} {term:?}");
+            }
+        }
+    }
+}
