@@ -14,7 +14,7 @@ use super::model::{Block, Model};
 use super::noise::{Noise, scale_of_squares};
 use super::observed::{Kind, Observed};
 use super::report::{Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict};
-use super::search::{Scored, Search, effects};
+use super::search::{Lead, Scored, Search, effects};
 use super::standing::{self, Standing};
 use crate::plant_file::PlantFile;
 
@@ -75,7 +75,7 @@ pub(super) fn diagnose(
     observed: &Observed,
     engine: &mut Engine,
     held: bool,
-    given: Option<Vec<Model>>,
+    given: Option<Lead>,
     progress: impl FnMut(&Scored),
 ) -> Diagnosis {
     let baseline = engine.at(Model::default());
@@ -96,7 +96,7 @@ pub(super) fn diagnose(
     let mut search = Search::new(engine);
     let mut best = match given {
         None => search.run(progress),
-        Some(models) => search.from(models, progress),
+        Some(lead) => search.from(lead, progress),
     };
     // Likelier but farther off is no cure.
     let [before, after] = [&baseline, &best.fit].map(|fit| scale_of_squares(&observed.errors(&fit.residual)));

@@ -133,7 +133,7 @@ fn judged(
         let mut engine = Engine::new(&thinned, &observed, Simulator::new(&thinned, &options.base));
         let mut search = Search::new(&mut engine);
         search.run(&mut *progress);
-        search.ranked().into_iter().take(LEADERS).map(|scored| scored.fit.model.clone()).collect()
+        search.lead(LEADERS)
     });
     let mut engine = Engine::new(data, &observed, Simulator::new(data, &options.base));
     let held = options.input == Input::Hold;

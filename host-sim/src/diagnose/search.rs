@@ -55,6 +55,15 @@ pub struct Search<'e, 'a> {
     caution: f64,
 }
 
+/// What a search on a part of the rows hands on.
+#[derive(Clone, Debug)]
+pub struct Lead {
+    /// Its best models.
+    pub models: Vec<Model>,
+    /// What it multiplied prices by.
+    pub caution: f64,
+}
+
 /// A block that could be added, from one start.
 struct Extension {
     block: Block,
@@ -96,9 +105,10 @@ impl<'e, 'a> Search<'e, 'a> {
     }
 
     /// The best structure when others, found on a part of the rows, are given: those are judged, and extended once more.
-    pub fn from(&mut self, given: Vec<Model>, mut progress: impl FnMut(&Scored)) -> Scored {
+    pub fn from(&mut self, Lead { models, caution }: Lead, mut progress: impl FnMut(&Scored)) -> Scored {
+        self.caution = caution;
         let mut best = self.root();
-        for model in given {
+        for model in models {
             let scored = self.judge(model);
             if scored.score > best.score {
                 best = scored;
@@ -112,6 +122,12 @@ impl<'e, 'a> Search<'e, 'a> {
             progress(&best);
         }
         self.pruned(best)
+    }
+
+    /// The best models, for a search on more rows.
+    pub fn lead(&self, count: usize) -> Lead {
+        let models = self.ranked().into_iter().take(count).map(|scored| scored.fit.model.clone()).collect();
+        Lead { models, caution: self.caution }
     }
 
     /// The simulation as it was.
