@@ -16,6 +16,7 @@ use super::observed::{Kind, Observed};
 use super::report::{Extended, Finding, NoiseReport, Parameter, Quality, Report, ResidualReport, SCHEMA, Verdict};
 use super::search::{Lead, Scored, Search, effects};
 use super::standing::{self, Standing};
+use super::swallowed;
 use crate::plant_file::PlantFile;
 
 /// A model whose error is so many times that of the simulation as it was is none.
@@ -106,18 +107,19 @@ pub(super) fn diagnose(
     let rivals = rivals(&search, &best);
     let mut weights = Vec::new();
     for effect in effects(&best.fit.model) {
-        let without = search.best_without(effect);
-        weights.push((effect, without));
+        let left_out = search.left_out(&best, effect);
+        weights.push((effect, search.best_without(effect), left_out));
     }
     let contenders = standing::contenders(&search, &best);
     let standings = standing::standings(engine, contenders);
     let readings = reading_findings(&data, observed, &best.fit);
-    let left = leftover::test(engine, &best.fit).filter(|left| left.significant);
+    let left = swallowed::test(&observed.errors(&best.fit.residual), &best.fit.noise.memory)
+        .or_else(|| leftover::test(engine, &best.fit).filter(|left| left.significant));
     let held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
     let quality_before = quality(engine, &baseline, &held_out[0], false);
     let quality_after = quality(engine, &best.fit, &held_out[1], true);
     let mut findings: Vec<Finding> =
-        weights.iter().map(|(effect, without)| finding(engine, &best, *effect, without)).collect();
+        weights.iter().map(|(effect, without, left_out)| finding(engine, &best, *effect, without, left_out)).collect();
     findings.extend(readings);
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
 
@@ -350,9 +352,10 @@ fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding>
     findings
 }
 
-fn finding(engine: &mut Engine, best: &Scored, effect: usize, without: &Scored) -> Finding {
+/// `without` is the best structure without the effect, others in its place; `left_out` the best with nothing in its place.
+fn finding(engine: &mut Engine, best: &Scored, effect: usize, without: &Scored, left_out: &Scored) -> Finding {
     let odds = best.score - without.score;
-    let (before, after) = (rms(engine, &without.fit), rms(engine, &best.fit));
+    let [before, rival, after] = [left_out, without, best].map(|scored| rms(engine, &scored.fit));
     let others: Vec<&str> = effects(&without.fit.model).into_iter().map(|other| EFFECTS[other].cause()).collect();
     let against = if others.is_empty() { "the simulation as it was".to_owned() } else { others.join(" and ") };
     let better = if best.fit.model.searched(effect, engine.data) {
@@ -366,10 +369,7 @@ fn finding(engine: &mut Engine, best: &Scored, effect: usize, without: &Scored) 
         parameters: parameters(engine, &best.fit, effect),
         rmse_before: before.max(after),
         rmse_after: after,
-        evidence: format!(
-            "{}: {better} than the best without it ({against}, {before:.3} V)",
-            EFFECTS[effect].meaning()
-        ),
+        evidence: format!("{}: {better} than the best without it ({against}, {rival:.3} V)", EFFECTS[effect].meaning()),
     }
 }
 

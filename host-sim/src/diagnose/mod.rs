@@ -14,7 +14,7 @@
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
-//! | [`leftover`], [`spectrum`] | what no effect explains |
+//! | [`leftover`], [`swallowed`], [`spectrum`] | what no effect explains |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
 
 use anyhow::Result;
@@ -44,6 +44,7 @@ pub mod signal;
 pub mod spectrum;
 pub mod standing;
 mod start;
+pub mod swallowed;
 pub mod text;
 
 pub use data::Input;

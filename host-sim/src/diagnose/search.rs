@@ -218,6 +218,11 @@ impl<'e, 'a> Search<'e, 'a> {
         self.children(&without).into_iter().next()
     }
 
+    /// The structure without one of its effects, the rest fitted again.
+    pub fn left_out(&mut self, scored: &Scored, effect: usize) -> Scored {
+        self.judge(scored.fit.model.without(effect))
+    }
+
     /// Each block in the form that suits the others best.
     fn reformed(&mut self, mut scored: Scored) -> Scored {
         for effect in effects(&scored.fit.model) {

@@ -59,7 +59,10 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         .collect();
     let rows = report.rows;
     let mut sentences = vec![match report.verdict {
-        Verdict::Consistent => format!("The simulation agrees with {name}: nothing beyond noise in {rows} readings."),
+        Verdict::Consistent if report.leftover.is_none() => {
+            format!("The simulation agrees with {name}: nothing beyond noise in {rows} readings.")
+        }
+        Verdict::Consistent => format!("The simulation agrees with {name}: nothing worth a cause in {rows} readings."),
         Verdict::Insufficient => {
             format!("{name} cannot tell what is wrong: its {rows} readings hold too little excitation.")
         }
@@ -68,6 +71,9 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         }
         Verdict::Unexplained => {
             format!("The simulation is wrong on {name}; {} explains only a part.", causes.join(", "))
+        }
+        Verdict::Ambiguous if report.alternatives.iter().any(Vec::is_empty) => {
+            format!("The simulation may be wrong on {name}: {}.", causes.join("; "))
         }
         Verdict::Ambiguous | Verdict::Explained => format!("The simulation is wrong on {name}: {}.", causes.join("; ")),
     }];

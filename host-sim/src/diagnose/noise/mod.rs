@@ -8,7 +8,7 @@
 //! Without the autoregression, coloured noise passes for structure; without the heavy tail, a few readings do. Orders
 //! are chosen by Schwarz's criterion. Rounded and stopped readings have the probability of their cell.
 
-mod memory;
+pub mod memory;
 mod reading;
 mod tail;
 
