@@ -183,7 +183,8 @@ fn explained(finding: &Finding) -> f64 {
 fn informative(engine: &mut Engine) -> bool {
     let data = engine.data;
     let moves = |values: &[f64]| values.iter().any(|value| *value != values[0]);
-    if data.full_scale_v <= 0.0 || !moves(&data.reading) {
+    // Under one voltage all the time, what the spring does may be its start as well as its answer.
+    if !moves(&data.voltage_v) || !moves(&data.reading) {
         return false;
     }
     let probe = ["gain-error", "time-constant"].iter().filter_map(|cause| index_of(cause)).fold(
