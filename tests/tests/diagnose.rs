@@ -81,8 +81,8 @@ fn an_effect_is_named_soon_after_it_can_be_told_apart() {
     let outcomes: Vec<Outcome> = jobs.par_iter().map(one).collect();
     let named = outcomes.iter().filter(|outcome| outcome.all_named()).count();
     println!("{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
-    // 95 % is the aim; 63 are named today, the bound is 60.
-    assert!(named >= 60, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
+    // 95 % is the aim; 63 are named today.
+    assert!(named >= 63, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
 }
 
 /// The campaign itself, on a diagnosis that knows the answer: it counts what it is told.
