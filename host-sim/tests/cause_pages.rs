@@ -22,11 +22,12 @@ fn record(read: impl Fn(usize, f64) -> f64) -> Record {
     };
     let mut record = Record { name: "stair".into(), rows: (0..1100).map(row).collect() };
     let data = Data::new(&record, Input::Hold);
-    let mut simulated = Vec::new();
+    let (mut simulated, mut state) = (Vec::new(), 1u32);
     Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulated);
     for (index, (row, simulated)) in record.rows.iter_mut().zip(simulated).enumerate() {
-        // Noise of 0.3 V RMS that is the same everywhere.
-        let noise = ((index * 7919) % 101) as f64 / 101.0 - 0.5;
+        // Noise of 0.3 V RMS that is the same everywhere and comes back to nothing.
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let noise = f64::from(state >> 8) / f64::from(1 << 24) - 0.5;
         row.measured = Some(read(index, simulated + noise));
     }
     record
