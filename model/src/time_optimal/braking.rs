@@ -37,7 +37,8 @@ impl Braking {
         let Promptness { at_once, in_a_tick, relaxed } = *least;
         let within = at_once + in_a_tick;
         Self {
-            at_once: Signal::from_num(within * step_v),
+            // What no braking can take back is more than any signal.
+            at_once: Signal::saturating_from_num(within * step_v),
             twice: libm::ldexp(2.0 * step_v * (in_a_tick + relaxed * within), 32) as u64,
             relaxed: libm::ldexp(relaxed, 32) as u32,
             per_drift: Steep::new(within / in_a_tick.max(1e-9)),
