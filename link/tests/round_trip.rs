@@ -25,7 +25,7 @@ proptest! {
     #[test]
     fn a_request_arrives_once_as_it_was_sent(sequence: u16, request in common::request()) {
         let frame = Frame::new(Sequence(sequence), &request);
-        prop_assert!(frame.as_bytes().len() <= 21);
+        prop_assert!(frame.as_bytes().len() <= MAX_FRAME);
         prop_assert_eq!(arrive(&frame), vec![(Sequence(sequence), request)]);
         prop_assert!(arrive_nothing_as_reply(&frame));
     }
