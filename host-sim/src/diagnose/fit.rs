@@ -84,21 +84,23 @@ impl<'a> Engine<'a> {
 
     /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
-        let model = self.polished(model);
+        let model = self.polished(model, |_| true);
         let model = self.descend(model, law);
         self.at(model)
     }
 
-    /// Moves what only a search can move, block by block, to where the rest of the model wants it.
-    fn polished(&mut self, mut model: Model) -> Model {
+    /// Moves what only a search can move, block by block, to where the rest of the model wants it in the rows that are seen.
+    pub fn polished(&mut self, mut model: Model, seen: impl Fn(usize) -> bool) -> Model {
         for index in 0..model.blocks.len() {
             let block = model.blocks[index].0;
             if !block.searched(self.data) {
                 continue;
             }
-            let residual = self.residual(&model.without(block.effect));
-            let sigma = scale(&residual);
-            let scene = Scene { data: self.data, residual: &residual, sigma };
+            let mut residual = self.residual(&model.without(block.effect));
+            let rows = 0..residual.len();
+            let errors: Vec<f64> = rows.clone().filter(|&row| seen(row)).map(|row| residual[row]).collect();
+            rows.filter(|&row| !seen(row)).for_each(|row| residual[row] = f64::NAN);
+            let scene = Scene { data: self.data, residual: &residual, sigma: scale(&errors) };
             block.effect().polish(block.form, &mut model.blocks[index].1, &scene);
         }
         model

@@ -10,10 +10,9 @@
 //! have put it, and the price of the block pays for the places that were looked at. [`Engine::foretold`] is what is
 //! reported as error on unseen stretches: it searches the run anew in the rows that are seen.
 
-use super::effect::Scene;
 use super::fit::{Engine, Fit, Jacobian, damped_step, normal_equations};
 use super::model::Model;
-use super::noise::{Term, scale};
+use super::noise::Term;
 
 /// A coordinate of which the seen rows hold less than this part of all information is not known.
 const KNOWN: f64 = 0.01;
@@ -35,32 +34,16 @@ impl Engine<'_> {
     /// Readings less prediction for each row, in V, by a fit that has not seen the row.
     pub fn foretold(&mut self, fit: &Fit) -> Vec<f64> {
         let whole = Whole::new(self, fit);
+        let data = self.data;
         let mut unseen = fit.residual.clone();
-        for fold in 0..self.data.folds {
-            let mut model = whole.refitted(self, fold);
-            self.search_places(&mut model, fold);
+        for fold in 0..data.folds {
+            let of_fold = |row: usize| usize::from(data.fold[row]) == fold;
+            let model = whole.refitted(self, fold);
+            let model = self.polished(model, |row| !of_fold(row));
             let there = self.residual(&model);
-            for row in (0..unseen.len()).filter(|&row| usize::from(self.data.fold[row]) == fold) {
-                unseen[row] = there[row];
-            }
+            (0..unseen.len()).filter(|&row| of_fold(row)).for_each(|row| unseen[row] = there[row]);
         }
         unseen
-    }
-
-    /// Finds anew, without a fold's rows, what only a search can place.
-    fn search_places(&mut self, model: &mut Model, fold: usize) {
-        for index in 0..model.blocks.len() {
-            let block = model.blocks[index].0;
-            if !block.searched(self.data) {
-                continue;
-            }
-            let mut residual = self.residual(&model.without(block.effect));
-            let seen = |row: usize| usize::from(self.data.fold[row]) != fold;
-            let errors: Vec<f64> = (0..residual.len()).filter(|&row| seen(row)).map(|row| residual[row]).collect();
-            (0..residual.len()).filter(|&row| !seen(row)).for_each(|row| residual[row] = f64::NAN);
-            let scene = Scene { data: self.data, residual: &residual, sigma: scale(&errors) };
-            block.effect().polish(block.form, &mut model.blocks[index].1, &scene);
-        }
     }
 }
 
@@ -113,5 +96,83 @@ impl<'f> Whole<'f> {
             block.searched(data) || places.iter().any(|place| own.contains(place))
         });
         model
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::base::Base;
+    use crate::diagnose::data::{Data, Input};
+    use crate::diagnose::effects::index_of;
+    use crate::diagnose::model::{Block, Simulator};
+    use crate::diagnose::noise::normals;
+    use crate::diagnose::observed::Observed;
+    use crate::record::{Record, Row};
+
+    const ROWS: usize = 800;
+    const GAIN: f64 = 1.1;
+    const FOLD: usize = 2;
+
+    /// A stair up and down, read from a spring of another gain with this error, in V, of a row and its noise of 1 V.
+    fn data(error: impl Fn(usize, f64) -> f64) -> Data {
+        let volts = |row: usize| 100.0 * (5 - (row / 80).abs_diff(5)) as f64;
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: volts(row), measured: Some(0.0) };
+        let record = Record { name: String::new(), rows: (0..ROWS).map(row).collect() };
+        let mut data = Data::new(&record, Input::Hold);
+        let mut readings = Vec::new();
+        Simulator::new(&data, &Base::paper()).run(&of("gain-error", vec![GAIN]), &mut readings);
+        let errors = normals(ROWS).into_iter().enumerate().map(|(row, noise)| error(row, noise));
+        data.reading = readings.into_iter().zip(errors).map(|(reading, error)| reading + error).collect();
+        data
+    }
+
+    fn of(cause: &str, point: Vec<f64>) -> Model {
+        Model::default().with(Block { effect: index_of(cause).unwrap(), form: 0 }, point)
+    }
+
+    fn unseen(data: &Data, row: usize) -> bool {
+        usize::from(data.fold[row]) == FOLD
+    }
+
+    /// The gain that all rows want, the gain that the rows outside of the fold want, and what is foretold of the fold.
+    fn gains(data: &Data) -> (f64, f64, Vec<f64>) {
+        let (base, observed) = (Base::paper(), Observed::new(data));
+        let mut engine = Engine::new(data, &observed, Simulator::new(data, &base));
+        let fit = engine.fit_twice(of("gain-error", vec![1.0]));
+        let refitted = Whole::new(&mut engine, &fit).refitted(&engine, FOLD);
+        let left = engine.foretold(&fit);
+        let rows = (0..ROWS).filter(|&row| unseen(data, row));
+        (fit.model.points()[0], refitted.points()[0], rows.map(|row| data.reading[row] - left[row]).collect())
+    }
+
+    /// As much noise in the fold, of the other sign.
+    #[test]
+    fn a_stretch_is_foretold_without_its_own_readings() {
+        let plain = data(|_, noise| noise);
+        let scrambled = data(|row, noise| if unseen(&plain, row) { -noise } else { noise });
+        let (seen_before, before, foretold_before) = gains(&plain);
+        let (seen_after, after, foretold_after) = gains(&scrambled);
+        let (seen_moved, moved) = ((seen_after - seen_before).abs(), (after - before).abs());
+        assert!(seen_moved > 1e-5 && moved < 0.02 * seen_moved, "{moved} {seen_moved}");
+        let apart = foretold_before.iter().zip(&foretold_after).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 0.02 * 500.0 * seen_moved, "{apart} V {seen_moved}");
+    }
+
+    #[test]
+    fn a_run_is_searched_in_rows_that_are_seen() {
+        let shifted = |row: usize, noise: f64| noise + if (500..640).contains(&row) { 9.0 } else { 0.0 };
+        let plain = data(shifted);
+        let wild = data(|row, noise| if unseen(&plain, row) { 1e3 } else { shifted(row, noise) });
+        let places = [&plain, &wild].map(|data| {
+            let (base, observed) = (Base::paper(), Observed::new(data));
+            let mut engine = Engine::new(data, &observed, Simulator::new(data, &base));
+            let run = Block { effect: index_of("reading-offset").unwrap(), form: 0 };
+            let model = of("gain-error", vec![GAIN]).with(run, vec![0.0; 3]);
+            engine.polished(model, |row| !unseen(data, row)).points()
+        });
+        assert_eq!(places[0], places[1]);
+        // The run ends where a stretch that is not seen begins.
+        assert!((490.0..=510.0).contains(&places[0][1]) && (630.0..=660.0).contains(&places[0][2]), "{places:?}");
     }
 }

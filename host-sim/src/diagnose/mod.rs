@@ -15,6 +15,8 @@
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
 //! | [`leftover`], [`swallowed`], [`spectrum`] | what no effect explains |
+//! | `informative`, `alternatives` | whether a record can tell anything; what it leaves open |
+//! | `finding`, `reading_findings`, `interval`, `quality` | a cause and what it is worth; parameters with intervals; errors |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
 
 use anyhow::Result;
@@ -22,6 +24,7 @@ use anyhow::Result;
 use crate::bad_input;
 use crate::record::Record;
 
+mod alternatives;
 pub mod bank;
 pub mod base;
 pub mod chain;
@@ -30,13 +33,18 @@ pub mod data;
 pub mod diagnosis;
 pub mod effect;
 pub mod effects;
+mod finding;
 pub mod fit;
 pub mod held_out;
+mod informative;
+mod interval;
 pub mod law;
 pub mod leftover;
 pub mod model;
 pub mod noise;
 pub mod observed;
+mod quality;
+mod reading_findings;
 pub mod relaxation;
 pub mod report;
 pub mod search;

@@ -3,10 +3,10 @@
 use super::data::Data;
 use super::effect::Quantity;
 use super::effects::EFFECTS;
-use super::fit::Engine;
+use super::fit::{Engine, Fit};
 use super::model::{Block, Model};
 use super::noise::scale_of_squares;
-use super::search::{Scored, Search, effects};
+use super::search::{Judge, Scored, Search, effects};
 
 /// A set of causes in its best forms.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Standing {
 const BEST: usize = 8;
 
 /// The best sets of causes, the best without each cause of the best one, and the simulation as it was.
-pub(super) fn contenders(search: &Search, best: &Scored) -> Vec<Scored> {
+pub(super) fn contenders<J: Judge>(search: &Search<J>, best: &Scored) -> Vec<Scored> {
     let without: Vec<_> =
         effects(&best.fit.model).into_iter().map(|effect| search.best_without(effect).fit.model.structure()).collect();
     let kept = |(place, scored): &(usize, &Scored)| {
@@ -37,14 +37,19 @@ pub(super) fn contenders(search: &Search, best: &Scored) -> Vec<Scored> {
     search.ranked().into_iter().enumerate().filter(kept).map(|(_, scored)| scored.clone()).collect()
 }
 
-/// Their standings, in the same order.
-pub(super) fn standings(engine: &mut Engine, contenders: Vec<Scored>) -> Vec<Standing> {
+/// Their standings, in the same order. Of some fits the errors on unseen stretches are known already.
+pub(super) fn standings(engine: &mut Engine, contenders: Vec<Scored>, known: [(&Fit, &[f64]); 2]) -> Vec<Standing> {
+    let data = engine.data;
+    let mut held_out_rmse = |fit: &Fit| match known.iter().find(|(other, _)| other.model == fit.model) {
+        Some((_, unseen)) => scale_of_squares(unseen),
+        None => scale_of_squares(&engine.foretold(fit)),
+    };
     let standing = |scored: Scored| Standing {
         causes: effects(&scored.fit.model).into_iter().map(|effect| EFFECTS[effect].cause()).collect(),
-        values: values(engine.data, &scored.fit.model),
+        values: values(data, &scored.fit.model),
         score: scored.score,
         rmse: scale_of_squares(&scored.fit.residual),
-        held_out_rmse: scale_of_squares(&engine.foretold(&scored.fit)),
+        held_out_rmse: held_out_rmse(&scored.fit),
     };
     contenders.into_iter().map(standing).collect()
 }

@@ -1,0 +1,107 @@
+//! The user's parameters of a fit with their 95 % intervals.
+//!
+//! ```text
+//! covariance = (J' W J)^-1        interval = value +- 1.96 sqrt(g' covariance g),    g: slope over the coordinates
+//! ```
+//!
+//! What only a search has found has the range that the search leaves it.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+
+use super::data::Data;
+use super::effect::{Quantity, Scene};
+use super::fit::{Engine, Fit, normal_equations};
+use super::model::Block;
+use super::quality::Z;
+use super::report::Parameter;
+
+/// Inverse of the information on the fitted coordinates.
+pub(super) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>> {
+    let jacobian = engine.jacobian(&fit.model, &fit.noise, &fit.residual);
+    let terms = engine.terms(&fit.noise, &fit.residual);
+    let (normal, _) = normal_equations(&jacobian, &terms);
+    // Reweighting overstates what a heavy tail tells; the scores' own variance does not.
+    let squares: f64 = terms.iter().map(|term| (term.weight * term.residual).powi(2)).sum();
+    let weights: f64 = terms.iter().map(|term| term.weight).sum();
+    let factor = if fit.noise.cell > 0.0 { 1.0 } else { (squares / weights).min(1.0) };
+    (normal * factor).try_inverse().filter(|matrix| matrix.iter().all(|value| value.is_finite()))
+}
+
+/// The user's parameters of an effect with their intervals, by the delta method.
+pub(super) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> BTreeMap<String, Parameter> {
+    let data = engine.data;
+    let covariance = covariance(engine, fit);
+    let bounds = fit.model.coordinates(data);
+    let places: Vec<usize> = (0..bounds.len()).filter(|&place| bounds[place].fitted).collect();
+    let mut start = 0;
+    let mut found = BTreeMap::new();
+    for (block, point) in &fit.model.blocks {
+        if block.effect == effect {
+            let quantities = |point: &[f64]| block.effect().quantities(block.form, point, data);
+            let values = quantities(point);
+            for (index, Quantity { name, unit, value }) in values.into_iter().enumerate() {
+                let slope: Vec<f64> = places
+                    .iter()
+                    .map(|&place| {
+                        if !(start..start + point.len()).contains(&place) {
+                            return 0.0;
+                        }
+                        let mut moved = point.clone();
+                        let step = 1e-5 * (1.0 + point[place - start].abs());
+                        moved[place - start] += step;
+                        (quantities(&moved)[index].value - value) / step
+                    })
+                    .collect();
+                let error = covariance.as_ref().map_or(f64::INFINITY, |matrix| {
+                    let slope = nalgebra::DVector::from_vec(slope);
+                    (slope.transpose() * matrix * &slope)[(0, 0)].max(0.0).sqrt()
+                });
+                let reach = reach(block, point, data, index);
+                found.insert(name, interval(value, error, unit, reach));
+            }
+            let residual = engine.residual(&fit.model.without(effect));
+            let scene = Scene { data, residual: &residual, sigma: fit.noise.sigma };
+            for (name, low, high) in block.effect().searched_range(block.form, point, &scene) {
+                if let Some(parameter) = found.get_mut(&name) {
+                    (parameter.low, parameter.high) = (low.min(parameter.value), high.max(parameter.value));
+                }
+            }
+        }
+        start += point.len();
+    }
+    found
+}
+
+/// Lowest and highest that a quantity can be: one coordinate after the other at its bounds.
+fn reach(block: &Block, point: &[f64], data: &Data, index: usize) -> (f64, f64) {
+    let mut reach = (f64::INFINITY, f64::NEG_INFINITY);
+    for (place, bounds) in block.coordinates(data).iter().enumerate() {
+        for bound in [bounds.lowest, point[place], bounds.highest] {
+            let mut moved = point.to_vec();
+            moved[place] = bound;
+            let value = block.effect().quantities(block.form, &moved, data)[index].value;
+            reach = (reach.0.min(value), reach.1.max(value));
+        }
+    }
+    reach
+}
+
+/// Symmetric, but for what is only a size: that never crosses zero. Within the quantity's reach, unless the value is its end:
+/// an amplitude of two parts is smallest between their bounds.
+fn interval(value: f64, error: f64, unit: &'static str, reach: (f64, f64)) -> Parameter {
+    let error = if error.is_finite() { error } else { 10.0 * value.abs() };
+    let (mut low, mut high) = (value - Z * error, value + Z * error);
+    if value > 0.0 && low < 0.0 && reach.0 >= 0.0 {
+        let factor = (Z * error / value).min(50.0).exp();
+        (low, high) = (value / factor, value * factor);
+    }
+    if reach.0 < value {
+        low = low.max(reach.0);
+    }
+    if reach.1 > value {
+        high = high.min(reach.1);
+    }
+    Parameter { value, low, high, unit }
+}

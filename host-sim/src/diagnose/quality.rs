@@ -1,0 +1,53 @@
+//! How good a simulation is: its errors, the noise that they show, and tests of what they should not show.
+
+use super::data::Data;
+use super::fit::{Engine, Fit};
+use super::noise::{Noise, scale_of_squares};
+use super::report::{NoiseReport, Quality, ResidualReport};
+
+/// 97.5 % of the standard normal.
+pub(super) const Z: f64 = 1.96;
+/// Lags of the residual's correlations.
+const LAGS: usize = 20;
+
+/// `unseen` is the residual on held-out stretches; `stops` if the simulation knows of bounds at which readings stop.
+pub(super) fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -> Quality {
+    let observed = engine.observed;
+    let error = |residual: &[f64]| scale_of_squares(&if stops { observed.errors(residual) } else { residual.into() });
+    let rmse = error(&fit.residual);
+    let reading = &engine.data.reading;
+    let mean = reading.iter().sum::<f64>() / reading.len() as f64;
+    let spread = scale_of_squares(&reading.iter().map(|value| value - mean).collect::<Vec<_>>());
+    Quality {
+        rmse,
+        fit_percent: 100.0 * (1.0 - rmse / spread.max(1e-12)),
+        held_out_rmse: error(unseen),
+        one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
+    }
+}
+
+pub(super) fn noise_report(noise: &Noise) -> NoiseReport {
+    NoiseReport {
+        sigma: noise.sigma,
+        tail: noise.nu.is_finite().then_some(noise.nu),
+        memory_rows: noise.memory.ar.len(),
+    }
+}
+
+pub(super) fn residual_report(data: &Data, fit: &Fit) -> ResidualReport {
+    let white = fit.noise.whitened(&fit.residual);
+    let changes: Vec<f64> = (0..data.rows())
+        .map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] })
+        .collect();
+    let correlation = |a: &[f64], b: &[f64], lag: usize| {
+        let lag = lag.min(a.len());
+        let product: f64 = a[lag..].iter().zip(b).map(|(a, b)| a * b).sum();
+        let size = (a.iter().map(|a| a * a).sum::<f64>() * b.iter().map(|b| b * b).sum::<f64>()).sqrt();
+        product / size.max(1e-300)
+    };
+    ResidualReport {
+        autocorrelation: (1..=LAGS).map(|lag| correlation(&white, &white, lag)).collect(),
+        input_correlation: (0..=LAGS).map(|lag| correlation(&white, &changes, lag)).collect(),
+        band: Z / (data.rows().max(1) as f64).sqrt(),
+    }
+}

@@ -1,0 +1,85 @@
+//! Causes that the readings themselves show: a lattice, a bound, outliers.
+
+use std::collections::BTreeMap;
+
+use super::data::Data;
+use super::fit::Fit;
+use super::noise::scale_of_squares;
+use super::observed::Observed;
+use super::quality::Z;
+use super::report::{Finding, Parameter};
+
+/// A step of the readings this many of the noise's scales wide is worth naming.
+const COARSE_STEP: f64 = 0.5;
+/// A reading this many of the noise's scales off is an outlier, once there are outliers.
+const FAR: f64 = 4.0;
+
+/// What the readings themselves show.
+pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let raw = scale_of_squares(&fit.residual);
+    let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
+    let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
+    let single = |name: &str, value: f64, low: f64, high: f64, unit| {
+        BTreeMap::from([(name.to_owned(), Parameter { value, low, high, unit })])
+    };
+    if let Some(step) = observed.step
+        && step > COARSE_STEP * stopped_raw
+    {
+        let grid = data.reading[0];
+        let after: Vec<f64> = data
+            .reading
+            .iter()
+            .zip(&predicted)
+            .map(|(reading, predicted)| reading - (((predicted - grid) / step).round() * step + grid))
+            .collect();
+        findings.push(Finding {
+            cause: "quantisation",
+            probability: 1.0,
+            parameters: single("step", step, step * (1.0 - 1e-6), step * (1.0 + 1e-6), "V"),
+            rmse_before: raw,
+            rmse_after: scale_of_squares(&after).min(raw),
+            evidence: format!(
+                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left",
+                step / raw
+            ),
+        });
+    }
+    for (bound, upper) in [(observed.upper, true), (observed.lower, false)] {
+        let Some(bound) = bound else { continue };
+        let stopped = data.reading.iter().filter(|&&reading| reading == bound).count();
+        findings.push(Finding {
+            cause: "sensor-saturation",
+            probability: 1.0,
+            parameters: single("limit", bound, bound - 1e-6 * bound.abs(), bound + 1e-6 * bound.abs(), "V"),
+            rmse_before: raw,
+            rmse_after: stopped_raw,
+            evidence: format!(
+                "{stopped} readings are exactly {bound}, the {} of all",
+                if upper { "highest" } else { "lowest" }
+            ),
+        });
+    }
+    if let Some((_, wide)) = fit.noise.wide {
+        let errors = observed.errors(&fit.residual);
+        let white = fit.noise.whitened(&errors);
+        let (far, kept): (Vec<usize>, Vec<usize>) =
+            (0..white.len()).partition(|&row| white[row].abs() > FAR * fit.noise.sigma);
+        let kept: Vec<f64> = kept.into_iter().map(|row| errors[row]).collect();
+        let fraction = far.len() as f64 / white.len() as f64;
+        let spread = (fraction * (1.0 - fraction) / white.len() as f64).sqrt();
+        findings.push(Finding {
+            cause: "outliers",
+            probability: 1.0,
+            parameters: single("fraction", fraction, (fraction - Z * spread).max(0.0), fraction + Z * spread, ""),
+            rmse_before: stopped_raw,
+            rmse_after: scale_of_squares(&kept),
+            evidence: format!(
+                "{} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
+                far.len(),
+                wide / fit.noise.sigma
+            ),
+        });
+    }
+    findings
+}

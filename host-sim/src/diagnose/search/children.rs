@@ -1,0 +1,61 @@
+//! What may follow a structure: the most promising of those with one block more.
+
+use std::collections::HashMap;
+
+use super::{Judge, Scored, Search, effects};
+use crate::diagnose::effects::EFFECTS;
+use crate::diagnose::fit::Fit;
+use crate::diagnose::model::Model;
+
+/// Extensions that are judged on held-out rows.
+const JUDGED: usize = 5;
+/// And as many more by their plain error, where the noise seems to have a memory.
+const JUDGED_PLAIN: usize = 3;
+
+impl<J: Judge> Search<'_, J> {
+    /// The most promising extensions, fitted and judged, the best first.
+    pub(super) fn children(&mut self, node: &Scored) -> Vec<Scored> {
+        let key = node.fit.model.structure();
+        if let Some(children) = self.extended.get(&key) {
+            return children.clone();
+        }
+        let mut children = self.judged(node, |_| true);
+        children.sort_by(|a, b| b.score.total_cmp(&a.score));
+        self.extended.insert(key, children.clone());
+        children
+    }
+
+    /// The best of the extensions by wanted effects, judged.
+    pub(super) fn judged(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Scored> {
+        let model = &node.fit.model;
+        let new = |effect| wanted(effect) && !model.has(effect) && !contained(effect, model);
+        let first_fits = self.judge.extended(&node.fit, &new);
+        let first_score =
+            |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, &fit.model) - fit.model.points().len() as f64;
+        let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
+        fits.sort_by(|a, b| b.0.total_cmp(&a.0));
+        fits.dedup_by_key(|(_, fit)| fit.model.structure());
+        // The best two forms of a cause, so that no cause takes all places.
+        let mut taken: HashMap<Vec<usize>, usize> = HashMap::new();
+        fits.retain(|(_, fit)| {
+            let count = taken.entry(effects(&fit.model)).or_default();
+            *count += 1;
+            *count <= 2
+        });
+        // What a memory of the noise hides while much is still wrong shows in the plain error.
+        let rest = fits.split_off(JUDGED.min(fits.len()));
+        let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.fit.plain).collect();
+        plain.sort_by(|a, b| b.1.plain.total_cmp(&a.1.plain));
+        if !node.fit.noise.memory.is_none() {
+            fits.extend(plain.into_iter().take(JUDGED_PLAIN));
+        }
+        fits.into_iter().map(|(_, fit)| self.seen.judge_anew(self.judge, fit)).collect()
+    }
+}
+
+/// True if an effect is a special case of one that is there: it could only trade with it.
+fn contained(effect: usize, model: &Model) -> bool {
+    let wider = EFFECTS[effect].special_case_of();
+    let narrower = |other: usize| EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause());
+    effects(model).into_iter().any(|other| wider.contains(&EFFECTS[other].cause()) || narrower(other))
+}

@@ -1,0 +1,100 @@
+//! What a search asks about structures: an [`Engine`] answers from a record, a test from what it was told.
+
+use super::caution::long_memory;
+use super::promise::Metric;
+use crate::diagnose::effect::Scene;
+use crate::diagnose::effects::EFFECTS;
+use crate::diagnose::fit::{Engine, Fit};
+use crate::diagnose::model::{Block, Model};
+use crate::diagnose::noise::{Noise, scale};
+
+/// What a block costs, in nats, beside its places and forms: so many are tried.
+const PRICE: f64 = 4.3;
+/// And each of its coordinates, beyond what held-out rows charge: a wider block must not take a narrower one's place.
+const PRICE_OF_COORDINATE: f64 = 1.8;
+/// An effect that promises less in all its forms, in nats, is not fitted.
+const PROMISE: f64 = 2.5;
+
+/// Fits structures and judges them.
+pub trait Judge {
+    /// The likeliest point near the model's own.
+    fn fit(&mut self, model: Model) -> Fit;
+
+    /// Log-likelihood of all rows, each unseen by its fit.
+    fn held_out(&mut self, fit: &Fit) -> f64;
+
+    /// First fits of the structures with one block more, whose effect is wanted, in every form that is worth fitting.
+    fn extended(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit>;
+
+    /// What a block costs, in nats.
+    fn price(&self, block: &Block) -> f64;
+
+    /// What prices have to be multiplied by for what a fit leaves, at least 1.
+    fn caution(&mut self, fit: &Fit) -> f64;
+}
+
+impl Judge for Engine<'_> {
+    fn fit(&mut self, model: Model) -> Fit {
+        self.fit_twice(model)
+    }
+
+    fn held_out(&mut self, fit: &Fit) -> f64 {
+        self.judged_unseen(fit)
+    }
+
+    fn extended(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+        let law = Noise::first_look();
+        let extensions = extensions(self, fit, wanted).into_iter();
+        extensions.map(|Extension { block, point, .. }| self.fit(fit.model.with(block, point), &law)).collect()
+    }
+
+    fn price(&self, block: &Block) -> f64 {
+        let effect = block.effect();
+        let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
+        PRICE + PRICE_OF_COORDINATE * fitted as f64 + effect.places(self.data) + (effect.forms() as f64).ln()
+    }
+
+    fn caution(&mut self, fit: &Fit) -> f64 {
+        long_memory(&self.terms(&fit.noise, &fit.residual))
+    }
+}
+
+/// A block that could be added, from one start.
+struct Extension {
+    block: Block,
+    point: Vec<f64>,
+    promise: f64,
+}
+
+/// Blocks that might be added, each from its most promising starts.
+fn extensions(engine: &mut Engine, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Extension> {
+    let mut metrics = vec![Metric::new(engine, fit, Noise::robust(&fit.residual))];
+    if !fit.noise.memory.is_none() {
+        metrics.push(Metric::new(engine, fit, fit.noise.clone()));
+    }
+    let sigma = scale(&fit.residual);
+    let mut found: Vec<Extension> = Vec::new();
+    for (index, effect) in EFFECTS.iter().enumerate().filter(|(index, _)| wanted(*index)) {
+        let mut of_effect: Vec<Extension> = Vec::new();
+        for form in 0..effect.forms() {
+            let block = Block { effect: index, form };
+            let scene = Scene { data: engine.data, residual: &fit.residual, sigma };
+            let starts = effect.starts(form, &scene).into_iter().map(|point| {
+                let there = engine.residual(&fit.model.with(block, point.clone()));
+                let change: Vec<f64> = fit.residual.iter().zip(&there).map(|(a, b)| a - b).collect();
+                let promise = metrics.iter().map(|metric| metric.promise(&change)).fold(0.0, f64::max);
+                Extension { block, point, promise }
+            });
+            let mut starts: Vec<Extension> = starts.collect();
+            starts.sort_by(|a, b| b.promise.total_cmp(&a.promise));
+            // A second start where the first may be a lesser peak.
+            starts.truncate(1 + usize::from(starts.len() > 4 && effect.forms() == 1));
+            of_effect.extend(starts);
+        }
+        // A promise is a poor judge of a form: if one form is worth fitting, all are.
+        if of_effect.iter().any(|extension| extension.promise > PROMISE) {
+            found.extend(of_effect);
+        }
+    }
+    found
+}

@@ -1,0 +1,71 @@
+//! What an effect that is not fitted yet promises: how much of the residual its change could explain.
+
+use crate::diagnose::fit::{Engine, Fit, Jacobian};
+use crate::diagnose::noise::Noise;
+
+/// How many times its start an effect may be, in the hope of a promise.
+const FARTHEST: f64 = 6.0;
+
+/// How much a change of the prediction could explain, when the model's own points follow.
+pub(super) struct Metric {
+    noise: Noise,
+    residual: Vec<f64>,
+    /// Square roots of the rows' weights.
+    roots: Vec<f64>,
+    /// What the model's own points can make, orthonormal.
+    own: Vec<Vec<f64>>,
+}
+
+impl Metric {
+    pub(super) fn new(engine: &mut Engine, fit: &Fit, noise: Noise) -> Self {
+        let terms = engine.terms(&noise, &fit.residual);
+        let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
+        let residual = terms.iter().map(|term| term.weight.sqrt() * term.residual).collect();
+        let Jacobian { columns, .. } = engine.jacobian(&fit.model, &noise, &fit.residual);
+        let mut own: Vec<Vec<f64>> = Vec::new();
+        for column in columns {
+            let mut column: Vec<f64> = column.iter().zip(&roots).map(|(value, root)| value * root).collect();
+            let size = norm(&column);
+            remove(&mut column, &own);
+            let left = norm(&column);
+            if left > 1e-6 * size {
+                column.iter_mut().for_each(|value| *value /= left);
+                own.push(column);
+            }
+        }
+        Self { noise, residual, roots, own }
+    }
+
+    /// Gain in nats of the best step along `change`, as far as a straight line may be believed.
+    pub(super) fn promise(&self, change: &[f64]) -> f64 {
+        let mut change: Vec<f64> =
+            self.noise.whitened(change).iter().zip(&self.roots).map(|(value, root)| value * root).collect();
+        remove(&mut change, &self.own);
+        let size = dot(&change, &change);
+        if size < 1e-9 {
+            return 0.0;
+        }
+        let along = dot(&self.residual, &change);
+        let step = (along / size).clamp(0.0, FARTHEST);
+        let total = dot(&self.residual, &self.residual);
+        let part = ((2.0 * along - step * size) * step / total.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
+        // The noise's scale would shrink along.
+        -0.5 * self.residual.len() as f64 * (1.0 - part).ln()
+    }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Takes off what lies along an orthonormal basis.
+fn remove(vector: &mut [f64], basis: &[Vec<f64>]) {
+    for direction in basis {
+        let along = dot(vector, direction);
+        vector.iter_mut().zip(direction).for_each(|(value, unit)| *value -= along * unit);
+    }
+}

@@ -1,0 +1,98 @@
+//! Every structure that was judged, and what it is worth.
+
+use std::collections::{HashMap, HashSet};
+
+use super::Scored;
+use super::judge::Judge;
+use crate::diagnose::effects::EFFECTS;
+use crate::diagnose::fit::Fit;
+use crate::diagnose::model::{Block, Model};
+
+/// A fit that is likelier by so many nats than the one that was judged is judged anew.
+const ANEW: f64 = 1.0;
+
+/// Structures with their scores, under one caution.
+#[derive(Debug)]
+pub(super) struct Seen {
+    scored: HashMap<Vec<Block>, Scored>,
+    /// What prices are multiplied by: noise whose memory is longer than its law can say makes chance finds look better.
+    pub(super) caution: f64,
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        Self { scored: HashMap::new(), caution: 1.0 }
+    }
+}
+
+impl Seen {
+    /// What a model's blocks cost, in nats.
+    pub(super) fn price(&self, judge: &impl Judge, model: &Model) -> f64 {
+        self.caution * model.blocks.iter().map(|(block, _)| judge.price(block)).sum::<f64>()
+    }
+
+    /// Charges everything anew.
+    pub(super) fn charge(&mut self, judge: &impl Judge, caution: f64) {
+        self.caution = caution;
+        let mut scored = std::mem::take(&mut self.scored);
+        scored.values_mut().for_each(|it| it.score = it.held_out - self.price(judge, &it.fit.model));
+        self.scored = scored;
+    }
+
+    /// A structure's score; it is fitted the first time that it is asked for.
+    pub(super) fn judge(&mut self, judge: &mut impl Judge, model: Model) -> Scored {
+        if let Some(seen) = self.scored.get(&model.structure()) {
+            return seen.clone();
+        }
+        self.fitted(judge, model)
+    }
+
+    /// The same, from a first fit that may be better than the one that was judged.
+    pub(super) fn judge_anew(&mut self, judge: &mut impl Judge, first: Fit) -> Scored {
+        match self.scored.get(&first.model.structure()).cloned() {
+            Some(seen) if seen.fit.log_likelihood + ANEW < first.log_likelihood => {
+                let again = self.fitted(judge, first.model);
+                if seen.score > again.score {
+                    self.scored.insert(seen.fit.model.structure(), seen.clone());
+                    return seen;
+                }
+                again
+            }
+            _ => self.judge(judge, first.model),
+        }
+    }
+
+    fn fitted(&mut self, judge: &mut impl Judge, model: Model) -> Scored {
+        let fit = judge.fit(model);
+        let held_out = judge.held_out(&fit);
+        let score = held_out - self.price(judge, &fit.model);
+        let scored = Scored { fit, held_out, score };
+        self.scored.insert(scored.fit.model.structure(), scored.clone());
+        scored
+    }
+
+    /// The best structure of each set of effects, the best set first.
+    pub(super) fn ranked(&self) -> Vec<&Scored> {
+        let mut ranked: Vec<&Scored> = self.scored.values().collect();
+        let key = |scored: &Scored| scored.fit.model.structure();
+        ranked.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| key(a).cmp(&key(b))));
+        let mut sets = HashSet::new();
+        ranked.retain(|scored| sets.insert(effects(&scored.fit.model)));
+        ranked
+    }
+
+    /// The best of all structures that do without an effect, and without a cause that contains it.
+    pub(super) fn best_without(&self, effect: usize) -> Option<Scored> {
+        let wider = EFFECTS[effect].special_case_of();
+        let has = |model: &Model| {
+            effects(model).into_iter().any(|other| other == effect || wider.contains(&EFFECTS[other].cause()))
+        };
+        let without = self.scored.values().filter(|scored| !has(&scored.fit.model));
+        without.max_by(|a, b| a.score.total_cmp(&b.score)).cloned()
+    }
+}
+
+/// The effects of a model, in the chain's order.
+pub fn effects(model: &Model) -> Vec<usize> {
+    model.blocks.iter().map(|(block, _)| block.effect).collect()
+}

@@ -1,0 +1,109 @@
+//! The search on its own: a judge that was told what each set of causes is worth.
+
+use std::collections::BTreeSet;
+
+use super::*;
+use crate::diagnose::effects::index_of;
+use crate::diagnose::noise::Noise;
+
+/// What every block costs.
+const PRICE: f64 = 10.0;
+
+/// Log-likelihoods of sets of causes; of other sets that of their best part, and a little for every further cause.
+struct Told {
+    worth: Vec<(BTreeSet<usize>, f64)>,
+    caution: f64,
+    fits: usize,
+}
+
+fn effect(cause: &str) -> usize {
+    index_of(cause).unwrap()
+}
+
+fn told(worth: &[(&[&str], f64)]) -> Told {
+    let set = |causes: &[&str]| causes.iter().map(|cause| effect(cause)).collect();
+    Told { worth: worth.iter().map(|(causes, worth)| (set(causes), *worth)).collect(), caution: 1.0, fits: 0 }
+}
+
+impl Judge for Told {
+    fn fit(&mut self, model: Model) -> Fit {
+        self.fits += 1;
+        let has: BTreeSet<usize> = effects(&model).into_iter().collect();
+        let of_part = self.worth.iter().filter(|(part, _)| part.is_subset(&has));
+        let log_likelihood =
+            of_part.map(|(part, worth)| worth + (has.len() - part.len()) as f64).fold(has.len() as f64, f64::max);
+        Fit { model, residual: Vec::new(), noise: Noise::first_look(), log_likelihood, plain: log_likelihood }
+    }
+
+    fn held_out(&mut self, fit: &Fit) -> f64 {
+        fit.log_likelihood
+    }
+
+    fn extended(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+        let blocks = (0..EFFECTS.len()).filter(|&effect| wanted(effect)).map(|effect| Block { effect, form: 0 });
+        blocks.map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
+    }
+
+    fn price(&self, _: &Block) -> f64 {
+        PRICE
+    }
+
+    fn caution(&mut self, _: &Fit) -> f64 {
+        self.caution
+    }
+}
+
+fn found(judge: &mut Told) -> Vec<&'static str> {
+    let best = Search::new(judge).run(|_| ());
+    best.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect()
+}
+
+#[test]
+fn it_adds_what_is_worth_its_price_and_stops() {
+    assert!(found(&mut told(&[])).is_empty());
+    assert!(found(&mut told(&[(&["hum"], 0.9 * PRICE)])).is_empty());
+    let mut judge = told(&[(&["delay"], 50.0), (&["hum"], 30.0), (&["delay", "hum"], 80.0)]);
+    assert_eq!(found(&mut judge), ["delay", "hum"]);
+    // Each structure once as a first fit for each that it follows, and once judged.
+    assert!(judge.fits < 200, "{} fits", judge.fits);
+}
+
+#[test]
+fn it_takes_out_what_stood_in_for_two() {
+    let pair: &[&str] = &["time-constant", "drift"];
+    let worth: [(&[&str], f64); 4] =
+        [(&["resonance"], 90.0), (&["time-constant"], 50.0), (&["drift"], 40.0), (pair, 200.0)];
+    assert_eq!(found(&mut told(&worth)), pair);
+}
+
+#[test]
+fn it_changes_one_block_for_another() {
+    // Neither is worth anything without the other, and the way there leads over a third.
+    let pair: &[&str] = &["amplifier-slew", "charge-leakage"];
+    let worth: [(&[&str], f64); 3] = [(&["delay"], 60.0), (&["delay", "charge-leakage"], 100.0), (pair, 150.0)];
+    assert_eq!(found(&mut told(&worth)), pair);
+}
+
+#[test]
+fn caution_makes_every_block_dearer() {
+    let mut judge = told(&[(&["gain-error"], 500.0), (&["gain-error", "hum"], 525.0)]);
+    assert_eq!(found(&mut judge), ["gain-error", "hum"]);
+    judge.caution = 3.0;
+    assert_eq!(found(&mut judge), ["gain-error"]);
+}
+
+#[test]
+fn a_special_case_is_not_added_to_what_contains_it() {
+    let mut judge = told(&[(&["static-nonlinearity"], 90.0), (&["static-nonlinearity", "gain-error"], 300.0)]);
+    assert_eq!(found(&mut judge), ["static-nonlinearity"]);
+}
+
+#[test]
+fn a_lead_is_judged_and_extended() {
+    let mut judge = told(&[(&["delay"], 50.0), (&["delay", "hum"], 90.0), (&["drift"], 40.0)]);
+    let model = |cause: &str| Model::default().with(Block { effect: effect(cause), form: 0 }, Vec::new());
+    let lead = Lead { models: vec![model("drift"), model("delay")], caution: 1.0 };
+    let best = Search::new(&mut judge).from(lead, |_| ());
+    assert_eq!(effects(&best.fit.model), [effect("delay"), effect("hum")]);
+    assert!((best.score - (90.0 - 2.0 * PRICE)).abs() < 1e-9);
+}
