@@ -1,22 +1,13 @@
 //! The extended spring under the whole tick, over all that is accepted. Built with overflow checks: a wrap panics.
 
+mod springs;
+
 use model::estimator::{Estimator, Model};
 use model::extended::{self, ExtendedPlant, Law, Leakage, Memory, Relaxation};
 use model::{Amplifier, Compensation, Config, Gains, Input, Limits, Plant, SampleTime, Settings, State, Volts};
 use proptest::prelude::*;
+use springs::WHOLE;
 
-/// Everything at once, on the scale of a real spring.
-const WHOLE: ExtendedPlant<'_> = ExtendedPlant {
-    memory: Some(Memory { direct: 0.8, thresholds_v: &[10.0, 25.0], weights: &[0.15, 0.05] }),
-    law: Some(Law { voltage_v: &[0.0, 100.0, 300.0, 500.0], stiffness: &[0.0, 80.0, 300.0, 500.0] }),
-    leakage: Some(Leakage { share: 0.1, time_constant_s: 40.0 }),
-    relaxation: Relaxation {
-        share: 0.0909,
-        time_constants_s: &[5.5, 40.0],
-        weights: &[0.8, 0.109],
-        time_constant_high_s: Some(8.0),
-    },
-};
 const PLAIN: ExtendedPlant<'_> = ExtendedPlant {
     memory: None,
     law: None,

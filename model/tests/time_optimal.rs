@@ -1,24 +1,15 @@
 //! The time-optimal pre-compensator over limits, moving targets and changes of its configuration, on plain and extended
 //! springs. Built with overflow checks: a wrap panics.
 
+mod springs;
+
 use model::estimator::{Estimator, Model};
 use model::extended::{self, ExtendedPlant, Law, Leakage, Memory, Relaxation};
 use model::{Amplifier, Approach, Compensation, Config, Gains, Input, Output, Plant, Settings, State, Volts};
 use proptest::prelude::*;
+use springs::WHOLE;
 
 const FAST: Compensation = Compensation::TimeOptimal(Approach::DEAD_BEAT);
-/// Everything at once, on the scale of a real spring.
-const WHOLE: ExtendedPlant<'_> = ExtendedPlant {
-    memory: Some(Memory { direct: 0.8, thresholds_v: &[25.0, 10.0], weights: &[0.05, 0.15] }),
-    law: Some(Law { voltage_v: &[0.0, 100.0, 300.0, 500.0], stiffness: &[0.0, 80.0, 300.0, 500.0] }),
-    leakage: Some(Leakage { share: 0.1, time_constant_s: 40.0 }),
-    relaxation: Relaxation {
-        share: 0.0909,
-        time_constants_s: &[5.5, 40.0],
-        weights: &[0.8, 0.109],
-        time_constant_high_s: Some(8.0),
-    },
-};
 
 fn settings<P: Model>(plant: P, limit_v: f64) -> Settings<P> {
     Settings { rate_hz: 1000.0, plant, compensation: FAST, amplifier: Amplifier::up_to(limit_v), feedback: None }
