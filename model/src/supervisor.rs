@@ -18,58 +18,15 @@
 //!
 //! No heap, no float, no panic in a tick; times are counted in ticks.
 
+mod fault;
+mod settings;
+
+pub use fault::Fault;
+pub use settings::{Config, Settings};
+
 use crate::amplifier::Limits;
 use crate::controller::Output;
-use crate::error::OutOfRange;
-use crate::units::{Accumulator, DacCode, SampleTime, Signal, Volts};
-
-/// Why a voltage was taken away. The numbers are used in logs, frames and after a reset, and never change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Fault {
-    /// The program stopped itself.
-    Panic = 1,
-    /// The processor stopped the program.
-    HardFault = 2,
-    /// Too many ticks were missed.
-    Overrun = 3,
-    /// The interlock opened.
-    Interlock = 4,
-    /// A task did not check in, or the watchdog had to reset the chip.
-    Watchdog = 5,
-    /// The amplifier's monitors disagree with what was put out.
-    Monitor = 6,
-    /// The settings were refused.
-    Config = 7,
-}
-
-impl Fault {
-    const ALL: [Self; 7] =
-        [Self::Panic, Self::HardFault, Self::Overrun, Self::Interlock, Self::Watchdog, Self::Monitor, Self::Config];
-
-    /// Stable number, 1 to 255; zero stands for no fault.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// Lower case, for logs.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Panic => "panic",
-            Self::HardFault => "hard-fault",
-            Self::Overrun => "overrun",
-            Self::Interlock => "interlock",
-            Self::Watchdog => "watchdog",
-            Self::Monitor => "monitor",
-            Self::Config => "config",
-        }
-    }
-
-    /// The fault of a code; `None` for zero and unknown numbers.
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|fault| fault.code() == code)
-    }
-}
+use crate::units::{Accumulator, DacCode, Signal, Volts};
 
 /// Whether a voltage may leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,79 +58,6 @@ pub enum Refusal {
     InterlockOpen = 2,
     /// No frame from the host within its time.
     HostSilent = 3,
-}
-
-/// Limits of the supervision, in SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Silence of the host, in s, after which the target is ramped down, 0.01 to 60.
-    pub host_timeout_s: f64,
-    /// How fast the target then falls, in V/s, 10 to 100 000.
-    pub ramp_v_per_s: f64,
-    /// Missed ticks that are forgiven at once, 1 to 100.
-    pub missed_ticks_allowed: u32,
-    /// Time in s after which one of them is forgotten, one sample time to 60.
-    pub forget_missed_s: f64,
-    /// Largest difference in V between the amplifier's voltage monitor and what was put out, 1 to 1000.
-    pub monitor_tolerance_v: f64,
-    /// Largest reading of the current monitor, in A, either direction, 1e-6 to 1.
-    pub max_current_a: f64,
-    /// How long, in s, a monitor may disagree, one sample time to 10; longer than the amplifier takes to settle.
-    pub monitor_time_s: f64,
-}
-
-impl Settings {
-    /// Half a second without a host, then 700 V/s down; five missed ticks, one forgotten a second; 35 V, 5 % of the
-    /// report's range, and 2 mA for 50 ms.
-    pub const DEFAULT: Self = Self {
-        host_timeout_s: 0.5,
-        ramp_v_per_s: 700.0,
-        missed_ticks_allowed: 5,
-        forget_missed_s: 1.0,
-        monitor_tolerance_v: 35.0,
-        max_current_a: 2e-3,
-        monitor_time_s: 0.05,
-    };
-
-    /// Scales the settings for the tick.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] names the field.
-    pub fn check(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
-        let seconds = sample_time.seconds();
-        let ticks = |field, value, lowest: f64, highest| {
-            let checked = OutOfRange::check(field, value, lowest.max(seconds)..=highest, "s")?;
-            Ok::<u32, OutOfRange>(libm::round(checked / seconds) as u32)
-        };
-        let ramp = OutOfRange::check("ramp_v_per_s", self.ramp_v_per_s, 10.0..=1e5, "V/s")?;
-        let allowed = f64::from(self.missed_ticks_allowed);
-        OutOfRange::check("missed_ticks_allowed", allowed, 1.0..=100.0, "ticks")?;
-        let tolerance = OutOfRange::check("monitor_tolerance_v", self.monitor_tolerance_v, 1.0..=1000.0, "V")?;
-        let current = OutOfRange::check("max_current_a", self.max_current_a, 1e-6..=1.0, "A")?;
-        let forget = ticks("forget_missed_s", self.forget_missed_s, 0.0, 60.0)?;
-        Ok(Config {
-            host_timeout: ticks("host_timeout_s", self.host_timeout_s, 0.01, 60.0)?,
-            ramp_step: Accumulator::from_num((ramp * seconds).min(1000.0)),
-            miss_cost: forget,
-            miss_limit: forget.saturating_mul(self.missed_ticks_allowed),
-            tolerance: Signal::from_num(tolerance),
-            max_current_ua: libm::round(current * 1e6) as i32,
-            monitor_ticks: ticks("monitor_time_s", self.monitor_time_s, 0.0, 10.0)?,
-        })
-    }
-}
-
-/// Checked limits, scaled for the tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config {
-    host_timeout: u32,
-    ramp_step: Accumulator,
-    /// A missed tick costs as many as it takes to forget it; each tick gives one back.
-    miss_cost: u32,
-    miss_limit: u32,
-    tolerance: Signal,
-    max_current_ua: i32,
-    monitor_ticks: u32,
 }
 
 /// What the amplifier says about itself.

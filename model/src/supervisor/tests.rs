@@ -3,7 +3,7 @@
 use super::*;
 use crate::amplifier::Limits;
 use crate::feedback::Sensor;
-use crate::units::ScaledStiffness;
+use crate::units::{SampleTime, ScaledStiffness};
 use proptest::prelude::*;
 
 const RATE_HZ: f64 = 1000.0;

@@ -1,0 +1,49 @@
+//! The faults and their stable numbers.
+
+/// Why a voltage was taken away. The numbers are used in logs, frames and after a reset, and never change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// The program stopped itself.
+    Panic = 1,
+    /// The processor stopped the program.
+    HardFault = 2,
+    /// Too many ticks were missed.
+    Overrun = 3,
+    /// The interlock opened.
+    Interlock = 4,
+    /// A task did not check in, or the watchdog had to reset the chip.
+    Watchdog = 5,
+    /// The amplifier's monitors disagree with what was put out.
+    Monitor = 6,
+    /// The settings were refused.
+    Config = 7,
+}
+
+impl Fault {
+    pub(super) const ALL: [Self; 7] =
+        [Self::Panic, Self::HardFault, Self::Overrun, Self::Interlock, Self::Watchdog, Self::Monitor, Self::Config];
+
+    /// Stable number, 1 to 255; zero stands for no fault.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// Lower case, for logs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Panic => "panic",
+            Self::HardFault => "hard-fault",
+            Self::Overrun => "overrun",
+            Self::Interlock => "interlock",
+            Self::Watchdog => "watchdog",
+            Self::Monitor => "monitor",
+            Self::Config => "config",
+        }
+    }
+
+    /// The fault of a code; `None` for zero and unknown numbers.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|fault| fault.code() == code)
+    }
+}

@@ -1,0 +1,77 @@
+//! The limits of the supervision, in SI units and scaled for the tick.
+
+use crate::error::OutOfRange;
+use crate::units::{Accumulator, SampleTime, Signal};
+
+/// Limits of the supervision, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Silence of the host, in s, after which the target is ramped down, 0.01 to 60.
+    pub host_timeout_s: f64,
+    /// How fast the target then falls, in V/s, 10 to 100 000.
+    pub ramp_v_per_s: f64,
+    /// Missed ticks that are forgiven at once, 1 to 100.
+    pub missed_ticks_allowed: u32,
+    /// Time in s after which one of them is forgotten, one sample time to 60.
+    pub forget_missed_s: f64,
+    /// Largest difference in V between the amplifier's voltage monitor and what was put out, 1 to 1000.
+    pub monitor_tolerance_v: f64,
+    /// Largest reading of the current monitor, in A, either direction, 1e-6 to 1.
+    pub max_current_a: f64,
+    /// How long, in s, a monitor may disagree, one sample time to 10; longer than the amplifier takes to settle.
+    pub monitor_time_s: f64,
+}
+
+impl Settings {
+    /// Half a second without a host, then 700 V/s down; five missed ticks, one forgotten a second; 35 V, 5 % of the
+    /// report's range, and 2 mA for 50 ms.
+    pub const DEFAULT: Self = Self {
+        host_timeout_s: 0.5,
+        ramp_v_per_s: 700.0,
+        missed_ticks_allowed: 5,
+        forget_missed_s: 1.0,
+        monitor_tolerance_v: 35.0,
+        max_current_a: 2e-3,
+        monitor_time_s: 0.05,
+    };
+
+    /// Scales the settings for the tick.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the field.
+    pub fn check(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
+        let seconds = sample_time.seconds();
+        let ticks = |field, value, lowest: f64, highest| {
+            let checked = OutOfRange::check(field, value, lowest.max(seconds)..=highest, "s")?;
+            Ok::<u32, OutOfRange>(libm::round(checked / seconds) as u32)
+        };
+        let ramp = OutOfRange::check("ramp_v_per_s", self.ramp_v_per_s, 10.0..=1e5, "V/s")?;
+        let allowed = f64::from(self.missed_ticks_allowed);
+        OutOfRange::check("missed_ticks_allowed", allowed, 1.0..=100.0, "ticks")?;
+        let tolerance = OutOfRange::check("monitor_tolerance_v", self.monitor_tolerance_v, 1.0..=1000.0, "V")?;
+        let current = OutOfRange::check("max_current_a", self.max_current_a, 1e-6..=1.0, "A")?;
+        let forget = ticks("forget_missed_s", self.forget_missed_s, 0.0, 60.0)?;
+        Ok(Config {
+            host_timeout: ticks("host_timeout_s", self.host_timeout_s, 0.01, 60.0)?,
+            ramp_step: Accumulator::from_num((ramp * seconds).min(1000.0)),
+            miss_cost: forget,
+            miss_limit: forget.saturating_mul(self.missed_ticks_allowed),
+            tolerance: Signal::from_num(tolerance),
+            max_current_ua: libm::round(current * 1e6) as i32,
+            monitor_ticks: ticks("monitor_time_s", self.monitor_time_s, 0.0, 10.0)?,
+        })
+    }
+}
+
+/// Checked limits, scaled for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    pub(super) host_timeout: u32,
+    pub(super) ramp_step: Accumulator,
+    /// A missed tick costs as many as it takes to forget it; each tick gives one back.
+    pub(super) miss_cost: u32,
+    pub(super) miss_limit: u32,
+    pub(super) tolerance: Signal,
+    pub(super) max_current_ua: i32,
+    pub(super) monitor_ticks: u32,
+}
