@@ -69,13 +69,12 @@ impl<P: Judged> Experiment<P> {
         self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;
 
         let start_s = self.schedule.start_s();
-        let last = ((self.schedule.end_s() - start_s) * rate_hz + 1e-6).floor();
+        let last = ((self.schedule.end_s() - start_s) * rate_hz).floor();
         if last >= MOST_TICKS {
             bad_input!("{} takes {last} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}", self.name);
         }
-        let ticks = last as usize + 1;
-        let mut reader = self.schedule.reader();
-        let targets: Vec<f64> = (0..ticks).map(|tick| reader.at(start_s + tick as f64 / rate_hz)).collect();
+        let targets = self.schedule.at_ticks(rate_hz);
+        let ticks = targets.len();
         let mut run = Run { start_s, rate_hz, with: Vec::new(), without: Vec::new() };
         run.with = one_loop(&controlled, &targets, |done| progress(done, 2 * ticks))?;
         run.without = one_loop(&alone, &targets, |done| progress(ticks + done, 2 * ticks))?;

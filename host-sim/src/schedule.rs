@@ -99,6 +99,13 @@ impl Schedule {
         self.pieces.last().map_or(0.0, |piece| piece.end_s)
     }
 
+    /// Voltages in V at ticks `rate_hz` a second, the first moment and the last that falls on a tick included.
+    pub(crate) fn at_ticks(&self, rate_hz: f64) -> Vec<f64> {
+        let mut reader = self.reader();
+        let ticks = ((self.end_s() - self.start_s()) * rate_hz + 1e-6).floor() as usize + 1;
+        (0..ticks).map(|tick| reader.at(self.start_s() + tick as f64 / rate_hz)).collect()
+    }
+
     /// The pieces in order.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces

@@ -85,9 +85,6 @@ pub struct Worst {
     pub overshoot_percent: f64,
 }
 
-/// The controller's voltages, in V, and stiffness by its own model, over the stair.
-pub(crate) type Samples = Run;
-
 impl Question<'_> {
     fn settings(&self, compensation: Compensation) -> Settings<ExtendedPlant<'_>> {
         Settings {
@@ -99,18 +96,15 @@ impl Question<'_> {
         }
     }
 
-    /// The fixed-point loop over the stair.
+    /// The fixed-point loop over the stair: its voltages, and stiffness by its own model.
     ///
     /// # Errors
     /// [`BadInput`] for what the tick refuses.
-    fn run(&self, compensation: Compensation) -> Result<Samples> {
+    fn run(&self, compensation: Compensation) -> Result<Run> {
         let config = self.settings(compensation).check().map_err(|error| BadInput(error.to_string()))?;
         let schedule = Schedule::ideal_stair();
-        let ticks = (schedule.end_s() * self.rate_hz + 1e-6) as usize + 1;
-        let mut reader = schedule.reader();
-        let targets: Vec<f64> = (0..ticks).map(|tick| reader.at(tick as f64 / self.rate_hz)).collect();
-        let with = one_loop(&config, &targets, |_| ())?;
-        Ok(Run { start_s: 0.0, rate_hz: self.rate_hz, with, without: Vec::new() })
+        let with = one_loop(&config, &schedule.at_ticks(self.rate_hz), |_| ())?;
+        Ok(Run { start_s: schedule.start_s(), rate_hz: self.rate_hz, with, without: Vec::new() })
     }
 
     /// The worst step; `None` if the tick refuses the settings.

@@ -11,7 +11,7 @@ use host_sim::plant_file;
 use host_sim::tune::{Question, tune};
 use model::Amplifier;
 
-use super::print;
+use super::{print, wrote};
 
 /// Choose gains and settings for a spring and an amplifier, with margins, and what an error of the model costs
 #[derive(Args, Debug)]
@@ -57,13 +57,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let answer = tune(&Question { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent })?;
     let json = format!("{}\n", serde_json::to_string(&answer)?);
     let text = tuning::text(&answer, &arguments.plant);
-    let mut wrote = String::new();
+    let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("tune.json", |out| out.write_all(json.as_bytes()))?;
         files.add("tune.txt", |out| out.write_all(text.as_bytes()))?;
         tuning::write(&mut files, &answer)?;
-        wrote = files.finish()?.iter().map(|path| format!("wrote {}\n", path.display())).collect();
+        written = wrote(&files.finish()?);
     }
-    print(&if arguments.json { json } else { text + &wrote })
+    print(&if arguments.json { json } else { text + &written })
 }

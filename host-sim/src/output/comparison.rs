@@ -1,42 +1,24 @@
 //! A comparison of controllers as text.
 
-use super::terminal::{line, optional, shortest_possible, tidy};
+use super::step_response;
+use super::terminal::{line, tidy};
 use crate::comparison::{AtLimit, Comparison};
 
 /// One table an amplifier.
 pub fn text(comparison: &Comparison) -> String {
     let mut text = String::new();
     for AtLimit { limit_v, steps } in &comparison.limits {
-        line(
-            &mut text,
-            &format!(
-                "up to {limit_v:<4} V |            |     t50     t90     t97 | overshoot     peak | shortest possible t97"
-            ),
-        );
-        line(
-            &mut text,
-            "    step [V] | controller |     [s]     [s]     [s] |       [%]      [V] |                   [s]",
-        );
+        line(&mut text, &format!("up to {limit_v:<4} V |            | {}", step_response::NAMES));
+        line(&mut text, &format!("    step [V] | controller | {}", step_response::UNITS));
         for step in steps {
             for (name, response) in step.each() {
-                line(
-                    &mut text,
-                    &format!(
-                        "{:>4} -> {:<4} | {name:<10} | {:>7} {:>7} {:>7} | {:9.2} {:8.1} | {:>21}",
-                        tidy(response.from_v),
-                        tidy(response.to_v),
-                        optional(response.t50_s, 3),
-                        optional(response.t90_s, 3),
-                        optional(response.t97_s, 3),
-                        response.overshoot_percent,
-                        response.peak_v,
-                        optional(response.bound_t97_s, 3),
-                    ),
-                );
+                let (from_v, to_v) = (tidy(response.from_v), tidy(response.to_v));
+                let columns = step_response::columns(response);
+                line(&mut text, &format!("{from_v:>4} -> {to_v:<4} | {name:<10} | {columns}"));
             }
         }
         text.push('\n');
     }
-    line(&mut text, shortest_possible(comparison.bound_from));
+    line(&mut text, step_response::shortest_possible(comparison.bound_from));
     text
 }

@@ -6,5 +6,6 @@ mod draw;
 pub mod figure;
 pub mod files;
 pub mod plots;
+mod step_response;
 pub mod terminal;
 pub mod tuning;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::step_response;
 use crate::experiment::StartsFrom;
 use crate::response::Response;
 use crate::stair::{LimitedTicks, Report, Row};
@@ -77,38 +78,14 @@ fn steps(text: &mut String, steps: &[Response], bound_from: StartsFrom) {
         line(text, "No step between two plateaus of at least 1 s.");
         return;
     }
-    line(text, "       step |     t50     t90     t97 | overshoot     peak | shortest possible t97");
-    line(text, "        [V] |     [s]     [s]     [s] |       [%]      [V] |                   [s]");
+    line(text, &format!("       step | {}", step_response::NAMES));
+    line(text, &format!("        [V] | {}", step_response::UNITS));
     for step in steps {
-        line(
-            text,
-            &format!(
-                "{:4} -> {:3} | {:>7} {:>7} {:>7} | {:9.2} {:8.1} | {:>21}",
-                tidy(step.from_v),
-                tidy(step.to_v),
-                optional(step.t50_s, 3),
-                optional(step.t90_s, 3),
-                optional(step.t97_s, 3),
-                step.overshoot_percent,
-                step.peak_v,
-                optional(step.bound_t97_s, 3),
-            ),
-        );
+        let columns = step_response::columns(step);
+        line(text, &format!("{:4} -> {:3} | {columns}", tidy(step.from_v), tidy(step.to_v)));
     }
     if steps.iter().any(|step| step.bound_t97_s.is_some()) {
-        line(text, shortest_possible(bound_from));
-    }
-}
-
-/// What the bound says.
-pub(super) fn shortest_possible(from: StartsFrom) -> &'static str {
-    match from {
-        StartsFrom::Settled => {
-            "Shortest possible: any controller within range and slew, from a spring settled at the old value."
-        }
-        StartsFrom::Reached => {
-            "Shortest possible: any controller within range and slew, from where this loop has brought the spring."
-        }
+        line(text, step_response::shortest_possible(bound_from));
     }
 }
 

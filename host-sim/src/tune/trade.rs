@@ -7,7 +7,7 @@
 use model::ScaledStiffness;
 use serde::Serialize;
 
-use super::{Samples, Worst};
+use super::Worst;
 use crate::experiment::{Run, Sample};
 use crate::plant_file::PlantFile;
 use crate::response::measure;
@@ -54,12 +54,12 @@ pub struct Trade {
 }
 
 /// Over +-50 % in steps of 5 %.
-pub(super) fn over_errors(file: &PlantFile, with_gains: Option<&Samples>, fast: Option<&Samples>) -> Vec<Trade> {
+pub(super) fn over_errors(file: &PlantFile, with_gains: Option<&Run>, fast: Option<&Run>) -> Vec<Trade> {
     let mut trade = Vec::new();
     for parameter in Parameter::ALL {
         for part in -10..=10 {
             let error = f64::from(part) / 20.0;
-            let on = |run: Option<&Samples>| run.map(|run| on_another(file, parameter, error, run));
+            let on = |run: Option<&Run>| run.map(|run| on_another(file, parameter, error, run));
             trade.push(Trade { parameter, error, proportional_integral: on(with_gains), fast: on(fast) });
         }
     }
