@@ -156,14 +156,7 @@ struct Done {
 fn main() -> ExitCode {
     // `cargo campaign -- singles` is meant as `cargo campaign singles`.
     let arguments = std::env::args().enumerate().filter(|(index, text)| !(*index == 1 && text == "--"));
-    match run(&Cli::parse_from(arguments.map(|(_, text)| text))) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    aim::exit_code(run(&Cli::parse_from(arguments.map(|(_, text)| text))))
 }
 
 /// True if every aim was met.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Parser;
-use end_to_end::campaign::aim::Aim;
+use end_to_end::campaign::aim::{self, Aim};
 use end_to_end::closed_loop::{effects, failing, tables};
 use model::{Amplifier, Approach, Compensation, Feedback, Settings};
 
@@ -28,14 +28,7 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    match run(&Cli::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    aim::exit_code(run(&Cli::parse()))
 }
 
 /// True if every aim was met.

@@ -1,6 +1,7 @@
 //! What is asked of the diagnosis, and whether it came out.
 
 use std::fmt::{self, Display};
+use std::process::ExitCode;
 
 use serde::Serialize;
 
@@ -46,6 +47,18 @@ impl Display for Aim {
             _ => format!("at most {high}"),
         };
         write!(f, "{what}: {found:.3}, asked for {aim}: {}", if self.is_met() { "met" } else { "NOT MET" })
+    }
+}
+
+/// How a command ends that asked for aims: `met` is whether all were.
+pub fn exit_code(met: anyhow::Result<bool>) -> ExitCode {
+    match met {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
     }
 }
 
