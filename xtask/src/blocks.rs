@@ -1,13 +1,13 @@
 //! Instructions a tick for each kind of spring under each controller: counted in one run by `firmware/examples/blocks.rs`,
 //! every run's digest held against this machine's.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use firmware::blocks::{CONTROLLERS, SPRINGS, run as on_this_machine};
 use firmware::control::Untimed;
 use serde_json::{Value, json};
 
 use crate::emulator;
-use crate::image::{self, Board, Opt};
+use crate::image::Opt;
 
 /// Mean and most instructions of a tick, a row a spring, a column a controller.
 type Table = Vec<[(u32, u32); CONTROLLERS.len()]>;
@@ -24,23 +24,15 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
 }
 
 fn count(opt: Opt) -> Result<Table> {
-    let elf = image::example("blocks", Board::Mps2, opt)?;
-    let run = emulator::play(&elf, "blocks", emulator::SHIFT, |_| {})?;
-    ensure!(run.exit == 0, "the emulator's exit code is {}", run.exit);
+    let run = emulator::count("blocks", opt)?;
     let mut counted = vec![[(0, 0); CONTROLLERS.len()]; SPRINGS.len()];
     for (row, (name, plant)) in SPRINGS.iter().enumerate() {
         for (column, (controller, compensation)) in CONTROLLERS.iter().enumerate() {
-            let start = format!("block spring={row} controller={column} ");
-            let line = run.log.iter().find_map(|line| line.message.strip_prefix(&start));
-            let line = line.with_context(|| format!("{name}, {controller} has not run"))?;
-            let value = |key: &str| {
-                let value = line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
-                value.with_context(|| format!("no {key} in `{line}`"))
-            };
+            let values = run.values(&format!("block spring={row} controller={column} "))?;
             let host = on_this_machine(plant.as_ref(), *compensation, &mut Untimed)?;
-            let target = u64::from_str_radix(value("digest")?, 16)?;
+            let target = u64::from_str_radix(&values.get::<String>("digest")?, 16)?;
             ensure!(host == target, "{name}, {controller}: digest {target:016x} on the target, {host:016x} here");
-            counted[row][column] = (value("mean")?.parse()?, value("max")?.parse()?);
+            counted[row][column] = (values.get("mean")?, values.get("max")?);
         }
     }
     Ok(counted)

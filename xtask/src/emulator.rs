@@ -8,14 +8,16 @@ use std::fs;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::process::{Child, Stdio};
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use host_sim::log::{Decoder, Done, Event, Formats, Item, Line, table_row};
 
-use crate::{image, shell};
+use crate::image::{self, Board, Opt};
+use crate::shell;
 
 /// The emulator.
 pub(crate) const QEMU: &str = "qemu-system-arm";
@@ -56,6 +58,30 @@ impl Run {
             last => bail!("the log does not end with `done` but with {:?}", last.map(text)),
         }
     }
+
+    /// What follows `start` in the line that begins with it.
+    pub(crate) fn values(&self, start: &str) -> Result<Values<'_>> {
+        let line = self.log.iter().find_map(|line| line.message.strip_prefix(start));
+        Ok(Values(line.with_context(|| format!("no line of the log begins with `{start}`"))?))
+    }
+}
+
+/// Words `key=value` in a line of the log.
+pub(crate) struct Values<'a>(&'a str);
+
+impl Values<'_> {
+    /// The value of `key`.
+    pub(crate) fn get<T: FromStr>(&self, key: &str) -> Result<T> {
+        let value = self.0.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('=')?.parse().ok());
+        value.with_context(|| format!("no {key} in `{}`", self.0))
+    }
+}
+
+/// Plays one of the firmware's examples that count instructions, to its end.
+pub(crate) fn count(example: &str, opt: Opt) -> Result<Run> {
+    let run = play(&image::example(example, Board::Mps2, opt)?, example, SHIFT, |_| {})?;
+    ensure!(run.exit == 0, "the emulator's exit code is {}", run.exit);
+    Ok(run)
 }
 
 /// Level and message of a line, without its time.

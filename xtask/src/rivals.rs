@@ -1,11 +1,10 @@
 //! Instructions a tick, beside what one could run instead: counted in one run by `firmware/examples/rivals.rs`.
 
-use anyhow::{Context, Result, ensure};
-use host_sim::log::Line;
+use anyhow::{Result, ensure};
 use serde_json::{Value, json};
 
-use crate::emulator;
-use crate::image::{self, Board, Opt};
+use crate::emulator::{self, Run};
+use crate::image::Opt;
 
 /// The first is this controller; names as in the example.
 const CONTENDERS: [(&str, &str); 5] = [
@@ -41,23 +40,15 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
 
 /// Every contender, this controller first.
 pub(crate) fn count(opt: Opt) -> Result<Vec<Row>> {
-    let elf = image::example("rivals", Board::Mps2, opt)?;
-    let run = emulator::play(&elf, "rivals", emulator::SHIFT, |_| {})?;
-    ensure!(run.exit == 0, "the emulator's exit code is {}", run.exit);
-    CONTENDERS.iter().map(|(name, what)| row(name, what, &run.log)).collect()
+    let run = emulator::count("rivals", opt)?;
+    CONTENDERS.iter().map(|(name, what)| row(name, what, &run)).collect()
 }
 
-fn row(name: &'static str, what: &'static str, log: &[Line]) -> Result<Row> {
-    let start = format!("rival name={name} ");
-    let line = log.iter().find_map(|line| line.message.strip_prefix(&start));
-    let line = line.with_context(|| format!("{name} has not run"))?;
-    let value = |key: &str| {
-        let value = line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
-        value.with_context(|| format!("no {key} in `{line}`"))
-    };
-    let end_mv: i32 = value("end_mv")?.parse()?;
+fn row(name: &'static str, what: &'static str, run: &Run) -> Result<Row> {
+    let values = run.values(&format!("rival name={name} "))?;
+    let end_mv: i32 = values.get("end_mv")?;
     ensure!((end_mv - END_MV).abs() <= TOLERANCE_MV, "{name} ends at {end_mv} mV instead of {END_MV} mV");
-    Ok(Row { name, what, min: value("min")?.parse()?, mean: value("mean")?.parse()?, max: value("max")?.parse()? })
+    Ok(Row { name, what, min: values.get("min")?, mean: values.get("mean")?, max: values.get("max")? })
 }
 
 /// By the mean.
