@@ -45,17 +45,18 @@ pub(crate) fn help() -> String {
 pub(crate) fn run() -> Result<()> {
     let start = Instant::now();
     let total = STEPS.len() + 4;
-    eprintln!("[1/{total}] setup");
+    let begin = |number: usize, name| eprintln!("[{number}/{total}] {name}, after {} s", start.elapsed().as_secs());
+    begin(1, "setup");
     setup::run()?;
     for (number, Step { name, args, env }) in (2..).zip(STEPS) {
-        eprintln!("[{number}/{total}] {name}");
+        begin(number, name);
         shell::run(shell::cargo().args(*args).envs(*env))?;
     }
-    eprintln!("[{}/{total}] firmware", total - 2);
+    begin(total - 2, "firmware");
     proof::run()?;
-    eprintln!("[{}/{total}] boot", total - 1);
+    begin(total - 1, "boot");
     boot::run()?;
-    eprintln!("[{total}/{total}] story");
+    begin(total, "story");
     story::check()?;
     eprintln!("all {total} steps passed in {} s", start.elapsed().as_secs());
     Ok(())
