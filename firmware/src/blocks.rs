@@ -77,6 +77,8 @@ pub fn run(
     }
 }
 
+/// Not inlined: all of them in one function are more than the compiler can reach across.
+#[inline(never)]
 fn ticks<P: Model>(settings: &Settings<P>, stopwatch: &mut impl Stopwatch) -> Result<u64, OutOfRange> {
     let (config, mut state) = (settings.check()?, State::<<P::Config as Estimator>::State>::default());
     let mut digest = Digest::default();

@@ -5,7 +5,9 @@
 use link::WireModel;
 use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Command, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
-use model::{Config, Input, OutOfRange, Output, SampleTime, Settings, State, Volts, estimator, extended};
+use model::{
+    Config, ExtendedPlant, Input, OutOfRange, Output, SampleTime, Settings, State, Volts, estimator, extended,
+};
 
 /// What the host ordered since the last tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -96,12 +98,10 @@ impl Control {
         supervision: &supervisor::Settings,
         last_fault: Option<Fault>,
     ) -> Result<Self, OutOfRange> {
-        Ok(Self {
-            spring: Spring::Plain(Loop { config: config(settings)?, state: State::default() }),
-            supervisor: Supervisor::new(supervision.check(SampleTime::from_rate(settings.rate_hz)?)?, last_fault),
-            target: Volts::ZERO,
-            ticks_since_host: u32::MAX,
-        })
+        let sample_time = settings.judge()?;
+        let supervisor = Supervisor::new(supervision.check(sample_time)?, last_fault);
+        let spring = Spring::Plain(Loop::new(settings, sample_time));
+        Ok(Self { spring, supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
     }
 
     /// Before the first tick: `found` replaces the settings' spring, and what its amplifier cannot do counts.
@@ -109,19 +109,12 @@ impl Control {
     /// # Errors
     /// [`OutOfRange`] names what is wrong with it; then the spring stays.
     pub fn take_on(&mut self, settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
-        let Settings { rate_hz, compensation, feedback, .. } = *settings;
-        let (plant, amplifier) = (found.plant(), found.behind(settings.amplifier));
-        // In place, and one copy at a time: the stack is small.
-        match plant.plain() {
-            Some(plant) => {
-                let config = config(&Settings { rate_hz, plant, compensation, amplifier, feedback })?;
-                self.spring = Spring::Plain(Loop { config, state: State::default() });
-            }
-            None => {
-                let config = config(&Settings { rate_hz, plant, compensation, amplifier, feedback })?;
-                self.spring = Spring::Extended(Loop { config, state: State::default() });
-            }
-        }
+        let settings = Found::new(settings, found);
+        let sample_time = settings.judge()?;
+        self.spring = match &settings {
+            Found::Plain(settings) => Spring::Plain(Loop::new(settings, sample_time)),
+            Found::Extended(settings) => Spring::Extended(Loop::new(settings, sample_time)),
+        };
         Ok(())
     }
 
@@ -130,12 +123,7 @@ impl Control {
     /// # Errors
     /// [`OutOfRange`] names what is wrong with it.
     pub fn check(settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
-        let Settings { rate_hz, compensation, feedback, .. } = *settings;
-        let (plant, amplifier) = (found.plant(), found.behind(settings.amplifier));
-        match plant.plain() {
-            Some(plant) => config(&Settings { rate_hz, plant, compensation, amplifier, feedback }).map(drop),
-            None => config(&Settings { rate_hz, plant, compensation, amplifier, feedback }).map(drop),
-        }
+        Found::new(settings, found).judge().map(drop)
     }
 
     /// Before the first tick: nothing may leave until this is acknowledged.
@@ -170,7 +158,36 @@ impl Control {
     }
 }
 
+/// Settings with a model that was found in the place of their spring.
+enum Found<'a> {
+    Plain(Settings),
+    Extended(Settings<ExtendedPlant<'a>>),
+}
+
+impl<'a> Found<'a> {
+    fn new(settings: &Settings, found: &'a WireModel) -> Self {
+        let Settings { rate_hz, compensation, feedback, .. } = *settings;
+        let (plant, amplifier) = (found.plant(), found.behind(settings.amplifier));
+        match plant.plain() {
+            Some(plant) => Self::Plain(Settings { rate_hz, plant, compensation, amplifier, feedback }),
+            None => Self::Extended(Settings { rate_hz, plant, compensation, amplifier, feedback }),
+        }
+    }
+
+    fn judge(&self) -> Result<SampleTime, OutOfRange> {
+        match self {
+            Self::Plain(settings) => settings.judge(),
+            Self::Extended(settings) => settings.judge(),
+        }
+    }
+}
+
 impl<E: Estimator> Loop<E> {
+    /// At rest.
+    fn new<P: Model<Config = E>>(settings: &Settings<P>, sample_time: SampleTime) -> Self {
+        Self { config: settings.scaled(sample_time), state: State::default() }
+    }
+
     #[inline(always)]
     fn follow(&mut self, decision: Decision, stopwatch: &mut impl Stopwatch) -> Output {
         match decision {
@@ -191,12 +208,6 @@ impl<E: Estimator> Loop<E> {
         stopwatch.stop();
         output
     }
-}
-
-/// Not inlined: what it needs on the stack is not to stay there.
-#[inline(never)]
-fn config<P: Model>(settings: &Settings<P>) -> Result<Config<P::Config>, OutOfRange> {
-    settings.check()
 }
 
 /// The model's tick as one function: it is counted as it would be called.

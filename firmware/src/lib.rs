@@ -28,6 +28,7 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(feature = "fast")]
 pub mod blocks;
 pub mod board;
 pub mod control;

@@ -4,7 +4,7 @@
 
 #![allow(unsafe_code)]
 
-use core::panic::PanicInfo;
+use core::panic::{Location, PanicInfo};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
@@ -23,14 +23,14 @@ pub static TICK: AtomicU32 = AtomicU32::new(0);
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
 /// Takes the voltage away and resets.
-pub fn stop(fault: Fault, panic: Option<&PanicInfo<'_>>) -> ! {
+pub fn stop(fault: Fault, panic: Option<&Location<'_>>) -> ! {
     cortex_m::interrupt::disable();
     board::kill();
     if !STOPPING.swap(true, Ordering::Relaxed) {
         let tick = TICK.load(Ordering::Relaxed);
         last_words::leave(fault, tick);
         log::fault(fault, tick);
-        if let Some(location) = panic.and_then(PanicInfo::location) {
+        if let Some(location) = panic {
             log::panicked(location.file(), location.line());
         }
     }
@@ -45,9 +45,12 @@ pub fn restart() -> ! {
     SCB::sys_reset()
 }
 
+/// Inlined, so that the optimiser sees that nobody reads the message, and leaves all messages out of the image.
 #[panic_handler]
+#[expect(unused_attributes, reason = "it is not ignored when all crates are optimised at once")]
+#[inline(always)]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    stop(Fault::Panic, Some(info))
+    stop(Fault::Panic, info.location())
 }
 
 /// The processor stopped the program.

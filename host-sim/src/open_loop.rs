@@ -16,7 +16,9 @@ use crate::bad_input::BadInput;
 /// [`BadInput`] for a spring that the tick refuses at this rate, voltages beyond +-2000 V and times that do not increase.
 pub fn simulate(spring: &impl Model, rate_hz: f64, time_s: &[f64], voltage_v: &[f64]) -> Result<Vec<f64>> {
     let refused = |error: model::OutOfRange| BadInput(error.to_string());
-    let config = SampleTime::from_rate(rate_hz).and_then(|time| spring.scaled(time)).map_err(refused)?;
+    let sample_time = SampleTime::from_rate(rate_hz).map_err(refused)?;
+    spring.check(sample_time).map_err(refused)?;
+    let config = spring.scaled(sample_time);
     let start = time_s.first().copied().unwrap_or(0.0);
     let mut state = Default::default();
     let mut tick = 0;

@@ -164,11 +164,11 @@ impl PlantFile {
         }
         let sample_time = SampleTime::from_rate(10_000.0)?;
         match self.extended().plain() {
-            Some(plant) => plant.scaled(sample_time).map(drop).map_err(|error| match error.field {
+            Some(plant) => plant.check(sample_time).map_err(|error| match error.field {
                 "share" => OutOfRange { field: "relaxation.share", ..error },
                 _ => OutOfRange { field: "relaxation.tau_s", ..error },
             })?,
-            None => self.extended().scaled(sample_time).map(drop)?,
+            None => self.extended().check(sample_time)?,
         }
         let amplifier = self.amplifier.clone().unwrap_or_default();
         for (field, value, lowest, highest, unit) in [

@@ -7,10 +7,10 @@
 //! A code `n` of a `b`-bit converter stands for `n * full_scale / (2^b - 1)`. The ends of the range are moved inward to
 //! the next code, so that rounding cannot leave it.
 
-use fixed::types::{I3F29, I12F20};
+use fixed::types::I3F29;
 
 use crate::error::OutOfRange;
-use crate::units::{Accumulator, DacCode, SampleTime, Signal, Volts};
+use crate::units::{Accumulator, DacCode, SampleTime, Signal, Volts, accumulator, signal};
 
 /// An amplifier and its converter, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +45,22 @@ impl Amplifier {
         }
     }
 
+    /// # Errors
+    /// [`OutOfRange`] names the field.
+    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+        let Self { full_scale_v, min_v, max_v, slew_v_per_s, dac_bits } = *self;
+        OutOfRange::check("full_scale_v", full_scale_v, 50.0..=1000.0, "V")?;
+        OutOfRange::check("dac_bits", f64::from(dac_bits), 8.0..=16.0, "bits")?;
+        OutOfRange::check("min_v", min_v, 0.0..=full_scale_v - 10.0, "V")?;
+        OutOfRange::check("max_v", max_v, min_v + 10.0..=full_scale_v, "V")?;
+        OutOfRange::check("slew_v_per_s", slew_v_per_s.unwrap_or(1e9), 1.0..=1e9, "V/s")
+    }
+
+    /// The most by which the voltage changes in a tick, in V, where that is a limit.
+    pub(crate) fn step_v(&self, sample_time: SampleTime) -> Option<f64> {
+        self.slew_v_per_s.map(|slew| slew * sample_time.seconds()).filter(|step_v| *step_v < self.full_scale_v)
+    }
+
     /// Volts between two neighbouring codes.
     pub fn volts_per_code(&self) -> f64 {
         self.full_scale_v / f64::from((1u32 << self.dac_bits) - 1)
@@ -59,7 +75,7 @@ pub struct Config {
     /// What to report of a change that was held back: nothing where a tick is long enough for any change.
     slew: Limits,
     step: Accumulator,
-    codes_per_volt: I12F20,
+    codes_per_volt: Signal,
     volts_per_code: I3F29,
 }
 
@@ -117,31 +133,24 @@ impl Limits {
 }
 
 impl Config {
-    /// # Errors
-    /// [`OutOfRange`] names the field of [`Amplifier`].
-    pub fn new(amplifier: &Amplifier, sample_time: SampleTime) -> Result<Self, OutOfRange> {
-        let Amplifier { full_scale_v, min_v, max_v, slew_v_per_s, dac_bits } = *amplifier;
-        let full_scale = OutOfRange::check("full_scale_v", full_scale_v, 50.0..=1000.0, "V")?;
-        OutOfRange::check("dac_bits", f64::from(dac_bits), 8.0..=16.0, "bits")?;
-        let lowest = OutOfRange::check("min_v", min_v, 0.0..=full_scale - 10.0, "V")?;
-        let highest = OutOfRange::check("max_v", max_v, lowest + 10.0..=full_scale, "V")?;
-        let slew = OutOfRange::check("slew_v_per_s", slew_v_per_s.unwrap_or(1e9), 1.0..=1e9, "V/s")?;
-        let step = (slew * sample_time.seconds()).min(full_scale);
+    /// Of an amplifier that [`Amplifier::check`] accepts.
+    pub(crate) fn new(amplifier: &Amplifier, sample_time: SampleTime) -> Self {
+        let step_v = amplifier.step_v(sample_time);
         let unit = amplifier.volts_per_code();
         let mut config = Self {
             lowest: Signal::ZERO,
             highest: Signal::ZERO,
-            slew: Limits::NONE.with(Limits::SLEW, step < full_scale),
-            step: Accumulator::from_num(step),
-            codes_per_volt: I12F20::from_num(1.0 / unit),
+            slew: Limits::NONE.with(Limits::SLEW, step_v.is_some()),
+            step: accumulator(step_v.unwrap_or(amplifier.full_scale_v)),
+            codes_per_volt: signal(1.0 / unit),
             // Rounded down: the highest code never stands for more than the full scale.
-            volts_per_code: I3F29::from_bits(libm::floor(libm::ldexp(unit, 29)) as i32),
+            volts_per_code: I3F29::from_bits((unit * f64::from(1 << 29)) as i32),
         };
         // A hair's breadth keeps an end that is a code's own voltage from losing that code to float rounding.
         let hair = 1e-9;
-        config.lowest = config.volts(DacCode(libm::ceil(lowest / unit - hair) as u16)).0;
-        config.highest = config.volts(DacCode(libm::floor(highest / unit + hair) as u16)).0;
-        Ok(config)
+        config.lowest = config.volts(DacCode((amplifier.min_v / unit + (1.0 - hair)) as u16)).0;
+        config.highest = config.volts(DacCode((amplifier.max_v / unit + hair) as u16)).0;
+        config
     }
 
     /// Puts out as much of `wanted` as the amplifier can.
@@ -211,7 +220,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn config(amplifier: &Amplifier, rate_hz: f64) -> Config {
-        Config::new(amplifier, SampleTime::from_rate(rate_hz).unwrap()).unwrap()
+        amplifier.check().unwrap();
+        Config::new(amplifier, SampleTime::from_rate(rate_hz).unwrap())
     }
 
     fn volts(value: f64) -> Volts {
@@ -269,7 +279,6 @@ mod tests {
 
     #[test]
     fn a_wrong_amplifier_is_named() {
-        let time = SampleTime::from_rate(1000.0).unwrap();
         let good = Amplifier::PAPER;
         for (field, wrong) in [
             ("full_scale_v", Amplifier { full_scale_v: 1500.0, ..good }),
@@ -280,7 +289,7 @@ mod tests {
             ("max_v", Amplifier { max_v: 701.0, ..good }),
             ("slew_v_per_s", Amplifier { slew_v_per_s: Some(0.0), ..good }),
         ] {
-            assert_eq!(Config::new(&wrong, time).unwrap_err().field, field, "{wrong:?}");
+            assert_eq!(wrong.check().unwrap_err().field, field, "{wrong:?}");
         }
     }
 }

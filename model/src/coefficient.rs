@@ -10,9 +10,7 @@
 use fixed::types::{I0F32, I5F27, I17F47};
 
 use crate::error::OutOfRange;
-use crate::units::{Accumulator, Signal};
-
-const TWO_TO_32: f64 = 4_294_967_296.0;
+use crate::units::{Accumulator, Signal, TWO_TO_32, saturated_to_32, steps};
 
 /// A factor of magnitude up to 1000, exact to 2^-33.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,12 +21,10 @@ pub struct Gain {
 
 impl Gain {
     /// The nearest gain to a finite `value` of at most 1000.
+    #[inline(never)]
     pub(crate) fn new(value: f64) -> Self {
-        let rest = libm::round((value - libm::round(value)) * TWO_TO_32) as i64;
-        // A rest of one half is the next whole number less one half.
-        let up = i64::from(rest > i64::from(i32::MAX));
-        let whole = libm::round(value) as i32 + up as i32;
-        Self { whole, rest: I0F32::from_bits((rest - (up << 32)) as i32) }
+        let (whole, rest) = halves(steps(value, TWO_TO_32));
+        Self { whole, rest: I0F32::from_bits(rest) }
     }
 
     /// `signal * self`, rounded down; the caller knows that it fits.
@@ -39,7 +35,7 @@ impl Gain {
 }
 
 /// What part of a lag is made up in one tick, 0 up to but not including 1/2, exact to 2^-53 of itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rate {
     high: I0F32,
     low: i32,
@@ -47,11 +43,10 @@ pub struct Rate {
 
 impl Rate {
     /// The nearest rate to a `value` of at least 0 and below 1/2.
+    #[inline(never)]
     pub(crate) fn new(value: f64) -> Self {
-        let bits = (value * TWO_TO_32 * TWO_TO_32) as i64;
-        // Round the upper half to the nearest, so that the lower half is a signed number too.
-        let high = (bits + (1 << 31)) >> 32;
-        Self { high: I0F32::from_bits(high as i32), low: (bits - (high << 32)) as i32 }
+        let (high, low) = halves((value * TWO_TO_32 * TWO_TO_32) as i64);
+        Self { high: I0F32::from_bits(high), low }
     }
 
     /// What one tick adds for `lag`, low by less than 2^-51 V.
@@ -76,25 +71,27 @@ impl Weight {
     pub(crate) const FRACTION_BITS: u32 = I5F27::FRAC_NBITS;
 
     /// The nearest weight to a finite `value` of at most 10.
+    #[inline(never)]
     pub(crate) fn new(value: f64) -> Self {
-        Self(I5F27::from_num(value))
+        Self(I5F27::from_bits(steps(value, f64::from(1 << Self::FRACTION_BITS)) as i32))
     }
 
     /// What is left of the magnitude that the weights of one sum may have together, after this one.
     pub(crate) fn budget(field: &'static str, value: f64, left: f64) -> Result<f64, OutOfRange> {
-        OutOfRange::check(field, value, -left..=left, "left of a sum of 10").map(|value| left - value.abs())
+        OutOfRange::check(field, value, -left..=left, "left of a sum of 10").map(|()| left - value.abs())
     }
 
     /// The factor itself, exactly.
     pub(crate) fn to_f64(self) -> f64 {
-        self.0.to_num()
+        f64::from(self.0.to_bits()) / f64::from(1 << Self::FRACTION_BITS)
     }
 
     /// What this weight makes `signal` of; beyond a signal's range, its end. Off the hot path: it divides.
+    #[cfg(feature = "time-optimal")]
     pub(crate) fn into(self, signal: Signal) -> Signal {
         let whole = i64::from(signal.to_bits()) << Self::FRACTION_BITS;
         let bits = whole.checked_div(i64::from(self.0.to_bits())).unwrap_or(whole);
-        Signal::from_bits(bits.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32)
+        Signal::from_bits(saturated_to_32(bits))
     }
 
     /// `signal * self`, exactly.
@@ -103,6 +100,8 @@ impl Weight {
         signal.wide_mul(self.0)
     }
 }
+
+const TWO_TO_29: f64 = 536_870_912.0;
 
 /// A positive factor from 2^-32 to 2^29, exact to 2^-30 of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -113,24 +112,32 @@ pub struct Steep {
 
 impl Steep {
     /// The nearest to a positive, finite `value`; beyond its range, the end.
+    #[inline(never)]
     pub(crate) fn new(value: f64) -> Self {
-        let (mantissa, exponent) = libm::frexp(value.max(libm::ldexp(1.0, -32)).min(libm::ldexp(1.0, 29)));
-        Self { mantissa: libm::round(libm::ldexp(mantissa, 30)) as i32, shift: (30 - exponent) as u8 }
+        // In halves of a power of two, of which a positive number's bits are made; so they sort like the numbers.
+        let bits = value.to_bits().max((1.0 / TWO_TO_32).to_bits()).min(TWO_TO_29.to_bits());
+        let mantissa = bits & ((1 << 52) - 1) | 1 << 52;
+        Self { mantissa: ((mantissa + (1 << 22)) >> 23) as i32, shift: (1052 - (bits >> 52)) as u8 }
     }
 
     /// `signal * self`, rounded down; beyond a signal's range, its end.
     #[inline(always)]
     pub(crate) fn times(self, signal: Signal) -> Signal {
         let product = (i64::from(signal.to_bits()) * i64::from(self.mantissa)) >> (self.shift & 63);
-        Signal::from_bits(product.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32)
+        Signal::from_bits(saturated_to_32(product))
     }
 }
 
 /// The signal of a sum, rounded down; beyond a signal's range, its end.
 #[inline(always)]
 pub(crate) fn saturated(sum: Sum) -> Signal {
-    let bits = sum.to_bits() >> Weight::FRACTION_BITS;
-    Signal::from_bits(bits.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32)
+    Signal::from_bits(saturated_to_32(sum.to_bits() >> Weight::FRACTION_BITS))
+}
+
+/// Upper and lower 32 bits, the upper ones rounded to the nearest, so that the lower ones are a signed number too.
+const fn halves(bits: i64) -> (i32, i32) {
+    let high = (bits + (1 << 31)) >> 32;
+    (high as i32, (bits - (high << 32)) as i32)
 }
 
 /// The upper half of an accumulator, which is a signal, rounded down.

@@ -55,34 +55,53 @@ impl<P: Model> Settings<P> {
     /// # Errors
     /// [`OutOfRange`] names the field, its value and what is allowed.
     pub fn check(&self) -> Result<Config<P::Config>, OutOfRange> {
+        self.judge().map(|sample_time| self.scaled(sample_time))
+    }
+
+    /// The time between two ticks, if the settings can be scaled for it: [`Settings::check`] without making anything.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the field, its value and what is allowed.
+    pub fn judge(&self) -> Result<SampleTime, OutOfRange> {
         let sample_time = SampleTime::from_rate(self.rate_hz)?;
-        let estimator = self.plant.scaled(sample_time)?;
-        let amplifier = amplifier::Config::new(&self.amplifier, sample_time)?;
+        self.plant.check(sample_time)?;
+        self.amplifier.check()?;
+        match &self.compensation {
+            Compensation::None => {}
+            Compensation::ProportionalIntegral(gains) => {
+                gains.check(&self.plant.promptness(sample_time), sample_time)?;
+            }
+            Compensation::TimeOptimal(approach) => {
+                self.plant.check_inverse()?;
+                approach.check()?;
+            }
+        }
+        self.feedback.as_ref().map_or(Ok(()), |feedback| feedback.check(sample_time))?;
+        Ok(sample_time)
+    }
+
+    /// Of settings and the sample time that [`Settings::judge`] gives for them; of others, anything.
+    pub fn scaled(&self, sample_time: SampleTime) -> Config<P::Config> {
+        let estimator = self.plant.scaled(sample_time);
+        let promptness = self.plant.promptness(sample_time);
         let pre_compensator = match &self.compensation {
             Compensation::None => PreCompensator::None,
             Compensation::ProportionalIntegral(gains) => {
-                let promptness = self.plant.promptness(sample_time);
-                PreCompensator::ProportionalIntegral(ProportionalIntegral::new(gains, &promptness, sample_time)?)
+                PreCompensator::ProportionalIntegral(ProportionalIntegral::new(gains, &promptness, sample_time))
             }
             Compensation::TimeOptimal(approach) => {
-                let inverse = self.plant.inverse(sample_time, self.amplifier.volts_per_code())?;
-                let step_v = self.amplifier.slew_v_per_s.unwrap_or(f64::INFINITY) * sample_time.seconds();
-                let limits = step_v < self.amplifier.full_scale_v;
-                let slew = limits.then(|| (self.plant.least_promptness(sample_time), step_v));
-                PreCompensator::TimeOptimal(TimeOptimal::new(
-                    approach,
-                    inverse,
-                    &self.plant.promptness(sample_time),
-                    slew,
-                    sample_time,
-                )?)
+                let inverse = self.plant.inverse(&estimator, sample_time, self.amplifier.volts_per_code());
+                let step_v = self.amplifier.step_v(sample_time);
+                let slew = step_v.map(|step_v| (self.plant.least_promptness(sample_time), step_v));
+                PreCompensator::TimeOptimal(TimeOptimal::new(approach, inverse, &promptness, slew, sample_time))
             }
         };
-        let feedback = match &self.feedback {
-            None => None,
-            Some(feedback) => Some(feedback::Config::new(feedback, sample_time)?),
-        };
-        Ok(Config { estimator, pre_compensator, amplifier, feedback })
+        Config {
+            estimator,
+            pre_compensator,
+            amplifier: amplifier::Config::new(&self.amplifier, sample_time),
+            feedback: self.feedback.as_ref().map(|feedback| feedback::Config::new(feedback, sample_time)),
+        }
     }
 }
 

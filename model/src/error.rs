@@ -19,18 +19,23 @@ pub struct OutOfRange {
 }
 
 impl OutOfRange {
-    /// Returns `value` if it lies in `allowed`.
+    /// An error unless `value` lies in `allowed`.
+    #[inline(always)]
     pub(crate) fn check(
         field: &'static str,
         value: f64,
         allowed: RangeInclusive<f64>,
         unit: &'static str,
-    ) -> Result<f64, Self> {
-        if allowed.contains(&value) {
-            return Ok(value);
-        }
+    ) -> Result<(), Self> {
         let (lowest, highest) = allowed.into_inner();
-        Err(Self { field, value, lowest, highest, unit })
+        Self { field, value, lowest, highest, unit }.judged()
+    }
+
+    /// Not inlined: soft floats are long.
+    #[inline(never)]
+    fn judged(self) -> Result<(), Self> {
+        let inside = self.lowest <= self.value && self.value <= self.highest;
+        if inside { Ok(()) } else { Err(self) }
     }
 
     /// The same for how many there are of something.
@@ -40,7 +45,7 @@ impl OutOfRange {
         allowed: RangeInclusive<usize>,
         unit: &'static str,
     ) -> Result<(), Self> {
-        Self::check(field, count as f64, *allowed.start() as f64..=*allowed.end() as f64, unit).map(drop)
+        Self::check(field, count as f64, *allowed.start() as f64..=*allowed.end() as f64, unit)
     }
 }
 

@@ -29,9 +29,14 @@ pub trait Model: Copy {
     /// What it becomes.
     type Config: Estimator;
 
+    /// Whether it can be scaled.
+    ///
     /// # Errors
     /// [`OutOfRange`] names the field.
-    fn scaled(&self, sample_time: SampleTime) -> Result<Self::Config, OutOfRange>;
+    fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange>;
+
+    /// Of a spring that [`Model::check`] accepts; of another one, anything.
+    fn scaled(&self, sample_time: SampleTime) -> Self::Config;
 
     /// How much of a change of voltage shows how soon, at the most.
     fn promptness(&self, sample_time: SampleTime) -> Promptness;
@@ -41,15 +46,22 @@ pub trait Model: Copy {
         self.promptness(sample_time)
     }
 
-    /// The way back, from a stiffness to a voltage whose `resolution_v` is that of the amplifier's converter.
+    /// Whether there is a way back, from a stiffness to a voltage.
     ///
     /// # Errors
     /// [`OutOfRange`] names what keeps more voltage from always giving more stiffness.
+    fn check_inverse(&self) -> Result<(), OutOfRange> {
+        Ok(())
+    }
+
+    /// The way back of this spring, which has become `config`, if there is one; `resolution_v` is that of the amplifier's
+    /// converter.
     fn inverse(
         &self,
+        config: &Self::Config,
         sample_time: SampleTime,
         resolution_v: f64,
-    ) -> Result<<Self::Config as Estimator>::Inverse, OutOfRange>;
+    ) -> <Self::Config as Estimator>::Inverse;
 }
 
 /// A spring that runs in a tick, on the voltage that was really applied.
@@ -122,11 +134,6 @@ impl Plant {
     pub const fn proportional_integral(proportional: f64, integral_per_s: f64) -> Self {
         Self { share: proportional / (1.0 + proportional), time_constant_s: (1.0 + proportional) / integral_per_s }
     }
-
-    /// What part of its lag the relaxed part makes up in one sample time.
-    fn relaxed_in(&self, sample_time: SampleTime) -> f64 {
-        -libm::expm1(-sample_time.seconds() / self.time_constant_s)
-    }
 }
 
 /// The plant for one sample time, scaled for the tick.
@@ -143,15 +150,6 @@ pub struct State {
 }
 
 impl Config {
-    /// # Errors
-    /// [`OutOfRange`] names `share` or `time_constant_s`.
-    pub fn new(plant: &Plant, sample_time: SampleTime) -> Result<Self, OutOfRange> {
-        let seconds = sample_time.seconds();
-        let share = OutOfRange::check("share", plant.share, 0.0..=0.9, "of a step")?;
-        OutOfRange::check("time_constant_s", plant.time_constant_s, 2.0 * seconds..=1e4, "s")?;
-        Ok(Self { share: Gain::new(share), relaxation: Rate::new(plant.relaxed_in(sample_time)) })
-    }
-
     /// Stiffness at this tick, with `applied` just put across the spring.
     #[inline(always)]
     pub fn estimate(&self, state: &State, applied: Volts) -> ScaledStiffness {
@@ -169,18 +167,24 @@ impl Config {
 impl Model for Plant {
     type Config = Config;
 
-    fn scaled(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
-        Config::new(self, sample_time)
+    fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+        OutOfRange::check("share", self.share, 0.0..=0.9, "of a step")?;
+        OutOfRange::check("time_constant_s", self.time_constant_s, 2.0 * sample_time.seconds()..=1e4, "s")
+    }
+
+    fn scaled(&self, sample_time: SampleTime) -> Config {
+        let relaxation = Rate::new(sample_time.part_of_way(self.time_constant_s));
+        Config { share: Gain::new(self.share), relaxation }
     }
 
     fn promptness(&self, sample_time: SampleTime) -> Promptness {
-        let relaxed = self.relaxed_in(sample_time);
+        let relaxed = sample_time.part_of_way(self.time_constant_s);
         Promptness { at_once: self.share, in_a_tick: (1.0 - self.share) * relaxed, relaxed }
     }
 
-    fn inverse(&self, sample_time: SampleTime, _: f64) -> Result<Steep, OutOfRange> {
+    fn inverse(&self, _: &Config, sample_time: SampleTime, _: f64) -> Steep {
         let Promptness { at_once, in_a_tick, .. } = self.promptness(sample_time);
-        Ok(Steep::new(demanded(at_once + in_a_tick)))
+        Steep::new(demanded(at_once + in_a_tick))
     }
 }
 
@@ -227,7 +231,7 @@ mod tests {
     use super::*;
 
     fn paper(rate_hz: f64) -> Config {
-        Config::new(&Plant::PAPER, SampleTime::from_rate(rate_hz).unwrap()).unwrap()
+        Plant::PAPER.scaled(SampleTime::from_rate(rate_hz).unwrap())
     }
 
     #[test]
@@ -268,7 +272,7 @@ mod tests {
     #[test]
     fn a_wrong_plant_is_named() {
         let time = SampleTime::from_rate(1000.0).unwrap();
-        let named = |share, time_constant_s| Config::new(&Plant { share, time_constant_s }, time).unwrap_err().field;
+        let named = |share, time_constant_s| Plant { share, time_constant_s }.check(time).unwrap_err().field;
         assert_eq!(named(-0.1, 5.5), "share");
         assert_eq!(named(f64::NAN, 5.5), "share");
         assert_eq!(named(0.1, 0.001), "time_constant_s");

@@ -83,13 +83,21 @@ impl ExtendedPlant<'_> {
 impl Model for ExtendedPlant<'_> {
     type Config = Config;
 
-    fn scaled(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
-        Ok(Config {
-            memory: self.memory.as_ref().map(memory::Config::new).transpose()?,
-            law: self.law.as_ref().map(law::Config::new).transpose()?,
-            leakage: self.leakage.map(|leakage| leakage::Config::new(&leakage, sample_time)).transpose()?,
-            lags: lags::Config::new(&self.relaxation, sample_time)?,
-        })
+    fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+        let Self { memory, law, leakage, relaxation } = self;
+        memory.as_ref().map_or(Ok(()), Memory::check)?;
+        law.as_ref().map_or(Ok(()), Law::check)?;
+        leakage.as_ref().map_or(Ok(()), |leakage| leakage.check(sample_time))?;
+        relaxation.check(sample_time)
+    }
+
+    fn scaled(&self, sample_time: SampleTime) -> Config {
+        Config {
+            memory: self.memory.as_ref().map(memory::Config::new),
+            law: self.law.as_ref().map(law::Config::new),
+            leakage: self.leakage.as_ref().map(|leakage| leakage::Config::new(leakage, sample_time)),
+            lags: lags::Config::new(&self.relaxation, sample_time),
+        }
     }
 
     fn promptness(&self, sample_time: SampleTime) -> Promptness {
@@ -111,8 +119,12 @@ impl Model for ExtendedPlant<'_> {
         }
     }
 
-    fn inverse(&self, sample_time: SampleTime, resolution_v: f64) -> Result<Inverse, OutOfRange> {
-        Inverse::new(self, sample_time, resolution_v)
+    fn check_inverse(&self) -> Result<(), OutOfRange> {
+        inverse::check(self)
+    }
+
+    fn inverse(&self, config: &Config, sample_time: SampleTime, resolution_v: f64) -> Inverse {
+        Inverse::new(self, config, sample_time, resolution_v)
     }
 }
 

@@ -51,7 +51,7 @@ pub mod watch;
 
 use crate::coefficient::{Rate, upper};
 use crate::error::OutOfRange;
-use crate::units::{Accumulator, SampleTime, ScaledStiffness, Signal, Volts};
+use crate::units::{Accumulator, SampleTime, ScaledStiffness, Signal, Volts, part_of_way};
 pub use watch::{Fault, Sensor};
 
 /// The model's last ticks, with which late readings are compared.
@@ -92,6 +92,21 @@ impl Feedback {
         fade_s: 2.0,
     };
 
+    /// # Errors
+    /// [`OutOfRange`] names the field.
+    pub(crate) fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+        let Self { noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s } = *self;
+        let seconds = sample_time.seconds();
+        OutOfRange::check("noise_v", noise_v, 0.001..=100.0, "V")?;
+        OutOfRange::check("model_uncertainty", model_uncertainty, 0.001..=1000.0, "V per root second")?;
+        OutOfRange::check("fastest_s", fastest_s, 0.0..=100.0, "s")?;
+        OutOfRange::check("interval_s", interval_s, seconds..=0.1, "s")?;
+        OutOfRange::check("oldest_s", oldest_s, 0.0..=(MEMORY - 1) as f64 * seconds, "s")?;
+        OutOfRange::check("lowest_v", lowest_v, -1000.0..=990.0, "V")?;
+        OutOfRange::check("highest_v", highest_v, lowest_v + 1.0..=1000.0, "V")?;
+        OutOfRange::check("fade_s", fade_s, 2.0 * seconds..=100.0, "s")
+    }
+
     /// What part of an innovation one reading adds to the correction.
     ///
     /// The Kalman gain, as far as [`fastest_s`](Self::fastest_s) allows it, and below 1/2.
@@ -99,7 +114,7 @@ impl Feedback {
         let ratio = self.model_uncertainty / self.noise_v;
         let rho = ratio * ratio * self.interval_s;
         let kalman = (libm::sqrt(rho * rho + 4.0 * rho) - rho) / 2.0;
-        let most = if self.fastest_s > 0.0 { -libm::expm1(-self.interval_s / self.fastest_s) } else { 1.0 };
+        let most = if self.fastest_s > 0.0 { part_of_way(self.interval_s, self.fastest_s) } else { 1.0 };
         kalman.min(most).min(0.499)
     }
 }
@@ -135,20 +150,14 @@ pub struct State {
 }
 
 impl Config {
-    /// # Errors
-    /// [`OutOfRange`] names the field of [`Feedback`].
-    pub fn new(feedback: &Feedback, sample_time: SampleTime) -> Result<Self, OutOfRange> {
-        let seconds = sample_time.seconds();
-        OutOfRange::check("model_uncertainty", feedback.model_uncertainty, 0.001..=1000.0, "V per root second")?;
-        OutOfRange::check("fastest_s", feedback.fastest_s, 0.0..=100.0, "s")?;
-        let fade = OutOfRange::check("fade_s", feedback.fade_s, 2.0 * seconds..=100.0, "s")?;
-        let watch = watch::Config::new(feedback, sample_time)?;
-        Ok(Self {
+    /// Of a sensor that [`Feedback::check`] accepts.
+    pub(crate) fn new(feedback: &Feedback, sample_time: SampleTime) -> Self {
+        Self {
             gain: Rate::new(feedback.gain()),
-            fade: Rate::new(-libm::expm1(-seconds / fade)),
-            watch,
+            fade: Rate::new(sample_time.part_of_way(feedback.fade_s)),
+            watch: watch::Config::new(feedback, sample_time),
             swing: swing::Config::new(feedback.interval_s, sample_time),
-        })
+        }
     }
 
     /// What the sensor said before this tick's voltage: corrects, or fades. What the model has to be led to, for the spring
@@ -252,7 +261,7 @@ mod tests {
     fn a_wrong_sensor_is_named() {
         let time = SampleTime::from_rate(1000.0).unwrap();
         let good = Feedback::TYPICAL;
-        assert!(Config::new(&good, time).is_ok());
+        assert_eq!(good.check(time), Ok(()));
         for (field, wrong) in [
             ("noise_v", Feedback { noise_v: 0.0, ..good }),
             ("noise_v", Feedback { noise_v: f64::NAN, ..good }),
@@ -265,7 +274,7 @@ mod tests {
             ("highest_v", Feedback { highest_v: -60.0, ..good }),
             ("fade_s", Feedback { fade_s: 0.0, ..good }),
         ] {
-            assert_eq!(Config::new(&wrong, time).unwrap_err().field, field, "{wrong:?}");
+            assert_eq!(wrong.check(time).unwrap_err().field, field, "{wrong:?}");
         }
     }
 }

@@ -38,10 +38,12 @@ pub mod controller;
 pub mod error;
 pub mod estimator;
 pub mod extended;
+#[cfg_attr(not(feature = "feedback"), path = "absent/feedback.rs")]
 pub mod feedback;
 pub mod pre_compensator;
 pub mod stiffness;
 pub mod supervisor;
+#[cfg_attr(not(feature = "time-optimal"), path = "absent/time_optimal.rs")]
 pub mod time_optimal;
 pub mod units;
 

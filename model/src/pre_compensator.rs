@@ -22,7 +22,7 @@
 use crate::coefficient::{Gain, Rate, upper};
 use crate::error::OutOfRange;
 use crate::estimator::{Pivot, Promptness};
-use crate::units::{Accumulator, SampleTime, Signal, Volts};
+use crate::units::{Accumulator, SampleTime, Signal, Volts, signal};
 
 /// Volts of proportional action beyond which any range is at its end, so that no more need be computed.
 const ENOUGH_V: f64 = 1024.0;
@@ -62,30 +62,35 @@ pub struct State {
     integrator: Accumulator,
 }
 
-impl ProportionalIntegral {
+impl Gains {
     /// For a spring that is as prompt as this.
     ///
     /// # Errors
     /// [`OutOfRange`] names `proportional_gain` or `integral_gain_per_s`.
-    pub fn new(gains: &Gains, spring: &Promptness, sample_time: SampleTime) -> Result<Self, OutOfRange> {
-        let seconds = sample_time.seconds();
+    pub(crate) fn check(&self, spring: &Promptness, sample_time: SampleTime) -> Result<(), OutOfRange> {
         // One tick moves what has relaxed by `relaxed + in_a_tick Kp g` of its distance; more than all of it rings.
         let Promptness { at_once, in_a_tick, relaxed } = *spring;
         let ringing = in_a_tick - (1.0 - relaxed) * at_once;
         let deadbeat = if ringing > 0.0 { (1.0 - relaxed) / ringing } else { f64::INFINITY };
-        let highest = deadbeat.min(100.0);
-        let proportional = OutOfRange::check("proportional_gain", gains.proportional, 0.001..=highest, "V/V")?;
+        OutOfRange::check("proportional_gain", self.proportional, 0.001..=deadbeat.min(100.0), "V/V")?;
         // A reset within a few ticks makes the loop hunt over DAC codes.
-        let fastest = proportional / (10.0 * seconds);
-        let integral = OutOfRange::check("integral_gain_per_s", gains.integral_per_s, 0.0..=fastest, "1/s")?;
-        let g = 1.0 / (1.0 + proportional * at_once);
-        Ok(Self {
+        let fastest = self.proportional / (10.0 * sample_time.seconds());
+        OutOfRange::check("integral_gain_per_s", self.integral_per_s, 0.0..=fastest, "1/s")
+    }
+}
+
+impl ProportionalIntegral {
+    /// Of gains that [`Gains::check`] accepts for this spring.
+    pub(crate) fn new(gains: &Gains, spring: &Promptness, sample_time: SampleTime) -> Self {
+        let Gains { proportional, integral_per_s } = *gains;
+        let g = 1.0 / (1.0 + proportional * spring.at_once);
+        Self {
             error_gain: Gain::new(proportional * g),
-            largest_error: Signal::from_num((ENOUGH_V / (proportional * g)).min(ENOUGH_V)),
+            largest_error: signal((ENOUGH_V / (proportional * g)).min(ENOUGH_V)),
             pivot_gain: Gain::new(1.0 - g),
             integrator_gain: Gain::new(g),
-            reset: Rate::new(seconds * integral / proportional),
-        })
+            reset: Rate::new(sample_time.seconds() * integral_per_s / proportional),
+        }
     }
 
     /// The voltage that this loop asks for, before the amplifier's limits.
@@ -125,7 +130,7 @@ mod tests {
         let time = SampleTime::from_rate(1000.0).unwrap();
         let named = |proportional, integral_per_s| {
             let gains = Gains { proportional, integral_per_s };
-            ProportionalIntegral::new(&gains, &Plant::PAPER.promptness(time), time).unwrap_err().field
+            gains.check(&Plant::PAPER.promptness(time), time).unwrap_err().field
         };
         assert_eq!(named(-4.0, 1.35), "proportional_gain");
         assert_eq!(named(0.0, 1.35), "proportional_gain");
@@ -137,7 +142,7 @@ mod tests {
         // The spring would be past its target after one tick, back after two, and so on.
         let slow = SampleTime::from_rate(100.0).unwrap();
         let quick = Plant { share: 0.0, time_constant_s: 0.1 }.promptness(slow);
-        let error = ProportionalIntegral::new(&Gains { proportional: 20.0, integral_per_s: 1.0 }, &quick, slow);
+        let error = Gains { proportional: 20.0, integral_per_s: 1.0 }.check(&quick, slow);
         assert_eq!(error.unwrap_err().field, "proportional_gain");
     }
 }

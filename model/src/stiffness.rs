@@ -113,13 +113,17 @@ impl Spring {
         let from_pascal = |pascal: f64| (pascal - law.at_zero_pa) / law.per_volt_pa;
         let reach = |at: &dyn Fn(f64) -> f64| at(self.min_v)..=at(self.max_v);
         let volts = match desired {
-            Desired::ScaledVolts(volts) => OutOfRange::check("stiffness", volts, reach(&|v| v), "V")?,
+            Desired::ScaledVolts(volts) => {
+                OutOfRange::check("stiffness", volts, reach(&|v| v), "V")?;
+                volts
+            }
             Desired::Pascal(pascal) => {
-                from_pascal(OutOfRange::check("stiffness", pascal, reach(&|v| self.youngs_modulus_pa(v)), "Pa")?)
+                OutOfRange::check("stiffness", pascal, reach(&|v| self.youngs_modulus_pa(v)), "Pa")?;
+                from_pascal(pascal)
             }
             Desired::NewtonPerMetre(constant) => {
-                let asked = OutOfRange::check("stiffness", constant, reach(&|v| self.newton_per_metre(v)), "N/m")?;
-                from_pascal(asked / self.beam.newton_per_metre_and_pascal())
+                OutOfRange::check("stiffness", constant, reach(&|v| self.newton_per_metre(v)), "N/m")?;
+                from_pascal(constant / self.beam.newton_per_metre_and_pascal())
             }
         };
         // The inverse may miss the end of the range by a float's last bit.

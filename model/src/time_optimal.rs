@@ -43,6 +43,12 @@ pub struct Approach {
 impl Approach {
     /// The fastest.
     pub const DEAD_BEAT: Self = Self { time_constant_s: 0.0 };
+
+    /// # Errors
+    /// [`OutOfRange`] names `approach_s`.
+    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+        OutOfRange::check("approach_s", self.time_constant_s, 0.0..=1.0, "s")
+    }
 }
 
 /// The pre-compensator for one spring and sample time, scaled for the tick.
@@ -65,24 +71,22 @@ pub struct State {
 }
 
 impl<I: Copy> TimeOptimal<I> {
-    /// `spring` is as prompt as this; `slew` has the spring's least promptness, and the volts that the amplifier makes in a tick, where that is a limit.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] names `approach_s`.
+    /// `spring` is as prompt as this; `slew` has the spring's least promptness, and the volts that the amplifier makes in
+    /// a tick, where that is a limit.
     pub(crate) fn new(
         approach: &Approach,
         inverse: I,
         spring: &Promptness,
         slew: Option<(Promptness, f64)>,
         sample_time: SampleTime,
-    ) -> Result<Self, OutOfRange> {
-        let time_constant = OutOfRange::check("approach_s", approach.time_constant_s, 0.0..=1.0, "s")?;
-        let part = |time_constant: f64| -libm::expm1(-sample_time.seconds() / time_constant);
-        let reach = if time_constant > 0.0 { part(time_constant) } else { 1.0 };
+    ) -> Self {
+        let time_constant = approach.time_constant_s;
+        let reach = if time_constant > 0.0 { sample_time.part_of_way(time_constant) } else { 1.0 };
         let braking = slew.map(|(least, step_v)| Braking::new(&least, step_v));
         let at_once = spring.at_once / (spring.at_once + spring.in_a_tick).max(1e-9);
         let kept = Weight::new((1.0 - reach) * at_once);
-        Ok(Self { inverse, reach: Weight::new(reach), kept, fading: Rate::new(part(HANDOVER_S)), braking })
+        let fading = Rate::new(sample_time.part_of_way(HANDOVER_S));
+        Self { inverse, reach: Weight::new(reach), kept, fading, braking }
     }
 
     /// The voltage that this law asks for, before the amplifier's limits; `driven` is the last one after

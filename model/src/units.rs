@@ -13,6 +13,45 @@ pub type Signal = I12F20;
 /// A value summed over many ticks.
 pub type Accumulator = I12F52;
 
+pub(crate) const TWO_TO_20: f64 = 1_048_576.0;
+pub(crate) const TWO_TO_32: f64 = 4_294_967_296.0;
+const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
+
+/// `value` in steps of 1 / `a_unit`, to the nearest one; beyond 64 bits, the end. Not inlined, like those below: without a
+/// double-precision unit each would be as long again wherever it is used.
+#[inline(never)]
+pub(crate) fn steps(value: f64, a_unit: f64) -> i64 {
+    libm::rint(value * a_unit) as i64
+}
+
+/// The nearest signal to `volts`; beyond its range, the end.
+#[inline(never)]
+pub(crate) fn signal(volts: f64) -> Signal {
+    Signal::from_bits(saturated_to_32(steps(volts, TWO_TO_20)))
+}
+
+/// The nearest accumulator to `volts`; beyond its range, the end.
+pub(crate) fn accumulator(volts: f64) -> Accumulator {
+    Accumulator::from_bits(steps(volts, TWO_TO_52))
+}
+
+/// What part of its way a first-order lag makes in `seconds`.
+#[inline(never)]
+pub(crate) fn part_of_way(seconds: f64, time_constant_s: f64) -> f64 {
+    -libm::expm1(-seconds / time_constant_s)
+}
+
+/// As many of `bits` as fit; beyond, the end.
+#[inline(always)]
+pub(crate) fn saturated_to_32(bits: i64) -> i32 {
+    bits.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32
+}
+
+/// In volts, exactly.
+fn volts(signal: Signal) -> f64 {
+    f64::from(signal.to_bits()) / TWO_TO_20
+}
+
 /// Voltage across the spring, in volts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Volts(pub Signal);
@@ -32,19 +71,19 @@ impl Volts {
     /// # Errors
     /// [`OutOfRange`] for NaN and anything beyond.
     pub fn new(volts: f64) -> Result<Self, OutOfRange> {
-        OutOfRange::check("voltage_v", volts, -2000.0..=2000.0, "V").map(|v| Self(Signal::from_num(v)))
+        OutOfRange::check("voltage_v", volts, -2000.0..=2000.0, "V").map(|()| Self(signal(volts)))
     }
 
     /// In volts, exactly.
     pub fn to_f64(self) -> f64 {
-        self.0.to_num()
+        volts(self.0)
     }
 }
 
 impl ScaledStiffness {
     /// In volts of equivalent static voltage, exactly.
     pub fn to_f64(self) -> f64 {
-        self.0.to_num()
+        volts(self.0)
     }
 }
 
@@ -62,13 +101,17 @@ impl SampleTime {
     /// # Errors
     /// [`OutOfRange`] unless `rate_hz` lies in 100 to 10 000 Hz.
     pub fn from_rate(rate_hz: f64) -> Result<Self, OutOfRange> {
-        let rate_hz = OutOfRange::check("rate_hz", rate_hz, 100.0..=10_000.0, "Hz")?;
-        Ok(Self { seconds: 1.0 / rate_hz })
+        OutOfRange::check("rate_hz", rate_hz, 100.0..=10_000.0, "Hz").map(|()| Self { seconds: 1.0 / rate_hz })
     }
 
     /// In seconds, 1e-4 to 1e-2.
     pub const fn seconds(self) -> f64 {
         self.seconds
+    }
+
+    /// What part of its way a first-order lag makes in one of them.
+    pub(crate) fn part_of_way(self, time_constant_s: f64) -> f64 {
+        part_of_way(self.seconds, time_constant_s)
     }
 }
 

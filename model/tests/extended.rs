@@ -201,12 +201,13 @@ proptest! {
         rate in 2.0..=4.0f64,
         voltages in prop::collection::vec(-2000.0..=2000.0f64, 1..40),
     ) {
-        let config = numbers.plant().scaled(SampleTime::from_rate(10f64.powf(rate)).unwrap());
-        prop_assert!(config.is_ok(), "{config:?}");
+        let (plant, sample_time) = (numbers.plant(), SampleTime::from_rate(10f64.powf(rate)).unwrap());
+        prop_assert_eq!(plant.check(sample_time), Ok(()));
+        let config = plant.scaled(sample_time);
         let mut state = extended::State::default();
         for voltage in voltages {
             for _ in 0..50 {
-                config.unwrap().run(&mut state, Volts::new(voltage).unwrap());
+                config.run(&mut state, Volts::new(voltage).unwrap());
             }
         }
     }

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use host_sim::log::{Decoder, Done, Event, Formats, Item, Line, table_row};
 
-use crate::image::{self, Board, Opt};
+use crate::image::{self, Opt};
 use crate::shell;
 
 /// The emulator.
@@ -77,9 +77,9 @@ impl Values<'_> {
     }
 }
 
-/// Plays one of the firmware's examples that count instructions, to its end.
-pub(crate) fn count(example: &str, opt: Opt) -> Result<Run> {
-    let run = play(&image::example(example, Board::Mps2, opt)?, example, SHIFT, |_| {})?;
+/// Plays one of the firmware's examples that count instructions, built with these features, to its end.
+pub(crate) fn count(example: &str, features: &str, opt: Opt) -> Result<Run> {
+    let run = play(&image::example(example, features, opt)?, example, SHIFT, |_| {})?;
     ensure!(run.exit == 0, "the emulator's exit code is {}", run.exit);
     Ok(run)
 }

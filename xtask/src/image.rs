@@ -55,19 +55,19 @@ impl Board {
 
 /// Builds an image and returns its ELF file.
 pub(crate) fn build(board: Board, opt: Opt) -> Result<PathBuf> {
-    compile(board, opt, ["--bin", board.name()], board.name())
+    compile(board.name(), opt, ["--bin", board.name()], board.name())
 }
 
-/// As [`build`], of an example of the firmware.
-pub(crate) fn example(name: &str, board: Board, opt: Opt) -> Result<PathBuf> {
-    compile(board, opt, ["--example", name], &format!("examples/{name}"))
+/// As [`build`], of an example of the firmware, with these features of it.
+pub(crate) fn example(name: &str, features: &str, opt: Opt) -> Result<PathBuf> {
+    compile(features, opt, ["--example", name], &format!("examples/{name}"))
 }
 
-fn compile(board: Board, opt: Opt, what: [&str; 2], file: &str) -> Result<PathBuf> {
+fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str) -> Result<PathBuf> {
     let target = target_directory()?;
     shell::run(shell::cargo().args(["build", "--quiet", "--package", "firmware"]).args(what).args([
         "--features",
-        board.name(),
+        features,
         "--profile",
         opt.profile(),
         "--target",

@@ -101,7 +101,7 @@ Examples:
     Flash,
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 128 KB, RAM below 18 KB and the stack in its place.
+    /// Exits with 1 unless flash stays below 64 KB, RAM below 16 KB and the stack in its place.
     Size(size::Args),
     /// Make the MCU's images: ELF, bin and hex
     ///

@@ -40,7 +40,7 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
 
 /// Every contender, this controller first.
 pub(crate) fn count(opt: Opt) -> Result<Vec<Row>> {
-    let run = emulator::count("rivals", opt)?;
+    let run = emulator::count("rivals", "mps2-an386", opt)?;
     CONTENDERS.iter().map(|(name, what)| row(name, what, &run)).collect()
 }
 

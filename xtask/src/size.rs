@@ -7,9 +7,9 @@ use crate::image::{self, Board, Opt};
 use crate::{elf, stack};
 
 /// Bytes of flash that an image may take, of 512 KB.
-const MOST_FLASH: u32 = 128 << 10;
+const MOST_FLASH: u32 = 64 << 10;
 /// Bytes of RAM, stack included.
-const MOST_RAM: u32 = 18 << 10;
+const MOST_RAM: u32 = 16 << 10;
 
 /// Options of `cargo xtask size`.
 #[derive(clap::Args)]

@@ -18,12 +18,11 @@
 //!
 //! What it needs of a spring: no negative weight in the relaxation, a rising law, a memory that rises once all plays move.
 
-use super::lags::relaxed_in;
-use super::{ExtendedPlant, Leakage, law, memory};
+use super::{Config, ExtendedPlant, Law, Memory, law, memory};
 use crate::coefficient::{Steep, Weight};
 use crate::error::OutOfRange;
 use crate::estimator::demanded;
-use crate::units::{SampleTime, Signal};
+use crate::units::{SampleTime, Signal, signal};
 
 /// The largest loss of charge that leaves something to hold a stiffness by.
 const MOST_LOSS: f64 = 0.95;
@@ -53,37 +52,43 @@ struct Varying {
     per_volt: Steep,
 }
 
+/// Whether a spring has a way back.
+///
+/// # Errors
+/// [`OutOfRange`] names the field as [`ExtendedPlant`]'s blocks do.
+pub(super) fn check(plant: &ExtendedPlant<'_>) -> Result<(), OutOfRange> {
+    let ExtendedPlant { memory, law, leakage, relaxation } = plant;
+    let mut gain = relaxation.share;
+    for (_, weight) in relaxation.lags() {
+        OutOfRange::check("relaxation.weights", weight, 0.0..=Weight::MOST, "to be led by its inverse")?;
+        gain += weight;
+    }
+    OutOfRange::check("relaxation.weights", gain, LEAST_GAIN..=Weight::MOST, "with the share, in all")?;
+    let loss = leakage.map_or(0.0, |leakage| leakage.share);
+    OutOfRange::check("leakage.share", loss, 0.0..=MOST_LOSS, "of the stiffness, to be led by its inverse")?;
+    law.as_ref().map_or(Ok(()), Law::check_inverse)?;
+    memory.as_ref().map_or(Ok(()), Memory::check_inverse)
+}
+
 impl Inverse {
-    /// # Errors
-    /// [`OutOfRange`] names the field as [`ExtendedPlant`]'s blocks do.
-    pub(super) fn new(
-        plant: &ExtendedPlant<'_>,
-        sample_time: SampleTime,
-        resolution_v: f64,
-    ) -> Result<Self, OutOfRange> {
-        let ExtendedPlant { memory, law, leakage, relaxation } = plant;
-        let mut gain = relaxation.share;
-        for (_, weight) in relaxation.lags() {
-            gain += OutOfRange::check("relaxation.weights", weight, 0.0..=Weight::MOST, "to be led by its inverse")?;
-        }
-        OutOfRange::check("relaxation.weights", gain, LEAST_GAIN..=Weight::MOST, "with the share, in all")?;
+    /// Of a spring that [`check`] accepts, and that has become `config`.
+    pub(super) fn new(plant: &ExtendedPlant<'_>, config: &Config, sample_time: SampleTime, resolution_v: f64) -> Self {
+        let ExtendedPlant { law, leakage, relaxation, .. } = plant;
         let (lost, lost_in_mean) = leakage.map_or((0.0, 0.0), |leakage| leakage.lost_in_a_tick(sample_time));
-        if let Some(Leakage { share, .. }) = leakage {
-            OutOfRange::check("leakage.share", *share, 0.0..=MOST_LOSS, "of the stiffness, to be led by its inverse")?;
-        }
         let demanded_at = |volts: f64| {
-            let later: f64 = relaxation.lags_at(volts).map(|(tau, weight)| weight * relaxed_in(tau, sample_time)).sum();
+            let later: f64 = relaxation.lags_at(volts).map(|(tau, weight)| weight * sample_time.part_of_way(tau)).sum();
             Steep::new(demanded(relaxation.share * (1.0 - lost) + (1.0 - lost_in_mean) * later))
         };
         let varying = relaxation.varying().map(|tau| {
             let end_v = tau.end_v();
-            Varying { at_end: demanded_at(end_v), end: Signal::from_num(end_v), per_volt: Steep::new(1.0 / end_v) }
+            Varying { at_end: demanded_at(end_v), end: signal(end_v), per_volt: Steep::new(1.0 / end_v) }
         });
-        Ok(Self {
+        let memory = config.memory.as_ref().map(|bank| memory::Inverse::new(bank, resolution_v));
+        Self {
             demanded: Demanded { at_zero: demanded_at(0.0), varying },
-            law: law.as_ref().map(law::Inverse::new).transpose()?.unwrap_or_default(),
-            memory: memory.as_ref().map(|it| memory::Inverse::new(it, resolution_v)).transpose()?.unwrap_or_default(),
-        })
+            law: law.as_ref().map(law::Inverse::new).unwrap_or_default(),
+            memory: memory.unwrap_or_default(),
+        }
     }
 
     /// How much more the law must answer, at this voltage, for a `change` of the stiffness.

@@ -33,6 +33,28 @@ pub struct Relaxation<'a> {
 }
 
 impl Relaxation<'_> {
+    /// # Errors
+    /// [`OutOfRange`] names `relaxation.share`, `.tau_s`, `.weights` or `.tau_high_s`.
+    pub(super) fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+        let Self { share, time_constants_s, weights, time_constant_high_s } = *self;
+        let (count, seconds) = (time_constants_s.len(), sample_time.seconds());
+        OutOfRange::check_count("relaxation.tau_s", count, 1..=MOST_LAGS, "time constants")?;
+        let fewest = if count == 1 { 0 } else { count };
+        OutOfRange::check_count("relaxation.weights", weights.len(), fewest..=count, "weights, one a time constant")?;
+        OutOfRange::check("relaxation.share", share, 0.0..=Weight::MOST, "of a step")?;
+        let mut left = Weight::MOST - share;
+        let mut ticks = if time_constant_high_s.is_some() { 4.0 } else { 2.0 };
+        for (tau, weight) in self.lags() {
+            OutOfRange::check("relaxation.tau_s", tau, ticks * seconds..=1e4, "s")?;
+            left = Weight::budget("relaxation.weights", weight, left)?;
+            ticks = 2.0;
+        }
+        self.varying().map_or(Ok(()), |TimeConstant { low_s, high_s }| {
+            let lowest = (4.0 * seconds).max(0.1 * low_s);
+            OutOfRange::check("relaxation.tau_high_s", high_s, lowest..=(10.0 * low_s).min(1e4), "s")
+        })
+    }
+
     /// Time constant and weight of each lag.
     pub fn lags(&self) -> impl Iterator<Item = (f64, f64)> {
         let weight = |lag| self.weights.get(lag).copied().unwrap_or(1.0 - self.share);
@@ -56,7 +78,7 @@ impl Relaxation<'_> {
         let slowest = if self.varying().is_some_and(|tau| tau.at(1000.0) > tau.at(0.0)) { 1000.0 } else { 0.0 };
         let mut promptness = Promptness { at_once: self.share, in_a_tick: 0.0, relaxed: 1.0 };
         for (tau, weight) in self.lags_at(slowest) {
-            let part = relaxed_in(tau, sample_time);
+            let part = sample_time.part_of_way(tau);
             promptness.in_a_tick += part * weight;
             promptness.relaxed = promptness.relaxed.min(part);
         }
@@ -68,17 +90,12 @@ impl Relaxation<'_> {
         // At an end it is shortest.
         let shortest = if self.varying().is_some_and(|tau| tau.at(1000.0) < tau.at(0.0)) { 1000.0 } else { 0.0 };
         for (tau, weight) in self.lags_at(shortest) {
-            let part = relaxed_in(tau, sample_time);
+            let part = sample_time.part_of_way(tau);
             promptness.in_a_tick += part * weight.max(0.0);
             promptness.relaxed = promptness.relaxed.max(part);
         }
         promptness
     }
-}
-
-/// What part of its distance a lag makes in one sample time.
-pub(super) fn relaxed_in(time_constant_s: f64, sample_time: SampleTime) -> f64 {
-    -libm::expm1(-sample_time.seconds() / time_constant_s)
 }
 
 /// The relaxation for one sample time, scaled for the tick.
@@ -96,38 +113,21 @@ pub(crate) struct Config {
 pub(crate) type State = [Accumulator; MOST_LAGS];
 
 impl Config {
-    /// # Errors
-    /// [`OutOfRange`] names `relaxation.share`, `.tau_s`, `.weights` or `.tau_high_s`.
-    pub(crate) fn new(relaxation: &Relaxation<'_>, sample_time: SampleTime) -> Result<Self, OutOfRange> {
-        let Relaxation { share, time_constants_s, weights, time_constant_high_s } = *relaxation;
-        let count = time_constants_s.len();
-        OutOfRange::check_count("relaxation.tau_s", count, 1..=MOST_LAGS, "time constants")?;
-        let fewest = if count == 1 { 0 } else { count };
-        OutOfRange::check_count("relaxation.weights", weights.len(), fewest..=count, "weights, one a time constant")?;
-        OutOfRange::check("relaxation.share", share, 0.0..=Weight::MOST, "of a step")?;
-        let mut left = Weight::budget("relaxation.share", share, Weight::MOST)?;
-
+    /// Of a relaxation that [`Relaxation::check`] accepts.
+    pub(crate) fn new(relaxation: &Relaxation<'_>, sample_time: SampleTime) -> Self {
         let mut config = Self {
-            share: Weight::new(share),
+            share: Weight::new(relaxation.share),
             weights: [Weight::default(); MOST_LAGS],
-            rates: [Rate::new(0.0); MOST_LAGS],
-            count: count as u8,
-            varying: None,
+            rates: [Rate::default(); MOST_LAGS],
+            count: relaxation.time_constants_s.len() as u8,
+            varying: relaxation.varying().map(|tau| VaryingRate::new(&tau, sample_time)),
         };
-        for (lag, (tau, weight)) in relaxation.lags().enumerate() {
-            let ticks = if lag == 0 && time_constant_high_s.is_some() { 4.0 } else { 2.0 };
-            OutOfRange::check("relaxation.tau_s", tau, ticks * sample_time.seconds()..=1e4, "s")?;
-            left = Weight::budget("relaxation.weights", weight, left)?;
-            config.weights[lag] = Weight::new(weight);
-            config.rates[lag] = Rate::new(relaxed_in(tau, sample_time));
+        let places = config.weights.iter_mut().zip(&mut config.rates);
+        for ((weight, rate), (tau, of_lag)) in places.zip(relaxation.lags()) {
+            *weight = Weight::new(of_lag);
+            *rate = Rate::new(sample_time.part_of_way(tau));
         }
-        if let Some(time_constant) = relaxation.varying() {
-            let TimeConstant { low_s, high_s } = time_constant;
-            let lowest = (4.0 * sample_time.seconds()).max(0.1 * low_s);
-            OutOfRange::check("relaxation.tau_high_s", high_s, lowest..=(10.0 * low_s).min(1e4), "s")?;
-            config.varying = Some(VaryingRate::new(&time_constant, sample_time));
-        }
-        Ok(config)
+        config
     }
 
     /// Stiffness with `input` just there.
@@ -167,7 +167,7 @@ mod tests {
             time_constant_high_s: None,
         };
         for rate_hz in [100.0, 10_000.0] {
-            let config = Config::new(&relaxation, SampleTime::from_rate(rate_hz).unwrap()).unwrap();
+            let config = Config::new(&relaxation, SampleTime::from_rate(rate_hz).unwrap());
             let (mut state, input) = (State::default(), Signal::from_num(600));
             for tick in 0..(10.0 * rate_hz) as u32 {
                 let time = f64::from(tick) / rate_hz;
@@ -184,7 +184,7 @@ mod tests {
     fn a_wrong_relaxation_is_named() {
         let named = |share, time_constants_s: &[f64], weights: &[f64], time_constant_high_s| {
             let relaxation = Relaxation { share, time_constants_s, weights, time_constant_high_s };
-            Config::new(&relaxation, SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field
+            relaxation.check(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field
         };
         assert_eq!(named(-0.1, &[5.0], &[], None), "relaxation.share");
         assert_eq!(named(0.1, &[], &[], None), "relaxation.tau_s");

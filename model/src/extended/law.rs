@@ -10,7 +10,7 @@
 
 use crate::coefficient::{Steep, Sum, Weight, saturated};
 use crate::error::OutOfRange;
-use crate::units::Signal;
+use crate::units::{Signal, signal};
 
 /// The most points of a law, (0, 0) included.
 pub const MOST_POINTS: usize = 9;
@@ -28,6 +28,40 @@ pub struct Law<'a> {
 }
 
 impl Law<'_> {
+    /// # Errors
+    /// [`OutOfRange`] names `law.voltage_v` or `law.stiffness`.
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        let count = self.voltage_v.len();
+        OutOfRange::check_count("law.voltage_v", count, 2..=MOST_POINTS, "points")?;
+        OutOfRange::check_count("law.stiffness", self.stiffness.len(), count..=count, "values, one a voltage")?;
+        let mut last = None;
+        for (&voltage, &value) in self.voltage_v.iter().zip(self.stiffness) {
+            let (allowed_v, unit, from, reach) = match last {
+                None => (0.0..=0.0, "V, where the law starts", 0.0, 0.0),
+                Some((start, from)) => (start + 1e-3..=1000.0, "V, upwards", from, Weight::MOST * (voltage - start)),
+            };
+            OutOfRange::check("law.voltage_v", voltage, allowed_v, unit)?;
+            let (lowest, highest) = (f64::max(from - reach, -2000.0), f64::min(from + reach, 2000.0));
+            OutOfRange::check("law.stiffness", value, lowest..=highest, "V")?;
+            last = Some((voltage, value));
+        }
+        Ok(())
+    }
+
+    /// Whether every line rises.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names `law.stiffness` where it does not rise.
+    pub(super) fn check_inverse(&self) -> Result<(), OutOfRange> {
+        for (volts, values) in self.voltage_v.windows(2).zip(self.stiffness.windows(2)) {
+            if let ([from_v, to_v], [from, to]) = (volts, values) {
+                let lowest = from + LEAST_SLOPE * (to_v - from_v);
+                OutOfRange::check("law.stiffness", *to, lowest..=2000.0, "V, to be led by its inverse")?;
+            }
+        }
+        Ok(())
+    }
+
     /// The steepest line's slope, at least 0.
     pub(crate) fn steepest(&self) -> f64 {
         self.slopes().fold(0.0, f64::max)
@@ -64,35 +98,18 @@ struct Line {
 }
 
 impl Config {
-    /// # Errors
-    /// [`OutOfRange`] names `law.voltage_v` or `law.stiffness`.
-    pub(crate) fn new(law: &Law<'_>) -> Result<Self, OutOfRange> {
-        let Law { voltage_v, stiffness } = *law;
-        OutOfRange::check_count("law.voltage_v", voltage_v.len(), 2..=MOST_POINTS, "points")?;
-        let count = voltage_v.len();
-        OutOfRange::check_count("law.stiffness", stiffness.len(), count..=count, "values, one a voltage")?;
-        let (mut start, mut value) = (voltage_v[0], stiffness[0]);
-        OutOfRange::check("law.voltage_v", start, 0.0..=0.0, "V, where the law starts")?;
-        OutOfRange::check("law.stiffness", value, 0.0..=0.0, "V, where the law starts")?;
+    /// Of a law that [`Law::check`] accepts.
+    pub(crate) fn new(law: &Law<'_>) -> Self {
         let mut lines = [Line::default(); MOST_POINTS - 1];
         let mut line = Line::default();
-        let mut points = voltage_v.iter().zip(stiffness).skip(1);
-        for next in &mut lines {
-            if let Some((&end, &at_end)) = points.next() {
-                OutOfRange::check("law.voltage_v", end, start + 1e-3..=1000.0, "V, upwards")?;
-                let reach = Weight::MOST * (end - start);
-                let (lowest, highest) = ((value - reach).max(-2000.0), (value + reach).min(2000.0));
-                OutOfRange::check("law.stiffness", at_end, lowest..=highest, "V")?;
-                line = Line {
-                    start: Signal::from_num(start),
-                    value: Signal::from_num(value),
-                    slope: Weight::new((at_end - value) / (end - start)),
-                };
-                (start, value) = (end, at_end);
+        let mut points = law.voltage_v.iter().zip(law.stiffness).zip(law.slopes());
+        for place in &mut lines {
+            if let Some(((&start, &value), slope)) = points.next() {
+                line = Line { start: signal(start), value: signal(value), slope: Weight::new(slope) };
             }
-            *next = line;
+            *place = line;
         }
-        Ok(Self { lines })
+        Self { lines }
     }
 
     /// The law at `input`.
@@ -117,25 +134,17 @@ pub(crate) struct Inverse {
 }
 
 impl Inverse {
-    /// Of a law that [`Config::new`] accepts.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] names `law.stiffness` where it does not rise.
-    pub(crate) fn new(law: &Law<'_>) -> Result<Self, OutOfRange> {
+    /// Of a law that [`Law::check_inverse`] accepts.
+    pub(crate) fn new(law: &Law<'_>) -> Self {
         let mut inverse = Self::default();
-        let lines = law.voltage_v.windows(2).zip(law.stiffness.windows(2));
-        let mut last = Steep::default();
-        let mut each = inverse.per_slope.iter_mut();
-        for ((volts, values), place) in lines.zip(&mut each) {
-            if let ([from_v, to_v], [from, to]) = (volts, values) {
-                let lowest = from + LEAST_SLOPE * (to_v - from_v);
-                OutOfRange::check("law.stiffness", *to, lowest..=2000.0, "V, to be led by its inverse")?;
+        let (mut per_slope, mut slopes) = (Steep::default(), law.slopes());
+        for place in &mut inverse.per_slope {
+            if let Some(slope) = slopes.next() {
+                per_slope = Steep::new(1.0 / slope);
             }
-            last = Steep::new(1.0 / slope(volts, values));
-            *place = last;
+            *place = per_slope;
         }
-        each.for_each(|place| *place = last);
-        Ok(inverse)
+        inverse
     }
 
     /// The input that `law` answers with `value`.
@@ -160,7 +169,8 @@ mod tests {
     use std::vec::Vec;
 
     fn at(law: &Law<'_>, input: f64) -> f64 {
-        Config::new(law).unwrap().at(Signal::from_num(input)).to_num()
+        law.check().unwrap();
+        Config::new(law).at(Signal::from_num(input)).to_num()
     }
 
     proptest! {
@@ -196,8 +206,7 @@ mod tests {
 
     #[test]
     fn a_wrong_law_is_named() {
-        let named =
-            |voltage_v: &[f64], stiffness: &[f64]| Config::new(&Law { voltage_v, stiffness }).unwrap_err().field;
+        let named = |voltage_v: &[f64], stiffness: &[f64]| Law { voltage_v, stiffness }.check().unwrap_err().field;
         assert_eq!(named(&[0.0], &[0.0]), "law.voltage_v");
         assert_eq!(named(&[0.0; 10], &[0.0; 10]), "law.voltage_v");
         assert_eq!(named(&[0.0, 1.0], &[0.0]), "law.stiffness");

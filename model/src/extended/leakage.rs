@@ -23,10 +23,17 @@ pub struct Leakage {
 }
 
 impl Leakage {
+    /// # Errors
+    /// [`OutOfRange`] names `leakage.share` or `leakage.tau_s`.
+    pub(super) fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+        OutOfRange::check("leakage.share", self.share, 0.0..=1.0, "of the stiffness")?;
+        OutOfRange::check("leakage.tau_s", self.time_constant_s, 100.0 * sample_time.seconds()..=1e5, "s")
+    }
+
     /// What part of a new input is lost at the end of a tick, and of its mean in the tick.
     pub(super) fn lost_in_a_tick(&self, sample_time: SampleTime) -> (f64, f64) {
         let ticks = self.time_constant_s / sample_time.seconds();
-        let rate = -libm::expm1(-1.0 / ticks);
+        let rate = sample_time.part_of_way(self.time_constant_s);
         (self.share * rate, self.share * (1.0 - rate * ticks))
     }
 }
@@ -44,18 +51,14 @@ pub(crate) struct Config {
 pub(crate) type State = Accumulator;
 
 impl Config {
-    /// # Errors
-    /// [`OutOfRange`] names `leakage.share` or `leakage.tau_s`.
-    pub(crate) fn new(leakage: &Leakage, sample_time: SampleTime) -> Result<Self, OutOfRange> {
-        let seconds = sample_time.seconds();
-        let share = OutOfRange::check("leakage.share", leakage.share, 0.0..=1.0, "of the stiffness")?;
-        let tau = OutOfRange::check("leakage.tau_s", leakage.time_constant_s, 100.0 * seconds..=1e5, "s")?;
+    /// Of a leakage that [`Leakage::check`] accepts.
+    pub(crate) fn new(leakage: &Leakage, sample_time: SampleTime) -> Self {
         let (_, until_mean) = leakage.lost_in_a_tick(sample_time);
-        Ok(Self {
-            share: Weight::new(share),
+        Self {
+            share: Weight::new(leakage.share),
             until_mean: Weight::new(until_mean),
-            rate: Rate::new(-libm::expm1(-seconds / tau)),
-        })
+            rate: Rate::new(sample_time.part_of_way(leakage.time_constant_s)),
+        }
     }
 
     /// What is left of `input` now.
@@ -84,7 +87,7 @@ mod tests {
         for rate_hz in [100.0, 1000.0, 10_000.0] {
             let sample_time = SampleTime::from_rate(rate_hz).unwrap();
             let leakage = Leakage { share: 0.4, time_constant_s: 2.0 };
-            let (config, mut state) = (Config::new(&leakage, sample_time).unwrap(), State::default());
+            let (config, mut state) = (Config::new(&leakage, sample_time), State::default());
             let input = Signal::from_num(500);
             for tick in 0..(4.0 * rate_hz) as u32 {
                 let (from, to) = (f64::from(tick) / rate_hz, f64::from(tick + 1) / rate_hz);
@@ -102,8 +105,7 @@ mod tests {
     #[test]
     fn a_wrong_leakage_is_named() {
         let sample_time = SampleTime::from_rate(1000.0).unwrap();
-        let named =
-            |share, time_constant_s| Config::new(&Leakage { share, time_constant_s }, sample_time).unwrap_err().field;
+        let named = |share, time_constant_s| Leakage { share, time_constant_s }.check(sample_time).unwrap_err().field;
         assert_eq!(named(1.1, 5.0), "leakage.share");
         assert_eq!(named(f64::NAN, 5.0), "leakage.share");
         assert_eq!(named(0.1, 0.05), "leakage.tau_s");

@@ -13,7 +13,7 @@
 
 use crate::coefficient::{Steep, Weight, saturated};
 use crate::error::OutOfRange;
-use crate::units::Signal;
+use crate::units::{Signal, signal};
 
 /// The most plays of a bank.
 pub const MOST_PLAYS: usize = 8;
@@ -35,10 +35,38 @@ pub struct Memory<'a> {
 }
 
 impl Memory<'_> {
+    /// # Errors
+    /// [`OutOfRange`] names `memory.direct`, `memory.thresholds_v` or `memory.weights`.
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        let count = self.thresholds_v.len();
+        OutOfRange::check_count("memory.thresholds_v", count, 0..=MOST_PLAYS, "plays")?;
+        OutOfRange::check_count("memory.weights", self.weights.len(), count..=count, "weights, one a threshold")?;
+        let mut left = Weight::budget("memory.direct", self.direct, Weight::MOST)?;
+        for (&threshold, &weight) in self.thresholds_v.iter().zip(self.weights) {
+            OutOfRange::check("memory.thresholds_v", threshold, 0.0..=1000.0, "V")?;
+            left = Weight::budget("memory.weights", weight, left)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the bank rises once all plays move.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names `memory.direct`.
+    pub(super) fn check_inverse(&self) -> Result<(), OutOfRange> {
+        let unit = "with all weights, to be led by its inverse";
+        OutOfRange::check("memory.direct", self.all_moving(), LEAST_SLOPE..=Weight::MOST, unit)
+    }
+
+    /// How steep the bank is while all plays move.
+    fn all_moving(&self) -> f64 {
+        self.direct + self.weights.iter().sum::<f64>()
+    }
+
     /// How steep the bank is when the voltage turns, and all plays stay at first; but a quarter of what it is later, so
     /// that a bank which does not answer at all at first is not thought never to answer.
     pub(super) fn turning(&self) -> f64 {
-        self.direct.max(0.25 * (self.direct + self.weights.iter().sum::<f64>()))
+        self.direct.max(0.25 * self.all_moving())
     }
 
     /// The steepest that the bank can be: all plays move.
@@ -65,23 +93,23 @@ struct Play {
 pub(crate) type State = [Signal; MOST_PLAYS];
 
 impl Config {
-    /// # Errors
-    /// [`OutOfRange`] names `memory.direct`, `memory.thresholds_v` or `memory.weights`.
-    pub(crate) fn new(memory: &Memory<'_>) -> Result<Self, OutOfRange> {
-        let Memory { direct, thresholds_v, weights } = *memory;
-        OutOfRange::check_count("memory.thresholds_v", thresholds_v.len(), 0..=MOST_PLAYS, "plays")?;
-        let count = thresholds_v.len();
-        OutOfRange::check_count("memory.weights", weights.len(), count..=count, "weights, one a threshold")?;
-        let mut left = Weight::budget("memory.direct", direct, Weight::MOST)?;
+    /// Of a memory that [`Memory::check`] accepts.
+    pub(crate) fn new(memory: &Memory<'_>) -> Self {
         let mut plays = [Play::default(); MOST_PLAYS];
-        for (play, (&threshold, &weight)) in plays.iter_mut().zip(thresholds_v.iter().zip(weights)) {
-            let threshold = OutOfRange::check("memory.thresholds_v", threshold, 0.0..=1000.0, "V")?;
-            left = Weight::budget("memory.weights", weight, left)?;
-            *play = Play { threshold: Signal::from_num(threshold), weight: Weight::new(weight) };
+        let mut count = 0;
+        for (&threshold, &weight) in memory.thresholds_v.iter().zip(memory.weights).take(MOST_PLAYS) {
+            let mut new = Play { threshold: signal(threshold), weight: Weight::new(weight) };
+            // Smaller thresholds first: the sum is exact, so its order is the inverse's choice.
+            for play in plays.iter_mut().take(count) {
+                if new.threshold < play.threshold {
+                    core::mem::swap(play, &mut new);
+                }
+            }
+            if let Some(end) = plays.get_mut(count) {
+                (*end, count) = (new, count + 1);
+            }
         }
-        // The sum is exact: its order is the inverse's choice.
-        plays[..count].sort_unstable_by_key(|play| play.threshold);
-        Ok(Self { direct: Weight::new(direct), plays, count: count as u8 })
+        Self { direct: Weight::new(memory.direct), plays, count: count as u8 }
     }
 
     /// The bank's output with `voltage` just applied.
@@ -116,12 +144,8 @@ struct Piece {
 }
 
 impl Inverse {
-    /// Of a bank that [`Config::new`] accepts, for steps of `resolution_v` of the voltage.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] names `memory.direct` if the bank does not rise once all plays move.
-    pub(crate) fn new(memory: &Memory<'_>, resolution_v: f64) -> Result<Self, OutOfRange> {
-        let bank = Config::new(memory)?;
+    /// Of a memory that [`Memory::check_inverse`] accepts, for steps of `resolution_v` of the voltage.
+    pub(crate) fn new(bank: &Config, resolution_v: f64) -> Self {
         let (mut slope, mut steepest) = (bank.direct.to_f64(), 0.0f64);
         let mut inverse = Self::default();
         let plays = bank.plays.iter().take(usize::from(bank.count));
@@ -129,14 +153,8 @@ impl Inverse {
             *piece = Piece { slope: Weight::new(slope), per_slope: (slope > LEVEL).then(|| Steep::new(1.0 / slope)) };
             (slope, steepest) = (slope + weight, steepest.max(slope));
         }
-        OutOfRange::check(
-            "memory.direct",
-            slope,
-            LEAST_SLOPE..=Weight::MOST,
-            "with all weights, to be led by its inverse",
-        )?;
-        inverse.toll = Signal::from_num(steepest * resolution_v);
-        Ok(inverse)
+        inverse.toll = signal(steepest * resolution_v);
+        inverse
     }
 
     /// The voltage that makes the bank's output `more` than at `voltage`, which is the last one.
@@ -174,7 +192,7 @@ mod tests {
     const BANK: Memory<'_> = Memory { direct: 0.5, thresholds_v: &[10.0, 40.0], weights: &[0.3, 0.2] };
 
     fn walk(memory: &Memory<'_>, voltages: &[f64]) -> f64 {
-        let (config, mut state) = (Config::new(memory).unwrap(), State::default());
+        let (config, mut state) = (Config::new(memory), State::default());
         let outputs = voltages.iter().map(|&voltage| config.run(&mut state, Signal::from_num(voltage)).to_num());
         outputs.last().unwrap_or(0.0)
     }
@@ -206,7 +224,7 @@ mod tests {
     #[test]
     fn a_wrong_bank_is_named() {
         let named = |direct, thresholds_v: &[f64], weights: &[f64]| {
-            Config::new(&Memory { direct, thresholds_v, weights }).unwrap_err().field
+            Memory { direct, thresholds_v, weights }.check().unwrap_err().field
         };
         assert_eq!(named(f64::NAN, &[], &[]), "memory.direct");
         assert_eq!(named(1.0, &[-1.0], &[0.1]), "memory.thresholds_v");

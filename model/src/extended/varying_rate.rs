@@ -15,7 +15,7 @@
 //! `tau`: 1e-5 from a hundred sample times on, 5e-3 at four. A rate that is off by a part `e` puts the response to a step
 //! off by less than `e / 2.7` of the step.
 
-use crate::units::{Accumulator, SampleTime, Signal};
+use crate::units::{Accumulator, SampleTime, Signal, signal, steps};
 
 /// Fraction bits of the inverse rate's slope beyond its own; up to 500 V it changes by less than 2^31.
 const MORE_BITS: u32 = 8;
@@ -66,19 +66,19 @@ pub(crate) struct VaryingRate {
 impl VaryingRate {
     /// Of a time constant of two sample times or more at all voltages, the shortest at least a twentieth of the longest.
     pub(crate) fn new(tau: &TimeConstant, sample_time: SampleTime) -> Self {
-        let inverse = |volts| -1.0 / libm::expm1(-sample_time.seconds() / tau.at(volts));
+        let inverse = |volts| 1.0 / sample_time.part_of_way(tau.at(volts));
         let (end_v, at_zero) = (tau.end_v(), inverse(0.0));
         let longest = at_zero.max(inverse(end_v));
-        let mut shift = 0;
-        while libm::ldexp(longest, 24 - shift) >= libm::ldexp(1.0, 31) {
-            shift += 1;
+        let (mut shift, mut scale) = (0, f64::from(1 << 24));
+        while longest * scale >= f64::from(1u32 << 31) {
+            (shift, scale) = (shift + 1, 0.5 * scale);
         }
         let per_volt = (inverse(end_v) - at_zero) / end_v;
         Self {
-            at_zero: libm::round(libm::ldexp(at_zero, 24 - shift)) as i32,
-            per_volt: libm::round(libm::ldexp(per_volt, 24 - shift + MORE_BITS as i32)) as i32,
-            end: Signal::from_num(end_v),
-            shift: shift as u8,
+            at_zero: steps(at_zero, scale) as i32,
+            per_volt: steps(per_volt, f64::from(1 << MORE_BITS) * scale) as i32,
+            end: signal(end_v),
+            shift,
         }
     }
 

@@ -19,7 +19,7 @@ pub(super) struct Envelope {
 
 impl Config {
     pub(super) fn new(sample_time: SampleTime) -> Self {
-        Self(Rate::new(-libm::expm1(-sample_time.seconds() / MEMORY_S)))
+        Self(Rate::new(sample_time.part_of_way(MEMORY_S)))
     }
 
     /// The signal is at `now` in this tick.

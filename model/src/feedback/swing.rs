@@ -9,7 +9,7 @@
 
 use super::envelope::{self, Envelope};
 use crate::coefficient::{Rate, upper};
-use crate::units::{Accumulator, SampleTime, Signal};
+use crate::units::{Accumulator, SampleTime, Signal, part_of_way};
 
 /// Crossings that quarter the gain.
 pub const SWINGS: u8 = 6;
@@ -44,7 +44,7 @@ pub(super) struct State {
 impl Config {
     pub(super) fn new(interval_s: f64, sample_time: SampleTime) -> Self {
         let envelope = envelope::Config::new(sample_time);
-        Self { envelope, mean: Rate::new(-libm::expm1(-interval_s / PAUSE_S)), pause: (PAUSE_S / interval_s) as u32 }
+        Self { envelope, mean: Rate::new(part_of_way(interval_s, PAUSE_S)), pause: (PAUSE_S / interval_s) as u32 }
     }
 
     /// In this tick `target` is asked for.

@@ -22,10 +22,9 @@
 //! moves. A model that is wrong looks the same.
 
 use super::envelope::{self, Envelope};
-use super::{Feedback, MEMORY, Reading};
+use super::{Feedback, Reading};
 use crate::coefficient::{Rate, upper};
-use crate::error::OutOfRange;
-use crate::units::{Accumulator, SampleTime, Signal};
+use crate::units::{Accumulator, SampleTime, Signal, part_of_way, signal};
 
 /// Intervals without a new reading that are borne, beside `oldest_s`.
 pub const SILENT: u32 = 4;
@@ -142,25 +141,21 @@ impl State {
 }
 
 impl Config {
-    pub(super) fn new(feedback: &Feedback, sample_time: SampleTime) -> Result<Self, OutOfRange> {
-        let seconds = sample_time.seconds();
-        // A hair's breadth keeps whole ticks whole.
-        let ticks = |time_s: f64| libm::floor(time_s / seconds + 1e-6);
-        let noise = OutOfRange::check("noise_v", feedback.noise_v, 0.001..=100.0, "V")?;
-        let interval = OutOfRange::check("interval_s", feedback.interval_s, seconds..=0.1, "s")?;
-        let oldest = OutOfRange::check("oldest_s", feedback.oldest_s, 0.0..=(MEMORY - 1) as f64 * seconds, "s")?;
-        let lowest = OutOfRange::check("lowest_v", feedback.lowest_v, -1000.0..=990.0, "V")?;
-        let highest = OutOfRange::check("highest_v", feedback.highest_v, lowest + 1.0..=1000.0, "V")?;
-        Ok(Self {
-            noise: Signal::from_num(SIGMAS * noise),
-            lowest: Signal::from_num(lowest),
-            highest: Signal::from_num(highest),
-            oldest: ticks(oldest) as u16,
-            silence: ticks(oldest) as u32 + libm::ceil(f64::from(SILENT) * interval / seconds - 1e-6) as u32,
+    pub(super) fn new(feedback: &Feedback, sample_time: SampleTime) -> Self {
+        let Feedback { noise_v, interval_s, oldest_s, lowest_v, highest_v, .. } = *feedback;
+        // Rounded down and up; a hair's breadth keeps whole ticks whole.
+        let oldest = (oldest_s / sample_time.seconds() + 1e-6) as u16;
+        let silent = (f64::from(SILENT) * interval_s / sample_time.seconds() + (1.0 - 1e-6)) as u32;
+        Self {
+            noise: signal(SIGMAS * noise_v),
+            lowest: signal(lowest_v),
+            highest: signal(highest_v),
+            oldest,
+            silence: u32::from(oldest).saturating_add(silent),
             envelope: envelope::Config::new(sample_time),
             recent: Rate::new(1.0 / RECENT),
-            forgive: Rate::new(-libm::expm1(-interval / FORGIVE_S)),
-        })
+            forgive: Rate::new(part_of_way(interval_s, FORGIVE_S)),
+        }
     }
 
     /// Of a model at rest.

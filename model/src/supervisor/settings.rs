@@ -1,7 +1,7 @@
 //! The limits of the supervision, in SI units and scaled for the tick.
 
 use crate::error::OutOfRange;
-use crate::units::{Accumulator, SampleTime, Signal};
+use crate::units::{Accumulator, SampleTime, Signal, accumulator, signal, steps};
 
 /// Limits of the supervision, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,25 +40,26 @@ impl Settings {
     /// # Errors
     /// [`OutOfRange`] names the field.
     pub fn check(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
+        let Self { host_timeout_s, ramp_v_per_s, missed_ticks_allowed, forget_missed_s, .. } = *self;
+        let Self { monitor_tolerance_v, max_current_a, monitor_time_s, .. } = *self;
         let seconds = sample_time.seconds();
-        let ticks = |field, value, lowest: f64, highest| {
-            let checked = OutOfRange::check(field, value, lowest.max(seconds)..=highest, "s")?;
-            Ok::<u32, OutOfRange>(libm::round(checked / seconds) as u32)
-        };
-        let ramp = OutOfRange::check("ramp_v_per_s", self.ramp_v_per_s, 10.0..=1e5, "V/s")?;
-        let allowed = f64::from(self.missed_ticks_allowed);
-        OutOfRange::check("missed_ticks_allowed", allowed, 1.0..=100.0, "ticks")?;
-        let tolerance = OutOfRange::check("monitor_tolerance_v", self.monitor_tolerance_v, 1.0..=1000.0, "V")?;
-        let current = OutOfRange::check("max_current_a", self.max_current_a, 1e-6..=1.0, "A")?;
-        let forget = ticks("forget_missed_s", self.forget_missed_s, 0.0, 60.0)?;
+        OutOfRange::check("host_timeout_s", host_timeout_s, 0.01..=60.0, "s")?;
+        OutOfRange::check("ramp_v_per_s", ramp_v_per_s, 10.0..=1e5, "V/s")?;
+        OutOfRange::check("missed_ticks_allowed", f64::from(missed_ticks_allowed), 1.0..=100.0, "ticks")?;
+        OutOfRange::check("forget_missed_s", forget_missed_s, seconds..=60.0, "s")?;
+        OutOfRange::check("monitor_tolerance_v", monitor_tolerance_v, 1.0..=1000.0, "V")?;
+        OutOfRange::check("max_current_a", max_current_a, 1e-6..=1.0, "A")?;
+        OutOfRange::check("monitor_time_s", monitor_time_s, seconds..=10.0, "s")?;
+        let ticks = |time_s| steps(time_s, 1.0 / seconds) as u32;
+        let forget = ticks(forget_missed_s);
         Ok(Config {
-            host_timeout: ticks("host_timeout_s", self.host_timeout_s, 0.01, 60.0)?,
-            ramp_step: Accumulator::from_num((ramp * seconds).min(1000.0)),
+            host_timeout: ticks(host_timeout_s),
+            ramp_step: accumulator((ramp_v_per_s * seconds).min(1000.0)),
             miss_cost: forget,
-            miss_limit: forget.saturating_mul(self.missed_ticks_allowed),
-            tolerance: Signal::from_num(tolerance),
-            max_current_ua: libm::round(current * 1e6) as i32,
-            monitor_ticks: ticks("monitor_time_s", self.monitor_time_s, 0.0, 10.0)?,
+            miss_limit: forget.saturating_mul(missed_ticks_allowed),
+            tolerance: signal(monitor_tolerance_v),
+            max_current_ua: steps(max_current_a, 1e6) as i32,
+            monitor_ticks: ticks(monitor_time_s),
         })
     }
 }

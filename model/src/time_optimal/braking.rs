@@ -16,7 +16,7 @@
 
 use crate::coefficient::Steep;
 use crate::estimator::{Outlook, Promptness};
-use crate::units::Signal;
+use crate::units::{Signal, TWO_TO_32, signal, steps};
 
 /// The brake for one spring, slew and sample time, scaled for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +38,9 @@ impl Braking {
         let within = at_once + in_a_tick;
         Self {
             // What no braking can take back is more than any signal.
-            at_once: Signal::saturating_from_num(within * step_v),
-            twice: libm::ldexp(2.0 * step_v * (in_a_tick + relaxed * within), 32) as u64,
-            relaxed: libm::ldexp(relaxed, 32) as u32,
+            at_once: signal(within * step_v),
+            twice: steps(2.0 * step_v * (in_a_tick + relaxed * within), TWO_TO_32) as u64,
+            relaxed: steps(relaxed, TWO_TO_32) as u32,
             per_drift: Steep::new(within / in_a_tick.max(1e-9)),
         }
     }
