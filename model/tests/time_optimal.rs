@@ -54,6 +54,39 @@ fn steps_do_not_overshoot_and_stay() {
     }
 }
 
+/// What is within reach is there after one tick, whatever the spring has been through.
+#[test]
+fn a_small_step_takes_one_tick() {
+    let relaxation = Relaxation { share: 0.2, time_constant_high_s: None, ..WHOLE.relaxation };
+    let leakage = Some(Leakage { share: 0.5, time_constant_s: 1.0 });
+    let plain = ExtendedPlant { memory: None, law: None, leakage: None, relaxation };
+    let quick =
+        Relaxation { share: 0.05, time_constants_s: &[0.1], weights: &[0.95], time_constant_high_s: Some(0.05) };
+    // The voltage of the step itself halves the time constant, which is not foreseen.
+    for (plant, most) in [
+        (plain, 0.001),
+        (ExtendedPlant { leakage, ..plain }, 0.001),
+        (ExtendedPlant { memory: WHOLE.memory, ..plain }, 0.001),
+        (ExtendedPlant { law: WHOLE.law, ..plain }, 0.001),
+        (ExtendedPlant { relaxation: quick, ..plain }, 0.25),
+    ] {
+        let amplifier = Amplifier { dac_bits: 16, ..Amplifier::up_to(1000.0) };
+        let settings = Settings { rate_hz: 100.0, amplifier, ..settings(plant, 1000.0) };
+        let config = settings.check().unwrap();
+        let mut state = State::default();
+        // Up, down, and held in between.
+        for (target, ticks) in [(250.0, 300), (150.0, 300), (200.0, 300)] {
+            (0..ticks).for_each(|_| _ = tick(&config, &mut state, target));
+        }
+        let applied = tick(&config, &mut state, 240.0).applied.to_f64();
+        // The same voltage again: what has come by the end of the tick.
+        let hold = Settings { compensation: Compensation::None, ..settings }.check().unwrap();
+        hold.adopt(&mut state, Volts::new(applied).unwrap());
+        let off = tick(&hold, &mut state, applied).stiffness.to_f64() - 240.0;
+        assert!(off.abs() < 40.0 * most, "{plant:?}: {off}");
+    }
+}
+
 /// A bank without direct part answers a turn only after twice its threshold: that way is crossed at once, and not again
 /// for less than a code.
 #[test]

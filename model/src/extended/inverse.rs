@@ -12,9 +12,10 @@
 //! ```
 //!
 //! with `loss` and `m` of the [leakage](super::leakage), whose effect on what was there before is not needed: the spring
-//! is run ahead for it. Where the first time constant depends on the voltage, `1 / H` is taken for straight between both
-//! ends of it. It bends the other way: too little is asked for, never too much, and what is left shrinks with every tick,
-//! by more than half even where the time constant changes tenfold. [`law`] and [`memory`] are inverted exactly.
+//! is run ahead for it. Where the first time constant depends on the voltage, `1 / H` is that of the present voltage, taken for
+//! straight between both ends. It bends the other way, so too little is asked for there; a voltage that is itself on its way
+//! to quicker time constants brings more than was asked. What is left shrinks with every tick. [`law`] and [`memory`] are
+//! inverted exactly.
 //!
 //! What it needs of a spring: no negative weight in the relaxation, a rising law, a memory that rises once all plays move.
 

@@ -85,3 +85,39 @@ impl State {
         Accumulator::from_bits(step.to_bits() >> (2 * self.quartered))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How often the gain is quartered by a mismatch that goes from one side to the other every `half_s`, each time to
+    /// `shrinks` of what it was.
+    fn quartered(half_s: f64, shrinks: f64, sides: u32) -> u8 {
+        let config = Config::new(1e-3, SampleTime::from_rate(1000.0).unwrap());
+        let mut state = State::default();
+        let target = Signal::from_num(300);
+        // At rest for long.
+        (0..20_000).for_each(|_| config.asked(&mut state, target));
+        let mut amplitude = 200.0;
+        for _ in 0..sides {
+            for _ in 0..(half_s * 1e3) as u32 {
+                config.asked(&mut state, target);
+                config.hear(&mut state, Signal::from_num(amplitude), Signal::from_num(6));
+            }
+            amplitude *= -shrinks;
+        }
+        state.quartered
+    }
+
+    #[test]
+    fn a_swing_that_stays_is_calmed_one_that_dies_or_dawdles_is_not() {
+        let six = u32::from(SWINGS);
+        assert_eq!(quartered(0.05, 1.0, six - 1), 0);
+        // The first sides are still larger than the mean that follows them.
+        assert_eq!(quartered(0.05, 1.0, six + 3), 1);
+        assert_eq!(quartered(0.05, 1.05, six + 3), 1);
+        assert_eq!(quartered(0.05, 1.0, 100), MOST);
+        assert_eq!(quartered(0.05, 0.8, 100), 0);
+        assert_eq!(quartered(1.2 * PAUSE_S, 1.0, 100), 0);
+    }
+}

@@ -88,6 +88,28 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        /// The parabola of the module's text, in double precision.
+        #[test]
+        fn the_brake_is_the_parabola(
+            (share, weight, relaxed) in (0.01..0.3f64, 0.3..1.0f64, 1e-4..1e-2f64),
+            step_v in 0.1..2.0f64,
+            (drift, way, wanted) in (0.0..0.5f64, 0.0..200.0f64, 0.0..100.0f64),
+            down: bool,
+        ) {
+            let (within, in_a_tick) = (share + weight * relaxed, weight * relaxed);
+            let braking = Braking::new(&Promptness { at_once: share, in_a_tick, relaxed }, step_v);
+            let signal = |volts: f64| Signal::from_num(if down { -volts } else { volts });
+            let outlook = Outlook { now: signal(0.0), then: signal(drift) };
+            let found = braking.limit(signal(wanted), signal(drift + way), outlook).to_num::<f64>();
+
+            let beyond = drift - within * step_v;
+            let braked = in_a_tick * step_v + relaxed * (within * step_v + beyond / 2.0);
+            let allowed = within / in_a_tick * ((2.0 * braked * way).sqrt() - beyond);
+            let expected = if beyond > 0.0 { wanted.min(allowed) } else { wanted };
+            let found = if down { -found } else { found };
+            prop_assert!((found - expected).abs() < 0.01 + 0.01 * expected.abs(), "{found} {expected}");
+        }
+
         #[test]
         fn a_root_is_rounded_down(square in 0u64..1 << 52, fewer in 0u32..52) {
             let square = square >> fewer;
