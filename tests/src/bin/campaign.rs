@@ -27,12 +27,12 @@ use serde_json::{Value, json};
     bin_name = "cargo campaign",
     after_help = "\
 Examples:
-  cargo campaign                               singles, nulls, pairs, triples, small
-  cargo campaign singles nulls --records 50    two parts, 50 records of each cause and 50 nulls
+  cargo campaign                             singles, nulls, pairs, triples, small
+  cargo campaign singles nulls --records 50  50 records of each cause and 50 nulls
   cargo campaign --first-seed 2 --docs docs/identification
   cargo campaign --write out/hidden --cause hysteresis --seed 3
-  cargo campaign --write out/hidden --cause drift --cause hum --noise heavy-tailed --rows 600 --uneven
-  cargo campaign rivals                        PySINDy and SysIdentPy on one record of each effect
+  cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
+  cargo campaign rivals                      beside PySINDy and SysIdentPy
 
 Exit codes: 0 success, 1 an aim was not met or the work failed, 2 bad arguments."
 )]
@@ -106,7 +106,7 @@ enum Part {
     Small,
     /// The same at 0.1, 0.2, 0.5 and 1 % noise
     Noise,
-    /// PySINDy and SysIdentPy: one record of each cause
+    /// Beside PySINDy and SysIdentPy: one record of each cause, and one of none
     Rivals,
 }
 
@@ -202,8 +202,8 @@ impl Cli {
             Part::Small => self.climbs(part, &[0.2]),
             Part::Noise => self.climbs(part, &[0.1, 0.2, 0.5, 1.0]),
             Part::Rivals => {
-                let bar = bar("rivals", Cause::ALL.len())?;
-                let rows = rivals::run(first, &diagnose, &bar)?;
+                let bar = bar("rivals", rivals::RECORDS)?;
+                let rows = rivals::run(first, &bar)?;
                 bar.finish_and_clear();
                 let markdown = rivals::table(&rows);
                 Ok(Done { part, markdown, wrong: String::new(), aims: Vec::new(), json: json!(rows) })

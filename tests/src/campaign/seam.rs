@@ -1,7 +1,10 @@
 //! The one place that calls the diagnosis.
 
 use anyhow::Result;
-use host_sim::diagnose::Options;
+use host_sim::diagnose::data::Data;
+use host_sim::diagnose::model::Simulator;
+use host_sim::diagnose::{Options, examine};
+use host_sim::record::Record;
 use serde_json::Value;
 
 use crate::hidden::Hidden;
@@ -15,4 +18,25 @@ pub type Diagnose<'a> = dyn Fn(&Hidden) -> Result<Value> + Sync + 'a;
 /// The record is refused.
 pub fn diagnose(hidden: &Hidden) -> Result<Value> {
     Ok(serde_json::to_value(host_sim::diagnose::diagnose(&hidden.record(), &Options::default())?)?)
+}
+
+/// What the model that the diagnosis makes of the first `rows` of a record foretells of all of it, in V, from the voltages
+/// alone; and the causes that it named.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn foretell(hidden: &Hidden, rows: usize) -> Result<(Vec<f64>, Vec<&'static str>)> {
+    let (whole, options) = (hidden.record(), Options::default());
+    let first = Record { name: whole.name.clone(), rows: whole.rows[..rows].to_vec() };
+    let learnt = examine(&first, &options, |_| ())?;
+    // Some numbers of the model are parts of the full scale that it was learnt at.
+    let data = Data { full_scale_v: learnt.data.full_scale_v, ..Data::new(&whole, options.input) };
+    let mut foretold = Vec::new();
+    Simulator::new(&data, &options.base).run(&learnt.extended.model, &mut foretold);
+    // A bound that readings stopped at exactly is a finding, but no part of the model.
+    let middle = learnt.data.reading.iter().sum::<f64>() / rows as f64;
+    for limit in learnt.report.findings.iter().filter_map(|finding| Some(finding.parameters.get("limit")?.value)) {
+        foretold.iter_mut().for_each(|y| *y = if limit > middle { y.min(limit) } else { y.max(limit) });
+    }
+    Ok((foretold, learnt.report.findings.iter().map(|finding| finding.cause).collect()))
 }
