@@ -82,3 +82,30 @@ fn usage(error: &clap::Error) -> ExitCode {
     eprintln!("{}: {}; see `--help`", Cli::command().get_name(), what.trim_start_matches("error: "));
     ExitCode::from(2)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of a terminal: a longer line is broken, and cannot be copied.
+    const COLUMNS: usize = 80;
+
+    #[test]
+    fn every_example_of_a_help_fits_the_terminal_and_is_a_command() {
+        let mut examples = 0;
+        for command in Cli::command().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            for line in help.lines().filter(|line| line.starts_with("  ")) {
+                assert!(line.len() <= COLUMNS, "{} columns: {line}", line.len());
+                // Without what is the shell's, and the comment.
+                let words = &line[line.find("vsj").expect("an example of vsj")..];
+                let words = words.split("  ").next().into_iter().flat_map(|words| words.split(" |")).next();
+                let words = words.unwrap_or_default();
+                let parsed = Cli::try_parse_from(words.split_whitespace());
+                assert!(parsed.is_ok(), "{line}: {}", parsed.err().map(|error| error.to_string()).unwrap_or_default());
+                examples += 1;
+            }
+        }
+        assert!(examples > 30, "{examples} examples");
+    }
+}

@@ -19,10 +19,10 @@ use super::{named, print, wrote};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj beam                                        the report's experiment, its aluminium foil, its layers
+  vsj beam                                        as in the report
   vsj beam --thickness-um 40 --force-un 500 --at-mm 10,30,59.8
-  vsj beam --force-un 500 --voltage-v 400 --json  the stack at 400 V, under 500 uN
-  vsj beam --experiment readings.csv --layers layers.csv --stack PET,PVdF,PET --out out/beam")]
+  vsj beam --force-un 500 --voltage-v 400 --json  the stack at 400 V, 500 uN
+  vsj beam --experiment readings.csv --layers layers.csv --stack PET,PVdF,PET")]
 pub(crate) struct Arguments {
     /// Readings of a beam experiment, with columns displacement_mm and force_un_<V>v; without it, the report's Table 1
     #[arg(long, value_name = "FILE.csv")]

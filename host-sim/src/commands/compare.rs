@@ -13,9 +13,9 @@ use super::print;
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj compare                                  none, paper and fast at 700 V and 1000 V
+  vsj compare                             none, paper, fast at 700 V and 1000 V
   vsj compare --limit-v 850 --slew-v-per-s 500
-  vsj compare --plant spring.toml --json       on another spring")]
+  vsj compare --plant spring.toml --json  on another spring")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]

@@ -1,5 +1,6 @@
 //! `vsj diagnose`: what the simulation gets wrong on measured data.
 
+use std::iter;
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -19,13 +20,13 @@ use super::{print, wrote};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj diagnose record.csv                        three sentences and a table
-  vsj diagnose record.csv --out out/diagnosis    with report.html, plots, residuals
-  vsj stair --plant out/diagnosis/plant.toml     the controller on the extended spring, in fixed point
-  vsj diagnose record.csv --json | jq .findings  for scripts
+  vsj diagnose record.csv                      three sentences and a table
+  vsj diagnose record.csv --out out/diagnosis  with a page, plots, residuals
+  vsj stair --plant out/diagnosis/plant.toml   the controller on what was found
+  vsj diagnose record.csv --json | jq .findings
   vsj diagnose data/table3_stair.csv --column measured --input stair
 
-Verdicts: consistent (nothing is wrong), explained, ambiguous (rival causes explain it as well), unexplained (no known
+Verdicts: consistent (nothing is wrong), explained, ambiguous (rival causes explain it as well), unexplained (no known \
 cause does), insufficient (the record cannot tell). All of them exit with 0.")]
 pub(crate) struct Arguments {
     /// The record
@@ -50,7 +51,9 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     fn origin(&self, record: &Record) -> Origin {
-        let command: Vec<String> = std::env::args_os().map(|word| quoted(&word.to_string_lossy())).collect();
+        // Not where the program lies: the page may be read elsewhere.
+        let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
+        let command: Vec<String> = iter::once("vsj".to_owned()).chain(words).collect();
         Origin {
             record: record.name.clone(),
             column: self.column.clone(),

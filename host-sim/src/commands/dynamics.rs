@@ -17,11 +17,11 @@ use super::{named, print, wrote};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj dynamics spring-damper               the report's input: stiffness 1, 4, 7, 1 for 30 s each, D = 10, L = 1, F = 10
+  vsj dynamics spring-damper           the report's input: 1, 4, 7, 1, 30 s each
   vsj dynamics zener --changes both --out out/zener
-  vsj dynamics analogue --json             the same springs as a circuit, and how far the two are apart
-  vsj dynamics pi-plant --input stair      the plant alone on the stair of Table 3
-  vsj dynamics zener --k1 5 --k2 0.5 --damper 3 --input levels.csv --between linear")]
+  vsj dynamics analogue --json         the same springs as a circuit
+  vsj dynamics pi-plant --input stair  the plant alone on the stair of Table 3
+  vsj dynamics zener --k1 5 --k2 0.5 --input levels.csv --between linear")]
 pub(crate) struct Arguments {
     /// The model
     #[arg(value_enum)]

@@ -17,10 +17,10 @@ use super::{named, print, wrote};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj joint                                       12 springs of the report's size around an inner radius of 20 mm
+  vsj joint                                     12 springs of the report's size
   vsj joint --springs 24 --inner-radius-mm 40 --outer-end clamped
-  vsj joint --stiffness 0.02                      which spring constant gives 0.02 N m/rad, and is it within reach
-  vsj joint --limit-v 1000 --within-s 1 --json    another amplifier, more time")]
+  vsj joint --stiffness 0.02                    what makes 0.02 N m/rad, if any
+  vsj joint --limit-v 1000 --within-s 1 --json  another amplifier, more time")]
 pub(crate) struct Arguments {
     /// Number of springs
     #[arg(long, default_value_t = 12, value_name = "N")]

@@ -19,11 +19,11 @@ use serde::Serialize;
 #[command(after_help = "\
 Examples:
   vsj link /dev/ttyACM0 status
-  vsj link /dev/ttyACM0 set 300 --arm --keep 60      arm, 300 V for a minute
+  vsj link /dev/ttyACM0 set 300 --arm --keep 60         arm, 300 V for a minute
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
-  vsj link unix:/tmp/mcu.sock watch                  the emulator
+  vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
-  vsj link /dev/ttyACM0 model out/diagnosis/plant.toml   run, and keep, what a diagnosis found
+  vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run what was found
 
 The MCU leads the voltage down when it has not heard the host for longer than its limit (see `status`): a target lives as \
 long as a command that keeps talking, --keep, watch or record. Each request is sent every 0.1 s until it is answered, for \

@@ -18,9 +18,9 @@ use serde::Serialize;
 #[command(after_help = "\
 Examples:
   vsj log firmware.elf capture.bin            a file that a debug probe wrote
-  qemu-system-arm ... | vsj log firmware.elf  live; Ctrl-C ends it with the summary
-  vsj log firmware.elf capture.bin --csv      columns time_s,level,event,message
-  vsj log firmware.elf capture.bin --json     one object with lines and summary
+  tail -f capture.bin | vsj log firmware.elf  live; ends with a summary
+  vsj log firmware.elf capture.bin --csv      time_s,level,event,message
+  vsj log firmware.elf capture.bin --json     one object, summary included
 
 Exit codes: 0 all read, 1 damaged or cut off but what could be read is printed, 2 not the log of this ELF.")]
 pub(crate) struct Arguments {

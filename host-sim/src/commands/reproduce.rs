@@ -13,9 +13,9 @@ use super::{print, wrote};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj reproduce                          what does not come out, most important first
-  vsj reproduce --json                   every number
-  vsj reproduce --out docs/reproduce     as a page
+  vsj reproduce                       what does not come out, and why
+  vsj reproduce --json                every number
+  vsj reproduce --out docs/reproduce  as a page
 
 The printed numbers are in data/printed.toml and the tables beside it.")]
 pub(crate) struct Arguments {

@@ -20,13 +20,13 @@ use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Plant, Sett
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj stair                                   the report's experiment, on the terminal
-  vsj stair --out out/stair                   with CSV and plots
-  vsj stair --controller none --input step    the spring left alone, ideal steps
-  vsj stair --limit-v 1000 --kp 8 --ki 2.7    another amplifier, other gains
-  vsj stair --controller fast --input step    as fast as the amplifier allows
-  vsj stair --plant spring.toml               another spring: hysteresis, leakage, several relaxations ...
-  vsj stair --input schedule.csv --json       any schedule with columns time_s,voltage_v")]
+  vsj stair                                 the report's experiment
+  vsj stair --out out/stair                 with CSV and plots
+  vsj stair --controller none --input step  the spring left alone, ideal steps
+  vsj stair --limit-v 1000 --kp 8 --ki 2.7  another amplifier, other gains
+  vsj stair --controller fast --input step  as fast as the amplifier allows
+  vsj stair --plant spring.toml             another spring: hysteresis, creep
+  vsj stair --input schedule.csv --json     any with columns time_s,voltage_v")]
 pub(crate) struct Arguments {
     /// Whose steps, CSV and voltage are shown: the spring left alone, the report's controller, or one as fast as the
     /// amplifier allows

@@ -17,9 +17,9 @@ use super::{print, wrote};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj tune                                    the report's spring at 700 V
+  vsj tune                                     the report's spring at 700 V
   vsj tune --limit-v 1000 --overshoot-percent 1
-  vsj tune --plant spring.toml --out out/tune  with t97 and overshoot over +-50 % error of the model, plotted
+  vsj tune --plant spring.toml --out out/tune  with plots of the cost of errors
   vsj tune --json | jq .fast")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
