@@ -89,7 +89,15 @@ fn every_file_is_written_and_named() {
 
     let made = |name: &str| fs::read_to_string(folder.path().join("made/here").join(name)).expect("a file");
     let page = made("report.html");
-    for part in ["charge-leakage", "tau_s = ", "held-out RMSE", "record.csv, column stiffness", "held between rows"] {
+    for part in [
+        "charge-leakage",
+        "tau_s = ",
+        "held-out RMSE",
+        ">extended</th>",
+        "<code>vsj diagnose record.csv --out made/here</code>",
+        "record.csv, column stiffness",
+        "held between rows",
+    ] {
         assert!(page.contains(part), "no {part:?} on the page");
     }
     // The plots are on the page and beside it.
@@ -280,7 +288,23 @@ fn a_poor_record_gets_a_verdict() {
         assert_eq!(names(&folder.path().join(format!("{name}.out"))), FILES, "{name}");
         let page = fs::read_to_string(folder.path().join(format!("{name}.out/report.html"))).expect("a page");
         assert!(page.contains(verdict) && !page.contains("NaN"), "{name}");
+        assert!(verdict != "insufficient" || !page.contains("xtended"), "{name}: nothing was extended");
     }
+}
+
+#[test]
+fn a_short_record_is_drawn_as_the_points_that_it_is() {
+    let folder = folder();
+    fs::write(folder.path().join("record.csv"), papers(17, |_| 0.0)).expect("a file");
+    let output = run(folder.path(), &["diagnose", "record.csv", "--out", "out"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let drawn = |name: &str, what: &str| {
+        fs::read_to_string(folder.path().join("out").join(name)).expect("a plot").matches(what).count()
+    };
+    // Readings, the simulation, and two dots in the legend; the command alone is a line.
+    assert_eq!((drawn("readings.svg", "<circle"), drawn("readings.svg", "<path")), (2 * 17 + 2, 1));
+    // The last row is 16 rows after the first.
+    assert_eq!((drawn("autocorrelation.svg", "<circle"), drawn("input_correlation.svg", "<circle")), (16, 17));
 }
 
 /// `docs/table3/` is what the diagnosis says of the report's own measurement today.

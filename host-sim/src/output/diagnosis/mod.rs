@@ -60,29 +60,37 @@ pub fn write(mut files: Files, diagnosis: &Diagnosis, origin: &Origin) -> Result
     files.finish()
 }
 
+/// True if the extended simulation differs from the one as it was.
+fn is_extended(diagnosis: &Diagnosis) -> bool {
+    !diagnosis.extended.model.blocks.is_empty()
+}
+
 fn figures(diagnosis: &Diagnosis) -> Vec<Figure> {
     let figure = |name, caption, svg| Figure { name, caption, svg };
-    vec![
-        figure(
-            "readings.svg",
+    let (beside, last) = if is_extended(diagnosis) {
+        (
             "Readings beside the simulation as it was and the extended one. Both run free: they see the voltage only.",
-            plots::readings(diagnosis),
-        ),
+            "How the extended simulation's whitened residual remembers itself. Chance stays within the band in 95 % of lags.",
+        )
+    } else {
+        (
+            "Readings beside the simulation. It runs free: it sees the voltage only.",
+            "How the simulation's whitened residual remembers itself. Chance stays within the band in 95 % of lags.",
+        )
+    };
+    vec![
+        figure("readings.svg", beside, plots::readings(diagnosis)),
         figure("residual.svg", "Readings less simulation: what is left, over time.", plots::residual(diagnosis)),
         figure(
             "residual_voltage.svg",
             "The same against the commanded voltage. A slope is a gain, a bow a nonlinearity, two branches a memory or a lag.",
             plots::residual_by_voltage(diagnosis),
         ),
-        figure(
-            "autocorrelation.svg",
-            "How the extended simulation's whitened residual remembers itself. Chance stays within the band in 95 % of lags.",
-            plots::autocorrelation(&diagnosis.report.residual),
-        ),
+        figure("autocorrelation.svg", last, plots::autocorrelation(&diagnosis.report)),
         figure(
             "input_correlation.svg",
             "What it remembers of the voltage's changes. Noise remembers nothing.",
-            plots::input_correlation(&diagnosis.report.residual),
+            plots::input_correlation(&diagnosis.report),
         ),
     ]
 }

@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::style;
 use super::tables;
-use super::{Figure, Origin};
+use super::{Figure, Origin, is_extended};
 use crate::diagnose::report::Verdict;
 use crate::diagnose::{Diagnosis, Input, text};
 
@@ -36,10 +36,15 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 @if let Some(leftover) = &report.leftover { p { (leftover) "." } }
                 h2 { "Evidence for the causes and their rivals" }
                 (tables::standings(diagnosis))
-                h2 { "What the cure is worth" }
-                (tables::quality(report))
-                h2 { "Gain on stretches that no fit has seen" }
-                (tables::folds(diagnosis))
+                @if is_extended(diagnosis) {
+                    h2 { "What the cure is worth" }
+                    (tables::quality(diagnosis))
+                    h2 { "Gain on stretches that no fit has seen" }
+                    (tables::folds(diagnosis))
+                } @else {
+                    h2 { "How well it fits" }
+                    (tables::quality(diagnosis))
+                }
                 h2 { "Next experiment" }
                 p {
                     @match &report.next_experiment {

@@ -17,21 +17,26 @@ pub fn panels(data: &Data, simulation: &[f64]) -> String {
     };
     let above: Vec<Plot> = vec![
         line(command(data), COMMAND, "commanded").with_dashed().into(),
-        line(each(&|row| simulation[row]), BEFORE, "simulation").into(),
         line(each(&|row| data.reading[row]), READING, "reading").into(),
+        line(each(&|row| simulation[row]), BEFORE, "simulation").into(),
     ];
     let below: Vec<Plot> =
         vec![line(each(&|row| data.reading[row] - simulation[row]), AFTER, "reading less simulation").into()];
     let (first, last) = (data.time_s[0], data.time_s[data.rows() - 1]);
-    let layout = |plots: &[Plot], y: &str| {
-        let layout = draw::layout(plots, Axes { title: "", x: "time [s]", y });
+    let layout = |plots: &[Plot], x: &str, y: &str| {
+        let layout = draw::layout(plots, Axes { title: "", x, y });
+        // Both panels as wide and as high: one stands below the other.
+        let layout = layout.with_force_margins(70.0, 10.0).with_force_margins_y(20.0, 50.0 * f64::from(!x.is_empty()));
         layout.with_x_axis_min(first).with_x_axis_max(last)
     };
-    let layouts = vec![layout(&above, "stiffness [V]"), layout(&below, "difference [V]")];
+    let layouts = vec![layout(&above, "", "stiffness [V]"), layout(&below, "time [s]", "difference [V]")];
     let figure = Figure::new(2, 1)
         .with_plots(vec![above, below])
         .with_layouts(layouts)
-        .with_cell_size(640.0, 200.0)
+        .with_cell_size(680.0, 180.0)
+        .with_row_height(1, 230.0)
+        .with_shared_x_all()
+        .with_spacing(0.0)
         .with_shared_legend();
     SvgBackend::new().render_scene(&figure.render())
 }

@@ -2,37 +2,43 @@
 
 use kuva::prelude::*;
 
+use super::is_extended;
 use super::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::diagnose::Diagnosis;
 use crate::diagnose::data::Data;
-use crate::diagnose::report::ResidualReport;
+use crate::diagnose::report::Report;
 use crate::output::draw::{self, Axes, line, thinned};
 
-/// Readings of a record with no more rows than this are points, not a line.
+/// A record with no more rows than this is drawn as points: a line would tell what is between them.
 const POINTS: usize = 120;
+/// Radius of a reading's point, and of a simulation's on it.
+const READ: f64 = 4.5;
+const SIMULATED: f64 = 3.0;
+/// Part of an axis by which it goes on beyond the points at its ends.
+const BEYOND: f64 = 0.015;
 
 /// Readings beside both simulations.
 pub fn readings(diagnosis: &Diagnosis) -> String {
     let Diagnosis { data, baseline, extended, .. } = diagnosis;
-    let each = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
-        (0..data.rows()).map(|row| (data.time_s[row], value(row))).collect()
-    };
-    let read = each(&|row| data.reading[row]);
-    let before = each(&|row| data.reading[row] - baseline.residual[row]);
-    let mut plots: Vec<Plot> = vec![line(command(data), COMMAND, "commanded").with_dashed().into()];
-    let few = data.rows() <= POINTS;
-    if !few {
-        plots.push(line(thinned(read.clone()), READING, "reading").into());
-    }
-    plots.push(line(thinned(before), BEFORE, "simulation").into());
+    let mut plots: Vec<Plot> = vec![
+        line(command(data), COMMAND, "commanded").with_dashed().into(),
+        by_row(data, |row| data.reading[row], READ, READING, "reading"),
+        by_row(data, |row| data.reading[row] - baseline.residual[row], SIMULATED, BEFORE, "simulation"),
+    ];
     if is_extended(diagnosis) {
-        let after = each(&|row| data.reading[row] - extended.residual[row]);
-        plots.push(line(thinned(after), AFTER, "extended").into());
-    }
-    if few {
-        plots.push(points(read, READING, "reading").with_size(3.5).into());
+        plots.push(by_row(data, |row| data.reading[row] - extended.residual[row], SIMULATED, AFTER, "extended"));
     }
     over_time(data, plots, "Readings and simulations", "voltage, scaled stiffness [V]")
+}
+
+/// A value of each row over time: a line, or points of that radius.
+fn by_row(data: &Data, value: impl Fn(usize) -> f64, radius: f64, colour: &str, name: &str) -> Plot {
+    let values = (0..data.rows()).map(|row| (data.time_s[row], value(row))).collect();
+    if data.rows() > POINTS {
+        line(thinned(values), colour, name).into()
+    } else {
+        points(values, colour, name).with_size(radius).into()
+    }
 }
 
 /// The commanded voltage, between the rows too; of a plateau, its ends.
@@ -60,13 +66,15 @@ pub(super) fn command(data: &Data) -> Vec<(f64, f64)> {
 
 /// What both simulations leave, over time.
 pub fn residual(diagnosis: &Diagnosis) -> String {
-    let times = &diagnosis.data.time_s;
-    let mut plots: Vec<Plot> = Vec::new();
-    for (residual, colour, name) in residuals(diagnosis) {
-        let left: Vec<(f64, f64)> = times.iter().copied().zip(residual.iter().copied()).collect();
-        plots.push(line(thinned(left), colour, name).into());
-    }
-    over_time(&diagnosis.data, plots, "Residual over time", "reading less simulation [V]")
+    let data = &diagnosis.data;
+    let of =
+        |(residual, colour, name): (&[f64], &str, &str)| by_row(data, |row| residual[row], SIMULATED, colour, name);
+    over_time(
+        data,
+        residuals(diagnosis).into_iter().map(of).collect(),
+        "Residual over time",
+        "reading less simulation [V]",
+    )
 }
 
 /// What both simulations leave, against the commanded voltage.
@@ -80,30 +88,46 @@ pub fn residual_by_voltage(diagnosis: &Diagnosis) -> String {
         plots.push(points(left, colour, name).with_size(2.5).with_marker_opacity(0.6).into());
     }
     let axes = Axes { title: "Residual against voltage", x: "commanded voltage [V]", y: "reading less simulation [V]" };
-    draw::svg(plots, axes)
+    let (low, high) = data.voltage_v.iter().fold((f64::MAX, f64::MIN), |(low, high), &v| (low.min(v), high.max(v)));
+    let layout = beyond(draw::layout(&plots, axes), low, high);
+    render_to_svg(plots, layout)
 }
 
 /// Autocorrelation of the whitened residual.
-pub fn autocorrelation(residual: &ResidualReport) -> String {
-    correlation(&residual.autocorrelation, 1, residual.band, "Residual with itself")
+pub fn autocorrelation(report: &Report) -> String {
+    correlation(report, &report.residual.autocorrelation, 1, "Residual with itself")
 }
 
 /// Correlation of the whitened residual with the voltage's changes.
-pub fn input_correlation(residual: &ResidualReport) -> String {
-    correlation(&residual.input_correlation, 0, residual.band, "Residual with the voltage's changes")
+pub fn input_correlation(report: &Report) -> String {
+    correlation(report, &report.residual.input_correlation, 0, "Residual with the voltage's changes")
 }
 
-/// Plots over the time of a record and no longer.
+/// Plots over the time of a record.
 fn over_time(data: &Data, plots: Vec<Plot>, title: &str, y: &str) -> String {
     let layout = draw::layout(&plots, Axes { title, x: "time [s]", y });
     let (first, last) = (data.time_s[0], data.time_s[data.rows() - 1]);
-    render_to_svg(plots, layout.with_x_axis_min(first).with_x_axis_max(last))
+    let layout = if data.rows() > POINTS {
+        layout.with_x_axis_min(first).with_x_axis_max(last)
+    } else {
+        beyond(layout, first, last)
+    };
+    render_to_svg(plots, layout)
 }
 
-fn correlation(values: &[f64], first_lag: usize, band: f64, title: &str) -> String {
+/// An axis from `low` to `high`, and a little more: a point at an end is drawn whole.
+fn beyond(layout: Layout, low: f64, high: f64) -> Layout {
+    let more = BEYOND * (high - low);
+    layout.with_x_axis_min(low - more).with_x_axis_max(high + more)
+}
+
+fn correlation(report: &Report, values: &[f64], first_lag: usize, title: &str) -> String {
+    // No two rows are farther apart than the record is long.
+    let values = &values[..values.len().min(report.rows - first_lag)];
+    let band = report.residual.band;
     let stems = values.iter().enumerate().map(|(index, &value)| ((index + first_lag) as f64, value));
     let plots: Vec<Plot> = vec![LollipopPlot::new().with_points(stems).with_color(AFTER).with_dot_radius(3.5).into()];
-    let reach = values.iter().fold(1.5 * band, |most: f64, value| most.max(1.1 * value.abs())).min(1.0);
+    let reach = values.iter().fold(1.5 * band, |most: f64, value| most.max(1.1 * value.abs())).min(1.1);
     let layout = draw::layout(&plots, Axes { title, x: "rows later", y: "correlation" })
         .with_shaded_region(ShadedRegion::horizontal(-band, band).with_color(COMMAND).with_opacity(0.25))
         .with_x_axis_min(-0.5)
@@ -118,11 +142,6 @@ fn correlation(values: &[f64], first_lag: usize, band: f64, title: &str) -> Stri
 
 fn points(data: Vec<(f64, f64)>, colour: &str, name: &str) -> ScatterPlot {
     ScatterPlot::new().with_data(data).with_color(colour).with_legend(name)
-}
-
-/// True if the extended simulation differs from the one as it was.
-fn is_extended(diagnosis: &Diagnosis) -> bool {
-    !diagnosis.extended.model.blocks.is_empty()
 }
 
 fn residuals(diagnosis: &Diagnosis) -> Vec<(&[f64], &'static str, &'static str)> {

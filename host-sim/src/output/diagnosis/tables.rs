@@ -2,9 +2,10 @@
 
 use maud::{Markup, html};
 
+use super::is_extended;
 use crate::diagnose::Diagnosis;
 use crate::diagnose::noise::scale_of_squares;
-use crate::diagnose::report::{Finding, Parameter, Report};
+use crate::diagnose::report::{Finding, Parameter};
 use crate::diagnose::standing::Standing;
 
 /// Each cause with its parameters.
@@ -29,7 +30,7 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
                         td.number { (number(finding.rmse_before)) }
                         td.number { (number(finding.rmse_after)) }
                     }
-                    tr { td.small colspan="5" { (finding.evidence) "." } }
+                    tr { td.small colspan="5" { div.evidence { (finding.evidence) "." } } }
                 }
             }
         } }
@@ -59,7 +60,7 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
             tbody {
                 @for (place, standing) in standings.iter().enumerate() {
                     tr.best[place == 0] {
-                        td.set { (set(&standing.causes)) div.small.note { (standing.values) } }
+                        td.set { (set(&standing.causes)) div.small.note { (values(&standing.values)) } }
                         td.number { (format!("{:.1}", behind(standing))) }
                         td.bar { i style=(width(behind(standing))) {} }
                         td.number { (number(standing.rmse)) }
@@ -76,6 +77,16 @@ fn set(causes: &[&str]) -> String {
     if causes.is_empty() { "none: the simulation as it was".to_owned() } else { causes.join(" + ") }
 }
 
+/// Values that are not broken within.
+fn values(list: &str) -> Markup {
+    html! {
+        @for (place, value) in list.split(", ").enumerate() {
+            @if place > 0 { ", " }
+            span.whole { (value) }
+        }
+    }
+}
+
 fn note(standings: &[Standing], place: usize) -> String {
     if place == 0 {
         return "the best".to_owned();
@@ -86,8 +97,9 @@ fn note(standings: &[Standing], place: usize) -> String {
     if without.is_empty() { String::new() } else { format!("the best without {}", without.join(", ")) }
 }
 
-/// Both simulations beside each other.
-pub(super) fn quality(report: &Report) -> Markup {
+/// Both simulations beside each other, if there are two.
+pub(super) fn quality(diagnosis: &Diagnosis) -> Markup {
+    let (report, extended) = (&diagnosis.report, is_extended(diagnosis));
     let (before, after) = (&report.baseline, &report.extended.quality);
     let rows = [
         ("free run RMSE [V]", before.rmse, after.rmse),
@@ -97,12 +109,14 @@ pub(super) fn quality(report: &Report) -> Markup {
     ];
     html! {
         div.scroll { table {
-            thead { tr { th { "" } th.number { "simulation" } th.number { "extended" } } }
+            thead { tr { th { "" } th.number.before { "simulation" } @if extended { th.number.after { "extended" } } } }
             tbody {
                 @for (what, before, after) in rows {
-                    tr { td { (what) } td.number { (number(before)) } td.number { (number(after)) } }
+                    tr { td { (what) } td.number { (number(before)) } @if extended { td.number { (number(after)) } } }
                 }
-                tr { td { "gain on held-out stretches [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) } }
+                @if extended {
+                    tr { td { "gain on held-out stretches [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) } }
+                }
             }
         } }
     }
@@ -125,7 +139,7 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
     html! {
         div.scroll { table {
             thead { tr {
-                th.number { "fold" } th.number { "rows" } th.number { "simulation [V]" } th.number { "extended [V]" } th { "" }
+                th.number { "fold" } th.number { "rows" } th.number.before { "simulation [V]" } th.number.after { "extended [V]" } th { "" }
                 th.number { "gain [%]" }
             } }
             tbody {
@@ -134,12 +148,17 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
                         td.number { (fold) } td.number { (rows) }
                         td.number { (number(before)) } td.number { (number(after)) }
                         td.bar { i.before style=(width(before)) {} i style=(width(after)) {} }
-                        td.number { (format!("{:.1}", 100.0 * (1.0 - after / before.max(1e-12)))) }
+                        td.number { (gain(before, after)) }
                     }
                 }
             }
         } }
     }
+}
+
+/// In percent; of a fold without any error there is none.
+fn gain(before: f64, after: f64) -> String {
+    if before > 0.0 { format!("{:.1}", 100.0 * (1.0 - after / before)) } else { "-".to_owned() }
 }
 
 /// The noise's law.
@@ -195,6 +214,11 @@ mod tests {
         ] {
             assert_eq!(number(value), text);
         }
+    }
+
+    #[test]
+    fn a_fold_without_error_has_nothing_to_gain() {
+        assert_eq!([gain(0.0, 0.0), gain(4.0, 1.0), gain(1.0, 2.0)], ["-", "75.0", "-100.0"]);
     }
 
     #[test]
