@@ -148,7 +148,7 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         (&["beam", "--voltage-v", "-1"], "--voltage-v: voltage_v = -1"),
         (&["beam", "--interlayer", "-1"], "--interlayer: interlayer_pa_per_m = -1"),
         (&["beam", "--elements", "0"], "--elements: elements = 0"),
-        (&["beam", "--stack", "PET,PVdF,PET"], "the stack has 0 layer(s) of aluminium; expected 2"),
+        (&["beam", "--stack", "PET,PVdF,PET"], "--stack: 0 layer(s) of aluminium; expected 2"),
         (&["beam", "--layers", "no.csv"], "no.csv: cannot be read"),
         (&["beam", "--layers", "l.csv"], "l.csv, line 1: no column `length_mm`"),
         (&["beam", "--experiment", "r.csv"], "r.csv, line 4, column force_un_0v: `x` is not a finite number"),

@@ -127,7 +127,11 @@ impl Stack {
         for kind in kinds {
             let listed = names.iter().filter(|name| **name == kind.material).count();
             if listed != kind.count {
-                bad_input!("the stack has {listed} layer(s) of {}; expected {}", kind.material, kind.count);
+                bad_input!(
+                    "--stack: {listed} layer(s) of {}; expected {}, as among the layers",
+                    kind.material,
+                    kind.count
+                );
             }
         }
         let layer = |name: &&str| match kinds.iter().find(|kind| kind.material == **name) {
@@ -140,7 +144,7 @@ impl Stack {
             }),
             None => {
                 let known: Vec<&str> = kinds.iter().map(|kind| kind.material.as_str()).collect();
-                bad_input!("the stack lists `{name}`, which is not among the layers; expected {}", known.join(", "))
+                bad_input!("--stack: `{name}` is not among the layers; expected {}", known.join(", "))
             }
         };
         Self::new(names.iter().map(layer).collect::<Result<_>>()?)
@@ -241,8 +245,8 @@ mod tests {
             (with(|k| k[2].width_mm = -1.0), "layer 1 (PET): width_m = -0.001 is not allowed"),
             (with(|k| k[3].youngs_modulus_gpa = f64::NAN), "layer 3 (PVdF): youngs_modulus_pa = NaN"),
             (with(|k| k[3].length_mm = 90.0), "layer 3 (PVdF): length_m = 0.09 is not allowed"),
-            (with(|k| k.truncate(3)), "the stack lists `PVdF`, which is not among the layers"),
-            (Stack::in_order(&kinds, "PET,PVdF,PET").unwrap_err().to_string(), "the stack has 0 layer(s) of aluminium"),
+            (with(|k| k.truncate(3)), "--stack: `PVdF` is not among the layers"),
+            (Stack::in_order(&kinds, "PET,PVdF,PET").unwrap_err().to_string(), "--stack: 0 layer(s) of aluminium"),
             (Stack::new(Vec::new()).unwrap_err().to_string(), "the stack has no layers"),
             (Stack::new(vec![thin; 21]).unwrap_err().to_string(), "the stack has 21 layers; expected at most 20"),
         ] {

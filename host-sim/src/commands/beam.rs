@@ -22,7 +22,8 @@ Examples:
   vsj beam                                        as in the report
   vsj beam --thickness-um 40 --force-un 500 --at-mm 10,30,59.8
   vsj beam --force-un 500 --voltage-v 400 --json  the stack at 400 V, 500 uN
-  vsj beam --experiment readings.csv --layers layers.csv --stack PET,PVdF,PET")]
+  vsj beam --experiment readings.csv --layers layers.csv
+  vsj beam --stack PET,aluminium,nylon,PVdF,aluminium,PET")]
 pub(crate) struct Arguments {
     /// Readings of a beam experiment, with columns displacement_mm and force_un_<V>v; without it, the report's Table 1
     #[arg(long, value_name = "FILE.csv")]
