@@ -78,13 +78,14 @@ Examples:
     Proof,
     /// Run the fault drills under QEMU
     ///
-    /// Panic, hard fault, stack overflow, stalled task, hanging control, overrun, interlock, silent host. Exits with 1
-    /// unless the voltage goes away on the DAC's wire and the log is the approved one.
+    /// Panic, hard fault, stack overflow, the same with floats in use, stalled task, hanging control, the same with
+    /// interrupts off, overrun, interlock, silent host. Exits with 1 unless the voltage goes away on the DAC's wire and
+    /// the log is the approved one.
     Drill(drill::Args),
     /// Let a host talk to the emulated firmware
     ///
-    /// Arms it, sets a stiffness, falls silent; then up to 10 000 damaged, random, late and foreign frames while armed, for
-    /// at most 20 s. Exits with 1 if one of them is followed or a tick is missed. A part of `test`.
+    /// Arms it, sets a stiffness, falls silent; then 10 000 damaged, random, late and foreign frames while armed,
+    /// in about a minute. Exits with 1 if one of them is followed or a tick is missed. A part of `test`.
     Talk,
     /// The whole story: run, diagnose, extend, run again
     ///
@@ -117,10 +118,7 @@ Examples:
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Exits with 1 if Rust is slower
     /// than its bounds allow.
-    #[command(
-        after_help = "Example:\n  cargo xtask boot             that image on register models: safe at boot and after a fault?
-  cargo xtask bench --json | jq .within_bounds"
-    )]
+    #[command(after_help = "Example:\n  cargo xtask bench --json | jq .within_bounds")]
     Bench(bench::Args),
 }
 
