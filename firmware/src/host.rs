@@ -18,7 +18,7 @@ use crate::RATE_HZ;
 use crate::control::{Control, Orders, Tick};
 use crate::post::{Letter, Post};
 use crate::roll_call::Member;
-use crate::script::SUPERVISION;
+use crate::settings::SUPERVISION;
 use crate::start::{self, Start};
 use crate::stop;
 use crate::store::{Pages, Store};

@@ -2,7 +2,7 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`blocks`] | the tick of each kind of spring under each controller, to be counted |
+//! | `blocks` | the tick of each kind of spring under each controller, to be counted (feature `fast`) |
 //! | [`board`] | what a board must be able to do |
 //! | [`control`] | one control tick: supervisor, model, supervisor |
 //! | [`pace`] | when the next tick is due, and how many were missed |
@@ -10,6 +10,7 @@
 //! | [`roll_call`] | the watchdog is fed only when every task has checked in |
 //! | [`store`] | the model that outlives a power cut |
 //! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
+//! | [`settings`] | what an image runs |
 //! | [`digest`] | one number for a whole run |
 //! | `last_words`, `stop` | what survives a reset; panic and hard fault |
 //! | `hang_guard` | a control task that hangs is stopped |
@@ -37,6 +38,7 @@ pub mod pace;
 pub mod post;
 pub mod roll_call;
 pub mod script;
+pub mod settings;
 pub mod store;
 
 #[cfg(feature = "mcu")]

@@ -70,7 +70,7 @@ impl Post {
 mod tests {
     use super::*;
     use crate::control::{Control, Senses, Untimed};
-    use crate::script::{SETTINGS, SUPERVISION};
+    use crate::settings::{SETTINGS, SUPERVISION};
     use model::supervisor::{Command, Fault};
 
     const DISARM: Order = Order { command: Some(Command::Disarm), target: None };

@@ -4,21 +4,18 @@
 //! | --- | --- |
 //! | `stair` | the report's stair: 70 s, from 20 s on every 10 s up by 100 V in 0.1 s |
 //! | `up-down` | 95 s: every 10 s up by 100 V to 500 V, then down to 100 V; the emulated board has a spring at its amplifier port |
+//! | `up-down fast` | the same under the time-optimal controller, in an image that has it (feature `fast`) |
 //! | `random SEED` | 100 000 ticks of arming, disarming, target jumps, an interlock that opens, a host that falls silent |
 //! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `silence` | fault drills |
 //! | (after a reset by a fault) | the aftermath: nothing may leave until the fault is acknowledged |
 
 use link::WireModel;
 use model::supervisor::Command;
-use model::{Settings, Volts, supervisor};
+use model::{Settings, Volts};
 
 use crate::control::{Control, Orders, Senses, Tick, Untimed};
 use crate::digest::Digest;
-
-/// Settings of every run.
-pub const SETTINGS: Settings = Settings::PAPER;
-/// Supervision of every run.
-pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
+use crate::settings::{Leader, SETTINGS, SUPERVISION};
 
 /// Ticks of the stair, 70 s.
 pub const STAIR_TICKS: u32 = 70_000;
@@ -26,8 +23,6 @@ pub const STAIR_TICKS: u32 = 70_000;
 pub const UP_DOWN_TICKS: u32 = 95_000;
 /// Ticks of a random run, 100 s.
 pub const RANDOM_TICKS: u32 = 100_000;
-/// Name of the way up and down.
-pub const UP_DOWN: &str = "up-down";
 /// When a drill arms.
 pub const ARM_TICK: u32 = 10;
 /// When a drill's mishap happens.
@@ -107,7 +102,7 @@ pub enum Script {
     /// See the module.
     Stair,
     /// See the module.
-    UpDown,
+    UpDown(Leader),
     /// See the module.
     Random(Random),
     /// See the module.
@@ -129,8 +124,8 @@ impl Script {
         if name == "stair" {
             return Some(Self::Stair);
         }
-        if name == UP_DOWN {
-            return Some(Self::UpDown);
+        if let Some(leader) = Leader::ALL.iter().find(|leader| leader.up_down() == name) {
+            return Some(Self::UpDown(*leader));
         }
         if let Some(seed) = name.strip_prefix("random ") {
             return seed.parse().ok().map(Self::random);
@@ -138,11 +133,19 @@ impl Script {
         Mishap::ALL.into_iter().find(|mishap| mishap.name() == name).map(Self::Drill)
     }
 
+    /// Spring and controller that it is played with.
+    pub const fn settings(&self) -> &'static Settings {
+        match self {
+            Self::UpDown(leader) => leader.settings(),
+            Self::Stair | Self::Random(_) | Self::Drill(_) | Self::Aftermath => &SETTINGS,
+        }
+    }
+
     /// How many ticks it has.
     pub const fn ticks(&self) -> u32 {
         match self {
             Self::Stair => STAIR_TICKS,
-            Self::UpDown => UP_DOWN_TICKS,
+            Self::UpDown(_) => UP_DOWN_TICKS,
             Self::Random(_) => RANDOM_TICKS,
             Self::Drill(_) => 1500,
             Self::Aftermath => 200,
@@ -156,7 +159,7 @@ impl Script {
         }
         Some(match self {
             Self::Stair => calm(arm_at(tick, 0), stair_v(tick)),
-            Self::UpDown => calm(arm_at(tick, 0), up_down_v(tick)),
+            Self::UpDown(_) => calm(arm_at(tick, 0), up_down_v(tick)),
             Self::Random(random) => random.step(tick),
             Self::Drill(mishap) => drill(*mishap, tick),
             Self::Aftermath => calm(aftermath(tick), 300),
@@ -273,9 +276,10 @@ pub fn rehearse_with(
     found: Option<&WireModel>,
     mut each: impl FnMut(&Control, &Tick),
 ) -> Result<Digest, model::OutOfRange> {
-    let mut control = Control::new(&SETTINGS, &SUPERVISION, None)?;
+    let settings = script.settings();
+    let mut control = Control::new(settings, &SUPERVISION, None)?;
     if let Some(found) = found {
-        control.take_on(&SETTINGS, found)?;
+        control.take_on(settings, found)?;
     }
     let mut digest = Digest::default();
     let mut number = 0;
@@ -297,6 +301,8 @@ mod tests {
     #[test]
     fn names_lead_to_scripts() {
         assert_eq!(Script::parse("stair"), Some(Script::Stair));
+        assert_eq!(Script::parse("up-down"), Some(Script::UpDown(Leader::Paper)));
+        assert_eq!(Script::parse("up-down fast").is_some(), cfg!(feature = "fast"));
         assert_eq!(Script::parse("random 7"), Some(Script::random(7)));
         assert_eq!(Script::parse("stall\n"), Some(Script::Drill(Mishap::Stall)));
         assert_eq!((Script::parse("random"), Script::parse("")), (None, None));

@@ -3,11 +3,11 @@
 use cortex_m::singleton;
 use link::{ModelId, Reason, WireModel};
 use model::supervisor::Fault;
-use model::{Amplifier, OutOfRange};
+use model::{Amplifier, OutOfRange, Settings};
 
 use crate::control::Control;
 use crate::log;
-use crate::script::{SETTINGS, SUPERVISION};
+use crate::settings::{SETTINGS, SUPERVISION};
 use crate::store::{Pages, Store};
 
 /// What a start comes to.
@@ -26,15 +26,16 @@ pub struct Start {
 /// [`OutOfRange`] names the setting.
 #[inline(never)]
 pub fn control<P: Pages>(
+    settings: &Settings,
     store: &Store<P>,
     last_fault: Option<Fault>,
 ) -> Result<Option<(&'static mut Control, Start)>, OutOfRange> {
     let Some(place) = singleton!(: Option<Control> = None) else { return Ok(None) };
-    build(last_fault, place)?;
+    build(settings, last_fault, place)?;
     let Some(control) = place else { return Ok(None) };
-    let mut start = Start { model: ModelId::default(), amplifier: SETTINGS.amplifier, last_fault };
+    let mut start = Start { model: ModelId::default(), amplifier: settings.amplifier, last_fault };
     if let Some((model, payload)) = store.newest() {
-        match take_on(control, payload) {
+        match take_on(settings, control, payload) {
             Ok(amplifier) => (start.model, start.amplifier) = (model, amplifier),
             Err(field) => {
                 log::refused(field);
@@ -58,15 +59,15 @@ pub fn check(payload: &[u8]) -> Result<(), Reason> {
 }
 
 #[inline(never)]
-fn take_on(control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
+fn take_on(settings: &Settings, control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
     let found = WireModel::read(payload);
     let Some(found) = &found else { return Err("format") };
-    control.take_on(&SETTINGS, found).map_err(|error| error.field)?;
-    Ok(found.behind(SETTINGS.amplifier))
+    control.take_on(settings, found).map_err(|error| error.field)?;
+    Ok(found.behind(settings.amplifier))
 }
 
 #[inline(never)]
-fn build(last_fault: Option<Fault>, place: &mut Option<Control>) -> Result<(), OutOfRange> {
-    *place = Some(Control::new(&SETTINGS, &SUPERVISION, last_fault)?);
+fn build(settings: &Settings, last_fault: Option<Fault>, place: &mut Option<Control>) -> Result<(), OutOfRange> {
+    *place = Some(Control::new(settings, &SUPERVISION, last_fault)?);
     Ok(())
 }

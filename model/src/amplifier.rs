@@ -146,7 +146,7 @@ impl Config {
             // Rounded down: the highest code never stands for more than the full scale.
             volts_per_code: I3F29::from_bits((unit * f64::from(1 << 29)) as i32),
         };
-        // A hair's breadth keeps an end that is a code's own voltage from losing that code to float rounding.
+        // Rounded up and down; a hair's breadth keeps an end that is a code's own voltage from losing that code.
         let hair = 1e-9;
         config.lowest = config.volts(DacCode((amplifier.min_v / unit + (1.0 - hair)) as u16)).0;
         config.highest = config.volts(DacCode((amplifier.max_v / unit + hair) as u16)).0;

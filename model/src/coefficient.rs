@@ -114,7 +114,7 @@ impl Steep {
     /// The nearest to a positive, finite `value`; beyond its range, the end.
     #[inline(never)]
     pub(crate) fn new(value: f64) -> Self {
-        // In halves of a power of two, of which a positive number's bits are made; so they sort like the numbers.
+        // The bits of a positive number are its exponent over its mantissa, so they sort like the number.
         let bits = value.to_bits().max((1.0 / TWO_TO_32).to_bits()).min(TWO_TO_29.to_bits());
         let mantissa = bits & ((1 << 52) - 1) | 1 << 52;
         Self { mantissa: ((mantissa + (1 << 22)) >> 23) as i32, shift: (1052 - (bits >> 52)) as u8 }

@@ -53,9 +53,15 @@ impl Board {
     }
 }
 
-/// Builds an image and returns its ELF file.
+/// Builds an image as it is flashed and returns its ELF file.
 pub(crate) fn build(board: Board, opt: Opt) -> Result<PathBuf> {
-    compile(board.name(), opt, ["--bin", board.name()], board.name())
+    build_with(&[], board, opt)
+}
+
+/// As [`build`], with these features of the firmware's.
+pub(crate) fn build_with(features: &[&str], board: Board, opt: Opt) -> Result<PathBuf> {
+    let features = [&[board.name()], features].concat().join(",");
+    compile(&features, opt, ["--bin", board.name()], board.name())
 }
 
 /// As [`build`], of an example of the firmware, with these features of it.

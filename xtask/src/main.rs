@@ -96,13 +96,14 @@ Examples:
 Examples:
   cargo xtask story                                three effects, as in `test`
   cargo xtask story --effect hysteresis gain-error
+  cargo xtask story --controller fast
   cargo xtask story --all --json")]
     Story(story::Args),
     /// Write the image to the real board and show its log (probe-rs)
     Flash,
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 64 KB, RAM below 16 KB and the stack in its place.
+    /// Exits with 1 unless flash stays below 64 KB, RAM below 16 KB and the stack in its place. With --fast it only measures.
     Size(size::Args),
     /// Make the MCU's images: ELF, bin and hex
     ///

@@ -20,7 +20,8 @@ use anyhow::{Context, Result, bail, ensure};
 use end_to_end::hidden::live::Live;
 use end_to_end::hidden::{Block, Cause, Effect, Noise, Schedule};
 use firmware::RATE_HZ;
-use firmware::script::{self, Script, UP_DOWN, UP_DOWN_TICKS, up_down_v};
+use firmware::script::{self, Script, UP_DOWN_TICKS, up_down_v};
+use firmware::settings::Leader;
 use host_sim::plant_file;
 use link::{ModelId, WireModel};
 use model::Plant;
@@ -53,6 +54,9 @@ pub(crate) struct Args {
     /// Hide each effect in turn, and none
     #[arg(long, conflicts_with = "effect")]
     all: bool,
+    /// Who leads the spring: `paper`, or `fast` in an image of its own
+    #[arg(long, default_value = "paper", value_parser = leader)]
+    controller: Leader,
     /// Where the effects' sizes and the noise come from
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -60,13 +64,21 @@ pub(crate) struct Args {
     #[arg(long)]
     json: bool,
     /// Approve the summary of the three effects as it is now
-    #[arg(long, conflicts_with_all = ["effect", "all"])]
+    #[arg(long, conflicts_with_all = ["effect", "all", "controller"])]
     bless: bool,
 }
 
 fn named(name: &str) -> Result<Cause, String> {
     let names: Vec<_> = Cause::ALL.iter().map(|cause| cause.name()).collect();
     Cause::named(name).ok_or_else(|| format!("expected one of {}", names.join(", ")))
+}
+
+fn leader(name: &str) -> Result<Leader, String> {
+    match name {
+        "paper" => Ok(Leader::Paper),
+        "fast" => Ok(Leader::Fast),
+        _ => Err("expected paper or fast".to_owned()),
+    }
 }
 
 /// What came of one effect.
@@ -112,7 +124,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         (false, []) => IN_TEST.map(Some).to_vec(),
         (false, given) => given.iter().copied().map(Some).collect(),
     };
-    let stage = Stage::new()?;
+    let stage = Stage::new(args.controller)?;
     let mut told = Vec::new();
     for effect in effects {
         let one = stage.tell(effect, args.seed).with_context(|| name(effect))?;
@@ -133,7 +145,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 /// As a step of `cargo xtask test`: three effects, the summary as approved.
 pub(crate) fn check() -> Result<()> {
     let begin = Instant::now();
-    let stage = Stage::new()?;
+    let stage = Stage::new(Leader::Paper)?;
     let told = IN_TEST.iter().map(|cause| stage.tell(Some(*cause), 1)).collect::<Result<Vec<_>>>()?;
     table::compare(&told)?;
     eprint!("{}", table::table(&told, 2));
@@ -147,6 +159,7 @@ fn name(effect: Option<Cause>) -> &'static str {
 
 /// What every story needs.
 struct Stage {
+    leader: Leader,
     elf: PathBuf,
     vsj: PathBuf,
     folder: PathBuf,
@@ -156,12 +169,16 @@ struct Stage {
 }
 
 impl Stage {
-    fn new() -> Result<Self> {
-        let elf = image::build(Board::Mps2, Opt::S)?;
+    fn new(leader: Leader) -> Result<Self> {
+        let features: &[&str] = match leader {
+            Leader::Paper => &[],
+            Leader::Fast => &["fast"],
+        };
+        let elf = image::build_with(features, Board::Mps2, Opt::S)?;
         shell::run(shell::cargo().args(["build", "--quiet", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
         let target = image::target_directory()?;
         let (mut rows, mut top_v, mut tick) = (Vec::new(), 0f64, 0);
-        script::rehearse(Script::UpDown, |_, done| {
+        script::rehearse(Script::UpDown(leader), |_, done| {
             if tick % EVERY == 0 {
                 rows.push((tick as f64 / f64::from(RATE_HZ), done.output.applied.to_f64()));
             }
@@ -170,6 +187,7 @@ impl Stage {
         })?;
         let (time_s, voltage_v) = rows.into_iter().unzip();
         Ok(Self {
+            leader,
             elf,
             vsj: target.join("release/vsj"),
             folder: target.join("story"),
@@ -221,8 +239,8 @@ impl Stage {
 
     /// One way up and down on the board, held against this machine.
     fn lead(&self, folder: &Path, spring: Live, found: Option<&WireModel>) -> Result<Vec<Moment>> {
-        let (run, moments) = lock_step::run(&self.elf, folder, spring)?;
-        Comparison::with(UP_DOWN, found, &run)?.check()?;
+        let (run, moments) = lock_step::run(&self.elf, self.leader.up_down(), folder, spring)?;
+        Comparison::with(self.leader.up_down(), found, &run)?.check()?;
         ensure!(moments.len() == UP_DOWN_TICKS as usize, "{} ticks at the spring", moments.len());
         Ok(moments)
     }

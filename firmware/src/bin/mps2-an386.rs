@@ -18,6 +18,7 @@ use firmware::mps2::uart::Uart;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
 use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
 use firmware::script::Script;
+use firmware::settings::SETTINGS;
 use firmware::start;
 use firmware::store::Store;
 use firmware::{hang_guard, stack_guard, tasks};
@@ -52,11 +53,15 @@ fn main() -> ! {
         (None, Some(script)) => Mode::Play(script),
         (None, None) => semihosting::exit(EXIT_NO_SCRIPT),
     };
-    if matches!(mode, Mode::Play(Script::UpDown)) && !board.amplifier().connect() {
+    if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
     let mut store = Store::new(Flash::init());
-    let started = start::control(&store, last_fault);
+    let settings = match &mode {
+        Mode::Play(script) => script.settings(),
+        Mode::Link => &SETTINGS,
+    };
+    let started = start::control(settings, &store, last_fault);
     let (control, desk) = match started
         .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start)?))).transpose())
     {

@@ -5,7 +5,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::control::{Control, Orders, Senses, Untimed};
-use firmware::script::{SETTINGS, SUPERVISION};
+use firmware::settings::{SETTINGS, SUPERVISION};
 use link::{Desired, Frame, Packet, Receiver, Reply, Request, Sequence, State, WireVolts};
 use model::Volts;
 use model::supervisor::Command;

@@ -10,7 +10,7 @@ use std::thread;
 
 use anyhow::{Context, Result, anyhow};
 use end_to_end::hidden::live::Live;
-use firmware::script::{SETTINGS, UP_DOWN};
+use firmware::settings::SETTINGS;
 
 use crate::emulator::{self, Run};
 use crate::shell;
@@ -31,8 +31,8 @@ pub(super) struct Moment {
     pub(super) read_v: f64,
 }
 
-/// Runs the way up and down in `folder`; the run, and every tick of the spring.
-pub(super) fn run(elf: &Path, folder: &Path, spring: Live) -> Result<(Run, Vec<Moment>)> {
+/// Runs the way up and down of this name in `folder`; the run, and every tick of the spring.
+pub(super) fn run(elf: &Path, name: &str, folder: &Path, spring: Live) -> Result<(Run, Vec<Moment>)> {
     for pipe in PIPES.map(|name| folder.join(name)) {
         match fs::remove_file(&pipe) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
@@ -41,7 +41,7 @@ pub(super) fn run(elf: &Path, folder: &Path, spring: Live) -> Result<(Run, Vec<M
     }
     thread::scope(|scope| {
         let beside = scope.spawn(|| serve(folder, spring));
-        let run = emulator::play_in(folder, elf, UP_DOWN, emulator::SHIFT, |_| {});
+        let run = emulator::play_in(folder, elf, name, emulator::SHIFT, |_| {});
         // If the board never came, whoever waits for it does so no longer.
         for pipe in PIPES {
             drop(OpenOptions::new().read(true).write(true).open(folder.join(pipe)));
