@@ -10,8 +10,9 @@
 
 use super::bank::Bank;
 use super::law::Law;
+use super::leakage::{Loss, Lost};
 use super::relaxation::Relaxation;
-use super::signal::{Lag, Signal};
+use super::signal::Signal;
 use crate::plant_file::{Amplifier, Leakage, PlantFile};
 
 /// Everything between the command and the stiffness that a plant file can hold.
@@ -27,7 +28,7 @@ pub struct Chain<'a> {
     /// The static law.
     pub law: Law<'a>,
     /// Losses of charge; a plant file holds the first.
-    pub leakages: Vec<Leakage>,
+    pub losses: Vec<Loss>,
     /// What comes at once, and what later.
     pub relaxation: Relaxation,
 }
@@ -46,7 +47,7 @@ impl<'a> Chain<'a> {
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
             memory: Bank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
-            leakages: file.leakage.iter().cloned().collect(),
+            losses: file.leakage.iter().map(Loss::of).collect(),
             relaxation,
         }
     }
@@ -62,9 +63,21 @@ impl<'a> Chain<'a> {
         if self.memory.fits() {
             file.memory = self.memory.table();
         }
-        file.law = self.law.table(full_scale_v);
-        file.leakage = self.leakages.first().cloned();
-        self.relaxation.extend(file);
+        let (gain, relaxation, leakage) = self.passed();
+        file.law = self.law.table(gain, full_scale_v);
+        file.leakage = leakage;
+        relaxation.extend(file);
+    }
+
+    /// Gain, relaxation and loss as a plant file has them.
+    fn passed(&self) -> (f64, Relaxation, Option<Leakage>) {
+        match self.losses.first() {
+            Some(loss) if loss.at_once > 0.0 => match loss.passed(&self.relaxation) {
+                Some((gain, share, leakage)) => (gain, Relaxation { share, ..self.relaxation }, Some(leakage)),
+                None => (1.0, self.relaxation, None),
+            },
+            loss => (1.0, self.relaxation, loss.map(|loss| Leakage { share: loss.share, tau_s: loss.tau_s })),
+        }
     }
 
     /// From the command to the spring's electrodes.
@@ -96,15 +109,12 @@ impl<'a> Chain<'a> {
         if !self.law.is_none() {
             signal.map(|voltage| self.law.at(voltage));
         }
-        for Leakage { share, tau_s } in &self.leakages {
-            let mut lag = Lag::at(*tau_s, signal.before);
-            signal.before *= 1.0 - share;
-            signal.pass(|piece| {
-                let (start, end) = lag.pass(piece);
-                (piece.from - share * start, piece.to - share * end)
-            });
-        }
+        let mut lost = Lost::default();
+        self.losses.iter().for_each(|loss| loss.take(signal, &mut lost));
         signal.before += ahead_v;
         self.relaxation.pass(signal, levels_v);
+        if !lost.is_none() {
+            lost.off(signal);
+        }
     }
 }

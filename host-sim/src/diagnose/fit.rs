@@ -49,13 +49,17 @@ pub struct Engine<'a> {
     pub observed: &'a Observed,
     /// Runs the models.
     pub simulator: Simulator<'a>,
+    /// Readings less what the simulation without any block predicts, in V.
+    pub simulation: Vec<f64>,
     predicted: Vec<f64>,
 }
 
 impl<'a> Engine<'a> {
     /// For one record.
     pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
-        Self { data, observed, simulator, predicted: Vec::new() }
+        let mut engine = Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new() };
+        engine.simulation = engine.residual(&Model::default());
+        engine
     }
 
     /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.

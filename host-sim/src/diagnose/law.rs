@@ -2,6 +2,7 @@
 
 use model::extended::law::MOST_POINTS;
 
+use super::knots::{Point, knots};
 use crate::plant_file;
 
 /// Laws one behind the other.
@@ -13,6 +14,8 @@ pub struct Law<'a> {
 
 /// A chord that departs from its curve by less, as a part of the full scale, is the curve.
 const STRAIGHT: f64 = 1e-7;
+/// Parts of the full scale at which a curve is looked at.
+const STEPS: usize = 1000;
 
 impl<'a> Law<'a> {
     /// Of a plant file; none is the straight line.
@@ -36,34 +39,17 @@ impl<'a> Law<'a> {
         self.behind.iter().fold(first, |value, law| law(value))
     }
 
-    /// For a plant file: at the points of the file's own, and at more up to `full_scale_v` where it bends most.
-    pub fn table(&self, full_scale_v: f64) -> Option<plant_file::Law> {
-        if self.behind.is_empty() {
+    /// For a plant file, `gain` times it: through knots up to `full_scale_v` or as far as the file's own law goes.
+    pub fn table(&self, gain: f64, full_scale_v: f64) -> Option<plant_file::Law> {
+        if self.behind.is_empty() && gain == 1.0 {
             return self.table.cloned();
         }
-        let mut voltage_v = self.table.map_or_else(|| vec![0.0, full_scale_v], |table| table.voltage_v.clone());
-        let chord =
-            |a: f64, b: f64, part: f64| self.at(a + part * (b - a)) - self.at(a) - part * (self.at(b) - self.at(a));
-        let bend =
-            |a: f64, b: f64| [0.25, 0.5, 0.75].map(|part| chord(a, b, part).abs()).into_iter().fold(0.0, f64::max);
-        if voltage_v[voltage_v.len() - 1] < full_scale_v && voltage_v.len() < MOST_POINTS {
-            voltage_v.push(full_scale_v);
-        }
-        while voltage_v.len() < MOST_POINTS {
-            let bends = voltage_v.windows(2).map(|pair| bend(pair[0], pair[1])).enumerate();
-            let Some((at, most)) = bends.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-            if most < STRAIGHT * full_scale_v {
-                break;
-            }
-            voltage_v.insert(at + 1, (voltage_v[at] + voltage_v[at + 1]) / 2.0);
-        }
-        // A chord is off on one side of its bow: half of that to either side.
-        let bows: Vec<f64> = voltage_v.windows(2).map(|pair| chord(pair[0], pair[1], 0.5)).collect();
-        let mut stiffness: Vec<f64> = voltage_v.iter().map(|&voltage| self.at(voltage)).collect();
-        for (point, value) in stiffness.iter_mut().enumerate().skip(1) {
-            let after = bows.get(point).copied().unwrap_or(bows[point - 1]);
-            *value += (bows[point - 1] + after) / 4.0;
-        }
+        let mut voltage_v: Vec<f64> = (0..=STEPS).map(|step| full_scale_v * step as f64 / STEPS as f64).collect();
+        voltage_v.extend(self.table.iter().flat_map(|table| &table.voltage_v));
+        voltage_v.sort_by(f64::total_cmp);
+        voltage_v.dedup_by(|b, a| *b - *a < 1e-3 * full_scale_v / STEPS as f64);
+        let curve: Vec<Point> = voltage_v.into_iter().map(|voltage| (voltage, gain * self.at(voltage))).collect();
+        let (voltage_v, stiffness) = knots(&curve, MOST_POINTS, STRAIGHT * full_scale_v).into_iter().unzip();
         Some(plant_file::Law { voltage_v, stiffness })
     }
 }

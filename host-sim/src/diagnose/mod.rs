@@ -7,7 +7,7 @@
 //! | module | what it is |
 //! | --- | --- |
 //! | [`base`] | the simulation that is judged |
-//! | [`chain`], [`bank`], [`law`] | command to stiffness: what a plant file says and effects change; runs and writes itself |
+//! | [`chain`], [`bank`], [`law`], `knots`, [`leakage`] | command to stiffness: what a plant file says and effects change; runs and writes itself |
 //! | [`data`], [`observed`] | the record made ready; what its readings say before any model |
 //! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
 //! | `start` | how far the spring has come where a record begins in mid-course |
@@ -38,7 +38,9 @@ pub mod fit;
 pub mod held_out;
 mod informative;
 mod interval;
+mod knots;
 pub mod law;
+pub mod leakage;
 pub mod leftover;
 pub mod model;
 pub mod noise;

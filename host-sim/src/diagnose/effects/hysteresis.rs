@@ -6,7 +6,7 @@
 //! | --- | --- | --- |
 //! | whole | one, weight 1 | r |
 //! | part | one | r, weight |
-//! | bank | three, at r / 3, r and 3 r | r, weights |
+//! | bank | five, at r / 5 to r | r, weights |
 //! | part with gain, bank with gain | the same, with the gain of the loop's mean line | and the gain |
 
 use crate::diagnose::bank::Bank;
@@ -18,7 +18,9 @@ pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
 /// Number of plays and own gain, by form.
-const FORMS: [(usize, bool); 5] = [(1, false), (1, false), (3, false), (1, true), (3, true)];
+const FORMS: [(usize, bool); 5] = [(1, false), (1, false), (5, false), (1, true), (5, true)];
+/// Thresholds of a bank, as parts of r.
+const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
 /// The bank of a form at a point.
 fn bank(form: usize, point: &[f64]) -> Bank {
@@ -27,7 +29,7 @@ fn bank(form: usize, point: &[f64]) -> Bank {
     let plays: Vec<(f64, f64)> = match (form, count) {
         (WHOLE, _) => vec![(threshold, 1.0)],
         (_, 1) => vec![(threshold, point[1])],
-        _ => [1.0 / 3.0, 1.0, 3.0].iter().zip(&point[1..4]).map(|(part, &weight)| (threshold * part, weight)).collect(),
+        _ => PARTS.iter().zip(&point[1..]).map(|(part, &weight)| (threshold * part, weight)).collect(),
     };
     let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
     let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();

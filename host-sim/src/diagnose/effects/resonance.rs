@@ -1,20 +1,25 @@
 //! Underdamped oscillation after a change, with the natural frequency `w = 2 pi freq`:
 //!
 //! ```text
-//! x'' + 2 zeta w x' + w^2 x = w^2 y        y' = y + part (x - y)
+//! x'' + 2 zeta w x' + w^2 x = w^2 e        y' = y + part (x - e)
 //! ```
 //!
-//! In one form the whole response swings (`part = 1`), in the other a part of it.
+//! | form | what excites it | part |
+//! | --- | --- | --- |
+//! | whole | the response, `e = y` | 1 |
+//! | quick | what changes quickly, `e = y - lag(T; y)` | fitted |
 
 use std::f64::consts::TAU;
 
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
-use crate::diagnose::signal::{Piece, Signal};
+use crate::diagnose::signal::{Lag, Piece, Signal};
 
 pub(super) struct Resonance;
 
-const IN_PART: usize = 1;
+const QUICK: usize = 1;
+/// From where on a quick change is looked for, in s.
+const QUICK_S: f64 = 0.5;
 
 /// Frequencies, in Hz, from a period of the whole record to what two samples show.
 fn range(data: &Data) -> (f64, f64) {
@@ -45,8 +50,9 @@ impl Effect for Resonance {
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (lowest, highest) = range(data);
         let mut coordinates = vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(1e-3, 0.95)];
-        if form == IN_PART {
+        if form == QUICK {
             coordinates.push(Coordinate::new(0.0, 1.5));
+            coordinates.push(Coordinate::log(0.2 * data.sample_s, data.duration_s()));
         }
         coordinates
     }
@@ -55,12 +61,10 @@ impl Effect for Resonance {
         let (lowest, highest) = range(data);
         let (from, to) = ((8.0 * lowest).ln(), (0.95 * highest).ln());
         let frequencies = (0..24).map(|part| from + (to - from) * f64::from(part) / 23.0);
-        let starts = frequencies.flat_map(|freq| [0.05f64, 0.3].map(|zeta| vec![freq, zeta.ln()]));
-        let in_part = |mut point: Vec<f64>| {
-            point.extend((form == IN_PART).then_some(0.2));
-            point
-        };
-        starts.map(in_part).collect()
+        let (dampings, rest): (&[f64], &[f64]) =
+            if form == QUICK { (&[0.1], &[1.0, QUICK_S.ln()]) } else { (&[0.05, 0.3], &[]) };
+        let start = |freq: f64, zeta: &f64| [&[freq, zeta.ln()], rest].concat();
+        frequencies.flat_map(|freq| dampings.iter().map(move |zeta| start(freq, zeta))).collect()
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
@@ -74,10 +78,15 @@ impl Effect for Resonance {
     fn respond(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
         let (omega, zeta) = (TAU * point[0].exp(), point[1].exp());
         let part = point.get(2).copied().unwrap_or(1.0);
-        let (mut x, mut v) = (signal.before, 0.0);
+        // Without a time of its own, nothing is slow.
+        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before));
+        let (mut x, mut v) = (if slow.is_some() { 0.0 } else { signal.before }, 0.0);
         let mut last = f64::NAN;
         let mut step = [[1.0, 0.0], [0.0, 1.0]];
-        signal.pass(|Piece { duration_s, from, to }| {
+        signal.pass(|piece| {
+            let (slow_from, slow_to) = slow.as_mut().map_or((0.0, 0.0), |slow| slow.pass(piece));
+            let Piece { duration_s, from, to } = piece;
+            let (from, to) = (from - slow_from, to - slow_to);
             let start = x;
             if duration_s > 0.0 {
                 if (duration_s - last).abs() > 1e-9 * duration_s || last.is_nan() {
@@ -91,7 +100,7 @@ impl Effect for Resonance {
                 x = to - lag + step[0][0] * dx + step[0][1] * dv;
                 v = slope + step[1][0] * dx + step[1][1] * dv;
             }
-            (from + part * (start - from), to + part * (x - to))
+            (piece.from + part * (start - from), piece.to + part * (x - to))
         });
     }
 }

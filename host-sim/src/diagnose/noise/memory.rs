@@ -9,6 +9,8 @@
 //! fractional difference has just that memory, `1/f^(2 power)` (Granger and Joyeux 1980). It is run as first-order sections
 //! with zeros and poles in turn (Oustaloup 2000), from the record's length up to half a row.
 
+use super::octaves::Octaves;
+
 /// A filter that turns noise with a memory into independent innovations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Memory {
@@ -36,6 +38,8 @@ const CLIP: f64 = 4.0;
 /// What a fractional difference must be likelier by than an autoregression alone, in nats: structure that is not yet
 /// explained looks like it too.
 const PRICE_OF_POWER: f64 = 8.0;
+/// What the spectrum may misjudge, in nats.
+const UNSURE: f64 = 10.0;
 
 impl Memory {
     /// Of a residual with a robust scale.
@@ -44,33 +48,35 @@ impl Memory {
             return Self::default();
         }
         let clipped: Vec<f64> = residual.iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
-        let (ar, cost) = autoregression(&clipped, LONGEST.min(residual.len() / ROWS_PER_LAG));
-        if ar.is_empty() || residual.len() < ROWS_FOR_POWER {
-            return Self { ar, ..Self::default() };
+        let rows = residual.len();
+        let (ar, cost) = autoregression(&correlation(&clipped, LONGEST.min(rows / ROWS_PER_LAG)), rows);
+        let alone = Self { ar, ..Self::default() };
+        if alone.is_none() || rows < ROWS_FOR_POWER {
+            return alone;
         }
-        let with_power = |power: f64| {
-            let mut memory = Self { power, ar: Vec::new(), sections: sections(power, residual.len()) };
-            let (ar, cost) = autoregression(&memory.whitened(&clipped), LONGEST_BESIDE);
-            memory.ar = ar;
-            (cost + PRICE_OF_POWER, memory)
-        };
-        let mut best = (cost, Self { ar, ..Self::default() });
+        // The power by the spectrum, which is quick; its price by what it really leaves.
+        let spectrum = Octaves::of(&clipped);
+        let by_spectrum = |power: f64| autoregression(&spectrum.correlation(power, LONGEST_BESIDE), rows).1;
+        let mut best = (f64::INFINITY, 0.0);
         let mut step = 0.2;
         let mut tried: Vec<f64> = (1..=5).map(|part| step * f64::from(part)).collect();
         while step > 0.02 {
             for power in tried {
-                let other = with_power(power);
-                if other.0 < best.0 {
-                    best = other;
+                let cost = by_spectrum(power);
+                if cost < best.0 {
+                    best = (cost, power);
                 }
             }
-            if best.1.power == 0.0 {
-                break;
-            }
             step /= 2.0;
-            tried = vec![best.1.power - step, best.1.power + step];
+            tried = vec![best.1 - step, best.1 + step];
         }
-        best.1
+        if best.0 + PRICE_OF_POWER > cost + UNSURE {
+            return alone;
+        }
+        let mut memory = Self { power: best.1, ar: Vec::new(), sections: sections(best.1, rows) };
+        let (ar, with_power) = autoregression(&correlation(&memory.whitened(&clipped), LONGEST_BESIDE), rows);
+        memory.ar = ar;
+        if with_power + PRICE_OF_POWER < cost { memory } else { alone }
     }
 
     /// True if errors foretell nothing.
@@ -119,17 +125,22 @@ fn sections(power: f64, rows: usize) -> Vec<(f64, f64)> {
     (0..count as u32).map(section).collect()
 }
 
-/// Autoregression of up to `longest` rows, and the negative log-likelihood it leaves, its own price in it, in nats.
-fn autoregression(values: &[f64], longest: usize) -> (Vec<f64>, f64) {
-    let rows = values.len() as f64;
-    let at = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / rows;
-    let correlation: Vec<f64> = (0..=longest).map(at).collect();
+/// Correlation of values with those of up to `longest` rows before.
+fn correlation(values: &[f64], longest: usize) -> Vec<f64> {
+    let at = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / values.len() as f64;
+    (0..=longest).map(at).collect()
+}
+
+/// Autoregression of as many rows as there are lags at most, and the negative log-likelihood it leaves, its own price in it,
+/// in nats.
+fn autoregression(correlation: &[f64], rows: usize) -> (Vec<f64>, f64) {
+    let rows = rows as f64;
     let mut error = correlation[0];
     if error <= 0.0 {
         return (Vec::new(), 0.0);
     }
     let (mut phi, mut best) = (Vec::new(), (Vec::new(), 0.5 * rows * error.ln()));
-    for order in 1..=longest {
+    for order in 1..correlation.len() {
         let ahead: f64 = phi.iter().enumerate().map(|(k, p)| p * correlation[order - 1 - k]).sum();
         let reflection = (correlation[order] - ahead) / error;
         let reversed: Vec<f64> = phi.iter().rev().copied().collect();

@@ -9,6 +9,7 @@
 //! are chosen by Schwarz's criterion. Rounded and stopped readings have the probability of their cell.
 
 pub mod memory;
+mod octaves;
 mod reading;
 mod tail;
 

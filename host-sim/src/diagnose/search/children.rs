@@ -31,7 +31,7 @@ impl<J: Judge> Search<'_, J> {
         let new = |effect| wanted(effect) && !model.has(effect) && !contained(effect, model);
         let first_fits = self.judge.extended(&node.fit, &new);
         let first_score =
-            |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, &fit.model) - fit.model.points().len() as f64;
+            |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, fit) - fit.model.points().len() as f64;
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
         fits.sort_by(|a, b| b.0.total_cmp(&a.0));
         fits.dedup_by_key(|(_, fit)| fit.model.structure());

@@ -12,6 +12,8 @@ use crate::diagnose::noise::{Noise, scale};
 const PRICE: f64 = 4.3;
 /// And each of its coordinates, beyond what held-out rows charge: a wider block must not take a narrower one's place.
 const PRICE_OF_COORDINATE: f64 = 1.8;
+/// Part of what blocks change that may be off because the spring's form is another than theirs.
+const MISFIT: f64 = 0.005;
 /// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
 
@@ -28,6 +30,9 @@ pub trait Judge {
 
     /// What a block costs, in nats.
     fn price(&self, block: &Block) -> f64;
+
+    /// What the blocks of a fit leave for being of another form than the spring's, in nats: each further block costs it.
+    fn misfit(&self, fit: &Fit) -> f64;
 
     /// What prices have to be multiplied by for what a fit leaves, at least 1.
     fn caution(&mut self, fit: &Fit) -> f64;
@@ -52,6 +57,12 @@ impl Judge for Engine<'_> {
         let effect = block.effect();
         let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
         PRICE + PRICE_OF_COORDINATE * fitted as f64 + effect.places(self.data) + (effect.forms() as f64).ln()
+    }
+
+    fn misfit(&self, fit: &Fit) -> f64 {
+        let explained: f64 =
+            self.simulation.iter().zip(&fit.residual).map(|(before, after)| (before - after).powi(2)).sum();
+        0.5 * explained * (MISFIT / fit.noise.marginal.max(fit.noise.cell)).powi(2)
     }
 
     fn caution(&mut self, fit: &Fit) -> f64 {

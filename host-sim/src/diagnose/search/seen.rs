@@ -26,16 +26,19 @@ impl Default for Seen {
 }
 
 impl Seen {
-    /// What a model's blocks cost, in nats.
-    pub(super) fn price(&self, judge: &impl Judge, model: &Model) -> f64 {
-        self.caution * model.blocks.iter().map(|(block, _)| judge.price(block)).sum::<f64>()
+    /// What a fit's blocks cost, in nats.
+    pub(super) fn price(&self, judge: &impl Judge, fit: &Fit) -> f64 {
+        let blocks = &fit.model.blocks;
+        let further = blocks.len().saturating_sub(1) as f64;
+        let misfit = if further > 0.0 { further * judge.misfit(fit) } else { 0.0 };
+        misfit + self.caution * blocks.iter().map(|(block, _)| judge.price(block)).sum::<f64>()
     }
 
     /// Charges everything anew.
     pub(super) fn charge(&mut self, judge: &impl Judge, caution: f64) {
         self.caution = caution;
         let mut scored = std::mem::take(&mut self.scored);
-        scored.values_mut().for_each(|it| it.score = it.held_out - self.price(judge, &it.fit.model));
+        scored.values_mut().for_each(|it| it.score = it.held_out - self.price(judge, &it.fit));
         self.scored = scored;
     }
 
@@ -65,7 +68,7 @@ impl Seen {
     fn fitted(&mut self, judge: &mut impl Judge, model: Model) -> Scored {
         let fit = judge.fit(model);
         let held_out = judge.held_out(&fit);
-        let score = held_out - self.price(judge, &fit.model);
+        let score = held_out - self.price(judge, &fit);
         let scored = Scored { fit, held_out, score };
         self.scored.insert(scored.fit.model.structure(), scored.clone());
         scored

@@ -13,6 +13,7 @@ const PRICE: f64 = 10.0;
 struct Told {
     worth: Vec<(BTreeSet<usize>, f64)>,
     caution: f64,
+    misfit: f64,
     fits: usize,
 }
 
@@ -22,7 +23,12 @@ fn effect(cause: &str) -> usize {
 
 fn told(worth: &[(&[&str], f64)]) -> Told {
     let set = |causes: &[&str]| causes.iter().map(|cause| effect(cause)).collect();
-    Told { worth: worth.iter().map(|(causes, worth)| (set(causes), *worth)).collect(), caution: 1.0, fits: 0 }
+    Told {
+        worth: worth.iter().map(|(causes, worth)| (set(causes), *worth)).collect(),
+        caution: 1.0,
+        misfit: 0.0,
+        fits: 0,
+    }
 }
 
 impl Judge for Told {
@@ -46,6 +52,10 @@ impl Judge for Told {
 
     fn price(&self, _: &Block) -> f64 {
         PRICE
+    }
+
+    fn misfit(&self, _: &Fit) -> f64 {
+        self.misfit
     }
 
     fn caution(&mut self, _: &Fit) -> f64 {
@@ -90,6 +100,14 @@ fn caution_makes_every_block_dearer() {
     assert_eq!(found(&mut judge), ["gain-error", "hum"]);
     judge.caution = 3.0;
     assert_eq!(found(&mut judge), ["gain-error"]);
+}
+
+#[test]
+fn a_further_block_costs_what_the_form_of_the_others_may_leave() {
+    let mut judge = told(&[(&["hysteresis"], 500.0), (&["hysteresis", "drift"], 520.0)]);
+    assert_eq!(found(&mut judge), ["hysteresis", "drift"]);
+    judge.misfit = 15.0;
+    assert_eq!(found(&mut judge), ["hysteresis"]);
 }
 
 #[test]
