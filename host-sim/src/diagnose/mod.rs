@@ -72,7 +72,7 @@ use search::{Scored, Search};
 const FEWEST_ROWS: usize = 8;
 
 /// A longer record is searched on every so many of its rows first.
-const ROWS_TO_SEARCH: usize = 10_000;
+const ROWS_TO_SEARCH: usize = 5_000;
 /// Sets of causes from there that are judged on all rows.
 const LEADERS: usize = 3;
 

@@ -29,7 +29,7 @@ impl<J: Judge> Search<'_, J> {
     pub(super) fn judged(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Scored> {
         let model = &node.fit.model;
         let new = |effect| wanted(effect) && !model.has(effect) && !contained(effect, model);
-        let first_fits = self.judge.extended(&node.fit, &new);
+        let first_fits = self.judge.extended(&node.fit, self.patient, &new);
         let first_score =
             |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, fit) - fit.model.points().len() as f64;
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();

@@ -25,8 +25,9 @@ pub trait Judge {
     /// Log-likelihood of all rows, each unseen by its fit.
     fn held_out(&mut self, fit: &Fit) -> f64;
 
-    /// First fits of the structures with one block more, whose effect is wanted, in every form that is worth fitting.
-    fn extended(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit>;
+    /// First fits of the structures with one block more, whose effect is wanted, in every form that is worth fitting; to the
+    /// `patient` also where the noise's memory hides what it is worth.
+    fn extended(&mut self, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit>;
 
     /// What a block costs, in nats.
     fn price(&self, block: &Block) -> f64;
@@ -47,9 +48,9 @@ impl Judge for Engine<'_> {
         self.judged_unseen(fit)
     }
 
-    fn extended(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+    fn extended(&mut self, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
         let law = Noise::first_look();
-        let extensions = extensions(self, fit, wanted).into_iter();
+        let extensions = extensions(self, fit, patient, wanted).into_iter();
         extensions.map(|Extension { block, point, .. }| self.fit(fit.model.with(block, point), &law)).collect()
     }
 
@@ -78,9 +79,13 @@ struct Extension {
 }
 
 /// Blocks that might be added, each from its most promising starts.
-fn extensions(engine: &mut Engine, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Extension> {
-    let mut metrics = vec![Metric::new(engine, fit, Noise::robust(&fit.residual))];
-    if !fit.noise.memory.is_none() {
+fn extensions(engine: &mut Engine, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Extension> {
+    let mut metrics = Vec::new();
+    let remembers = !fit.noise.memory.is_none();
+    if patient || !remembers {
+        metrics.push(Metric::new(engine, fit, Noise::robust(&fit.residual)));
+    }
+    if remembers {
         metrics.push(Metric::new(engine, fit, fit.noise.clone()));
     }
     let sigma = scale(&fit.residual);

@@ -54,6 +54,8 @@ pub struct Search<'j, J> {
     seen: Seen,
     /// Extensions of each structure, best first.
     extended: HashMap<Vec<Block>, Vec<Scored>>,
+    /// Also what the noise's memory may hide is tried; once is enough.
+    patient: bool,
 }
 
 /// What a search on a part of the rows hands on.
@@ -68,7 +70,7 @@ pub struct Lead {
 impl<'j, J: Judge> Search<'j, J> {
     /// Asks `judge`.
     pub fn new(judge: &'j mut J) -> Self {
-        Self { judge, seen: Seen::default(), extended: HashMap::new() }
+        Self { judge, seen: Seen::default(), extended: HashMap::new(), patient: true }
     }
 
     /// The best structure; `progress` hears of each structure that becomes the best.
@@ -87,6 +89,7 @@ impl<'j, J: Judge> Search<'j, J> {
     /// The best structure when others, found on a part of the rows, are given: those are judged, and extended once more.
     pub fn from(&mut self, Lead { models, caution }: Lead, mut progress: impl FnMut(&Scored)) -> Scored {
         self.seen.caution = caution;
+        self.patient = false;
         let mut best = self.root();
         for model in models {
             let scored = self.seen.judge(self.judge, model);

@@ -45,7 +45,7 @@ impl Judge for Told {
         fit.log_likelihood
     }
 
-    fn extended(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+    fn extended(&mut self, fit: &Fit, _: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
         let blocks = (0..EFFECTS.len()).filter(|&effect| wanted(effect)).map(|effect| Block { effect, form: 0 });
         blocks.map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
     }
