@@ -7,6 +7,7 @@
 //! | form | what excites it | part |
 //! | --- | --- | --- |
 //! | whole | the response, `e = y` | 1 |
+//! | in part | the response | fitted |
 //! | quick | what changes quickly, `e = y - lag(T; y)` | fitted |
 
 use std::f64::consts::TAU;
@@ -17,7 +18,8 @@ use crate::diagnose::signal::{Lag, Piece, Signal};
 
 pub(super) struct Resonance;
 
-const QUICK: usize = 1;
+const WHOLE: usize = 0;
+const QUICK: usize = 2;
 /// From where on a quick change is looked for, in s.
 const QUICK_S: f64 = 0.5;
 
@@ -44,14 +46,16 @@ impl Effect for Resonance {
     }
 
     fn forms(&self) -> usize {
-        2
+        3
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (lowest, highest) = range(data);
         let mut coordinates = vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(1e-3, 0.95)];
-        if form == QUICK {
+        if form != WHOLE {
             coordinates.push(Coordinate::new(0.0, 1.5));
+        }
+        if form == QUICK {
             coordinates.push(Coordinate::log(0.2 * data.sample_s, data.duration_s()));
         }
         coordinates
@@ -61,8 +65,11 @@ impl Effect for Resonance {
         let (lowest, highest) = range(data);
         let (from, to) = ((8.0 * lowest).ln(), (0.95 * highest).ln());
         let frequencies = (0..24).map(|part| from + (to - from) * f64::from(part) / 23.0);
-        let (dampings, rest): (&[f64], &[f64]) =
-            if form == QUICK { (&[0.1], &[1.0, QUICK_S.ln()]) } else { (&[0.05, 0.3], &[]) };
+        let (dampings, rest): (&[f64], &[f64]) = match form {
+            WHOLE => (&[0.05, 0.3], &[]),
+            QUICK => (&[0.1], &[1.0, QUICK_S.ln()]),
+            _ => (&[0.05, 0.3], &[0.2]),
+        };
         let start = |freq: f64, zeta: &f64| [&[freq, zeta.ln()], rest].concat();
         frequencies.flat_map(|freq| dampings.iter().map(move |zeta| start(freq, zeta))).collect()
     }
