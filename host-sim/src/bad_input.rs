@@ -35,5 +35,22 @@ pub(crate) fn check(field: &str, value: f64, allowed: RangeInclusive<f64>, unit:
     }
     let (lowest, highest) = allowed.into_inner();
     let expected = format!("{lowest} to {highest} {unit}");
+    // Not with hundreds of digits.
+    let value = if value.abs() < 1e15 || !value.is_finite() { format!("{value}") } else { format!("{value:e}") };
     bad_input!("{field} = {value} is not allowed: expected {}", expected.trim_end())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_refused_is_shown_shortly() {
+        for (value, shown) in
+            [(-1.0, "-1"), (1e9, "1000000000"), (1e300, "1e300"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")]
+        {
+            let error = check("x", value, 0.0..=1.0, "V").unwrap_err().to_string();
+            assert_eq!(error, format!("x = {shown} is not allowed: expected 0 to 1 V"));
+        }
+    }
 }

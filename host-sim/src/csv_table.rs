@@ -3,7 +3,7 @@
 //! Whatever is wrong is one line that names file, line, column and what was expected.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -21,22 +21,25 @@ const MOST_BYTES: u64 = 1 << 29;
 /// The text of a file.
 ///
 /// # Errors
-/// [`BadInput`] if it cannot be read, or has more than a million lines behind the first.
+/// [`BadInput`] if it cannot be read, is not UTF-8, or has more than a million lines behind the first.
 pub fn read(path: &Path) -> Result<String> {
     let name = path.display();
     let unreadable = |error| BadInput(format!("{name}: cannot be read: {error}"));
     let mut file = BufReader::new(File::open(path).map_err(unreadable)?).take(MOST_BYTES);
     let mut text = String::new();
     // Only once, for it may be a pipe, and no more of it than is allowed.
-    for _ in 0..MOST_ROWS + 2 {
-        if file.read_line(&mut text).map_err(unreadable)? == 0 {
-            if file.limit() == 0 {
-                bad_input!(
-                    "{name}: more than {} MiB; expected less: keep every tenth row, or a part of it",
-                    MOST_BYTES >> 20
-                );
+    for line in 1..=MOST_ROWS + 2 {
+        match file.read_line(&mut text) {
+            Ok(1..) => (),
+            _ if file.limit() == 0 => bad_input!(
+                "{name}: more than {} MiB; expected less: keep every tenth row, or a part of it",
+                MOST_BYTES >> 20
+            ),
+            Ok(0) => return Ok(text),
+            Err(error) if error.kind() == ErrorKind::InvalidData => {
+                bad_input!("{name}, line {line}: not UTF-8; expected a text in UTF-8")
             }
-            return Ok(text);
+            Err(error) => return Err(unreadable(error).into()),
         }
     }
     bad_input!("{name}: more than {MOST_ROWS} lines; expected fewer: keep every tenth row, or a part of it")
@@ -67,7 +70,18 @@ impl<'a> Table<'a> {
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
         let mut lines = Lines { text, byte: 0, line: 1 };
         let header = reader.headers().map_err(|error| unreadable(name, &mut lines, &error))?.clone();
+        let twice =
+            |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
+        if let Some((_, column)) = header.iter().enumerate().find(twice) {
+            let line = lines.at(header.position());
+            bad_input!("{name}, line {line}: column `{column}` stands there twice; expected every column once");
+        }
         Ok(Self { name, header, reader, record: StringRecord::new(), lines })
+    }
+
+    /// What messages call it.
+    pub(crate) fn name(&self) -> &'a str {
+        self.name
     }
 
     /// Names of the columns, in order.
@@ -82,14 +96,19 @@ impl<'a> Table<'a> {
 
     /// The same of a column that must be there; `expected` says what the header should have.
     pub(crate) fn require(&mut self, column: &str, expected: &str) -> Result<usize> {
-        let Some(index) = self.find(column) else {
-            let (line, found) = (self.lines.at(self.header.position()), self.columns().collect::<Vec<_>>().join(","));
-            bad_input!(
-                "{}, line {line}: no column `{column}`; expected a header with {expected}, found `{found}`",
-                self.name
-            )
-        };
-        Ok(index)
+        self.find(column).ok_or_else(|| self.lacks(column, expected).into())
+    }
+
+    /// What to say if it is not.
+    pub(crate) fn lacks(&mut self, column: &str, expected: &str) -> BadInput {
+        let name = self.name;
+        if self.columns().all(str::is_empty) {
+            return BadInput(format!("{name}: no header; expected one with {expected}"));
+        }
+        let (line, found) = (self.lines.at(self.header.position()), self.columns().collect::<Vec<_>>().join(","));
+        BadInput(format!(
+            "{name}, line {line}: no column `{column}`; expected a header with {expected}, found `{found}`"
+        ))
     }
 
     /// The next row.
@@ -159,7 +178,7 @@ impl Lines<'_> {
         let start = position.map_or(0, |at| at.byte() as usize).clamp(self.byte, self.text.len());
         self.line += self.text[self.byte..start].matches('\n').count();
         self.byte = start;
-        let skipped = self.text[start..].lines().take_while(|line| line.trim().is_empty() || line.starts_with('#'));
+        let skipped = self.text[start..].lines().take_while(|line| line.is_empty() || line.starts_with('#'));
         self.line + skipped.count()
     }
 }

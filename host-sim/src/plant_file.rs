@@ -192,7 +192,8 @@ impl PlantFile {
     /// What the file says of the record that neither the tick nor its amplifier stage runs, by name.
     pub fn left_out(&self) -> Vec<String> {
         let delayed = self.amplifier.as_ref().is_some_and(|amplifier| amplifier.delay_s.is_some());
-        let unmodelled = self.unmodelled.iter().flat_map(|table| table.keys().cloned());
+        let unmodelled =
+            self.unmodelled.iter().flat_map(|table| table.keys().map(|key| key.escape_debug().to_string()));
         delayed.then(|| "amplifier.delay_s".to_owned()).into_iter().chain(unmodelled).collect()
     }
 
@@ -213,10 +214,13 @@ pub fn load(plant: &str) -> Result<PlantFile> {
     if plant == "paper" {
         return Ok(Plant::PAPER.into());
     }
-    match std::fs::read_to_string(Path::new(plant)) {
-        Ok(text) => parse(plant, &text),
-        Err(error) => bad_input!("{plant}: cannot be read: {error}; expected `paper` or a plant file"),
-    }
+    let unreadable = |error| BadInput(format!("{plant}: cannot be read: {error}; expected `paper` or a plant file"));
+    let text = String::from_utf8(std::fs::read(Path::new(plant)).map_err(unreadable)?).map_err(|error| {
+        let end = error.utf8_error().valid_up_to();
+        let before = String::from_utf8_lossy(&error.as_bytes()[..end]);
+        BadInput(format!("{}: not UTF-8; expected a text in UTF-8", place::line_and_column(plant, &before, end)))
+    })?;
+    parse(plant, &text)
 }
 
 /// The same where only the plain spring will do.

@@ -6,6 +6,7 @@ use anyhow::Result;
 
 use crate::bad_input;
 use crate::csv_table::{Table, read};
+use crate::schedule::Schedule;
 
 /// One row of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +33,12 @@ pub struct Record {
 /// Larger magnitudes, in V, are a fault of the file: no spring and no amplifier has them.
 const MOST_V: f64 = 1e6;
 
+/// Voltages that differ by less are the same, in V.
+const ROUNDING_V: f64 = 1.0;
+
+/// The voltage at the spring, where a file has that and not the commanded one.
+pub const APPLIED: &str = "applied_v";
+
 /// The measured column unless another is asked for.
 pub const MEASURED: &str = "stiffness";
 
@@ -50,15 +57,21 @@ impl Record {
         }
     }
 
-    /// Checks that the measured column is there.
+    /// Checks that the voltages are those of a schedule, between its lowest and highest within `near_s` of each row.
     ///
     /// # Errors
-    /// [`crate::BadInput`] with the name of the column that is missing.
-    pub fn require_measured(&self, column: &str) -> Result<()> {
-        if self.rows.iter().all(|row| row.measured.is_some()) {
-            return Ok(());
+    /// [`crate::BadInput`] with file, line and column of the first that is not.
+    pub fn check_commanded(&self, schedule: &Schedule, name: &str, near_s: f64) -> Result<()> {
+        for &Row { line, time_s, voltage_v, .. } in &self.rows {
+            let [before, after] = [-near_s, near_s].map(|near| schedule.reader().at(time_s + near));
+            if !(before.min(after) - ROUNDING_V..=before.max(after) + ROUNDING_V).contains(&voltage_v) {
+                bad_input!(
+                    "{}, line {line}, column voltage_v: {voltage_v} V at {time_s} s; expected {after} V as in {name}",
+                    self.name
+                );
+            }
         }
-        bad_input!("{}: no column `{column}`; expected time_s, voltage_v and {column}", self.name)
+        Ok(())
     }
 
     /// Reads a file; `measured` names the column of the measured stiffness, [`MEASURED`] unless the user says another.
@@ -69,19 +82,40 @@ impl Record {
         Self::parse(&path.display().to_string(), &read(path)?, measured)
     }
 
+    /// The same of a record that must have readings. What `vsj stair` writes is one: it calls the voltage [`APPLIED`].
+    ///
+    /// # Errors
+    /// As [`Record::open`], and without the measured column.
+    pub fn open_measured(path: &Path, measured: &str) -> Result<Self> {
+        Self::parse_measured(&path.display().to_string(), &read(path)?, measured)
+    }
+
     /// Reads the text of a file; `name` is what messages call it.
     ///
     /// # Errors
     /// As [`Record::open`].
     pub fn parse(name: &str, text: &str, measured: &str) -> Result<Self> {
-        let mut table = Table::new(name, text)?;
-        let also = if measured == MEASURED { String::new() } else { format!(", {measured}") };
-        let expected = format!("time_s, voltage_v{also}");
-        let (time, voltage) = (table.require("time_s", &expected)?, table.require("voltage_v", &expected)?);
+        let table = Table::new(name, text)?;
         // The usual column may be absent, one that was asked for must not.
-        let measured =
-            if measured == MEASURED { table.find(measured) } else { Some(table.require(measured, &expected)?) };
+        let measured = (measured != MEASURED || table.find(measured).is_some()).then_some(measured);
+        Self::from_table(table, &["voltage_v"], measured)
+    }
 
+    /// As [`Record::open_measured`].
+    fn parse_measured(name: &str, text: &str, measured: &str) -> Result<Self> {
+        Self::from_table(Table::new(name, text)?, &["voltage_v", APPLIED], Some(measured))
+    }
+
+    /// With the voltage in the first of these columns that is there.
+    fn from_table(mut table: Table<'_>, voltages: &[&str], measured: Option<&str>) -> Result<Self> {
+        let expected: Vec<&str> = ["time_s", "voltage_v"].into_iter().chain(measured).collect();
+        let expected = expected.join(", ");
+        let time = table.require("time_s", &expected)?;
+        let voltage = voltages.iter().find_map(|column| table.find(column));
+        let voltage = voltage.map_or_else(|| table.require("voltage_v", &expected), Ok)?;
+        let measured = measured.map(|column| table.require(column, &expected)).transpose()?;
+
+        let name = table.name();
         let mut rows: Vec<Row> = Vec::new();
         while let Some(row) = table.next()? {
             let row = Row {
@@ -136,9 +170,35 @@ mod tests {
     }
 
     #[test]
+    fn readings_may_be_required_and_go_with_the_voltage_that_was_applied() {
+        let error = Record::parse_measured("r", "# a\ntime_s,voltage_v\n0,1\n1,2\n", MEASURED).unwrap_err().to_string();
+        assert!(error.starts_with("r, line 2: no column `stiffness`"), "{error}");
+        let text = "time_s,target_v,applied_v,stiffness\n0,1,2,3\n1,1,2,3\n";
+        assert_eq!(Record::parse_measured("r", text, MEASURED).unwrap().rows[1].voltage_v, 2.0);
+        assert!(Record::parse("r", text, MEASURED).is_err(), "a schedule says what is commanded");
+        let both = "time_s,applied_v,voltage_v,stiffness\n0,1,2,3\n1,1,2,3\n";
+        assert_eq!(Record::parse_measured("r", both, MEASURED).unwrap().rows[1].voltage_v, 2.0);
+    }
+
+    #[test]
+    fn a_record_of_another_schedule_is_refused_with_its_first_row() {
+        let check = |text: &str| {
+            let record = Record::parse("r", text, MEASURED).unwrap();
+            record.check_commanded(&Schedule::stair(), "the stair", 0.1).map_err(|error| error.to_string())
+        };
+        // On the ramp, and at its ends, either voltage will do.
+        assert_eq!(check("time_s,voltage_v\n0,0\n20,0\n20.05,100\n20.1,100\n90,500\n"), Ok(()));
+        let expected = "r, line 3, column voltage_v: 0 V at 25 s; expected 100 V as in the stair";
+        assert_eq!(check("time_s,voltage_v\n0,0\n25,0\n"), Err(expected.to_owned()));
+    }
+
+    #[test]
     fn every_fault_is_named_with_its_place() {
         for (text, expected) in [
-            ("", "no column `time_s`"),
+            ("", "data.csv: no header; expected one with time_s, voltage_v"),
+            ("\n# a\n\n", "data.csv: no header; expected one with time_s, voltage_v"),
+            ("# a\ntime_s,voltage_v,time_s\n0,1,2\n", "line 2: column `time_s` stands there twice"),
+            ("time_s,voltage_v\n0,1\n  \n", "line 3: 1 field(s); expected 2"),
             ("time_s,volts\n0,1\n", "line 1: no column `voltage_v`"),
             ("time_s,voltage_v\n", "0 row(s) of data; expected at least 2"),
             ("time_s,voltage_v\n0,1\n", "1 row(s)"),

@@ -52,7 +52,10 @@ impl OutOfRange {
 impl fmt::Display for OutOfRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { field, value, lowest, highest, unit } = self;
-        write!(f, "{field} = {value} is not allowed: expected {lowest}")?;
+        write!(f, "{field} = ")?;
+        // Not with hundreds of digits.
+        if value.is_finite() && value.abs() >= 1e15 { write!(f, "{value:e}") } else { write!(f, "{value}") }?;
+        write!(f, " is not allowed: expected {lowest}")?;
         if lowest != highest {
             write!(f, " to {highest}")?;
         }

@@ -132,6 +132,8 @@ fn the_joint_against_the_requirement() {
 #[test]
 fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
     let folder = tempdir().unwrap();
+    fs::write(folder.path().join("one.csv"), "displacement_mm,force_un_0v\n1,1\n2,2\n3,3\n").unwrap();
+    fs::write(folder.path().join("rest.csv"), "displacement_mm,force_un_0v,force_un_9v\n0,1,2\n0,2,1\n").unwrap();
     fs::write(folder.path().join("l.csv"), "material,youngs_modulus_gpa\nPET,3\n").unwrap();
     fs::write(folder.path().join("r.csv"), "# balance\ndisplacement_mm,force_un_0v,force_un_9v\n# mm,uN,uN\n1,x,2\n")
         .unwrap();
@@ -152,7 +154,14 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         (&["beam", "--layers", "no.csv"], "no.csv: cannot be read"),
         (&["beam", "--layers", "l.csv"], "l.csv, line 1: no column `length_mm`"),
         (&["beam", "--experiment", "r.csv"], "r.csv, line 4, column force_un_0v: `x` is not a finite number"),
-        (&["joint", "--springs", "0"], "--springs: springs = 0"),
+        (&["beam", "--experiment", "one.csv"], "one.csv: the beam experiment has 1 voltage(s); expected at least two"),
+        (
+            &["beam", "--experiment", "rest.csv"],
+            "rest.csv: the beam experiment: readings do not determine the fit; expected",
+        ),
+        (&["beam", "--length-mm", "1e300"], "--length-mm: length_m = 1e297 is not allowed"),
+        (&["joint", "--springs", "0"], "'--springs <N>': 0 is not in 1..=1000000000"),
+        (&["joint", "--springs", "5000000000"], "'--springs <N>': 5000000000 is not in 1..=1000000000"),
         (&["joint", "--inner-radius-mm", "-1"], "--inner-radius-mm: inner_radius_m = -0.001"),
         (&["joint", "--thickness-um", "0"], "--thickness-um: thickness_m = 0"),
         (&["joint", "--high", "0.1"], "--high: high_n_m_per_rad = 0.1"),

@@ -254,6 +254,9 @@ fn a_bad_file_is_named_with_its_place() {
     assert!(code == Some(2) && error.contains("none.csv: cannot be read"), "{error}");
     let (code, error) = refused(folder.path(), &["diagnose", "reading.csv", "--column", "force"]);
     assert!(code == Some(2) && error.contains("no column `force`"), "{error}");
+    fs::write(folder.path().join("other.csv"), "time_s,voltage_v,stiffness\n0,0,1\n25,0,1\n").expect("a file");
+    let (code, error) = refused(folder.path(), &["diagnose", "other.csv", "--input", "stair"]);
+    assert!(code == Some(2) && error.contains("other.csv, line 3, column voltage_v: 0 V at 25 s"), "{error}");
 }
 
 /// Poor records are not bad files: they get a verdict, whichever files are asked for.

@@ -153,6 +153,7 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
     fs::write(folder.path().join("bad.toml"), "schema = 1\n[relaxation]\nshare = -1.0\ntau_s = 5.5\n").unwrap();
     fs::write(folder.path().join("lines.csv"), "time_s,voltage_v\n\"1\n2\",100\n3,100\n").unwrap();
     fs::write(folder.path().join("s.csv"), "time_s,voltage_v\n0,0\n5,100\n").unwrap();
+    fs::write(folder.path().join("latin.csv"), b"time_s,voltage_v\n# \xb5s\n0,0\n5,100\n").unwrap();
     fs::write(folder.path().join("file"), "").unwrap();
     for (arguments, expected) in [
         (&["--input", "no.csv"][..], "no.csv: cannot be read"),
@@ -178,6 +179,12 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         (&["--every", "-1"], "--every -1: expected a positive number of seconds"),
         (&["--controller", "magic"], "invalid value 'magic' for '--controller <CONTROLLER>'"),
         (&["--out", "file/sub"], "file/sub: cannot be made"),
+        (&["--between", "linear"], "--between is of no use with --input stair: expected --input FILE.csv"),
+        (&["--input", "step", "--column", "gauge"], "--column is of no use with --input step"),
+        (&["--approach-s", "2"], "--approach-s is the fast controller's: expected --controller fast"),
+        (&["--kp", "1e300"], "--kp: proportional_gain = 1e300 is not allowed"),
+        (&["--input", "latin.csv"], "latin.csv, line 2: not UTF-8; expected a text in UTF-8"),
+        (&["--plant", "latin.csv"], "latin.csv, line 2, column 3: not UTF-8; expected a text in UTF-8"),
         (&["--nonsense"], "unexpected argument '--nonsense' found"),
     ] {
         let mut all = vec!["stair", "--out", "result"];
@@ -204,10 +211,19 @@ fn an_earlier_result_survives_a_failure() {
     fs::remove_file(folder.path().join("result/voltage.svg")).unwrap();
     fs::create_dir_all(folder.path().join("result/voltage.svg/in the way")).unwrap();
     let output = run(folder.path(), &["stair", "--out", "result", "--every", "1", "--kp", "5"]);
-    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
     let after = fs::read(folder.path().join("result/stair.csv")).unwrap();
     assert!(after == before, "half of the result was replaced");
     assert_eq!(fs::read_dir(folder.path().join("result")).unwrap().count(), 3, "temporary files were left behind");
+}
+
+/// What one command writes, the other reads.
+#[test]
+fn its_csv_can_be_diagnosed() {
+    let folder = tempdir().unwrap();
+    assert!(run(folder.path(), &["stair", "--out", "result", "--every", "0.5"]).status.success());
+    let found = json(folder.path(), &["diagnose", "result/stair.csv", "--json"]);
+    assert_eq!(found["rows"], 141);
 }
 
 #[test]

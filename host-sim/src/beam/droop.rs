@@ -44,7 +44,12 @@ impl Deflection {
     /// [`crate::BadInput`] for what is no beam, load or tolerance (0.0001 to 1); another if the exact theory finds no
     /// equilibrium.
     pub fn new(beam: &Beam, load: &Load, tolerance: f64) -> Result<Self> {
-        check("tolerance", tolerance, 1e-4..=1.0, "of the largest displacement")?;
+        checked(beam, load, tolerance)?;
+        Self::of(beam, load, tolerance)
+    }
+
+    /// The same of a load that may be beyond what is allowed.
+    fn of(beam: &Beam, load: &Load, tolerance: f64) -> Result<Self> {
         let exact = elastica::shape(beam, load)?;
         let linear_error = linear_error(beam, load, &exact);
         Ok(Self { beam: *beam, load: *load, exact, linear_error, droops: linear_error > tolerance })
@@ -79,6 +84,13 @@ impl Deflection {
     }
 }
 
+fn checked(beam: &Beam, load: &Load, tolerance: f64) -> Result<()> {
+    check("tolerance", tolerance, 1e-4..=1.0, "of the largest displacement")?;
+    beam.checked()?;
+    load.checked()?;
+    Ok(())
+}
+
 fn linear_error(beam: &Beam, load: &Load, exact: &[Point]) -> f64 {
     let largest = |value: &dyn Fn(&Point) -> f64| exact.iter().map(|point| value(point).abs()).fold(0.0, f64::max);
     let displacement = largest(&|point| point.y_m);
@@ -94,7 +106,8 @@ fn linear_error(beam: &Beam, load: &Load, exact: &[Point]) -> f64 {
 /// # Errors
 /// As [`Deflection::new`].
 pub fn limit(beam: &Beam, load: &Load, tolerance: f64) -> Result<Option<f64>> {
-    let droops = |factor: f64| Ok::<_, anyhow::Error>(Deflection::new(beam, &load.scaled(factor), tolerance)?.droops);
+    checked(beam, load, tolerance)?;
+    let droops = |factor: f64| Ok::<_, anyhow::Error>(Deflection::of(beam, &load.scaled(factor), tolerance)?.droops);
     let size = (load.tip_n * beam.length_m.powi(2) / beam.bending_stiffness_n_m2()).abs().max(
         (beam.weight_n_per_m(load.gravity_m_per_s2) * beam.length_m.powi(3) / beam.bending_stiffness_n_m2()).abs(),
     );
@@ -143,6 +156,14 @@ mod tests {
             assert!(tip.exact_mm < tip.linear_mm);
         }
         assert_eq!(limit(&FOIL, &PUSHED.scaled(0.0), 0.05).unwrap(), None);
+    }
+
+    /// Bending goes by P L^2 / E I, however large the force that it takes.
+    #[test]
+    fn a_beam_that_bends_under_no_allowed_load_has_its_limit() {
+        let thick = Beam { thickness_m: 1e5 * FOIL.thickness_m, ..FOIL };
+        let [usual, limit] = [FOIL, thick].map(|beam| limit(&beam, &PUSHED, 0.05).unwrap().unwrap());
+        assert!((limit / usual / 1e15 - 1.0).abs() < 1e-6, "{}", limit / usual);
     }
 
     #[test]

@@ -38,9 +38,8 @@ const MOST_STEPS: usize = 30;
 /// The bent beam, clamp first, [`ELEMENTS`] + 1 points.
 ///
 /// # Errors
-/// [`crate::BadInput`] for what is no beam or load; another if no shape is found.
+/// If no shape is found.
 pub fn shape(beam: &Beam, load: &Load) -> Result<Vec<Point>> {
-    let (beam, load) = (beam.checked()?, load.checked()?);
     let (length, stiffness) = (beam.length_m, beam.bending_stiffness_n_m2());
     let tip = load.tip_n * length.powi(2) / stiffness;
     let weight = beam.weight_n_per_m(load.gravity_m_per_s2) * length.powi(3) / stiffness;

@@ -170,7 +170,8 @@ fn law(readings: &[Reading], degree: i32) -> Result<Fit> {
 
 /// Readings that determine no fit are the caller's to mend.
 fn determined(fit: Result<Fit>) -> Result<Fit> {
-    fit.map_err(|error| BadInput(format!("the beam experiment: {error}")).into())
+    let expected = "expected displacements other than 0 at each voltage, three readings or more";
+    fit.map_err(|error| BadInput(format!("the beam experiment: {error}; {expected}")).into())
 }
 
 /// Two-sided chance of the quadratic term.

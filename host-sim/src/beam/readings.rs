@@ -17,13 +17,16 @@ pub struct Reading {
     pub force_un: f64,
 }
 
+/// What a header has.
+const COLUMNS: &str = "displacement_mm, force_un_0v, force_un_400v, ...";
+
 /// Reads a table with the columns `displacement_mm` and one `force_un_<V>v` a voltage.
 ///
 /// # Errors
 /// [`crate::BadInput`] with file, line, column and what was expected.
 pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
     let mut table = Table::new(name, text)?;
-    let displacement = table.require("displacement_mm", "displacement_mm, force_un_0v, force_un_400v, ...")?;
+    let displacement = table.require("displacement_mm", COLUMNS)?;
     let voltage = |column: &str| {
         let volts: f64 = column.strip_prefix("force_un_")?.strip_suffix('v')?.parse().ok()?;
         volts.is_finite().then_some(volts)
@@ -31,7 +34,7 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
     let voltages: Vec<(usize, f64)> =
         table.columns().enumerate().filter_map(|(index, column)| Some((index, voltage(column)?))).collect();
     if voltages.is_empty() {
-        bad_input!("{name}: no column `force_un_<V>v`; expected one a voltage, such as force_un_400v");
+        return Err(table.lacks("force_un_<V>v", COLUMNS).into());
     }
     let mut readings = Vec::new();
     while let Some(row) = table.next()? {
@@ -39,6 +42,9 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
         for &(column, voltage_v) in &voltages {
             readings.push(Reading { voltage_v, displacement_mm, force_un: row.number(column)? });
         }
+    }
+    if readings.is_empty() {
+        bad_input!("{name}: 0 rows of data; expected one a displacement");
     }
     Ok(readings)
 }
@@ -59,8 +65,11 @@ mod tests {
     fn a_bad_table_is_one_line_with_its_place() {
         for (text, expected) in [
             ("force_un_0v\n1\n", "t, line 1: no column `displacement_mm`"),
-            ("displacement_mm\n1\n", "t: no column `force_un_<V>v`"),
-            ("displacement_mm,force_un_infv\n1,2\n", "t: no column `force_un_<V>v`"),
+            ("# a\ndisplacement_mm\n1\n", "t, line 2: no column `force_un_<V>v`"),
+            ("displacement_mm,force_un_infv\n1,2\n", "t, line 1: no column `force_un_<V>v`"),
+            ("displacement_mm,force_un_0v,force_un_0v\n1,2,3\n", "t, line 1: column `force_un_0v` stands there twice"),
+            ("displacement_mm,force_un_0v\n", "t: 0 rows of data"),
+            ("# a\n", "t: no header; expected one with displacement_mm"),
             (
                 "displacement_mm,force_un_0v\n1,2\n# a\n\n1,x\n",
                 "t, line 5, column force_un_0v: `x` is not a finite number",

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use host_sim::BadInput;
 use host_sim::beam::cantilever::{Beam, Load};
 use host_sim::beam::layered::ELEMENTS;
 use host_sim::beam::readings;
@@ -81,7 +82,7 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let question = question(arguments)?;
-    let report = Report::new(&question).map_err(|error| named(error, OPTIONS))?;
+    let report = Report::new(&question).map_err(|error| in_file(named(error, OPTIONS), arguments))?;
     let text = report.text();
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
@@ -93,6 +94,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         written = wrote(&files.finish()?);
     }
     if arguments.json { print(&format!("{}\n", serde_json::to_string(&report)?)) } else { print(&(text + &written)) }
+}
+
+/// Says which file an experiment that says too little came from.
+fn in_file(error: anyhow::Error, arguments: &Arguments) -> anyhow::Error {
+    match &arguments.experiment {
+        Some(path) if error.to_string().starts_with("the beam experiment") => {
+            BadInput(format!("{}: {error}", path.display())).into()
+        }
+        _ => error,
+    }
 }
 
 fn question(arguments: &Arguments) -> Result<Question> {

@@ -10,13 +10,18 @@ use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
 use host_sim::plant_file;
 use host_sim::record::{MEASURED, Record};
+use host_sim::schedule::Schedule;
 use indicatif::ProgressBar;
 
 use super::{print, wrote};
 
+/// Within this time, in s, a row of the stair may have the voltage before a step or that after it.
+const RAMP_S: f64 = 0.1;
+
 /// Show what the simulation gets wrong on measured data, name the cause, measure the gain of the cure
 ///
-/// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (volts of equivalent static voltage).
+/// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (volts of equivalent static voltage). Without
+/// voltage_v, applied_v is taken, as `vsj stair --out` writes it.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -76,8 +81,10 @@ fn quoted(word: &str) -> String {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let base = Base::new(plant_file::load(&arguments.plant)?)?;
-    let record = Record::open(&arguments.data, &arguments.column)?;
-    record.require_measured(&arguments.column)?;
+    let record = Record::open_measured(&arguments.data, &arguments.column)?;
+    if arguments.input == Input::Stair {
+        record.check_commanded(&Schedule::stair(), "the report's stair (--input stair)", RAMP_S)?;
+    }
     let options = Options { input: arguments.input, base };
     // A folder that cannot be made is known before the search begins.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;

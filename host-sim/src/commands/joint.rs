@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::beam::cantilever::Beam;
 use host_sim::joint::report::{Report, Requirement};
-use host_sim::joint::{Joint, OuterEnd};
+use host_sim::joint::{Joint, MOST_SPRINGS, OuterEnd};
 use host_sim::output::files::Files;
 use host_sim::plant_file;
 use host_sim::reference::Loop;
@@ -23,7 +23,7 @@ Examples:
   vsj joint --limit-v 1000 --within-s 1 --json  another amplifier, more time")]
 pub(crate) struct Arguments {
     /// Number of springs
-    #[arg(long, default_value_t = 12, value_name = "N")]
+    #[arg(long, default_value_t = 12, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPRINGS)))]
     springs: u32,
     /// Radius of the inner ring, in mm
     #[arg(long, default_value_t = 20.0, value_name = "MM", allow_negative_numbers = true)]
@@ -119,7 +119,6 @@ const OPTIONS: &[(&str, &str)] = &[
     ("length_m", "--length-mm"),
     ("width_m", "--width-mm"),
     ("thickness_m", "--thickness-um"),
-    ("springs", "--springs"),
     ("low_n_m_per_rad", "--low"),
     ("high_n_m_per_rad", "--high"),
     ("within_s", "--within-s"),

@@ -40,12 +40,12 @@ pub(crate) struct Arguments {
     /// time_s,voltage_v
     #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
     input: String,
-    /// What the voltage does between two rows of an input file
-    #[arg(long, value_enum, default_value_t)]
-    between: Between,
-    /// Column of an input file with the measured stiffness
-    #[arg(long, default_value = MEASURED, value_name = "NAME")]
-    column: String,
+    /// What the voltage does between two rows of an input file; without it, hold
+    #[arg(long, value_enum)]
+    between: Option<Between>,
+    /// Column of an input file with the measured stiffness; without it, stiffness, if there is one
+    #[arg(long, value_name = "NAME")]
+    column: Option<String>,
     /// Highest voltage of the amplifier, in V
     #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
     limit_v: f64,
@@ -64,9 +64,9 @@ pub(crate) struct Arguments {
     /// Integral gain of the controller, in 1/s
     #[arg(long, default_value_t = Gains::PAPER.integral_per_s, value_name = "GAIN", allow_negative_numbers = true)]
     ki: f64,
-    /// Time constant with which the fast controller makes the last part of the way, in s, 0 to 1
-    #[arg(long, default_value_t = 0.0, value_name = "S", allow_negative_numbers = true)]
-    approach_s: f64,
+    /// Time constant with which the fast controller makes the last part of the way, in s, 0 to 1; without it, 0
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    approach_s: Option<f64>,
     /// Ticks per second, 100 to 10 000
     #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
@@ -110,7 +110,9 @@ impl Arguments {
             rate_hz: self.rate_hz,
             plant: file.extended(),
             compensation: match self.controller {
-                Controller::Fast => Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s }),
+                Controller::Fast => {
+                    Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s.unwrap_or(0.0) })
+                }
                 _ => Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki }),
             },
             amplifier: file.behind(Amplifier {
@@ -121,6 +123,20 @@ impl Arguments {
             }),
             feedback: None,
         }
+    }
+
+    /// Refuses what would not be looked at.
+    fn check(&self) -> Result<()> {
+        let no_file = ["stair", "step"].contains(&self.input.as_str());
+        for (option, given) in [("--between", self.between.is_some()), ("--column", self.column.is_some())] {
+            if given && no_file {
+                bad_input!("{option} is of no use with --input {}: expected --input FILE.csv", self.input);
+            }
+        }
+        if self.approach_s.is_some() && self.controller != Controller::Fast {
+            bad_input!("--approach-s is the fast controller's: expected --controller fast");
+        }
+        Ok(())
     }
 
     /// Ticks between two rows of the CSV.
@@ -135,6 +151,7 @@ impl Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    arguments.check()?;
     let file = plant_file::load(&arguments.plant)?;
     let left_out = file.left_out();
     if !left_out.is_empty() {
@@ -160,9 +177,9 @@ fn run_plant<P: Judged>(
         "stair" => ("the stair".to_owned(), Schedule::stair()),
         "step" => ("the stair of ideal steps".to_owned(), Schedule::ideal_stair()),
         file => {
-            let read = record.insert(Record::open(Path::new(file), &arguments.column)?);
+            let read = record.insert(Record::open(Path::new(file), arguments.column.as_deref().unwrap_or(MEASURED))?);
             read.check_range(arguments.min_v, arguments.limit_v)?;
-            (file.to_owned(), Schedule::from_record(read, arguments.between))
+            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default()))
         }
     };
     let experiment = Experiment { name, schedule, settings };

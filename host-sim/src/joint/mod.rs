@@ -41,6 +41,9 @@ pub struct Joint {
     pub outer_end: OuterEnd,
 }
 
+/// More springs are a slip of the pen.
+pub const MOST_SPRINGS: u32 = 1_000_000_000;
+
 impl Joint {
     /// Returns the joint if it is one.
     ///
@@ -49,7 +52,7 @@ impl Joint {
     pub fn checked(self) -> Result<Self> {
         check("inner_radius_m", self.inner_radius_m, 0.0..=100.0, "m")?;
         check("spring_length_m", self.spring_length_m, 1e-6..=100.0, "m")?;
-        check("springs", f64::from(self.springs), 1.0..=1e9, "springs")?;
+        check("springs", f64::from(self.springs), 1.0..=f64::from(MOST_SPRINGS), "springs")?;
         Ok(self)
     }
 

@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use model::Spring;
 use tempfile::NamedTempFile;
 
@@ -47,12 +47,12 @@ impl Files {
     /// Moves every file to its place and tells their paths.
     ///
     /// # Errors
-    /// If one of them cannot be; then none is moved.
+    /// If one of them cannot be; then none is moved. [`crate::BadInput`] if something else than a file is in its place.
     pub fn finish(self) -> Result<Vec<PathBuf>> {
         // What could go wrong in a folder that was just written to is known before the first file is moved.
         for (_, path) in &self.written {
             if path.exists() && !path.is_file() {
-                bail!("{} cannot be written: it is not a file", path.display());
+                bad_input!("{} cannot be written: it is not a file; expected another folder", path.display());
             }
         }
         let mut paths = Vec::new();

@@ -76,3 +76,9 @@ fn faults_are_one_line_with_their_place() {
         assert!(got.contains(expected) && !got.contains('\n'), "{text:?}: {got}");
     }
 }
+
+#[test]
+fn what_is_left_out_is_named_in_one_line() {
+    let text = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 5.5\n[unmodelled]\ndrift = 1\n\"a\\nb\\u0000\" = 1\n";
+    assert_eq!(parse("t", text).unwrap().left_out(), [r"a\nb\0", "drift"]);
+}

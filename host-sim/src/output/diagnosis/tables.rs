@@ -101,18 +101,21 @@ fn note(standings: &[Standing], place: usize) -> String {
 pub(super) fn quality(diagnosis: &Diagnosis) -> Markup {
     let (report, extended) = (&diagnosis.report, is_extended(diagnosis));
     let (before, after) = (&report.baseline, &report.extended.quality);
+    // Readings that are all the same have no spread to compare errors with.
+    let spread = diagnosis.data.reading.windows(2).any(|pair| pair[0] != pair[1]);
+    let of_spread = |percent| if spread { number(percent) } else { "-".to_owned() };
     let rows = [
-        ("free run RMSE [V]", before.rmse, after.rmse),
-        ("held-out RMSE [V]", before.held_out_rmse, after.held_out_rmse),
-        ("one-step RMSE [V]", before.one_step_rmse, after.one_step_rmse),
-        ("fit [%]", before.fit_percent, after.fit_percent),
+        ("free run RMSE [V]", number(before.rmse), number(after.rmse)),
+        ("held-out RMSE [V]", number(before.held_out_rmse), number(after.held_out_rmse)),
+        ("one-step RMSE [V]", number(before.one_step_rmse), number(after.one_step_rmse)),
+        ("fit [%]", of_spread(before.fit_percent), of_spread(after.fit_percent)),
     ];
     html! {
         div.scroll { table {
             thead { tr { th { "" } th.number.before { "simulation" } @if extended { th.number.after { "extended" } } } }
             tbody {
                 @for (what, before, after) in rows {
-                    tr { td { (what) } td.number { (number(before)) } @if extended { td.number { (number(after)) } } }
+                    tr { td { (what) } td.number { (before) } @if extended { td.number { (after) } } }
                 }
                 @if extended {
                     tr { td { "gain on held-out stretches [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) } }
