@@ -179,7 +179,7 @@ fn all_files_or_none() {
     // The last file cannot be: a folder has its name.
     fs::create_dir_all(folder.path().join("out/diagnosis.json")).expect("a folder");
     let (code, error) = refused(folder.path(), &["diagnose", "record.csv", "--out", "out"]);
-    assert_eq!(code, Some(1), "{error}");
+    assert_eq!(code, Some(2), "{error}");
     assert_eq!(names(&folder.path().join("out")), ["diagnosis.json"]);
 
     let (code, error) = refused(folder.path(), &["diagnose", "record.csv", "--out", "record.csv"]);
@@ -224,8 +224,8 @@ fn a_bad_file_is_named_with_its_place() {
     let good = stair(|_, voltage| voltage);
     let edited = |from: &str, to: &str| good.replacen(from, to, 1);
     for (name, csv, expected) in [
-        ("empty", String::new(), "no column `time_s`"),
-        ("comments", "# nothing\n".to_owned(), "no column `time_s`"),
+        ("empty", String::new(), "no header; expected one with time_s, voltage_v, stiffness"),
+        ("comments", "# nothing\n".to_owned(), "no header; expected one with time_s"),
         ("header", "time_s,voltage_v,stiffness\n".to_owned(), "0 row(s) of data"),
         (
             "few",
