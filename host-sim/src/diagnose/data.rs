@@ -21,7 +21,7 @@ pub enum Input {
     Stair,
 }
 
-/// Parts that the record is divided into; each fold leaves out every [`FOLDS`]th of its stretches.
+/// Parts that the record is divided into; each fold leaves out one in [`FOLDS`] of its stretches.
 pub const FOLDS: usize = 5;
 /// Stretches of a long record. Short beside most effects in place, long beside the noise's memory.
 const STRETCHES: usize = 40;
@@ -138,7 +138,9 @@ fn folds(voltage_v: &[f64]) -> Vec<u8> {
         }
     }
     let length = rows.div_ceil(STRETCHES).max(SHORTEST_STRETCH);
-    (0..rows).map(|row| ((row / length) % FOLDS) as u8).collect()
+    // Each turn begins with another fold: or else, of a stair whose steps take as long as a turn, one fold had all beginnings.
+    let fold_of = |stretch: usize| (stretch + 2 * (stretch / FOLDS)) % FOLDS;
+    (0..rows).map(|row| fold_of(row / length) as u8).collect()
 }
 
 #[cfg(test)]
@@ -155,6 +157,19 @@ mod tests {
             let fold = folds(&record);
             assert!(fold.chunk_by(|a, b| a == b).all(|stretch| stretch.len() == SHORTEST_STRETCH), "{fold:?}");
             assert_eq!(fold.iter().max(), Some(&(FOLDS as u8 - 1)));
+        }
+    }
+
+    /// Whatever the period of a schedule, in stretches: what happens at one of its moments is seen by every fit.
+    #[test]
+    fn no_fold_has_every_step() {
+        let fold = folds(&[0.0; 60 * STRETCHES]);
+        for period in 2..=STRETCHES / 4 {
+            for phase in 0..period {
+                let steps: Vec<u8> = fold.iter().copied().step_by(60).skip(phase).step_by(period).collect();
+                let most = (0..FOLDS).map(|of| steps.iter().filter(|step| usize::from(**step) == of).count()).max();
+                assert!(most.unwrap() < steps.len(), "{period}, {phase}: {steps:?}");
+            }
         }
     }
 }

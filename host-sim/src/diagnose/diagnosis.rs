@@ -8,7 +8,7 @@ use super::fit::{Engine, Fit};
 use super::informative::informative;
 use super::leftover::{self, Leftover};
 use super::model::Model;
-use super::noise::scale_of_squares;
+use super::noise::{FINEST_V, scale_of_squares};
 use super::observed::{Kind, Observed};
 use super::quality::{noise_report, quality, residual_report};
 use super::reading_findings::reading_findings;
@@ -19,7 +19,7 @@ use super::swallowed;
 use crate::plant_file::PlantFile;
 
 /// A model whose error is so many times that of the simulation as it was is none.
-const WORSE: f64 = 1.05;
+const WORSE: f64 = 1.005;
 /// What must be left of the whitened residual's variance to be called unexplained.
 const MATERIAL: f64 = 0.1;
 
@@ -91,7 +91,8 @@ pub(super) fn diagnose(
     let known = [(&baseline, &*held_out[0]), (&best.fit, &*held_out[1])];
     let standings = standing::standings(engine, contenders, known);
     let left = swallowed::test(&observed.errors(&best.fit.residual), &best.fit.noise.memory)
-        .or_else(|| leftover::test(engine, &best.fit).filter(|left| left.significant));
+        .or_else(|| leftover::test(engine, &best.fit).filter(|left| left.significant))
+        .filter(|left| left.rms > FINEST_V);
     let quality_before = quality(engine, &baseline, &held_out[0], false);
     let quality_after = quality(engine, &best.fit, &held_out[1], true);
     let mut findings: Vec<Finding> =

@@ -25,7 +25,8 @@ pub(super) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>>
     // Reweighting overstates what a heavy tail tells; the scores' own variance does not.
     let squares: f64 = terms.iter().map(|term| (term.weight * term.residual).powi(2)).sum();
     let weights: f64 = terms.iter().map(|term| term.weight).sum();
-    let factor = if fit.noise.cell > 0.0 { 1.0 } else { (squares / weights).min(1.0) };
+    let heavy = fit.noise.cell == 0.0 && (fit.noise.nu.is_finite() || fit.noise.wide.is_some());
+    let factor = if heavy { (squares / weights).min(1.0) } else { 1.0 };
     (normal * factor).try_inverse().filter(|matrix| matrix.iter().all(|value| value.is_finite()))
 }
 

@@ -6,6 +6,7 @@
 use std::borrow::Cow;
 
 use super::data::Data;
+use super::noise::FINEST_V;
 
 /// One row's reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +78,7 @@ impl Observed {
                 Kind::Exact
             }
         });
-        let coarse = step.is_some_and(|step| step >= COARSE * scatter(&data.reading));
+        let coarse = step.is_some_and(|step| step >= COARSE * scatter(&data.reading).max(FINEST_V));
         Self { kinds: kinds.collect(), step, upper, lower, coarse }
     }
 

@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::fit::{Engine, Fit};
-use super::noise::{Noise, scale_of_squares};
+use super::noise::{FINEST_V, Noise, scale_of_squares};
 use super::report::{NoiseReport, Quality, ResidualReport};
 
 /// 97.5 % of the standard normal.
@@ -20,7 +20,8 @@ pub(super) fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -
     let spread = scale_of_squares(&reading.iter().map(|value| value - mean).collect::<Vec<_>>());
     Quality {
         rmse,
-        fit_percent: 100.0 * (1.0 - rmse / spread.max(1e-12)),
+        // Of readings that never change there is none.
+        fit_percent: if spread > FINEST_V { 100.0 * (1.0 - rmse / spread) } else { f64::NAN },
         held_out_rmse: error(unseen),
         one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::data::Data;
 use super::fit::Fit;
-use super::noise::scale_of_squares;
+use super::noise::{FINEST_V, scale_of_squares};
 use super::observed::Observed;
 use super::quality::Z;
 use super::report::{Finding, Parameter};
@@ -24,7 +24,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> V
         BTreeMap::from([(name.to_owned(), Parameter { value, low, high, unit })])
     };
     if let Some(step) = observed.step
-        && step > COARSE_STEP * stopped_raw
+        && step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data

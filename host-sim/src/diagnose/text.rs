@@ -29,7 +29,8 @@ pub fn text(name: &str, report: &Report) -> String {
         ("one-step RMSE [V]", before.one_step_rmse, after.one_step_rmse),
         ("fit [%]", before.fit_percent, after.fit_percent),
     ] {
-        let _ = writeln!(text, "{what:22} {before:12.3} {after:12.3}");
+        let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".into() };
+        let _ = writeln!(text, "{what:22} {:>12} {:>12}", number(before), number(after));
     }
     if let Some(error) = report.extended.fixed_point_error_v {
         let _ = writeln!(text, "{}", in_fixed_point(error));
@@ -87,6 +88,8 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
                 after.held_out_rmse,
                 100.0 * report.extended.gain
             )
+        } else if after.rmse > (1.0 - FORETOLD) * before.rmse {
+            format!("With {it} in the model, the error stays at {:.3} V.", after.rmse)
         } else {
             format!(
                 "With {it} in the model, the error falls from {:.3} to {:.3} V, but not on stretches that no fit has seen: no \

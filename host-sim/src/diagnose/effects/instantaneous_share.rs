@@ -24,7 +24,7 @@ impl Effect for InstantaneousShare {
     }
 
     fn coordinates(&self, _: usize, _: &Data) -> Vec<Coordinate> {
-        vec![Coordinate::new(-0.2, 0.98)]
+        vec![Coordinate::new(-0.2, 1.0)]
     }
 
     fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {

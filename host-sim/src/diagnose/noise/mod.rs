@@ -19,6 +19,10 @@ use super::observed::{COARSE, Kind, Observed};
 use reading::{in_cell, stopped};
 use tail::tail_constant;
 
+/// No reading is taken to be better than this, in V: the tick itself says no more, and a record without noise, as another
+/// simulation writes it, differs from ours by the steps in which both were computed.
+pub const FINEST_V: f64 = 0.01;
+
 /// The law of the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
@@ -74,14 +78,18 @@ impl Noise {
         let residual = &*observed.errors(residual);
         let mut noise = Self::robust(&exact(residual, observed));
         if let Some(step) = observed.step
-            && (observed.coarse || step >= COARSE * rest_of(scale_of_squares(residual), step))
+            && (observed.coarse || step >= COARSE * rest_of(scale_of_squares(residual), step).max(FINEST_V))
         {
             noise.cell = step / 2.0;
             noise.nu = f64::INFINITY;
-            noise.sigma = rest_of(scale_of_squares(residual), step).max(0.05 * step);
+            noise.sigma = rest_of(scale_of_squares(residual), step).max(0.05 * step).max(FINEST_V);
             noise.rescale_cells(residual, observed);
             noise.marginal = noise.sigma;
             return noise;
+        }
+        if scale_of_squares(residual) <= FINEST_V {
+            // What is left is the arithmetic's.
+            return noise.with_tail(f64::INFINITY, FINEST_V);
         }
         noise.memory = Memory::fitted(residual, noise.sigma);
         let innovations: Vec<f64> = exact(&noise.whitened(residual), observed);
@@ -186,7 +194,8 @@ impl Noise {
             let noise = Self { sigma: ln_sigma.exp(), marginal: ln_sigma.exp(), ..self.clone() };
             residual.iter().zip(&observed.kinds).map(|(&r, &kind)| noise.term(kind, r, r).log).sum()
         };
-        let (mut low, mut high) = ((0.02 * self.cell).ln(), (scale_of_squares(residual) + self.cell).ln());
+        let (mut low, mut high) =
+            ((0.02 * self.cell).max(FINEST_V).ln(), (scale_of_squares(residual) + self.cell).ln());
         const GOLDEN: f64 = 0.618_033_988_75;
         for _ in 0..12 {
             let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
@@ -213,16 +222,16 @@ fn exact(innovations: &[f64], observed: &Observed) -> Vec<f64> {
     innovations.iter().zip(&observed.kinds).filter(|(_, kind)| **kind == Kind::Exact).map(|(e, _)| *e).collect()
 }
 
-/// Robust scale around zero: the median size, as a normal's standard deviation. Noise is never exactly zero; rows that
-/// are (a spring at rest, read without noise) say nothing of it.
+/// Robust scale around zero: the median size, as a normal's standard deviation, [`FINEST_V`] at least. Noise is never exactly
+/// zero; rows that are (a spring at rest, read without noise) say nothing of it.
 pub fn scale(residual: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).filter(|size| *size > 0.0).collect();
     if sizes.is_empty() {
-        return 0.0;
+        return FINEST_V;
     }
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / 0.6745).max(1e-9)
+    (*median / 0.6745).max(FINEST_V)
 }
 
 /// Root of the mean square.

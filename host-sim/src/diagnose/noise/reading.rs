@@ -2,6 +2,9 @@
 
 use super::{HALF_LN_TAU, Term};
 
+/// Half a cell, in scales of the noise, from which on it is a point.
+const NARROW: f64 = 0.05;
+
 fn density(z: f64) -> f64 {
     (-0.5 * z * z - HALF_LN_TAU).exp()
 }
@@ -26,6 +29,11 @@ pub(super) fn stopped(residual: f64, sigma: f64) -> Term {
 
 /// A reading that was rounded to a cell.
 pub(super) fn in_cell(residual: f64, sigma: f64, half: f64) -> Term {
+    if half < NARROW * sigma {
+        // The density hardly changes across it.
+        let log = -0.5 * (residual / sigma).powi(2) - HALF_LN_TAU + (2.0 * half / sigma).ln();
+        return Term { log, residual, weight: 1.0 / (sigma * sigma) };
+    }
     // A cell is as likely on either side.
     let side = if residual < 0.0 { -1.0 } else { 1.0 };
     let (a, b) = ((residual.abs() - half) / sigma, (residual.abs() + half) / sigma);

@@ -1,6 +1,6 @@
 //! The tail of the innovations: a normal's, Student's t, or a mixture of two normals, by likelihood.
 
-use super::{Noise, scale, scale_of_squares};
+use super::{FINEST_V, Noise, scale, scale_of_squares};
 
 const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];
 /// What a mixture must be better by than one heavy tail, in nats, to be outliers.
@@ -15,14 +15,14 @@ impl Noise {
     pub(super) fn fit_scale(&mut self, innovations: &[f64], rounds: usize) {
         let normal = self.nu.is_infinite() && self.wide.is_none();
         let start = if normal { scale_of_squares(innovations) } else { scale(innovations) };
-        *self = self.scaled_to(start.max(1e-9));
+        *self = self.scaled_to(start.max(FINEST_V));
         if normal {
             return;
         }
         for _ in 0..rounds {
             let squares: f64 = innovations.iter().map(|&e| e * e * self.weight(e)).sum();
             let factor = (squares / innovations.len().max(1) as f64).sqrt();
-            *self = self.scaled_to((self.sigma * factor).max(1e-9));
+            *self = self.scaled_to((self.sigma * factor).max(FINEST_V));
         }
     }
 
@@ -34,7 +34,7 @@ impl Noise {
 
     /// The likeliest tail of some innovations, and its scale.
     pub(super) fn fit_tail(&mut self, innovations: &[f64]) {
-        let start = scale(innovations).max(1e-9);
+        let start = scale(innovations);
         let mut best = f64::NEG_INFINITY;
         let mut consider = |noise: &mut Self, tried: Self, cost: f64| {
             let log: f64 = innovations.iter().map(|&e| tried.exact_term(e).log).sum::<f64>() - cost;
@@ -43,7 +43,7 @@ impl Noise {
                 *noise = tried;
             }
         };
-        let normal = self.with_tail(f64::INFINITY, scale_of_squares(innovations).max(1e-9));
+        let normal = self.with_tail(f64::INFINITY, scale_of_squares(innovations).max(FINEST_V));
         consider(self, normal.clone(), 0.0);
         for nu in TAILS {
             let mut heavy = normal.with_tail(nu, start);
@@ -76,7 +76,7 @@ impl Noise {
                 wide_sum += outlier * e * e;
             }
             fraction = (weight / count).clamp(1e-6, 0.5);
-            sigma = (narrow_sum / (count - weight)).sqrt().max(1e-9);
+            sigma = (narrow_sum / (count - weight)).sqrt().max(FINEST_V);
             wide = (wide_sum / weight.max(1e-9)).sqrt().max(WIDE * sigma);
         }
         Self { wide: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }

@@ -1,0 +1,68 @@
+//! Records as people make them first: a stair of even steps up and down, from another simulation, with little noise or none.
+
+use std::fmt::Write;
+
+use end_to_end::hidden::noise::Noise;
+use end_to_end::vsj::json;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+use tempfile::tempdir;
+
+const SAMPLE_S: f64 = 0.1;
+const LEVELS_V: [f64; 8] = [0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 300.0, 100.0];
+/// As many rows as a turn of the folds that are held out.
+const ROWS_PER_LEVEL: usize = 300;
+
+/// `gain (w + (u - w) / 11)`, `w` following `u` with `tau_s`.
+fn stiffness(gain: f64, tau_s: f64) -> Vec<(f64, f64)> {
+    let kept = (-SAMPLE_S / tau_s).exp();
+    let volts = LEVELS_V.into_iter().flat_map(|volts| std::iter::repeat_n(volts, ROWS_PER_LEVEL));
+    let spring = volts.scan(0.0, |lag, volts| {
+        let now = gain * (*lag + (volts - *lag) / 11.0);
+        *lag = volts + (*lag - volts) * kept;
+        Some((volts, now))
+    });
+    spring.collect()
+}
+
+/// What is said of readings.
+fn diagnosed(rows: &[(f64, f64)]) -> Value {
+    let mut text = String::from("time_s,voltage_v,stiffness\n");
+    for (row, (volts, stiffness)) in rows.iter().enumerate() {
+        writeln!(text, "{:.1},{volts},{stiffness}", row as f64 * SAMPLE_S).unwrap();
+    }
+    let folder = tempdir().unwrap();
+    std::fs::write(folder.path().join("record.csv"), text).unwrap();
+    json(folder.path(), &["diagnose", "record.csv", "--json"])
+}
+
+fn causes(report: &Value) -> Vec<&str> {
+    report["findings"].as_array().unwrap().iter().map(|finding| finding["cause"].as_str().unwrap()).collect()
+}
+
+/// All that a quick spring shows is just after the steps.
+#[test]
+fn a_quick_spring_is_no_row_of_outliers() {
+    for (seed, tau_s) in [(1, 0.5), (2, 1.0), (3, 1.2)] {
+        let exact = stiffness(1.0, tau_s);
+        let noise = Noise::white(0.2).draw(&mut ChaCha8Rng::seed_from_u64(seed), exact.len());
+        let rows: Vec<_> = exact.into_iter().zip(noise).map(|((u, y), noise)| (u, y + noise)).collect();
+        let report = diagnosed(&rows);
+        assert_eq!(causes(&report), ["time-constant"], "{tau_s}: {report}");
+        let found = report["findings"][0]["parameters"]["tau_s"]["value"].as_f64().unwrap();
+        assert!((found / tau_s - 1.0).abs() < 0.02, "{tau_s}: {found}");
+    }
+}
+
+#[test]
+fn a_record_without_noise_is_read_as_it_is() {
+    let as_is: fn(f64) -> f64 = |y| y;
+    for round in [as_is, |y| (y * 1e3).round() / 1e3, |y| (y * 1e2).round() / 1e2] {
+        let rounded = |gain, tau_s| stiffness(gain, tau_s).into_iter().map(|(u, y)| (u, round(y))).collect::<Vec<_>>();
+        let report = diagnosed(&rounded(1.0, 5.5));
+        assert_eq!(report["verdict"], "consistent", "{report}");
+        assert_eq!(causes(&diagnosed(&rounded(0.9, 5.5))), ["gain-error"]);
+        assert_eq!(causes(&diagnosed(&rounded(1.0, 3.0))), ["time-constant"]);
+    }
+}
