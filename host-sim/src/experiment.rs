@@ -68,14 +68,13 @@ impl<P: Judged> Experiment<P> {
         let alone = uncontrolled.check().map_err(|error| BadInput(error.to_string()))?;
         self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;
 
-        let start_s = self.schedule.start_s();
-        let last = ((self.schedule.end_s() - start_s) * rate_hz).floor();
+        let last = self.schedule.last_tick(rate_hz);
         if last >= MOST_TICKS {
             bad_input!("{} takes {last} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}", self.name);
         }
         let targets = self.schedule.at_ticks(rate_hz);
         let ticks = targets.len();
-        let mut run = Run { start_s, rate_hz, with: Vec::new(), without: Vec::new() };
+        let mut run = Run { start_s: self.schedule.start_s(), rate_hz, with: Vec::new(), without: Vec::new() };
         run.with = one_loop(&controlled, &targets, |done| progress(done, 2 * ticks))?;
         run.without = one_loop(&alone, &targets, |done| progress(ticks + done, 2 * ticks))?;
         for (settings, samples) in [(&self.settings, &mut run.with), (&uncontrolled, &mut run.without)] {

@@ -102,8 +102,13 @@ impl Schedule {
     /// Voltages in V at ticks `rate_hz` a second, the first moment and the last that falls on a tick included.
     pub(crate) fn at_ticks(&self, rate_hz: f64) -> Vec<f64> {
         let mut reader = self.reader();
-        let ticks = ((self.end_s() - self.start_s()) * rate_hz + 1e-6).floor() as usize + 1;
-        (0..ticks).map(|tick| reader.at(self.start_s() + tick as f64 / rate_hz)).collect()
+        let ticks = 0..=self.last_tick(rate_hz) as usize;
+        ticks.map(|tick| reader.at(self.start_s() + tick as f64 / rate_hz)).collect()
+    }
+
+    /// Number of the last of those ticks, from 0: a whole number, however large.
+    pub(crate) fn last_tick(&self, rate_hz: f64) -> f64 {
+        ((self.end_s() - self.start_s()) * rate_hz + 1e-6).floor()
     }
 
     /// The pieces in order.

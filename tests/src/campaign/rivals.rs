@@ -140,13 +140,15 @@ fn at_floor(rmse: f64, floor: f64) -> bool {
 
 /// How often each tool is at the floor, worse than the paper's plant, or nowhere; and its typical time.
 fn counts(rows: &[Row]) -> String {
-    let mut text = "\
+    let mut text = format!(
+        "\
 Where the paper's plant is at the floor, the last 40 % do not show what is hidden, or no model could foretell it.
 
-| of 19 records | at the floor | worse than the paper's plant by 10 % | left all bounds | median time in s |
+| of {} records | at the floor | worse than the paper's plant by 10 % | left all bounds | median time in s |
 | --- | --- | --- | --- | --- |
-"
-    .replace("19", &rows.len().to_string());
+",
+        rows.len()
+    );
     for (tool, name) in TOOLS.iter().enumerate() {
         let count = |which: &dyn Fn(&Row, Option<f64>) -> bool| {
             rows.iter().filter(|row| which(row, row.tools[tool].rmse)).count()

@@ -67,8 +67,9 @@ impl Noise {
         noise.with_tail(5.0, sigma)
     }
 
-    /// The same with another tail and scale.
+    /// The same with another tail and scale, [`FINEST_V`] at least.
     fn with_tail(&self, nu: f64, sigma: f64) -> Self {
+        let sigma = sigma.max(FINEST_V);
         let shape = if nu.is_finite() { tail_constant(nu) } else { -HALF_LN_TAU };
         Self { nu, sigma, constant: shape - sigma.ln(), ..self.clone() }
     }
@@ -87,8 +88,7 @@ impl Noise {
             noise.marginal = noise.sigma;
             return noise;
         }
-        if scale_of_squares(residual) <= FINEST_V {
-            // What is left is the arithmetic's.
+        if negligible(residual) {
             return noise.with_tail(f64::INFINITY, FINEST_V);
         }
         noise.memory = Memory::fitted(residual, noise.sigma);
@@ -232,6 +232,11 @@ pub fn scale(residual: &[f64]) -> f64 {
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     (*median / 0.6745).max(FINEST_V)
+}
+
+/// True if what is left is the arithmetic's.
+pub fn negligible(residual: &[f64]) -> bool {
+    scale_of_squares(residual) <= FINEST_V
 }
 
 /// Root of the mean square.

@@ -15,21 +15,22 @@ impl Noise {
     pub(super) fn fit_scale(&mut self, innovations: &[f64], rounds: usize) {
         let normal = self.nu.is_infinite() && self.wide.is_none();
         let start = if normal { scale_of_squares(innovations) } else { scale(innovations) };
-        *self = self.scaled_to(start.max(FINEST_V));
+        *self = self.scaled_to(start);
         if normal {
             return;
         }
         for _ in 0..rounds {
             let squares: f64 = innovations.iter().map(|&e| e * e * self.weight(e)).sum();
             let factor = (squares / innovations.len().max(1) as f64).sqrt();
-            *self = self.scaled_to((self.sigma * factor).max(FINEST_V));
+            *self = self.scaled_to(self.sigma * factor);
         }
     }
 
     /// The same shape, of another scale.
     fn scaled_to(&self, sigma: f64) -> Self {
-        let wide = self.wide.map(|(fraction, wide)| (fraction, wide * sigma / self.sigma));
-        Self { wide, ..self.with_tail(self.nu, sigma) }
+        let scaled = self.with_tail(self.nu, sigma);
+        let wide = self.wide.map(|(fraction, wide)| (fraction, wide * scaled.sigma / self.sigma));
+        Self { wide, ..scaled }
     }
 
     /// The likeliest tail of some innovations, and its scale.
@@ -43,7 +44,7 @@ impl Noise {
                 *noise = tried;
             }
         };
-        let normal = self.with_tail(f64::INFINITY, scale_of_squares(innovations).max(FINEST_V));
+        let normal = self.with_tail(f64::INFINITY, scale_of_squares(innovations));
         consider(self, normal.clone(), 0.0);
         for nu in TAILS {
             let mut heavy = normal.with_tail(nu, start);

@@ -6,7 +6,7 @@ use crate::diagnose::effect::Scene;
 use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::{Engine, Fit};
 use crate::diagnose::model::{Block, Model};
-use crate::diagnose::noise::{FINEST_V, Noise, scale, scale_of_squares};
+use crate::diagnose::noise::{Noise, negligible, scale};
 
 /// What a block costs, in nats, beside its places and forms: so many are tried.
 const PRICE: f64 = 4.3;
@@ -67,10 +67,7 @@ impl Judge for Engine<'_> {
     }
 
     fn caution(&mut self, fit: &Fit) -> f64 {
-        if scale_of_squares(&fit.residual) <= FINEST_V {
-            return 1.0;
-        }
-        long_memory(&self.terms(&fit.noise, &fit.residual))
+        if negligible(&fit.residual) { 1.0 } else { long_memory(&self.terms(&fit.noise, &fit.residual)) }
     }
 }
 
