@@ -52,10 +52,11 @@ fn a_spring_as_in_the_paper_gets_no_finding() {
     assert!(1.0 - summary.nothing_extra <= 0.025, "{}\n{wrong}", summary.nothing_extra);
 }
 
-/// 116 records, every two causes of different blocks once.
+/// 58 records, every second of the pairs of causes of different blocks.
 #[test]
 fn two_effects_are_both_named() {
-    let (_, summary, wrong) = outcomes(&part::pairs(FIRST, 1));
+    let jobs: Vec<Job> = part::pairs(FIRST, 1).into_iter().step_by(2).collect();
+    let (_, summary, wrong) = outcomes(&jobs);
     assert!(summary.all_named >= 0.93, "{}\n{wrong}", summary.all_named);
     assert!(summary.nothing_extra >= 0.93, "{}\n{wrong}", summary.nothing_extra);
 }

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use host_sim::log::{Decoder, Done, Event, Formats, Item, Line, table_row};
+use tempfile::NamedTempFile;
 
 use crate::image::{self, Opt};
 use crate::shell;
@@ -130,10 +131,10 @@ pub(crate) fn obey_in<T>(
     work: impl FnOnce() -> Result<T>,
 ) -> Result<(T, Run)> {
     let formats = Formats::parse(&image::read(elf)?)?;
-    let wire = elf.with_file_name(format!("dac-{}-link", std::process::id()));
+    let wire = NamedTempFile::new()?;
     let begin = Instant::now();
     let host = format!("unix:{},server=on,wait=off", socket.display());
-    let mut child = start(folder, elf, LINK, &host, &wire, &format!("shift={SHIFT},align=on"))?;
+    let mut child = start(folder, elf, LINK, &host, wire.path(), &format!("shift={SHIFT},align=on"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let (result, log) = thread::scope(|scope| {
         let reader = scope.spawn(|| decode(formats, &mut output, show));
@@ -143,11 +144,11 @@ pub(crate) fn obey_in<T>(
         anyhow::Ok((result, log?))
     })?;
     child.wait()?;
-    let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
-    let _ = (fs::remove_file(&wire), fs::remove_file(socket));
+    let dac = fs::read(&wire)?;
+    let _ = fs::remove_file(socket);
     // Ended by us: it has no exit code of its own. When it cannot keep up with our clock it says so in the midst of the log,
     // which costs a line.
-    Ok((result?, Run { exit: 0, log: log.lines, dac: written(&dac?), took: begin.elapsed() }))
+    Ok((result?, Run { exit: 0, log: log.lines, dac: written(&dac), took: begin.elapsed() }))
 }
 
 /// As [`obey`], until the emulator ends, and with every line of the log.
@@ -175,9 +176,9 @@ pub(crate) fn play_in(
     show: impl FnMut(&str) + Send,
 ) -> Result<Run> {
     let formats = Formats::parse(&image::read(elf)?)?;
-    let wire = elf.with_file_name(format!("dac-{}-{}", std::process::id(), script.replace(' ', "-")));
+    let wire = NamedTempFile::new()?;
     let begin = Instant::now();
-    let mut child = start(folder, elf, script, "null", &wire, &format!("shift={shift},sleep=off"))?;
+    let mut child = start(folder, elf, script, "null", wire.path(), &format!("shift={shift},sleep=off"))?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let over = AtomicBool::new(false);
     let (log, status) = thread::scope(|scope| {
@@ -196,13 +197,12 @@ pub(crate) fn play_in(
         anyhow::Ok((log?, child.wait()?))
     })?;
     let took = begin.elapsed();
-    let dac = fs::read(&wire).with_context(|| format!("cannot read {}", wire.display()));
-    let _ = fs::remove_file(&wire);
+    let dac = fs::read(&wire)?;
     if took >= TIMEOUT {
         let last = log.lines.last().map(text);
         bail!("the emulator was stopped after {} s; the log's last line is {last:?}", took.as_secs());
     }
-    Ok(Run { exit: status.code().unwrap_or(-1), log: log.whole()?, dac: written(&dac?), took })
+    Ok(Run { exit: status.code().unwrap_or(-1), log: log.whole()?, dac: written(&dac), took })
 }
 
 /// What came of a log.

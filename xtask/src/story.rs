@@ -27,6 +27,7 @@ use link::{ModelId, WireModel};
 use model::Plant;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -125,12 +126,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         (false, given) => given.iter().copied().map(Some).collect(),
     };
     let stage = Stage::new(args.controller)?;
-    let mut told = Vec::new();
-    for effect in effects {
-        let one = stage.tell(effect, args.seed).with_context(|| name(effect))?;
-        eprintln!("{}", table::line(&one, 2));
-        told.push(one);
-    }
+    let told = stage.tell_all(&effects, args.seed)?;
     if args.bless {
         table::bless(&told)?;
     }
@@ -146,9 +142,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 pub(crate) fn check() -> Result<()> {
     let begin = Instant::now();
     let stage = Stage::new(Leader::Paper)?;
-    let told = IN_TEST.iter().map(|cause| stage.tell(Some(*cause), 1)).collect::<Result<Vec<_>>>()?;
-    table::compare(&told)?;
-    eprint!("{}", table::table(&told, 2));
+    table::compare(&stage.tell_all(&IN_TEST.map(Some), 1)?)?;
     eprintln!("the story of three effects in {:.0} s, as approved", begin.elapsed().as_secs_f64());
     Ok(())
 }
@@ -194,6 +188,16 @@ impl Stage {
             schedule: Schedule { time_s, voltage_v },
             top_v,
         })
+    }
+
+    /// One board and one spring for each effect, all at once.
+    fn tell_all(&self, effects: &[Option<Cause>], seed: u64) -> Result<Vec<Told>> {
+        let tell = |&effect: &Option<Cause>| {
+            let told = self.tell(effect, seed).with_context(|| name(effect))?;
+            eprintln!("{}", table::line(&told, 2));
+            Ok(told)
+        };
+        effects.par_iter().map(tell).collect()
     }
 
     fn tell(&self, cause: Option<Cause>, seed: u64) -> Result<Told> {
@@ -271,8 +275,9 @@ impl Stage {
 
     /// Over the link, as a user does. The board restarts, and says that it runs this very model.
     fn send(&self, folder: &Path, model: &WireModel) -> Result<()> {
-        // The path of a socket has to be short.
-        let socket = self.elf.with_file_name(format!("story-{}", std::process::id()));
+        // The path of a socket has to be short, and is this thread's alone.
+        let thread = rayon::current_thread_index().unwrap_or_default();
+        let socket = self.elf.with_file_name(format!("story-{}-{thread}", std::process::id()));
         let port = format!("unix:{}", socket.display());
         let send = || {
             drop(talk::open(&port)?);
