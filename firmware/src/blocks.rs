@@ -4,7 +4,7 @@
 use model::estimator::{Estimator, Model};
 use model::extended::{Law, Leakage, Memory, Relaxation};
 use model::units::Signal;
-use model::{Approach, Compensation, ExtendedPlant, Gains, OutOfRange, Plant, Settings, State, Volts};
+use model::{Approach, Compensation, ExtendedPlant, Gains, Input, OutOfRange, Plant, Settings, State, Volts};
 
 use crate::control::{Stopwatch, whole_tick};
 use crate::digest::Digest;
@@ -91,9 +91,9 @@ fn ticks<P: Model>(settings: &Settings<P>, stopwatch: &mut impl Stopwatch) -> Re
             bits ^= bits << 5;
             target = (bits >> 3) as i32;
         }
-        let target = Volts(Signal::from_bits(target));
+        let input = Input { target: Volts(Signal::from_bits(target)), ..Input::default() };
         stopwatch.start();
-        let output = whole_tick(&config, &mut state, target);
+        let output = whole_tick(&config, &mut state, input);
         stopwatch.stop();
         digest.add_output(&output);
     }

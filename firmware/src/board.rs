@@ -16,7 +16,8 @@ pub trait Amplifier {
         None
     }
 
-    /// What the spring's stiffness sensor read since the last tick, on the scale of volts; `None` without sensor.
+    /// What the spring's stiffness sensor read since the last voltage went out, on the scale of volts; `None` without sensor,
+    /// or without a new reading.
     fn measured(&mut self) -> Option<Volts> {
         None
     }

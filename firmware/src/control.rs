@@ -6,7 +6,8 @@ use link::WireModel;
 use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Command, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
 use model::{
-    Config, ExtendedPlant, Input, OutOfRange, Output, SampleTime, Settings, State, Volts, estimator, extended,
+    Config, ExtendedPlant, Input, OutOfRange, Output, Reading, SampleTime, ScaledStiffness, Settings, State, Volts,
+    estimator, extended,
 };
 
 /// What the host ordered since the last tick.
@@ -31,7 +32,8 @@ pub struct Senses {
     pub monitors: Option<Monitors>,
     /// A fault that somebody else found.
     pub fault: Option<Fault>,
-    /// The stiffness sensor's reading, on the scale of volts.
+    /// The stiffness sensor's reading, on the scale of volts. Sampled after the last tick's voltage had gone out; an older
+    /// one is none.
     pub measured: Option<Volts>,
 }
 
@@ -150,9 +152,10 @@ impl Control {
             monitors: senses.monitors,
             fault: senses.fault,
         });
+        let measured = senses.measured.and_then(|volts| Reading::fresh(ScaledStiffness(volts.0)));
         let output = match &mut self.spring {
-            Spring::Plain(spring) => spring.follow(decision, stopwatch),
-            Spring::Extended(spring) => spring.follow(decision, stopwatch),
+            Spring::Plain(spring) => spring.follow(decision, measured, stopwatch),
+            Spring::Extended(spring) => spring.follow(decision, measured, stopwatch),
         };
         Tick { drive: self.supervisor.release(&output), output, measured: senses.measured }
     }
@@ -189,22 +192,22 @@ impl<E: Estimator> Loop<E> {
     }
 
     #[inline(always)]
-    fn follow(&mut self, decision: Decision, stopwatch: &mut impl Stopwatch) -> Output {
+    fn follow(&mut self, decision: Decision, measured: Option<Reading>, stopwatch: &mut impl Stopwatch) -> Output {
         match decision {
-            Decision::Rest => self.config.rest(&mut self.state),
+            Decision::Rest => self.config.rest(&mut self.state, measured),
             Decision::Start(target) => {
                 // From zero volts, as if zero had been asked for until now.
                 self.config.adopt(&mut self.state, Volts::ZERO);
-                self.timed(target, stopwatch)
+                self.timed(Input { target, measured }, stopwatch)
             }
-            Decision::Pursue(target) => self.timed(target, stopwatch),
+            Decision::Pursue(target) => self.timed(Input { target, measured }, stopwatch),
         }
     }
 
     #[inline(always)]
-    fn timed(&mut self, target: Volts, stopwatch: &mut impl Stopwatch) -> Output {
+    fn timed(&mut self, input: Input, stopwatch: &mut impl Stopwatch) -> Output {
         stopwatch.start();
-        let output = whole_tick(&self.config, &mut self.state, target);
+        let output = whole_tick(&self.config, &mut self.state, input);
         stopwatch.stop();
         output
     }
@@ -212,6 +215,6 @@ impl<E: Estimator> Loop<E> {
 
 /// The model's tick as one function: it is counted as it would be called.
 #[inline(never)]
-pub(crate) fn whole_tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, target: Volts) -> Output {
-    config.tick(state, Input { target, ..Input::default() })
+pub(crate) fn whole_tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, input: Input) -> Output {
+    config.tick(state, input)
 }

@@ -10,6 +10,7 @@
 //! | [`roll_call`] | the watchdog is fed only when every task has checked in |
 //! | [`store`] | the model that outlives a power cut |
 //! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
+//! | [`rehearsal`] | the same without a board, for the host |
 //! | [`settings`] | what an image runs |
 //! | [`digest`] | one number for a whole run |
 //! | `last_words`, `stop` | what survives a reset; panic and hard fault |
@@ -36,6 +37,7 @@ pub mod control;
 pub mod digest;
 pub mod pace;
 pub mod post;
+pub mod rehearsal;
 pub mod roll_call;
 pub mod script;
 pub mod settings;

@@ -10,8 +10,8 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
 use micromath::F32Ext;
-use model::Volts;
 use model::supervisor::Fault;
+use model::{Sensor, Volts};
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
@@ -24,6 +24,8 @@ pub enum Event {
     Fault(Fault, u32),
     /// The limits that act have changed.
     Limits(u8, u32),
+    /// The stiffness sensor is trusted from this tick on, or is not.
+    Sensor(Sensor, u32),
     /// Once a second.
     Summary(Summary),
     /// The end of an emulated run.
@@ -126,6 +128,7 @@ pub fn event(event: Event) {
         Event::State(from, to) => info!("state {=str} -> {=str}", from, to),
         Event::Fault(it, tick) => fault(it, tick),
         Event::Limits(bits, tick) => warn!("limit bits={=u8} tick={=u32}", bits, tick),
+        Event::Sensor(sensor, tick) => warn!("sensor {=str} tick={=u32}", sensor.name(), tick),
         Event::Summary(s) => info!(
             "summary tick={=u32} overruns={=u32} worst_lateness_us={=u32} rms_lateness_us={=f32} limited_ticks={=u32} state={=str} target_mv={=i32} applied_mv={=i32} stiffness_mv={=i32}",
             s.tick,

@@ -5,17 +5,16 @@
 //! | `stair` | the report's stair: 70 s, from 20 s on every 10 s up by 100 V in 0.1 s |
 //! | `up-down` | 95 s: every 10 s up by 100 V to 500 V, then down to 100 V; the emulated board has a spring at its amplifier port |
 //! | `up-down fast` | the same under the time-optimal controller, in an image that has it (feature `fast`) |
+//! | `up-down sensor`, `up-down fast sensor` | the same with the spring's readings in the loop (feature `feedback`) |
 //! | `random SEED` | 100 000 ticks of arming, disarming, target jumps, an interlock that opens, a host that falls silent |
 //! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `silence` | fault drills |
 //! | (after a reset by a fault) | the aftermath: nothing may leave until the fault is acknowledged |
 
-use link::WireModel;
 use model::supervisor::Command;
 use model::{Settings, Volts};
 
-use crate::control::{Control, Orders, Senses, Tick, Untimed};
-use crate::digest::Digest;
-use crate::settings::{Leader, SETTINGS, SUPERVISION};
+use crate::control::Orders;
+use crate::settings::{LEADERS, Leader, SETTINGS};
 
 /// Ticks of the stair, 70 s.
 pub const STAIR_TICKS: u32 = 70_000;
@@ -97,12 +96,12 @@ pub struct Step {
 }
 
 /// A run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Script {
     /// See the module.
     Stair,
     /// See the module.
-    UpDown(Leader),
+    UpDown(&'static Leader),
     /// See the module.
     Random(Random),
     /// See the module.
@@ -124,8 +123,8 @@ impl Script {
         if name == "stair" {
             return Some(Self::Stair);
         }
-        if let Some(leader) = Leader::ALL.iter().find(|leader| leader.up_down() == name) {
-            return Some(Self::UpDown(*leader));
+        if let Some(leader) = LEADERS.iter().find(|leader| leader.run == name) {
+            return Some(Self::UpDown(leader));
         }
         if let Some(seed) = name.strip_prefix("random ") {
             return seed.parse().ok().map(Self::random);
@@ -136,7 +135,7 @@ impl Script {
     /// Spring and controller that it is played with.
     pub const fn settings(&self) -> &'static Settings {
         match self {
-            Self::UpDown(leader) => leader.settings(),
+            Self::UpDown(leader) => leader.settings,
             Self::Stair | Self::Random(_) | Self::Drill(_) | Self::Aftermath => &SETTINGS,
         }
     }
@@ -259,50 +258,16 @@ impl Random {
     }
 }
 
-/// Runs a script without a clock, as a host does; `each` hears of every tick. Mishaps are for the target only.
-///
-/// # Errors
-/// Never with the settings above.
-pub fn rehearse(script: Script, each: impl FnMut(&Control, &Tick)) -> Result<Digest, model::OutOfRange> {
-    rehearse_with(script, None, each)
-}
-
-/// As [`rehearse`], with a model that was found.
-///
-/// # Errors
-/// [`model::OutOfRange`] for a model that cannot be run.
-pub fn rehearse_with(
-    mut script: Script,
-    found: Option<&WireModel>,
-    mut each: impl FnMut(&Control, &Tick),
-) -> Result<Digest, model::OutOfRange> {
-    let settings = script.settings();
-    let mut control = Control::new(settings, &SUPERVISION, None)?;
-    if let Some(found) = found {
-        control.take_on(settings, found)?;
-    }
-    let mut digest = Digest::default();
-    let mut number = 0;
-    while let Some(step) = script.step(number) {
-        let senses = Senses { interlock_closed: step.interlock_closed, ..Senses::default() };
-        let tick = control.tick(&step.orders, &senses, &mut Untimed);
-        digest.add(&tick);
-        each(&control, &tick);
-        number += 1;
-    }
-    Ok(digest)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use model::supervisor::{Fault, State};
 
     #[test]
     fn names_lead_to_scripts() {
         assert_eq!(Script::parse("stair"), Some(Script::Stair));
-        assert_eq!(Script::parse("up-down"), Some(Script::UpDown(Leader::Paper)));
+        assert_eq!(Script::parse("up-down"), Some(Script::UpDown(&LEADERS[0])));
         assert_eq!(Script::parse("up-down fast").is_some(), cfg!(feature = "fast"));
+        assert_eq!(Script::parse("up-down sensor").is_some(), cfg!(feature = "feedback"));
         assert_eq!(Script::parse("random 7"), Some(Script::random(7)));
         assert_eq!(Script::parse("stall\n"), Some(Script::Drill(Mishap::Stall)));
         assert_eq!((Script::parse("random"), Script::parse("")), (None, None));
@@ -319,26 +284,5 @@ mod tests {
     fn up_goes_down_again() {
         let seen = [0, 5_000, 5_050, 14_999, 50_000, 55_050, 60_000, 85_050, 85_100, 94_999].map(up_down_v);
         assert_eq!(seen, [0, 0, 50, 100, 500, 450, 400, 150, 100, 100]);
-    }
-
-    /// A random run that never armed would agree with anything.
-    #[test]
-    fn a_random_run_sees_every_state_often() {
-        for seed in [1, 2, 3] {
-            let (mut armed, mut disarmed, mut ramping, mut faulted, mut limited) = (0u32, 0u32, 0u32, 0u32, 0u32);
-            rehearse(Script::random(seed), |control, tick| {
-                match control.supervisor().state() {
-                    State::Armed if control.supervisor().ramping() => ramping += 1,
-                    State::Armed => armed += 1,
-                    State::Disarmed => disarmed += 1,
-                    State::Faulted(Fault::Interlock) => faulted += 1,
-                    State::Faulted(fault) => panic!("{fault:?}"),
-                }
-                limited += u32::from(tick.output.limits != model::Limits::NONE);
-            })
-            .unwrap();
-            let seen = [armed, disarmed, ramping, faulted, limited];
-            assert!(armed > 40_000 && seen.iter().all(|ticks| *ticks > 500), "{seed}: {seen:?}");
-        }
     }
 }

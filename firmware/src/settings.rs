@@ -1,50 +1,47 @@
 //! What an image runs: spring, controller and amplifier, and how they are supervised.
 
+#[cfg(feature = "feedback")]
+use model::Feedback;
 #[cfg(feature = "fast")]
 use model::{Approach, Compensation};
 use model::{Settings, supervisor};
 
-/// Of what is flashed, and of every run under the paper's controller.
+/// Of every run under the paper's controller.
 pub const SETTINGS: Settings = Settings::PAPER;
-/// The same under the time-optimal controller.
+/// Of what is flashed.
+#[cfg(not(feature = "feedback"))]
+pub const FLASHED: Settings = SETTINGS;
+/// Of what is flashed: with a sensor, which corrects nothing until a board has one.
+#[cfg(feature = "feedback")]
+pub const FLASHED: Settings = sensing(SETTINGS);
+/// Under the time-optimal controller.
 #[cfg(feature = "fast")]
 const FAST: Settings = Settings { compensation: Compensation::TimeOptimal(Approach::DEAD_BEAT), ..SETTINGS };
 /// Supervision of every run.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 
-/// Who leads the spring.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Leader {
-    /// The paper's controller.
-    Paper,
-    /// The time-optimal one.
-    #[cfg(feature = "fast")]
-    Fast,
+/// Who leads the spring up and down.
+#[derive(Debug, PartialEq)]
+pub struct Leader {
+    /// Name of the run.
+    pub run: &'static str,
+    /// What the controller is built from.
+    pub settings: &'static Settings,
 }
 
-impl Leader {
-    /// All that are in the image.
-    pub const ALL: &[Self] = &[
-        Self::Paper,
-        #[cfg(feature = "fast")]
-        Self::Fast,
-    ];
+/// All that are in the image.
+pub static LEADERS: &[Leader] = &[
+    Leader { run: "up-down", settings: &SETTINGS },
+    #[cfg(feature = "fast")]
+    Leader { run: "up-down fast", settings: &FAST },
+    #[cfg(feature = "feedback")]
+    Leader { run: "up-down sensor", settings: &FLASHED },
+    #[cfg(all(feature = "fast", feature = "feedback"))]
+    Leader { run: "up-down fast sensor", settings: &const { sensing(FAST) } },
+];
 
-    /// Name of the way up and down under it.
-    pub const fn up_down(self) -> &'static str {
-        match self {
-            Self::Paper => "up-down",
-            #[cfg(feature = "fast")]
-            Self::Fast => "up-down fast",
-        }
-    }
-
-    /// What it is built from.
-    pub const fn settings(self) -> &'static Settings {
-        match self {
-            Self::Paper => &SETTINGS,
-            #[cfg(feature = "fast")]
-            Self::Fast => &FAST,
-        }
-    }
+/// The same with a stiffness sensor.
+#[cfg(feature = "feedback")]
+const fn sensing(settings: Settings) -> Settings {
+    Settings { feedback: Some(Feedback::TYPICAL), ..settings }
 }

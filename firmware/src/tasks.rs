@@ -4,7 +4,7 @@ use core::sync::atomic::Ordering;
 
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use model::supervisor::{Fault, State};
-use model::{Limits, Volts};
+use model::{Limits, Sensor, Volts};
 
 use crate::board::{Amplifier, Board};
 use crate::control::{Control, Orders, Senses, Stopwatch, Tick};
@@ -85,6 +85,7 @@ struct Report {
     state: &'static str,
     fault: bool,
     limits: Limits,
+    sensor: Option<Sensor>,
     overruns: u32,
     worst_lateness_us: u32,
     squared_lateness_us2: u32,
@@ -116,6 +117,12 @@ impl Report {
         if limits != self.limits {
             queue(Event::Limits(limits.bits(), number));
             self.limits = limits;
+        }
+        if let Some(sensor) = tick.output.sensor
+            && self.sensor != Some(sensor)
+        {
+            queue(Event::Sensor(sensor, number));
+            self.sensor = Some(sensor);
         }
         self.limited_ticks = self.limited_ticks.saturating_add(u32::from(limits != Limits::NONE));
         if number.is_multiple_of(RATE_HZ) {

@@ -167,8 +167,8 @@ pub struct Output {
     pub stiffness: ScaledStiffness,
     /// The limits that acted.
     pub limits: Limits,
-    /// Whether the stiffness sensor is trusted.
-    pub sensor: Sensor,
+    /// Whether the stiffness sensor is trusted; none without [`Settings::feedback`].
+    pub sensor: Option<Sensor>,
 }
 
 impl<E: Estimator> Config<E> {
@@ -200,28 +200,30 @@ impl<E: Estimator> Config<E> {
         if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
             it.track(&mut state.pre_compensator, drive.voltage);
         }
-        let (stiffness, sensor) = match &self.feedback {
-            None => (model, Sensor::None),
-            Some(feedback) => (feedback.correct(&mut state.feedback, model), state.feedback.sensor()),
-        };
+        let (stiffness, sensor) = self.correct(&mut state.feedback, model);
         let limits = drive.limits.with(Limits::TARGET, moved);
         Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits, sensor }
     }
 
     /// One tick with the amplifier off: zero volts at once, whatever slew and range. The integrator waits for
-    /// [`Config::adopt`].
-    pub fn rest(&self, state: &mut State<E::State>) -> Output {
-        state.amplifier = amplifier::State::default();
-        let stiffness = self.estimator.run(&mut state.estimator, Volts::ZERO);
+    /// [`Config::adopt`]; the sensor is heard as ever.
+    pub fn rest(&self, state: &mut State<E::State>, measured: Option<Reading>) -> Output {
         let (zero, code) = (Volts::ZERO, DacCode(0));
-        Output {
-            target: zero,
-            voltage: zero,
-            code,
-            applied: zero,
-            stiffness,
-            limits: Limits::NONE,
-            sensor: Sensor::None,
+        state.amplifier = amplifier::State::default();
+        if let Some(feedback) = &self.feedback {
+            feedback.hear(&mut state.feedback, zero, measured);
+        }
+        let model = self.estimator.run(&mut state.estimator, zero);
+        let (stiffness, sensor) = self.correct(&mut state.feedback, model);
+        Output { target: zero, voltage: zero, code, applied: zero, stiffness, limits: Limits::NONE, sensor }
+    }
+
+    /// The estimate, and what is thought of the sensor.
+    #[inline(always)]
+    fn correct(&self, state: &mut feedback::State, model: ScaledStiffness) -> (ScaledStiffness, Option<Sensor>) {
+        match &self.feedback {
+            None => (model, None),
+            Some(feedback) => feedback.correct(state, model),
         }
     }
 

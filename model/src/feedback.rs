@@ -113,7 +113,8 @@ impl Feedback {
     pub fn gain(&self) -> f64 {
         let ratio = self.model_uncertainty / self.noise_v;
         let rho = ratio * ratio * self.interval_s;
-        let kalman = (libm::sqrt(rho * rho + 4.0 * rho) - rho) / 2.0;
+        // Newton's way to the root of L^2 + rho L - rho, from above: a square root takes 0.7 KB of flash.
+        let kalman = (0..40).fold(1.0, |gain, _| (gain * gain + rho) / (2.0 * gain + rho));
         let most = if self.fastest_s > 0.0 { part_of_way(self.interval_s, self.fastest_s) } else { 1.0 };
         kalman.min(most).min(0.499)
     }
@@ -127,6 +128,13 @@ pub struct Reading {
     /// Whole ticks since it was sampled; 0: after the last tick's voltage had gone out. The same sample may be passed again
     /// as it ages.
     pub age: u16,
+}
+
+impl Reading {
+    /// Sampled after the last tick's voltage had gone out. None where the crate is built without this module.
+    pub fn fresh(stiffness: ScaledStiffness) -> Option<Self> {
+        Some(Self { stiffness, age: 0 })
+    }
 }
 
 /// The correction for one sample time, scaled for the tick.
@@ -184,15 +192,15 @@ impl Config {
         state.corrected(target)
     }
 
-    /// What the model says with this tick's voltage just put out; the corrected estimate.
+    /// What the model says with this tick's voltage just put out; the corrected estimate, and whether the sensor is trusted.
     #[inline]
-    pub(crate) fn correct(&self, state: &mut State, model: ScaledStiffness) -> ScaledStiffness {
+    pub(crate) fn correct(&self, state: &mut State, model: ScaledStiffness) -> (ScaledStiffness, Option<Sensor>) {
         self.watch.moved(&mut state.watch, model.0);
         state.newest = state.newest.wrapping_add(1);
         if let Some(newest) = state.model.get_mut(usize::from(state.newest) % MEMORY) {
             *newest = model.0;
         }
-        ScaledStiffness(model.0.saturating_add(upper(state.correction)))
+        (ScaledStiffness(model.0.saturating_add(upper(state.correction))), Some(state.watch.sensor()))
     }
 }
 
@@ -210,11 +218,6 @@ impl State {
     #[inline]
     pub(crate) fn corrected(&self, target: Volts) -> Volts {
         Volts(target.0.saturating_sub(upper(self.correction)))
-    }
-
-    /// Whether the sensor is trusted.
-    pub fn sensor(&self) -> Sensor {
-        self.watch.sensor()
     }
 
     /// What the sensor adds to the model, in V.

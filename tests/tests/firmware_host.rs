@@ -3,7 +3,8 @@
 //! `cargo xtask proof` holds the emulated image against the same code, so that simulator, firmware on the host and
 //! firmware on the MCU are one chain of equal bits.
 
-use firmware::script::{STAIR_TICKS, Script, rehearse};
+use firmware::rehearsal::rehearse;
+use firmware::script::{STAIR_TICKS, Script};
 use firmware::settings::SETTINGS;
 use host_sim::experiment::Experiment;
 use host_sim::schedule::Schedule;

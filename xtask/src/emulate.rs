@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use firmware::script::{self, Script};
+use firmware::rehearsal;
+use firmware::script::Script;
 use link::WireModel;
+use model::Volts;
 use serde_json::{Value, json};
 
 use crate::emulator::{self, Run, SAFE, Written};
@@ -72,15 +74,20 @@ pub(crate) struct Comparison {
 impl Comparison {
     /// Rehearses `name` on this machine.
     pub(crate) fn new(name: &str, run: &Run) -> Result<Self> {
-        Self::with(name, None, run)
+        Self::with(name, None, |_| None, run)
     }
 
-    /// As [`Comparison::new`], with a model that was found.
-    pub(crate) fn with(name: &str, found: Option<&WireModel>, run: &Run) -> Result<Self> {
+    /// As [`Comparison::new`], with a model that was found, and what the sensor told the board before each tick.
+    pub(crate) fn with(
+        name: &str,
+        found: Option<&WireModel>,
+        measured: impl FnMut(u32) -> Option<Volts>,
+        run: &Run,
+    ) -> Result<Self> {
         let Some(script) = Script::parse(name) else { bail!("no script `{name}`") };
         // The board writes zero once before its first tick.
         let mut expected = vec![SAFE];
-        let digest = script::rehearse_with(script, found, |_, tick| {
+        let digest = rehearsal::rehearse_with(script, found, measured, |_, tick| {
             expected.push(Written { code: tick.drive.code().0, enabled: tick.drive.enabled() });
         })?;
         let different = expected.iter().zip(&run.dac).position(|(host, target)| host != target);

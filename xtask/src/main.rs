@@ -91,12 +91,13 @@ Examples:
     ///
     /// The emulated board leads a spring with a hidden effect up and down a stair, in lock step; `vsj diagnose` names the
     /// cause; the extended model goes over the link, is checked, stored and run after a restart. Prints the true stiffness
-    /// error before and after.
+    /// error before and after. With --feedback the board hears the spring's sensor instead, and then one that falls silent.
     #[command(after_help = "\
 Examples:
   cargo xtask story                                three effects, as in `test`
   cargo xtask story --effect hysteresis gain-error
   cargo xtask story --controller fast
+  cargo xtask story --feedback                     the paper's model, without the sensor and with it
   cargo xtask story --all --json")]
     Story(story::Args),
     /// Write the image to the real board and show its log (probe-rs)

@@ -20,6 +20,17 @@ pub(crate) struct Args {
     /// Of images with the time-optimal controller, for which there is no bound
     #[arg(long)]
     fast: bool,
+    /// Of images with a stiffness sensor in the loop, for which the bounds are the same
+    #[arg(long)]
+    feedback: bool,
+}
+
+impl Args {
+    /// Of the firmware's, beside what is flashed.
+    fn features(&self) -> Vec<&'static str> {
+        let asked = [("fast", self.fast), ("feedback", self.feedback)];
+        asked.into_iter().filter_map(|(feature, asked)| asked.then_some(feature)).collect()
+    }
 }
 
 /// One image.
@@ -33,8 +44,8 @@ pub(crate) struct Size {
 
 /// `cargo xtask size`.
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let features: &[&str] = if args.fast { &["fast"] } else { &[] };
-    let sizes = Board::ALL.into_iter().map(|board| measure(features, board)).collect::<Result<Vec<_>>>()?;
+    let features = args.features();
+    let sizes = Board::ALL.into_iter().map(|board| measure(&features, board)).collect::<Result<Vec<_>>>()?;
     if args.json {
         println!("{}", Value::from(sizes.iter().map(report).collect::<Vec<_>>()));
     } else {

@@ -38,7 +38,7 @@ pub(crate) fn help() -> String {
         let env = env.map(|(key, value)| format!("{key}={value} ")).unwrap_or_default();
         let _ = writeln!(help, "  {name:<10} {env}cargo {}", args.join(" "));
     }
-    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot\n  story      cargo xtask story, as approved\n"
+    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot\n  story      cargo xtask story, as approved; a sensor that falls silent\n"
 }
 
 /// `cargo xtask test`.

@@ -14,7 +14,7 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
-use firmware::settings::SETTINGS;
+use firmware::settings::FLASHED;
 use firmware::start;
 use firmware::store::Store;
 use firmware::tasks;
@@ -55,7 +55,7 @@ fn main() -> ! {
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
     let mut store = Store::new(flash);
-    let started = start::control(&SETTINGS, &store, last_fault);
+    let started = start::control(&FLASHED, &store, last_fault);
     match started.and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start)?))).transpose()) {
         // Built once.
         Ok(None) => {}

@@ -12,13 +12,9 @@ pub enum Feedback {}
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {}
 
-/// What the loop thinks of its sensor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Sensor {
-    /// There is none.
-    #[default]
-    None,
-}
+/// Nobody thinks anything of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {}
 
 /// There is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +30,20 @@ impl Feedback {
     }
 }
 
+impl Reading {
+    /// Nobody listens.
+    pub fn fresh(_: ScaledStiffness) -> Option<Self> {
+        None
+    }
+}
+
+impl Sensor {
+    /// It has none.
+    pub const fn name(self) -> &'static str {
+        match self {}
+    }
+}
+
 impl Config {
     pub(crate) fn new(feedback: &Feedback, _: SampleTime) -> Self {
         match *feedback {}
@@ -43,7 +53,7 @@ impl Config {
         match *self {}
     }
 
-    pub(crate) fn correct(&self, _: &mut State, _: ScaledStiffness) -> ScaledStiffness {
+    pub(crate) fn correct(&self, _: &mut State, _: ScaledStiffness) -> (ScaledStiffness, Option<Sensor>) {
         match *self {}
     }
 }
@@ -53,11 +63,6 @@ impl State {
 
     pub(crate) fn corrected(&self, target: Volts) -> Volts {
         target
-    }
-
-    /// None.
-    pub fn sensor(&self) -> Sensor {
-        Sensor::None
     }
 
     /// Nothing.

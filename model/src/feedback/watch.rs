@@ -44,15 +44,26 @@ const RECENT: f64 = 4.0;
 pub const FORGIVE_S: f64 = 30.0;
 
 /// What the loop thinks of its sensor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
-    /// There is none in the configuration.
-    #[default]
-    None,
     /// Its readings correct the estimate.
     Trusted,
     /// The loop runs on the model alone.
     Failed(Fault),
+}
+
+impl Sensor {
+    /// For logs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Trusted => "trusted",
+            Self::Failed(Fault::Absent) => "absent",
+            Self::Failed(Fault::Stale) => "stale",
+            Self::Failed(Fault::Stuck) => "stuck",
+            Self::Failed(Fault::Jumping) => "jumping",
+            Self::Failed(Fault::OutOfRange) => "out-of-range",
+        }
+    }
 }
 
 /// Why a sensor is not trusted.

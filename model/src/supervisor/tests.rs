@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::amplifier::Limits;
-use crate::feedback::Sensor;
 use crate::units::{SampleTime, ScaledStiffness};
 use proptest::prelude::*;
 
@@ -38,7 +37,7 @@ fn output(applied_v: f64) -> Output {
         applied,
         stiffness: ScaledStiffness::default(),
         limits: Limits::NONE,
-        sensor: Sensor::None,
+        sensor: None,
     }
 }
 

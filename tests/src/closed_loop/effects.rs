@@ -53,7 +53,7 @@ pub fn one(settings: &Settings, cause: Option<Cause>, seeds: std::ops::Range<u64
         without.extend(steps(&scene.run(&alone, |_, _| None)?, settings.rate_hz));
         let run = scene.run(settings, |_, read| fresh(read))?;
         with.extend(steps(&run, settings.rate_hz));
-        trusted += run.iter().filter(|sample| sample.sensor == Sensor::Trusted).count();
+        trusted += run.iter().filter(|sample| sample.sensor == Some(Sensor::Trusted)).count();
         ticks += run.len();
     }
     let trusted = trusted as f64 / ticks as f64;

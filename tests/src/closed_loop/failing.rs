@@ -121,7 +121,7 @@ fn one(
         fresh(read)
     })?;
     let first = |range: std::ops::Range<usize>, sensor: Sensor| {
-        let found = run[range.clone()].iter().position(|sample| sample.sensor == sensor);
+        let found = run[range.clone()].iter().position(|sample| sample.sensor == Some(sensor));
         found.map(|ticks| (ticks as f64 + 1.0) / settings.rate_hz)
     };
     let seen_s = failure.fault().and_then(|fault| first(from..to, Sensor::Failed(fault)));

@@ -32,7 +32,7 @@ pub struct Sample {
     /// What went out.
     pub code: DacCode,
     /// What the controller thinks of its sensor.
-    pub sensor: Sensor,
+    pub sensor: Option<Sensor>,
 }
 
 impl Scene {
@@ -84,5 +84,5 @@ impl Scene {
 
 /// A reading of this tick.
 pub fn fresh(read: f64) -> Option<Reading> {
-    Volts::new(read.clamp(-2000.0, 2000.0)).ok().map(|volts| Reading { stiffness: ScaledStiffness(volts.0), age: 0 })
+    Volts::new(read.clamp(-2000.0, 2000.0)).ok().and_then(|volts| Reading::fresh(ScaledStiffness(volts.0)))
 }

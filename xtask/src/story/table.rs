@@ -6,7 +6,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 
-use super::{Errors, Told};
+use super::better_model::Told;
+use super::stage::Errors;
 use crate::shell;
 
 /// A better diagnosis is not to need a new approval for a tenth of a volt.

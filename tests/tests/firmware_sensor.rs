@@ -1,0 +1,116 @@
+//! The firmware's control tick around a spring that is not the one it thinks, with a stiffness sensor on its board.
+//!
+//! `cargo xtask story --feedback` holds the emulated image against the same code.
+
+use end_to_end::closed_loop::stair;
+use end_to_end::hidden::{Cause, Effect, Live, Noise};
+use firmware::control::{Control, Orders, Senses, Untimed};
+use firmware::settings::{SETTINGS, SUPERVISION};
+use model::feedback::Fault;
+use model::supervisor::Command;
+use model::{Feedback, Sensor, Settings, Volts};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Armed at once with 300 V; so long.
+const TICKS: usize = 40_000;
+/// When the sensor fails.
+const FAILS: usize = 20_000;
+
+/// A tick.
+#[derive(Clone, Copy, Debug)]
+struct Moment {
+    truth_v: f64,
+    applied_v: f64,
+    sensor: Option<Sensor>,
+}
+
+/// What the board makes of a reading in this tick.
+type Sense = fn(usize, f64) -> Option<f64>;
+
+fn good(_: usize, read: f64) -> Option<f64> {
+    Some(read)
+}
+
+/// The control tick around a spring that hides `cause`.
+fn lead(feedback: Option<Feedback>, cause: Cause, sense: Sense) -> Vec<Moment> {
+    let noise = Noise::white(0.2);
+    let effect = Effect::draw(&mut ChaCha8Rng::seed_from_u64(1), cause, 0, &stair::schedule(), noise.sigma_v);
+    let mut spring = Live::new(&[effect], noise, 1, 500.0, TICKS);
+    let mut control = Control::new(&Settings { feedback, ..SETTINGS }, &SUPERVISION, None).unwrap();
+    let mut measured = None;
+    let tick = |number: usize| {
+        let command = (number == 0).then_some(Command::Arm);
+        let orders = Orders { heard: true, command, target: Some(Volts::new(300.0).unwrap()) };
+        let senses = Senses { interlock_closed: true, measured, ..Senses::default() };
+        let tick = control.tick(&orders, &senses, &mut Untimed);
+        let applied_v = tick.output.applied.to_f64();
+        let (truth_v, reading) = spring.hold(applied_v, 1e-3);
+        measured = sense(number, reading.read).map(|read| Volts::new(read).unwrap());
+        Moment { truth_v, applied_v, sensor: tick.output.sensor }
+    };
+    (0..TICKS).map(tick).collect()
+}
+
+/// Mean of the true stiffness in a second, less the target.
+fn error_v(moments: &[Moment], until: usize) -> f64 {
+    moments[until - 1000..until].iter().map(|moment| moment.truth_v - 300.0).sum::<f64>() / 1000.0
+}
+
+#[test]
+fn readings_lead_a_wrong_spring_to_its_target() {
+    for cause in [Cause::GainError, Cause::StaticNonlinearity, Cause::ChargeLeakage] {
+        let errors = [None, Some(Feedback::TYPICAL)].map(|feedback| error_v(&lead(feedback, cause, good), TICKS).abs());
+        assert!(errors[0] > 5.0 && errors[1] < 0.5, "{cause}: {errors:?} V without and with the sensor");
+    }
+}
+
+/// Whatever it says instead: seen in time, no bump, and in the end the stiffness that the model alone comes to.
+#[test]
+fn without_its_sensor_it_is_the_loop_without_one() {
+    let alone = lead(None, Cause::GainError, good);
+    let cases: [(Fault, Sense); 3] = [
+        (Fault::Absent, |k, read| (k < FAILS).then_some(read)),
+        (Fault::Jumping, |k, read| Some(if k < FAILS { read } else { read + 30.0 })),
+        (Fault::OutOfRange, |k, read| Some(if k < FAILS { read } else { 1500.0 })),
+    ];
+    for (fault, sense) in cases {
+        let run = lead(Some(Feedback::TYPICAL), Cause::GainError, sense);
+        let before = error_v(&run, FAILS);
+        assert!(before.abs() < 0.5, "{fault:?}: {before} V before");
+        assert_eq!(run[FAILS].sensor, Some(Sensor::Trusted));
+        // Ten fading times later; a jump is forgiven after that.
+        let after = error_v(&run, FAILS + 16_000) - error_v(&alone, FAILS + 16_000);
+        assert!(after.abs() < 0.5, "{fault:?}: {after} V beside the loop without a sensor");
+        let seen = run[FAILS..].iter().position(|moment| moment.sensor == Some(Sensor::Failed(fault)));
+        assert!(seen.is_some_and(|ticks| ticks < 20), "{fault:?}: seen after {seen:?} ticks");
+        let change = |pair: &[Moment]| (pair[1].applied_v - pair[0].applied_v).abs();
+        let bump = run[FAILS - 1..].windows(2).map(change).fold(0.0, f64::max);
+        assert!(bump < 1.0, "{fault:?}: the voltage changed by {bump} V in a tick");
+    }
+}
+
+/// One that is never heard changes nothing; one that is stuck is believed until the model has moved by its noise.
+#[test]
+fn a_dead_sensor_changes_nothing() {
+    let alone = lead(None, Cause::GainError, good);
+    let dead: [(Fault, Sense, f64); 2] = [(Fault::Absent, |_, _| None, 0.0), (Fault::Stuck, |_, _| Some(0.0), 1.0)];
+    for (fault, sense, most_v) in dead {
+        let run = lead(Some(Feedback::TYPICAL), Cause::GainError, sense);
+        assert!(run[1000..].iter().all(|moment| moment.sensor == Some(Sensor::Failed(fault))));
+        let apart = run.iter().zip(&alone).map(|(one, other)| (one.truth_v - other.truth_v).abs()).fold(0.0, f64::max);
+        assert!(apart <= most_v, "{fault:?}: the stiffness is up to {apart} V apart");
+    }
+}
+
+/// Trust is there before the first voltage leaves.
+#[test]
+fn it_is_heard_while_disarmed() {
+    let settings = Settings { feedback: Some(Feedback::TYPICAL), ..SETTINGS };
+    let mut control = Control::new(&settings, &SUPERVISION, None).unwrap();
+    let mut hear = |measured| control.tick(&Orders::default(), &Senses { measured, ..Senses::default() }, &mut Untimed);
+    assert_eq!(hear(None).output.sensor, Some(Sensor::Failed(Fault::Absent)));
+    let last = (0..60).map(|tick| hear(Some(Volts::new(f64::from(tick % 2)).unwrap()))).last().unwrap();
+    assert_eq!(last.output.sensor, Some(Sensor::Trusted));
+    assert!(!last.drive.enabled());
+}
