@@ -16,6 +16,8 @@ use super::stage::{Controller, Errors, Stage, Way, name};
 const SILENT: Range<usize> = 50_000..60_000;
 /// Where a change of voltage has no other cause: until the next step.
 const AT_REST: Range<usize> = 49_999..55_000;
+/// Of the log, in the table; JSON has all.
+const MOST_LINES: usize = 6;
 /// At most that of a tick, in V: a few codes.
 const MOST_BUMP_V: f64 = 1.0;
 
@@ -97,7 +99,12 @@ pub(super) fn line(heard: &Heard) -> String {
     for led in [with, silent] {
         let _ = write!(text, "{:>8.2}", led.bump_v);
     }
-    text + "  " + &silent.log.join(", ")
+    let shown = silent.log.len().min(MOST_LINES);
+    text += &format!("  {}", silent.log[..shown].join(", "));
+    match silent.log.len() - shown {
+        0 => text,
+        more => text + &format!(" and {more} more"),
+    }
 }
 
 /// All of them.
