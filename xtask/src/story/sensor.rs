@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::lock_step::{Moment, NEVER};
 use super::stage::{Controller, Errors, Stage, Way, name};
+use crate::{audit, image};
 
 /// The sensor's silence, in ticks: from the midst of the time at 500 V over the next step.
 const SILENT: Range<usize> = 50_000..60_000;
@@ -70,9 +71,11 @@ pub(super) fn hear(stage: &Stage, cause: Option<Cause>, seed: u64) -> Result<Hea
     })
 }
 
-/// For `cargo xtask test`: the board trusts its sensor, loses it, and trusts it again, without a bump.
+/// For `cargo xtask test`: the board trusts its sensor, loses it, and trusts it again, without a bump and without a way into
+/// a panic.
 pub(super) fn check() -> Result<()> {
     let stage = stage(Controller::Paper)?;
+    audit::run(&image::read(&stage.elf)?)?;
     let cause = Some(Cause::GainError);
     let way = stage.lead(&sensing(&stage), &stage.folder(cause)?, stage.spring(cause, 1), SILENT, None)?;
     let Led { bump_v, log, .. } = Led::of(way);
