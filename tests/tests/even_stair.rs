@@ -14,12 +14,16 @@ const LEVELS_V: [f64; 8] = [0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 300.0, 100.0
 /// As many rows as a turn of the folds that are held out.
 const ROWS_PER_LEVEL: usize = 300;
 
-/// `gain (w + (u - w) / 11)`, `w` following `u` with `tau_s`.
+/// `gain (w + share (u - w))`, `w` following `u` with `tau_s`; the paper's share.
 fn stiffness(gain: f64, tau_s: f64) -> Vec<(f64, f64)> {
+    with_share(1.0 / 11.0, gain, tau_s)
+}
+
+fn with_share(share: f64, gain: f64, tau_s: f64) -> Vec<(f64, f64)> {
     let kept = (-SAMPLE_S / tau_s).exp();
     let volts = LEVELS_V.into_iter().flat_map(|volts| std::iter::repeat_n(volts, ROWS_PER_LEVEL));
     let spring = volts.scan(0.0, |lag, volts| {
-        let now = gain * (*lag + (volts - *lag) / 11.0);
+        let now = gain * (*lag + share * (volts - *lag));
         *lag = volts + (*lag - volts) * kept;
         Some((volts, now))
     });
@@ -65,4 +69,31 @@ fn a_record_without_noise_is_read_as_it_is() {
         assert_eq!(causes(&diagnosed(&rounded(0.9, 5.5))), ["gain-error"]);
         assert_eq!(causes(&diagnosed(&rounded(1.0, 3.0))), ["time-constant"]);
     }
+}
+
+/// What a cable, a unit or a wrong channel makes is no spring's, however full the schedule.
+#[test]
+fn a_sensor_that_reads_no_spring_is_told() {
+    let exact = stiffness(1.0, 5.5);
+    let noise = Noise::white(0.2).draw(&mut ChaCha8Rng::seed_from_u64(4), exact.len());
+    for (scale, expected) in
+        [(0.0, "do not follow the voltage"), (1000.0, "1000.0"), (0.001, "0.001"), (-1.0, "-1.000 times")]
+    {
+        let noise = noise.iter().map(|noise| noise * f64::max(scale, 0.001));
+        let rows: Vec<_> = exact.iter().zip(noise).map(|((u, y), noise)| (*u, scale * y + noise)).collect();
+        let report = diagnosed(&rows);
+        assert_eq!(report["verdict"], "unexplained", "{scale}: {report}");
+        assert!(report["leftover"].as_str().unwrap().contains(expected), "{scale}: {report}");
+        assert!(report["next_experiment"].as_str().unwrap().contains("sensor"), "{scale}: {report}");
+    }
+}
+
+/// A spring that the tick cannot run is named all the same, and its file says that it is not for the tick.
+#[test]
+fn a_spring_beyond_the_tick_is_told() {
+    let report = diagnosed(&with_share(0.95, 1.0, 5.5));
+    assert_eq!(causes(&report), ["instantaneous-share"], "{report}");
+    let refused = report["extended"]["tick_refuses"].as_str().expect("why");
+    assert!(refused.contains("relaxation.share") && refused.contains("0 to 0.9"), "{refused}");
+    assert!(diagnosed(&stiffness(0.9, 5.5))["extended"]["tick_refuses"].is_null());
 }

@@ -26,15 +26,18 @@ pub struct Cure {
     /// the voltages that the fitted amplifier puts out at the record's rows, each held until the next. What the file
     /// only mentions is in neither. `None` if the tick refuses the spring, or the record's voltage is not held.
     pub fixed_point_error_v: Option<f64>,
+    /// Why the tick refuses the spring, if it does.
+    pub tick_refuses: Option<String>,
 }
 
 /// Of a fitted model.
 pub(super) fn of(engine: &Engine, model: &Model, held: bool) -> Cure {
     let (data, base) = (engine.data, engine.simulator.base);
     let file = model.extend(base, data);
-    let runs = held && data.duration_s() < LONGEST_S && file.check().is_ok();
+    let tick_refuses = file.check().err().map(|error| error.to_string());
+    let runs = held && data.duration_s() < LONGEST_S && tick_refuses.is_none();
     let fixed_point_error_v = runs.then(|| error(model, base, data, &file)).flatten();
-    Cure { file, fixed_point_error_v }
+    Cure { file, fixed_point_error_v, tick_refuses }
 }
 
 fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f64> {

@@ -5,7 +5,7 @@ use super::cure;
 use super::data::Data;
 use super::finding::{explained, finding};
 use super::fit::{Engine, Fit};
-use super::informative::informative;
+use super::informative::{Silent, silent};
 use super::leftover::{self, Leftover};
 use super::model::Model;
 use super::noise::{FINEST_V, scale_of_squares};
@@ -67,8 +67,8 @@ pub(super) fn diagnose(
     progress: impl FnMut(&Scored),
 ) -> Diagnosis {
     let baseline = engine.at(Model::default());
-    if !informative(engine) {
-        return insufficient(data, observed, engine, baseline);
+    if let Some(silent) = silent(engine, &baseline) {
+        return unsearched(data, observed, engine, baseline, &silent);
     }
     let mut search = Search::new(engine);
     let mut best = match given {
@@ -130,6 +130,7 @@ pub(super) fn diagnose(
             quality: quality_after,
             model: None,
             fixed_point_error_v: cure.fixed_point_error_v,
+            tick_refuses: cure.tick_refuses,
         },
         findings,
         alternatives,
@@ -150,22 +151,20 @@ pub(super) fn diagnose(
     }
 }
 
-/// Of a record that can tell nothing.
-fn insufficient(data: Data, observed: &Observed, engine: &Engine, baseline: Fit) -> Diagnosis {
+/// Of a record that can tell nothing of the spring.
+fn unsearched(data: Data, observed: &Observed, engine: &Engine, baseline: Fit, silent: &Silent) -> Diagnosis {
     let unseen = baseline.residual.clone();
     let quality = quality(engine, &baseline, &unseen, false);
-    let next_experiment = "run a stair over the whole range up and down again, each step held for five time constants: \
-                           from this record the gain or the time constant could be almost anything";
     let report = Report {
         schema: SCHEMA,
         rows: data.rows(),
-        verdict: Verdict::Insufficient,
+        verdict: silent.verdict(),
         baseline: quality,
         findings: Vec::new(),
         alternatives: Vec::new(),
-        next_experiment: Some(next_experiment.into()),
-        extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None },
-        leftover: None,
+        next_experiment: Some(silent.next_experiment().into()),
+        extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+        leftover: silent.leftover(),
         noise: noise_report(&baseline.noise),
         residual: residual_report(&data, &baseline),
     };

@@ -1,32 +1,147 @@
-//! Whether a record can tell anything at all.
+//! Whether a record can tell anything of the spring, and what to do if not.
 
-use super::effects::{EFFECTS, index_of};
+use super::data::Data;
+use super::effects::index_of;
 use super::fit::{Engine, Fit};
 use super::interval::covariance;
 use super::model::{Block, Model};
 use super::noise::Noise;
+use super::report::Verdict;
 
-/// True if gain and time constant would show in this record at all.
-pub(super) fn informative(engine: &mut Engine) -> bool {
+/// A stair moves the simulation at least so far, in V: readings that stay where they are then are no spring's.
+const FAR_V: f64 = 5.0;
+/// Correlation with the simulation from which on readings are the same on another scale.
+const ALIKE: f64 = 0.98;
+/// Correlation below which readings have nothing to do with the voltage.
+const STRANGE: f64 = 0.2;
+
+/// Why no cause is looked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Silent {
+    /// Too little happens, or noise hides it.
+    Excitation,
+    /// The readings are those of no spring: what they do.
+    Sensor(String),
+}
+
+impl Silent {
+    pub(super) fn verdict(&self) -> Verdict {
+        match self {
+            Self::Excitation => Verdict::Insufficient,
+            Self::Sensor(_) => Verdict::Unexplained,
+        }
+    }
+
+    /// What the simulation leaves, in words.
+    pub(super) fn leftover(&self) -> Option<String> {
+        match self {
+            Self::Excitation => None,
+            Self::Sensor(what) => Some(what.clone()),
+        }
+    }
+
+    pub(super) fn next_experiment(&self) -> &'static str {
+        match self {
+            Self::Excitation => {
+                "run a stair over the whole range up and down again, each step held for five time constants: from this \
+                 record the gain or the time constant could be almost anything"
+            }
+            Self::Sensor(_) => {
+                "look at the sensor, its cable and its unit (volts of equivalent static voltage are expected), then repeat \
+                 the record"
+            }
+        }
+    }
+}
+
+/// `None` if gain and time constant would show in this record.
+pub(super) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
     let data = engine.data;
     let moves = |values: &[f64]| values.iter().any(|value| *value != values[0]);
     // Under one voltage all the time, what the spring does may be its start as well as its answer.
-    if !moves(&data.voltage_v) || !moves(&data.reading) {
-        return false;
+    if !moves(&data.voltage_v) {
+        return Some(Silent::Excitation);
     }
-    let probe = ["gain-error", "time-constant"].iter().filter_map(|cause| index_of(cause)).fold(
-        Model::default(),
-        |model, effect| {
-            let point =
-                if EFFECTS[effect].cause() == "gain-error" { 1.0 } else { engine.simulator.base.relaxation.tau_s.ln() };
-            model.with(Block { effect, form: 0 }, vec![point])
-        },
-    );
-    // The noise as it is at best, the information as it is where the search starts.
+    let beside = Beside::of(data, baseline);
+    if !moves(&data.reading) {
+        let far = beside.simulated[1] - beside.simulated[0] > FAR_V;
+        return Some(if far { Silent::Sensor(beside.still()) } else { Silent::Excitation });
+    }
+    let block = |cause| Block { effect: index_of(cause).expect("an effect"), form: 0 };
+    let (gain, time_constant) = (block("gain-error"), block("time-constant"));
+    let probe =
+        Model::default().with(gain, vec![1.0]).with(time_constant, vec![engine.simulator.base.relaxation.tau_s.ln()]);
     let best = engine.fit(probe.clone(), &Noise::first_look());
+    let bounds = &gain.coordinates(data)[0];
+    let found = best.model.blocks.iter().find(|(block, _)| *block == gain).map_or(1.0, |(_, point)| point[0]);
+    if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found) {
+        if beside.correlation.abs() > ALIKE {
+            return Some(Silent::Sensor(beside.scaled()));
+        }
+        if beside.correlation.abs() < STRANGE {
+            return Some(Silent::Sensor(beside.still()));
+        }
+    }
+    // The noise as it is at best, the information as it is where the search starts.
     let residual = engine.residual(&probe);
     let start = Fit { model: probe, residual, noise: best.noise, ..best };
-    let Some(covariance) = covariance(engine, &start) else { return false };
     // Half of the gain, or a factor of e in the time constant, is no knowledge.
-    covariance[(0, 0)].sqrt() < 0.5 && covariance[(1, 1)].sqrt() < 1.0
+    let known = covariance(engine, &start)
+        .is_some_and(|covariance| covariance[(0, 0)].sqrt() < 0.5 && covariance[(1, 1)].sqrt() < 1.0);
+    (!known).then_some(Silent::Excitation)
+}
+
+/// Readings beside the simulation: the range of both, and how one goes with the other.
+struct Beside {
+    read: [f64; 2],
+    simulated: [f64; 2],
+    /// 0 where one of them stays.
+    correlation: f64,
+    /// Of the readings over the simulation.
+    slope: f64,
+}
+
+impl Beside {
+    fn of(data: &Data, baseline: &Fit) -> Self {
+        let read = &data.reading;
+        let simulated: Vec<f64> = read.iter().zip(&baseline.residual).map(|(read, left)| read - left).collect();
+        let range = |values: &[f64]| {
+            values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
+        };
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let (mean_read, mean_simulated) = (mean(read), mean(&simulated));
+        let [mut both, mut of_read, mut of_simulated] = [0.0; 3];
+        for (read, simulated) in read.iter().zip(&simulated) {
+            let (read, simulated) = (read - mean_read, simulated - mean_simulated);
+            both += read * simulated;
+            of_read += read * read;
+            of_simulated += simulated * simulated;
+        }
+        Self {
+            read: range(read),
+            simulated: range(&simulated),
+            correlation: both / (of_read * of_simulated).sqrt().max(f64::MIN_POSITIVE),
+            slope: both / of_simulated.max(f64::MIN_POSITIVE),
+        }
+    }
+
+    fn still(&self) -> String {
+        let ([low, high], [from, to]) = (self.read, self.simulated);
+        format!(
+            "The readings, {low:.3} to {high:.3} V, do not follow the voltage, under which the simulation goes from \
+             {from:.0} to {to:.0} V"
+        )
+    }
+
+    fn scaled(&self) -> String {
+        format!("The readings are {} times what the simulation says, beyond any spring", significant(self.slope))
+    }
+}
+
+/// To three digits, however large or small.
+fn significant(number: f64) -> String {
+    match number.abs() {
+        0.001..1e5 => format!("{number:.3}"),
+        _ => format!("{number:.2e}"),
+    }
 }

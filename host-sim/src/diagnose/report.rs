@@ -75,6 +75,8 @@ pub struct Extended {
     pub model: Option<String>,
     /// Largest difference between the fixed-point tick and the fit, over the record, in V.
     pub fixed_point_error_v: Option<f64>,
+    /// Why the tick does not run that plant file, where it does not.
+    pub tick_refuses: Option<String>,
 }
 
 /// A named cause.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::cure::SMALL_ERROR_V;
 use super::effects::{EFFECTS, index_of};
-use super::report::{Finding, Report, Verdict};
+use super::report::{Extended, Finding, Report, Verdict};
 
 /// A gain below this is none.
 const FORETOLD: f64 = 0.005;
@@ -22,7 +22,8 @@ pub fn text(name: &str, report: &Report) -> String {
         }
     }
     let (before, after) = (&report.baseline, &report.extended.quality);
-    let _ = writeln!(text, "\n{:22} {:>12} {:>12}", "", "simulation", "extended");
+    let extends = !report.findings.is_empty();
+    let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
     for (what, before, after) in [
         ("free run RMSE [V]", before.rmse, after.rmse),
         ("held-out RMSE [V]", before.held_out_rmse, after.held_out_rmse),
@@ -30,22 +31,29 @@ pub fn text(name: &str, report: &Report) -> String {
         ("fit [%]", before.fit_percent, after.fit_percent),
     ] {
         let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".into() };
-        let _ = writeln!(text, "{what:22} {:>12} {:>12}", number(before), number(after));
+        let after = if extends { format!(" {:>12}", number(after)) } else { String::new() };
+        let _ = writeln!(text, "{what:22} {:>12}{after}", number(before));
     }
-    if let Some(error) = report.extended.fixed_point_error_v {
-        let _ = writeln!(text, "{}", in_fixed_point(error));
+    if extends && let Some(sentence) = in_fixed_point(&report.extended) {
+        let _ = writeln!(text, "{sentence}");
     }
     text
 }
 
-fn in_fixed_point(error_v: f64) -> String {
-    if error_v <= SMALL_ERROR_V {
-        return format!("The fixed-point tick runs the extended spring within {error_v:.3} V of the fit.");
+/// Whether the tick runs the extended spring.
+pub fn in_fixed_point(extended: &Extended) -> Option<String> {
+    if let Some(why) = &extended.tick_refuses {
+        return Some(format!("The fixed-point tick does NOT run the extended spring: {why}."));
     }
-    format!(
-        "The extended spring as written is NOT the fitted one: in the fixed-point tick it departs by up to {error_v:.3} V, \
-         more than {SMALL_ERROR_V} V."
-    )
+    let error_v = extended.fixed_point_error_v?;
+    Some(if error_v <= SMALL_ERROR_V {
+        format!("The fixed-point tick runs the extended spring within {error_v:.3} V of the fit.")
+    } else {
+        format!(
+            "The extended spring as written is NOT the fitted one: in the fixed-point tick it departs by up to \
+             {error_v:.3} V, more than {SMALL_ERROR_V} V."
+        )
+    })
 }
 
 /// What is wrong; what the cure is worth; what to do next.
@@ -107,7 +115,8 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         sentences.push(format!("The data cannot reject instead: {}.", rivals.join("; ")));
     }
     if let Some(leftover) = &report.leftover {
-        sentences.push(format!("{leftover}."));
+        let small = if report.verdict == Verdict::Unexplained { "" } else { "Too little to change this verdict: " };
+        sentences.push(format!("{small}{leftover}."));
     }
     if let Some(next) = &report.next_experiment {
         sentences.push(format!("To decide, {next}."));

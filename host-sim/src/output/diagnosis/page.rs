@@ -39,6 +39,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 @if is_extended(diagnosis) {
                     h2 { "What the cure is worth" }
                     (tables::quality(diagnosis))
+                    @if let Some(sentence) = text::in_fixed_point(&report.extended) { p { (sentence) } }
                     h2 { "Gain on stretches that no fit has seen" }
                     (tables::folds(diagnosis))
                 } @else {
