@@ -58,10 +58,9 @@ pub(super) fn run(
     thread::scope(|scope| {
         let beside = scope.spawn(|| serve(folder, spring, silent));
         let run = emulator::play_in(folder, elf, name, emulator::SHIFT, |_| {});
-        // If the board never came, whoever waits for it does so no longer.
-        for pipe in PIPES {
-            drop(OpenOptions::new().read(true).write(true).open(folder.join(pipe)));
-        }
+        // If the board never came, whoever waits for it to open a pipe does so no longer, and reads the end of the first.
+        let [to, _from] = PIPES.map(|pipe| OpenOptions::new().read(true).write(true).open(folder.join(pipe)));
+        drop(to);
         let moments = beside.join().map_err(|_| anyhow!("the spring's thread stopped"))?;
         Ok((run?, moments?))
     })
