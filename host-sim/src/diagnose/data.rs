@@ -31,6 +31,9 @@ const SHORTEST_STRETCH: usize = 3;
 const FEW_ROWS: usize = 200;
 const FEWEST_STAIRS: usize = 4;
 
+/// Pieces of the command for a first look at a long record.
+const THINNED_PIECES: usize = 8_000;
+
 /// Fewest readings at rest that tell whether the spring is at rest too.
 const FEWEST_AT_REST: usize = 8;
 /// A decay so many standard deviations high is one, also where noise has a memory.
@@ -51,6 +54,8 @@ pub struct Data {
     pub full_scale_v: f64,
     /// Median time between rows, in s.
     pub sample_s: f64,
+    /// The same for all rows of the record, of which these may be a part.
+    pub command_s: f64,
     /// Readings are equally far apart.
     pub even: bool,
     /// The record begins in mid-course: how far the spring has come by then, its readings have to tell.
@@ -82,6 +87,7 @@ impl Data {
         let mut gaps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         gaps.sort_by(f64::total_cmp);
         let sample_s = gaps.get(gaps.len() / 2).copied().unwrap_or(1.0);
+        let command_s = sample_s / every as f64;
         let even =
             gaps.last().zip(gaps.first()).is_some_and(|(longest, shortest)| longest - shortest < 0.01 * sample_s);
         // A record that begins under voltage had it before, or begins at the moment of the step.
@@ -89,10 +95,13 @@ impl Data {
         let stepped = first / first_v < 2.0 * Plant::PAPER.share;
         let before = if stepped { 0.0 } else { first_v };
         let begun = first_v != 0.0 || still_falling(&time_s, &voltage_v, &reading);
-        let command = Signal::new(&schedule, &time_s, before);
+        let command = match every {
+            1 => Signal::new(&schedule, &time_s, before),
+            _ => Signal::coarse(&schedule, &time_s, before, THINNED_PIECES),
+        };
         let fold = folds(&voltage_v);
         let folds = fold.iter().max().map_or(1, |&last| usize::from(last) + 1);
-        Self { time_s, voltage_v, reading, command, full_scale_v, sample_s, even, begun, fold, folds }
+        Self { time_s, voltage_v, reading, command, full_scale_v, sample_s, command_s, even, begun, fold, folds }
     }
 
     /// Number of readings.

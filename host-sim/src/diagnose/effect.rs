@@ -24,6 +24,17 @@ pub enum Stage {
     Reading,
 }
 
+/// What of a run an effect changes. Runs that differ in later things alone share the earlier ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Acts {
+    /// By [`Effect::change`].
+    OnChain,
+    /// By [`Effect::respond`] alone.
+    OnResponse,
+    /// By [`Effect::read`] alone.
+    OnReadings,
+}
+
 /// A number that the fit moves. Coordinates are chosen so that a fit is well behaved: logarithms where only size counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
@@ -94,6 +105,11 @@ pub trait Effect: Sync {
 
     /// Where it acts.
     fn stage(&self) -> Stage;
+
+    /// What of a run it changes.
+    fn acts(&self) -> Acts {
+        Acts::OnChain
+    }
 
     /// What it does, in words that follow "because".
     fn meaning(&self) -> &'static str;

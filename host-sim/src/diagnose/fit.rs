@@ -11,6 +11,7 @@ use super::model::{Model, Simulator};
 use super::noise::{Noise, Term, scale};
 use super::observed::Observed;
 use super::start;
+use super::sums::dot;
 
 /// A model with its points fitted.
 #[derive(Clone, Debug)]
@@ -40,6 +41,8 @@ pub struct Jacobian {
 const ROUNDS: usize = 14;
 /// A round that gains less than this, in nats, is the last.
 const ENOUGH: f64 = 0.02;
+/// A step that promises less is not tried.
+const HOPELESS: f64 = 0.1 * ENOUGH;
 
 /// Fits models to one record.
 pub struct Engine<'a> {
@@ -113,6 +116,11 @@ impl<'a> Engine<'a> {
     /// First for robust independent noise, then for the law that it leaves.
     pub fn fit_twice(&mut self, model: Model) -> Fit {
         let first = self.fit(model, &Noise::first_look());
+        self.fit_again(first)
+    }
+
+    /// For the law that a first fit leaves.
+    pub fn fit_again(&mut self, first: Fit) -> Fit {
         let second = self.fit(first.model.clone(), &first.noise);
         if second.log_likelihood >= first.log_likelihood { second } else { first }
     }
@@ -129,8 +137,7 @@ impl<'a> Engine<'a> {
         }
         model.set_points(&points);
         let mut residual = self.residual(&model);
-        let mut noise = law.rescaled(&residual, self.observed);
-        let mut value = self.log(&noise, &residual);
+        let (mut noise, mut value) = law.rescaled(&residual, self.observed);
         let mut damping = 1e-3;
         for _ in 0..ROUNDS {
             let jacobian = self.jacobian(&model, &noise, &residual);
@@ -148,11 +155,13 @@ impl<'a> Engine<'a> {
                 for (&place, step) in jacobian.places.iter().zip(step.iter()) {
                     moved[place] = (moved[place] + step).clamp(bounds[place].lowest, bounds[place].highest);
                 }
+                if promised(&normal, &gradient, &jacobian.places, &points, &moved) < HOPELESS {
+                    break;
+                }
                 let mut candidate = model.clone();
                 candidate.set_points(&moved);
                 let there = self.residual(&candidate);
-                let noise_there = law.rescaled(&there, self.observed);
-                let value_there = self.log(&noise_there, &there);
+                let (noise_there, value_there) = law.rescaled(&there, self.observed);
                 if value_there > value {
                     gained = value_there - value;
                     (points, model, residual, noise, value) = (moved, candidate, there, noise_there, value_there);
@@ -211,18 +220,25 @@ pub fn normal_equations(jacobian: &Jacobian, terms: &[Term]) -> (DMatrix<f64>, D
     let mut normal = DMatrix::zeros(size, size);
     let mut gradient = DVector::zeros(size);
     let mut weighted = vec![0.0; terms.len()];
+    let residual: Vec<f64> = terms.iter().map(|term| term.residual).collect();
     for (i, column) in jacobian.columns.iter().enumerate() {
         for ((weighted, value), term) in weighted.iter_mut().zip(column).zip(terms) {
             *weighted = value * term.weight;
         }
-        gradient[i] = weighted.iter().zip(terms).map(|(w, term)| w * term.residual).sum();
+        gradient[i] = dot(&weighted, &residual);
         for (j, other) in jacobian.columns.iter().enumerate().skip(i) {
-            let product: f64 = weighted.iter().zip(other).map(|(a, b)| a * b).sum();
+            let product = dot(&weighted, other);
             normal[(i, j)] = product;
             normal[(j, i)] = product;
         }
     }
     (normal, gradient)
+}
+
+/// What the parabola of the normal equations gains between two points, in nats.
+fn promised(normal: &DMatrix<f64>, gradient: &DVector<f64>, places: &[usize], from: &[f64], to: &[f64]) -> f64 {
+    let step = DVector::from_iterator(places.len(), places.iter().map(|&place| to[place] - from[place]));
+    gradient.dot(&step) - 0.5 * (normal * &step).dot(&step)
 }
 
 /// The solution of the damped normal equations, scaled to unit diagonal.

@@ -10,6 +10,7 @@ use super::data::Data;
 use super::fit::{Engine, Fit, Jacobian};
 use super::signal::{Lag, Piece};
 use super::spectrum;
+use super::sums::dot;
 
 /// Structure that no block has taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,7 +127,6 @@ fn explained(columns: &[&Vec<f64>], target: &[f64]) -> f64 {
     if columns.is_empty() {
         return 0.0;
     }
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let size = columns.len();
     let scale: Vec<f64> = columns.iter().map(|column| 1.0 / dot(column, column).sqrt().max(1e-30)).collect();
     let mut normal = DMatrix::zeros(size, size);

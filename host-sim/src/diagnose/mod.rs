@@ -54,6 +54,7 @@ pub mod signal;
 pub mod spectrum;
 pub mod standing;
 mod start;
+mod sums;
 pub mod swallowed;
 pub mod text;
 
@@ -71,8 +72,9 @@ use search::{Scored, Search};
 /// Fewest readings that anything can be said of.
 const FEWEST_ROWS: usize = 8;
 
-/// A longer record is searched on every so many of its rows first.
-const ROWS_TO_SEARCH: usize = 5_000;
+/// A longer record is searched on a part of its rows first, of about so many.
+const LONG: usize = 5_000;
+const ROWS_TO_SEARCH: usize = 2_500;
 /// Sets of causes from there that are judged on all rows.
 const LEADERS: usize = 3;
 
@@ -135,7 +137,7 @@ fn judged(
     observed: Observed,
     progress: &mut impl FnMut(&Scored),
 ) -> Diagnosis {
-    let every = data.rows().div_ceil(ROWS_TO_SEARCH);
+    let every = if data.rows() > LONG { data.rows().div_ceil(ROWS_TO_SEARCH) } else { 1 };
     let given = (every > 1).then(|| {
         let thinned = Data::thinned(record, options.input, every);
         let bounded = !observed.all_exact();

@@ -83,6 +83,12 @@ impl Relaxation {
         let before = signal.before;
         let main = 1.0 - self.share - self.creep;
         let mut lag = Lag::at(self.tau_s, before);
+        if self.creep == 0.0 && !self.varies() {
+            return signal.pass(|piece| {
+                let (start, end) = lag.pass(piece);
+                (self.share * piece.from + main * start, self.share * piece.to + main * end)
+            });
+        }
         let mut slow = Lag::at(self.creep_tau_s, before);
         let mut levels = levels_v.iter().copied().filter(|_| self.varies());
         let mut level = f64::NAN;

@@ -48,8 +48,13 @@ impl Clone for Signal {
 impl Signal {
     /// The schedule's voltage, divided at `times_s`, in V.
     pub fn new(schedule: &Schedule, times_s: &[f64], before: f64) -> Self {
+        Self::coarse(schedule, times_s, before, MOST_PIECES)
+    }
+
+    /// The same in about so many pieces where more would be finer.
+    pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize) -> Self {
         let duration = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
-        let longest = LONGEST_PIECE_S.max(duration / MOST_PIECES as f64);
+        let longest = LONGEST_PIECE_S.max(duration / pieces as f64);
         let mut signal = Self { before, ..Self::default() };
         let mut reader = schedule.reader();
         for pair in times_s.windows(2) {

@@ -18,6 +18,9 @@ pub struct Peak {
     pub sine: f64,
 }
 
+/// Rows between which an oscillation is turned.
+const TURNS: usize = 64;
+
 /// The strongest lines, one at a time: each is taken off before the next is looked for.
 pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
     let rows = residual.len();
@@ -56,15 +59,57 @@ fn on_a_grid(residual: &[f64], data: &Data) -> Vec<Complex<f64>> {
     grid
 }
 
+/// Sine and cosine of a frequency at each row, from the first reading. Between equal steps of time they are turned, which is
+/// cheaper than computing them; now and then they are computed anew, before rounding shows.
+pub fn oscillation(frequency_hz: f64, data: &Data) -> impl Iterator<Item = (f64, f64)> {
+    let start = data.time_s.first().copied().unwrap_or(0.0);
+    let omega = TAU * frequency_hz;
+    let (mut before, mut step, mut turn, mut now) = (start, f64::NAN, (0.0, 1.0), (0.0, 1.0));
+    data.time_s.iter().enumerate().map(move |(row, &time)| {
+        let since = time - before;
+        before = time;
+        let steady = (since - step).abs() < 1e-9 * step;
+        if !steady {
+            step = since;
+            turn = (omega * step).sin_cos();
+        }
+        now = if steady && row % TURNS != 0 {
+            (now.0 * turn.1 + now.1 * turn.0, now.1 * turn.1 - now.0 * turn.0)
+        } else {
+            (omega * (time - start)).sin_cos()
+        };
+        now
+    })
+}
+
 /// Cosine and sine at one frequency by least squares, taken as orthogonal.
 fn line(residual: &[f64], data: &Data, frequency_hz: f64) -> Peak {
-    let start = data.time_s.first().copied().unwrap_or(0.0);
     let (mut cosine, mut sine) = (0.0, 0.0);
-    for (value, time) in residual.iter().zip(&data.time_s) {
-        let (s, c) = (TAU * frequency_hz * (time - start)).sin_cos();
+    for (value, (s, c)) in residual.iter().zip(oscillation(frequency_hz, data)) {
         cosine += value * c;
         sine += value * s;
     }
     let half = residual.len() as f64 / 2.0;
     Peak { frequency_hz, cosine: cosine / half, sine: sine / half }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::data::Input;
+    use crate::record::{Record, Row};
+
+    #[test]
+    fn a_turned_oscillation_is_the_computed_one() {
+        for jitter in [0.0, 0.3] {
+            let time = |row: usize| 5.0 + 0.01 * (row as f64 + jitter * ((row * row % 7) as f64 / 7.0));
+            let row = |row: usize| Row { line: row, time_s: time(row), voltage_v: 0.0, measured: Some(0.0) };
+            let record = Record { name: String::new(), rows: (0..20_000).map(row).collect() };
+            let data = Data::new(&record, Input::Hold);
+            for (row, (sin, cos)) in oscillation(7.3, &data).enumerate() {
+                let exact = (TAU * 7.3 * (time(row) - time(0))).sin_cos();
+                assert!((sin - exact.0).hypot(cos - exact.1) < 1e-8, "{row}: {sin} {cos} {exact:?}");
+            }
+        }
+    }
 }

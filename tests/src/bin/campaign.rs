@@ -33,6 +33,7 @@ Examples:
   cargo campaign --write out/hidden --cause hysteresis --seed 3
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
   cargo campaign rivals                      beside PySINDy and SysIdentPy
+  RAYON_NUM_THREADS=1 cargo campaign speed   seconds by rows and noise, each record alone on the machine
 
 Exit codes: 0 success, 1 an aim was not met or the work failed, 2 bad arguments."
 )]
@@ -40,7 +41,7 @@ struct Cli {
     /// Parts to run
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
-    /// Records per cause (singles, forms, stress, small, noise), per pair, or in all (nulls, triples)
+    /// Records per cause (singles, forms, stress, small, noise, speed), per pair, or in all (nulls, triples)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// Where the seeds start: another number, other records
@@ -106,6 +107,8 @@ enum Part {
     Small,
     /// The same at 0.1, 0.2, 0.5 and 1 % noise
     Noise,
+    /// Seconds of a processor for 2401 to 100 000 rows, in white and coloured noise: one record of each cause
+    Speed,
     /// Beside PySINDy and SysIdentPy: one record of each cause, and one of none
     Rivals,
 }
@@ -199,6 +202,7 @@ impl Cli {
             Part::Pairs => self.jobs(part, &part::pairs(first, self.count(3)), aim::pairs),
             Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), aim::triples),
             Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
+            Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.climbs(part, &[0.2]),
             Part::Noise => self.climbs(part, &[0.1, 0.2, 0.5, 1.0]),
             Part::Rivals => {
@@ -227,7 +231,8 @@ impl Cli {
             Part::Stress => "record",
             _ => "cause",
         };
-        let mut markdown = tables::named(what, jobs, &outcomes);
+        let mut markdown =
+            if part == Part::Speed { tables::speed(jobs, &outcomes) } else { tables::named(what, jobs, &outcomes) };
         if matches!(part, Part::Singles | Part::Pairs | Part::Triples) {
             write!(markdown, "\n{}", tables::accuracy(&outcomes))?;
         }

@@ -111,6 +111,21 @@ pub fn stress(first: u64, count: usize) -> Vec<Job> {
     numbered(first, 6, jobs)
 }
 
+/// `count` records of each cause of 2401 to 100 000 rows: white and coloured noise (both kinds). Every length has the same
+/// schedules and values.
+pub fn speed(first: u64, count: usize) -> Vec<Job> {
+    let of = |kind, rows| {
+        let change = move |recipe| Recipe { noise: Noise::white(0.2).of(kind), rows, ..recipe };
+        let group = format!("{}, {rows} rows", Kind::name(kind));
+        each_cause(first, 8, count, &Cause::ALL, change).into_iter().map(move |job| Job { group: group.clone(), ..job })
+    };
+    let kinds = [Kind::White, Kind::Coloured, Kind::OneOverF];
+    kinds
+        .into_iter()
+        .flat_map(|kind| [2401, 10_000, 30_000, 100_000].into_iter().flat_map(move |rows| of(kind, rows)))
+        .collect()
+}
+
 /// Several causes in one record, counted by their blocks.
 fn several(causes: &[Cause]) -> Job {
     let mut blocks: Vec<_> = causes.iter().map(|cause| cause.block()).collect();

@@ -1,8 +1,8 @@
 //! What became of one record.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
+use cpu_time::ThreadTime;
 use serde::{Deserialize, Serialize};
 
 use super::bound;
@@ -55,7 +55,7 @@ pub struct Outcome {
     pub parameters: Vec<Estimate>,
     /// Held-out error of the extended model over what the true spring leaves.
     pub held_out_ratio: Option<f64>,
-    /// For the diagnosis, in s.
+    /// Of a processor, for the diagnosis, in s.
     pub seconds: f64,
     /// Why there was no report.
     pub failure: Option<String>,
@@ -83,7 +83,7 @@ pub struct Estimate {
 impl Outcome {
     /// Has a record diagnosed and scores the answer.
     pub fn of(hidden: &Hidden, diagnose: &Diagnose<'_>) -> Self {
-        let start = Instant::now();
+        let start = ThreadTime::now();
         let answer =
             diagnose(hidden).and_then(|report| serde_json::from_value::<Report>(report).map_err(anyhow::Error::from));
         let seconds = start.elapsed().as_secs_f64();

@@ -32,7 +32,7 @@ pub struct Summary {
     pub held_out_ratio: Option<f64>,
     /// The same, 95 of 100 are below.
     pub held_out_ratio_95: Option<f64>,
-    /// Median time of a diagnosis in s.
+    /// Median time of a diagnosis, in s of a processor.
     pub seconds: Option<f64>,
 }
 

@@ -63,6 +63,47 @@ pub fn named(what: &str, jobs: &[Job], outcomes: &[Outcome]) -> String {
     )
 }
 
+/// What a diagnosis takes of a processor, and what it finds: one line a group, in each noise the shortest records first.
+pub fn speed(jobs: &[Job], outcomes: &[Outcome]) -> String {
+    let mut before: Option<(&str, f64, f64)> = None;
+    let row = |chunk: &[(&Job, &Outcome)]| {
+        let (job, _) = chunk[0];
+        let count = chunk.len() as f64;
+        let share = |is: fn(&Outcome) -> bool| percent(chunk.iter().filter(|(_, it)| is(it)).count() as f64 / count);
+        let mean = chunk.iter().map(|(_, outcome)| outcome.seconds).sum::<f64>() / count;
+        let (_, worst) = chunk.iter().max_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds)).expect("no group is empty");
+        let (noise, rows) = (job.recipe.noise.kind.name(), job.recipe.rows as f64);
+        let of_shorter = before.filter(|(of, ..)| *of == noise);
+        let power = of_shorter.map(|(_, fewer, less)| (mean / less).ln() / (rows / fewer).ln());
+        before = Some((noise, rows, mean));
+        vec![
+            noise.to_owned(),
+            job.recipe.rows.to_string(),
+            chunk.len().to_string(),
+            format!("{mean:.2}"),
+            format!("{:.2}", worst.seconds),
+            worst.hidden.join(", "),
+            power.map_or_else(|| "-".to_owned(), |power| format!("{power:.2}")),
+            share(Outcome::first_is_right),
+            share(Outcome::nothing_extra),
+        ]
+    };
+    let pairs: Vec<(&Job, &Outcome)> = jobs.iter().zip(outcomes).collect();
+    let groups = pairs.chunk_by(|a, b| a.0.group == b.0.group);
+    let header = [
+        "noise",
+        "rows",
+        "records",
+        "mean [s]",
+        "worst [s]",
+        "hidden in it",
+        "grows as rows^",
+        "first right",
+        "nothing extra",
+    ];
+    "Seconds of one processor.\n\n".to_owned() + &table(&header, groups.map(row))
+}
+
 /// How near the parameters come and how often their bounds hold.
 pub fn accuracy(outcomes: &[Outcome]) -> String {
     let row = |a: Accuracy| {

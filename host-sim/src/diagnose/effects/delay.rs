@@ -2,7 +2,8 @@
 //!
 //! Of an even record, the rows see a jump of the command later by a whole row where the delay passes a multiple of their
 //! distance: there the prediction jumps, in between it is smooth. So the delay is whole rows, which a start chooses, and
-//! a part above 0 and up to 1 row, which a fit moves; a delay of whole rows, the usual one, is an end that it reaches.
+//! a part above 0 and up to 1 row, which a fit moves; a delay of whole rows, the usual one, is an end that it reaches. The
+//! rows are those of the command, also where only some of the readings are looked at.
 
 use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
@@ -11,13 +12,13 @@ use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
 pub(super) struct Delay;
 
 fn longest(data: &Data) -> f64 {
-    (0.1 * data.duration_s()).max(2.0 * data.sample_s)
+    (0.1 * data.duration_s()).max(2.0 * data.command_s)
 }
 
 /// Whole rows, and what is left above 0, in s.
 fn split(data: &Data, delay_s: f64) -> Vec<f64> {
-    let rows = if data.even { (delay_s / data.sample_s - 1e-6).ceil() - 1.0 } else { 0.0 };
-    let whole = rows.max(0.0) * data.sample_s;
+    let rows = if data.even { (delay_s / data.command_s - 1e-6).ceil() - 1.0 } else { 0.0 };
+    let whole = rows.max(0.0) * data.command_s;
     vec![whole, delay_s - whole]
 }
 
@@ -39,23 +40,18 @@ impl Effect for Delay {
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        let most = if data.even { data.sample_s } else { longest(data) };
-        vec![Coordinate::kept(0.0, longest(data)), Coordinate::new(1e-3 * data.sample_s, most)]
+        let most = if data.even { data.command_s } else { longest(data) };
+        vec![Coordinate::kept(0.0, longest(data)), Coordinate::new(1e-3 * data.command_s, most)]
     }
 
     fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
         let mut whole = 0.0;
         let mut starts = Vec::new();
-        while whole * data.sample_s < longest(data) {
-            starts.extend([0.5, 1.0].map(|part| split(data, (whole + part) * data.sample_s)));
+        while whole * data.command_s < longest(data) {
+            starts.extend([0.5, 1.0].map(|part| split(data, (whole + part) * data.command_s)));
             whole += f64::max(1.0, (0.08 * whole).floor());
         }
         starts
-    }
-
-    /// As wholes and parts of this record's rows: it may come from one with fewer.
-    fn polish(&self, _: usize, point: &mut [f64], Scene { data, .. }: &Scene) {
-        point.copy_from_slice(&split(data, point[0] + point[1]));
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
@@ -63,7 +59,7 @@ impl Effect for Delay {
     }
 
     fn places(&self, data: &Data) -> f64 {
-        (longest(data) / data.sample_s).clamp(1.0, 5.0).ln()
+        (longest(data) / data.command_s).clamp(1.0, 5.0).ln()
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

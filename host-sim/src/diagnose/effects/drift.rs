@@ -7,7 +7,7 @@
 //! | added | `y + rate t full scale` |
 
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
 
 pub(super) struct Drift;
 
@@ -21,6 +21,10 @@ impl Effect for Drift {
 
     fn stage(&self) -> Stage {
         Stage::Relaxation
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::OnReadings
     }
 
     fn meaning(&self) -> &'static str {

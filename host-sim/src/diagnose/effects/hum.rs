@@ -1,9 +1,7 @@
 //! A periodic disturbance rides on the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
 
-use std::f64::consts::TAU;
-
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::spectrum;
 
 pub(super) struct Hum;
@@ -18,6 +16,10 @@ impl Effect for Hum {
 
     fn stage(&self) -> Stage {
         Stage::Reading
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::OnReadings
     }
 
     fn meaning(&self) -> &'static str {
@@ -52,9 +54,7 @@ impl Effect for Hum {
     }
 
     fn read(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
-        let start = data.time_s.first().copied().unwrap_or(0.0);
-        for (reading, time) in readings.iter_mut().zip(&data.time_s) {
-            let (sin, cos) = (TAU * point[0] * (time - start)).sin_cos();
+        for (reading, (sin, cos)) in readings.iter_mut().zip(spectrum::oscillation(point[0], data)) {
             *reading += point[1] * cos + point[2] * sin;
         }
     }

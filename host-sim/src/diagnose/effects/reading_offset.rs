@@ -1,7 +1,7 @@
 //! One stretch of readings is shifted by a constant.
 
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
 
 pub(super) struct ReadingOffset;
 
@@ -84,6 +84,10 @@ impl Effect for ReadingOffset {
 
     fn stage(&self) -> Stage {
         Stage::Reading
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::OnReadings
     }
 
     fn meaning(&self) -> &'static str {

@@ -13,7 +13,7 @@
 use std::f64::consts::TAU;
 
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
 use crate::diagnose::signal::{Lag, Piece, Signal};
 
 pub(super) struct Resonance;
@@ -35,6 +35,10 @@ impl Effect for Resonance {
 
     fn stage(&self) -> Stage {
         Stage::Relaxation
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::OnResponse
     }
 
     fn meaning(&self) -> &'static str {

@@ -4,7 +4,7 @@
 //! "at least this much". These forms are for a bound that comes before the noise.
 
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
 
 pub(super) struct SensorSaturation;
 
@@ -17,6 +17,10 @@ impl Effect for SensorSaturation {
 
     fn stage(&self) -> Stage {
         Stage::Reading
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::OnReadings
     }
 
     fn meaning(&self) -> &'static str {

@@ -10,6 +10,7 @@
 //! with zeros and poles in turn (Oustaloup 2000), from the record's length up to half a row.
 
 use super::octaves::Octaves;
+use crate::diagnose::sums::dot;
 
 /// A filter that turns noise with a memory into independent innovations.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,6 +34,8 @@ const ROWS: usize = 24;
 const ROWS_FOR_POWER: usize = 150;
 /// A section spans this ratio of frequencies.
 const SPAN: f64 = 4.0;
+/// Rows that are whitened at a time.
+const BLOCK: usize = 1024;
 /// Beyond these, in robust scales, a residual does not teach the memory.
 const CLIP: f64 = 4.0;
 /// What a fractional difference must be likelier by than an autoregression alone, in nats: structure that is not yet
@@ -92,20 +95,31 @@ impl Memory {
     /// What the memory does not foretell. Before the first row, everything is taken to have been as it is there.
     pub fn whitened(&self, residual: &[f64]) -> Vec<f64> {
         let mut rough = residual.to_vec();
-        for &(zero, pole) in &self.sections {
-            let mut before = rough.first().copied().unwrap_or(0.0);
-            let mut out = before * (1.0 - zero) / (1.0 - pole);
-            for value in &mut rough {
-                out = *value - zero * before + pole * out;
-                before = std::mem::replace(value, out);
+        // Value before and after each section. All sections in one pass over the rows: they do not wait for each other.
+        let mut first = rough.first().copied().unwrap_or(0.0);
+        let at_rest = |&(zero, pole): &(f64, f64)| {
+            let before = first;
+            let out = before * (1.0 - zero) / (1.0 - pole);
+            first = before - zero * before + pole * out;
+            (before, out)
+        };
+        let mut states: Vec<(f64, f64)> = self.sections.iter().map(at_rest).collect();
+        for value in &mut rough {
+            for (&(zero, pole), (before, out)) in self.sections.iter().zip(&mut states) {
+                *out = *value - zero * *before + pole * *out;
+                *before = std::mem::replace(value, *out);
             }
         }
         let mut white = rough.clone();
-        for (lag, phi) in (1..).zip(&self.ar) {
-            let (early, rest) = white.split_at_mut(lag.min(rough.len()));
-            early.iter_mut().for_each(|white| *white -= phi * rough[0]);
-            for (white, earlier) in rest.iter_mut().zip(&rough) {
-                *white -= phi * earlier;
+        // Block by block, so that a block stays in the cache while all lags pass over it.
+        for (block, white) in white.chunks_mut(BLOCK).enumerate() {
+            let first = block * BLOCK;
+            for (lag, phi) in (1usize..).zip(&self.ar) {
+                let (early, rest) = white.split_at_mut(lag.saturating_sub(first).min(white.len()));
+                early.iter_mut().for_each(|white| *white -= phi * rough[0]);
+                for (white, earlier) in rest.iter_mut().zip(&rough[(first + early.len()).saturating_sub(lag)..]) {
+                    *white -= phi * earlier;
+                }
             }
         }
         white
@@ -127,7 +141,7 @@ fn sections(power: f64, rows: usize) -> Vec<(f64, f64)> {
 
 /// Correlation of values with those of up to `longest` rows before.
 fn correlation(values: &[f64], longest: usize) -> Vec<f64> {
-    let at = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / values.len() as f64;
+    let at = |lag: usize| dot(&values[..values.len() - lag], &values[lag..]) / values.len() as f64;
     (0..=longest).map(at).collect()
 }
 
@@ -189,6 +203,18 @@ mod tests {
         let left = memory.whitened(&values);
         let off: f64 = left.iter().zip(&innovations[rows..]).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / rows as f64;
         assert!(off < 0.05, "{off}");
+    }
+
+    #[test]
+    fn blocks_leave_no_seams() {
+        let values = normals(3 * BLOCK + 7);
+        let ar: Vec<f64> = (1..=LONGEST).map(|lag| (lag as f64).cos() / 50.0).collect();
+        let memory = Memory { ar, ..Memory::default() };
+        for (row, white) in memory.whitened(&values).into_iter().enumerate() {
+            let earlier = (1..).zip(&memory.ar).map(|(lag, phi)| phi * values[row.saturating_sub(lag)]);
+            let exact = values[row] - earlier.sum::<f64>();
+            assert!((white - exact).abs() < 1e-12, "{row}: {white} {exact}");
+        }
     }
 
     #[test]

@@ -8,6 +8,8 @@
 //! Without the autoregression, coloured noise passes for structure; without the heavy tail, a few readings do. Orders
 //! are chosen by Schwarz's criterion. Rounded and stopped readings have the probability of their cell.
 
+use std::borrow::Cow;
+
 pub mod memory;
 mod octaves;
 mod reading;
@@ -16,6 +18,7 @@ mod tail;
 pub use memory::Memory;
 
 use super::observed::{COARSE, Kind, Observed};
+use super::sums::dot;
 use reading::{in_cell, stopped};
 use tail::tail_constant;
 
@@ -92,23 +95,25 @@ impl Noise {
             return noise.with_tail(f64::INFINITY, FINEST_V);
         }
         noise.memory = Memory::fitted(residual, noise.sigma);
-        let innovations: Vec<f64> = exact(&noise.whitened(residual), observed);
-        noise.fit_tail(&innovations);
+        noise.fit_tail(&exact(&noise.whitened(residual), observed));
         noise.marginal = scale_of_squares(&exact(residual, observed)).max(noise.sigma);
         noise
     }
 
-    /// The same law with the scale that suits a residual.
-    pub fn rescaled(&self, residual: &[f64], observed: &Observed) -> Self {
-        let residual = &*observed.errors(residual);
+    /// The same law with the scale that suits a residual, and the log-likelihood of all rows under it.
+    pub fn rescaled(&self, residual: &[f64], observed: &Observed) -> (Self, f64) {
+        let errors = &*observed.errors(residual);
+        let white = self.whitened(errors);
         let mut noise = self.clone();
         if noise.cell > 0.0 {
-            noise.rescale_cells(residual, observed);
+            noise.rescale_cells(errors, observed);
         } else {
-            noise.fit_scale(&exact(&noise.whitened(residual), observed), 3);
+            let exact = exact(&white, observed);
+            noise.fit_scale(noise.first_scale(&exact), &exact, |&e| (e, 1.0), 3);
             noise.marginal *= noise.sigma / self.sigma;
         }
-        noise
+        let value = noise.log_of(residual, &white, observed);
+        (noise, value)
     }
 
     /// Innovations: what the noise's memory does not foretell.
@@ -160,18 +165,24 @@ impl Noise {
 
     /// Log-likelihood of all rows.
     pub fn log_likelihood(&self, residual: &[f64], observed: &Observed) -> f64 {
+        self.log_of(residual, &self.whitened(&observed.errors(residual)), observed)
+    }
+
+    /// The same, of a residual that is whitened already.
+    fn log_of(&self, residual: &[f64], white: &[f64], observed: &Observed) -> f64 {
         let plain = self.cell == 0.0 && self.wide.is_none() && observed.all_exact();
         if !plain {
-            return self.logs(residual, observed).sum();
+            let logs = residual.iter().zip(white).zip(&observed.kinds);
+            return logs.map(|((&residual, &white), &kind)| self.term(kind, residual, white).log).sum();
         }
-        let white = self.whitened(residual);
         let count = white.len() as f64 * self.constant;
         let variance = self.sigma * self.sigma;
         if self.nu.is_infinite() {
-            return count - 0.5 * white.iter().map(|e| e * e).sum::<f64>() / variance;
+            return count - 0.5 * dot(white, white) / variance;
         }
         // The logarithm of a product is dear once, not eight times; eight factors cannot overflow below 1e38 each.
-        let factor = |e: &f64| (1.0 + e * e / (self.nu * variance)).min(1e38);
+        let narrow = 1.0 / (self.nu * variance);
+        let factor = |e: &f64| (1.0 + e * e * narrow).min(1e38);
         let logs: f64 = white.chunks(8).map(|chunk| chunk.iter().map(factor).product::<f64>().ln()).sum();
         count - 0.5 * (self.nu + 1.0) * logs
     }
@@ -187,27 +198,6 @@ impl Noise {
         let parameters = (self.memory.parameters() + usize::from(self.nu.is_finite())) as f64;
         0.5 * (rows.max(2) as f64).ln() * parameters
     }
-
-    /// The scale under which rounded readings are likeliest: golden section on its logarithm.
-    fn rescale_cells(&mut self, residual: &[f64], observed: &Observed) {
-        let log = |ln_sigma: f64| -> f64 {
-            let noise = Self { sigma: ln_sigma.exp(), marginal: ln_sigma.exp(), ..self.clone() };
-            residual.iter().zip(&observed.kinds).map(|(&r, &kind)| noise.term(kind, r, r).log).sum()
-        };
-        let (mut low, mut high) =
-            ((0.02 * self.cell).max(FINEST_V).ln(), (scale_of_squares(residual) + self.cell).ln());
-        const GOLDEN: f64 = 0.618_033_988_75;
-        for _ in 0..12 {
-            let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-            if log(a) > log(b) {
-                high = b;
-            } else {
-                low = a;
-            }
-        }
-        self.sigma = (0.5 * (low + high)).exp();
-        self.marginal = self.sigma;
-    }
 }
 
 const HALF_LN_TAU: f64 = 0.918_938_533_204_672_7;
@@ -218,7 +208,10 @@ fn rest_of(scale: f64, step: f64) -> f64 {
 }
 
 /// Innovations of rows that were read as they are.
-fn exact(innovations: &[f64], observed: &Observed) -> Vec<f64> {
+fn exact<'i>(innovations: &'i [f64], observed: &Observed) -> Cow<'i, [f64]> {
+    if observed.all_exact() {
+        return Cow::Borrowed(innovations);
+    }
     innovations.iter().zip(&observed.kinds).filter(|(_, kind)| **kind == Kind::Exact).map(|(e, _)| *e).collect()
 }
 
@@ -241,7 +234,7 @@ pub fn negligible(residual: &[f64]) -> bool {
 
 /// Root of the mean square.
 pub fn scale_of_squares(residual: &[f64]) -> f64 {
-    (residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64).sqrt()
+    (dot(residual, residual) / residual.len().max(1) as f64).sqrt()
 }
 
 /// Independent numbers, nearly normal: sums of twelve of splitmix64's.

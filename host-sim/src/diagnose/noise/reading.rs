@@ -1,9 +1,40 @@
 //! What a reading that was rounded, or that stopped at a bound, says of the noise: the probability of its cell.
 
-use super::{HALF_LN_TAU, Term};
+use super::tail::sizes;
+use super::{FINEST_V, HALF_LN_TAU, Noise, Term, exact, scale_of_squares};
+use crate::diagnose::observed::{Kind, Observed};
+use crate::diagnose::sums::total;
 
 /// Half a cell, in scales of the noise, from which on it is a point.
 const NARROW: f64 = 0.05;
+
+impl Noise {
+    /// The scale under which rounded readings are likeliest: golden section on its logarithm.
+    pub(super) fn rescale_cells(&mut self, residual: &[f64], observed: &Observed) {
+        let in_cells = sizes(&exact(residual, observed), 0.5 * self.cell.max(scale_of_squares(residual)));
+        let rows = || residual.iter().zip(&observed.kinds);
+        let stopped: Vec<(f64, Kind)> =
+            rows().filter(|(_, kind)| **kind != Kind::Exact).map(|(&residual, &kind)| (residual, kind)).collect();
+        let log = |ln_sigma: f64| -> f64 {
+            let noise = Self { sigma: ln_sigma.exp(), marginal: ln_sigma.exp(), ..self.clone() };
+            let at_bound: f64 = stopped.iter().map(|&(r, kind)| noise.term(kind, r, r).log).sum();
+            at_bound + total(&in_cells, |&(r, times)| times * in_cell(r, noise.sigma, noise.cell).log)
+        };
+        let (mut low, mut high) =
+            ((0.02 * self.cell).max(FINEST_V).ln(), (scale_of_squares(residual) + self.cell).ln());
+        const GOLDEN: f64 = 0.618_033_988_75;
+        for _ in 0..12 {
+            let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+            if log(a) > log(b) {
+                high = b;
+            } else {
+                low = a;
+            }
+        }
+        self.sigma = (0.5 * (low + high)).exp();
+        self.marginal = self.sigma;
+    }
+}
 
 fn density(z: f64) -> f64 {
     (-0.5 * z * z - HALF_LN_TAU).exp()

@@ -1,7 +1,7 @@
 //! Caution where noise has a longer memory than its law can say.
 
-use super::promise::dot;
 use crate::diagnose::noise::Term;
+use crate::diagnose::sums::dot;
 
 /// How much more the means of the rows' pulls over long stretches vary than independent ones would; 1 unless significant.
 ///

@@ -7,6 +7,8 @@ use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::model::Model;
 
+/// What an extension may be behind its node at first, in nats, to be judged at all; for the patient, anything.
+const HOPELESS: f64 = 10.0;
 /// Extensions that are judged on held-out rows.
 const JUDGED: usize = 5;
 /// And as many more by their plain error, where the noise seems to have a memory.
@@ -33,6 +35,10 @@ impl<J: Judge> Search<'_, J> {
         let first_score =
             |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, fit) - fit.model.points().len() as f64;
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
+        if !self.patient {
+            let lost = first_score(&node.fit) - HOPELESS;
+            fits.retain(|(score, _)| *score > lost);
+        }
         fits.sort_by(|a, b| b.0.total_cmp(&a.0));
         fits.dedup_by_key(|(_, fit)| fit.model.structure());
         // The best two forms of a cause, so that no cause takes all places.
@@ -46,7 +52,7 @@ impl<J: Judge> Search<'_, J> {
         let rest = fits.split_off(JUDGED.min(fits.len()));
         let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.fit.plain).collect();
         plain.sort_by(|a, b| b.1.plain.total_cmp(&a.1.plain));
-        if !node.fit.noise.memory.is_none() {
+        if self.patient && !node.fit.noise.memory.is_none() {
             fits.extend(plain.into_iter().take(JUDGED_PLAIN));
         }
         fits.into_iter().map(|(_, fit)| self.seen.judge_anew(self.judge, fit)).collect()

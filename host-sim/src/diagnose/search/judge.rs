@@ -16,11 +16,16 @@ const PRICE_OF_COORDINATE: f64 = 1.8;
 const MISFIT: f64 = 0.005;
 /// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
+/// And to those who are not patient must promise this part of its price.
+const PART_OF_PRICE: f64 = 0.5;
 
 /// Fits structures and judges them.
 pub trait Judge {
     /// The likeliest point near the model's own.
     fn fit(&mut self, model: Model) -> Fit;
+
+    /// The likeliest point near that of a first fit.
+    fn fit_again(&mut self, first: Fit) -> Fit;
 
     /// Log-likelihood of all rows, each unseen by its fit.
     fn held_out(&mut self, fit: &Fit) -> f64;
@@ -44,13 +49,23 @@ impl Judge for Engine<'_> {
         self.fit_twice(model)
     }
 
+    fn fit_again(&mut self, first: Fit) -> Fit {
+        Engine::fit_again(self, first)
+    }
+
     fn held_out(&mut self, fit: &Fit) -> f64 {
         self.judged_unseen(fit)
     }
 
     fn extended(&mut self, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
-        let law = Noise::first_look();
-        let extensions = extensions(self, fit, patient, wanted).into_iter();
+        let mut extensions = extensions(self, fit, patient, wanted);
+        // Who is not patient trusts the law of the noise, and a promise.
+        let law = if patient { Noise::first_look() } else { fit.noise.clone() };
+        if !patient {
+            let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit) };
+            extensions.retain(|it| it.promise > PART_OF_PRICE * (Judge::price(self, &it.block) + misfit));
+        }
+        let extensions = extensions.into_iter();
         extensions.map(|Extension { block, point, .. }| self.fit(fit.model.with(block, point), &law)).collect()
     }
 

@@ -2,6 +2,7 @@
 
 use crate::diagnose::fit::{Engine, Fit, Jacobian};
 use crate::diagnose::noise::Noise;
+use crate::diagnose::sums::dot;
 
 /// How many times its start an effect may be, in the hope of a promise.
 const FARTHEST: f64 = 6.0;
@@ -52,10 +53,6 @@ impl Metric {
         // The noise's scale would shrink along.
         -0.5 * self.residual.len() as f64 * (1.0 - part).ln()
     }
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn norm(a: &[f64]) -> f64 {

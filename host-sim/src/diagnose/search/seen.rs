@@ -47,26 +47,31 @@ impl Seen {
         if let Some(seen) = self.scored.get(&model.structure()) {
             return seen.clone();
         }
-        self.fitted(judge, model)
+        let fit = judge.fit(model);
+        self.scored(judge, fit)
     }
 
     /// The same, from a first fit that may be better than the one that was judged.
     pub(super) fn judge_anew(&mut self, judge: &mut impl Judge, first: Fit) -> Scored {
         match self.scored.get(&first.model.structure()).cloned() {
             Some(seen) if seen.fit.log_likelihood + ANEW < first.log_likelihood => {
-                let again = self.fitted(judge, first.model);
+                let fit = judge.fit_again(first);
+                let again = self.scored(judge, fit);
                 if seen.score > again.score {
                     self.scored.insert(seen.fit.model.structure(), seen.clone());
                     return seen;
                 }
                 again
             }
-            _ => self.judge(judge, first.model),
+            Some(seen) => seen,
+            None => {
+                let fit = judge.fit_again(first);
+                self.scored(judge, fit)
+            }
         }
     }
 
-    fn fitted(&mut self, judge: &mut impl Judge, model: Model) -> Scored {
-        let fit = judge.fit(model);
+    fn scored(&mut self, judge: &mut impl Judge, fit: Fit) -> Scored {
         let held_out = judge.held_out(&fit);
         let score = held_out - self.price(judge, &fit);
         let scored = Scored { fit, held_out, score };
