@@ -11,7 +11,7 @@ use crate::settings::SUPERVISION;
 /// Runs a script without a clock, as a host does; `each` hears of every tick. Mishaps are for the target only.
 ///
 /// # Errors
-/// Never with the settings above.
+/// Never: the settings are this crate's own.
 pub fn rehearse(script: Script, each: impl FnMut(&Control, &Tick)) -> Result<Digest, OutOfRange> {
     rehearse_with(script, None, |_| None, each)
 }

@@ -7,6 +7,7 @@ use super::interval::covariance;
 use super::model::{Block, Model};
 use super::noise::Noise;
 use super::report::Verdict;
+use super::sums::dot;
 
 /// A stair moves the simulation at least so far, in V: readings that stay where they are then are no spring's.
 const FAR_V: f64 = 5.0;
@@ -108,20 +109,16 @@ impl Beside {
         let range = |values: &[f64]| {
             values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
         };
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let (mean_read, mean_simulated) = (mean(read), mean(&simulated));
-        let [mut both, mut of_read, mut of_simulated] = [0.0; 3];
-        for (read, simulated) in read.iter().zip(&simulated) {
-            let (read, simulated) = (read - mean_read, simulated - mean_simulated);
-            both += read * simulated;
-            of_read += read * read;
-            of_simulated += simulated * simulated;
-        }
+        let centred = |values: &[f64]| -> Vec<f64> {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|value| value - mean).collect()
+        };
+        let (a, b) = (centred(read), centred(&simulated));
         Self {
             read: range(read),
             simulated: range(&simulated),
-            correlation: both / (of_read * of_simulated).sqrt().max(f64::MIN_POSITIVE),
-            slope: both / of_simulated.max(f64::MIN_POSITIVE),
+            correlation: dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt().max(f64::MIN_POSITIVE),
+            slope: dot(&a, &b) / dot(&b, &b).max(f64::MIN_POSITIVE),
         }
     }
 

@@ -33,19 +33,10 @@ impl Noise {
         }
         let count = total(items, |item| of(item).1).max(1.0);
         for _ in 0..rounds {
-            let squares = if self.wide.is_some() {
-                total(items, |item| {
-                    let (e, times) = of(item);
-                    times * e * e * self.weight(e)
-                })
-            } else {
-                let narrow = self.nu * self.sigma * self.sigma;
-                (self.nu + 1.0)
-                    * total(items, |item| {
-                        let (e, times) = of(item);
-                        times * e * e / (narrow + e * e)
-                    })
-            };
+            let squares = total(items, |item| {
+                let (e, times) = of(item);
+                times * e * e * self.weight(e)
+            });
             *self = self.scaled_to(self.sigma * (squares / count).sqrt());
         }
     }
