@@ -11,10 +11,10 @@ use end_to_end::campaign::ladder::{self, RUNGS};
 use end_to_end::campaign::part::{self, Job};
 use end_to_end::campaign::score::Outcome;
 use end_to_end::campaign::seam::diagnose;
-use end_to_end::campaign::{rivals, tables};
+use end_to_end::campaign::{rivals, strangers, tables};
 use end_to_end::hidden::noise::{Kind, Noise};
 use end_to_end::hidden::record::Recipe;
-use end_to_end::hidden::{Cause, Hidden};
+use end_to_end::hidden::{self, Cause, Hidden};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
@@ -41,7 +41,8 @@ struct Cli {
     /// Parts to run
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
-    /// Records per cause (singles, forms, stress, small, noise, speed), per pair, or in all (nulls, triples)
+    /// Records per cause (singles, forms, stress, small, noise, speed), per form (strangers), per pair, or in all (nulls,
+    /// triples)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// Where the seeds start: another number, other records
@@ -109,6 +110,8 @@ enum Part {
     Noise,
     /// Seconds of a processor for 2401 to 100 000 rows, in white and coloured noise: one record of each cause
     Speed,
+    /// One effect by laws that the diagnosis was not made with: 5 of each
+    Strangers,
     /// Beside PySINDy and SysIdentPy: one record of each cause, and one of none
     Rivals,
 }
@@ -205,6 +208,14 @@ impl Cli {
             Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.climbs(part, &[0.2]),
             Part::Noise => self.climbs(part, &[0.1, 0.2, 0.5, 1.0]),
+            Part::Strangers => {
+                let forms = hidden::strangers::all();
+                let bar = bar("strangers", forms.len() * self.count(5))?;
+                let answers = strangers::run(&forms, first, self.count(5), &diagnose, &bar)?;
+                bar.finish_and_clear();
+                let (markdown, wrong) = (strangers::page(&forms, &answers), strangers::wrong(&forms, &answers));
+                Ok(Done { part, markdown, wrong, aims: Vec::new(), json: json!(answers) })
+            }
             Part::Rivals => {
                 let bar = bar("rivals", rivals::RECORDS)?;
                 let rows = rivals::run(first, &bar)?;

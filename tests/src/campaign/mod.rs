@@ -10,6 +10,7 @@
 //! | [`aim`] | what is asked for, and whether it came out |
 //! | [`tables`] | all of it as Markdown |
 //! | [`rivals`] | what other tools make of the same records |
+//! | [`strangers`] | records of laws that the diagnosis was not made with |
 
 pub mod aim;
 pub mod apart;
@@ -20,5 +21,6 @@ pub mod part;
 pub mod rivals;
 pub mod score;
 pub mod seam;
+pub mod strangers;
 pub mod summary;
 pub mod tables;

@@ -24,7 +24,7 @@ pub struct Job {
 }
 
 /// Seeds of the records of a part; parts never share a record.
-fn seed(first: u64, part: u64, index: usize) -> u64 {
+pub(super) fn seed(first: u64, part: u64, index: usize) -> u64 {
     first.wrapping_mul(1_000_000_007) + part * 100_000_000 + index as u64
 }
 

@@ -12,6 +12,7 @@
 //! | [`moving`] | the same, stepped through time |
 //! | [`reading`] | what happens to the readings after the spring |
 //! | [`live`] | spring and sensor step by step, for a controller to close a loop around |
+//! | [`strangers`] | forms of the causes that the diagnosis was not made with, by a simulator of their own |
 //! | [`record`], [`truth`], [`export`] | the finished record, what is true about it, both as files |
 
 pub mod cause;
@@ -27,6 +28,7 @@ pub mod reading;
 pub mod record;
 pub mod schedule;
 pub mod spring;
+pub mod strangers;
 pub mod truth;
 
 pub use cause::{Block, Cause};
