@@ -1,6 +1,6 @@
 //! What the diagnosis makes of records whose laws it was not made with, judged by the names that each form accepts.
 //!
-//! The first finding decides. A name that the form does not accept is wrong; no finding is a miss, which `unexplained` says
+//! The first finding decides. A name that the form does not accept there is wrong; no finding is a miss, which `unexplained` says
 //! openly. `unexplained` beside a right first name is right too: such a law lies outside the catalogue.
 
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ pub enum Grade {
     More,
     /// No name.
     Silent,
-    /// First name not true.
+    /// Another first name than a right one.
     Wrong,
 }
 
@@ -108,8 +108,8 @@ pub fn page(forms: &[Form], answers: &[Answer]) -> String {
 One effect in each record, by a law that `vsj diagnose` was not made with; plain sizes, {} V of white noise. The names that are
 right for a form were written down before the first diagnosis: in brackets those that are as right in the first place, after
 \"and\" those that are true beside it. *right*: first finding right and all others true. *more*: first right, beside it a name
-that is not true. *silent*: no finding. *wrong*: the first finding is a name that is not true of the form. `unexplained`
-beside a right first name counts as right.
+that is not true. *silent*: no finding. *wrong*: the first finding is another name, be it one that is true beside a right one.
+`unexplained` beside a right first name counts as right.
 
 ",
         Noise::white(0.2).sigma_v
@@ -123,13 +123,27 @@ beside a right first name counts as right.
     let header =
         ["hidden", "form", "records", "right", "more", "silent", "wrong", "verdicts", "not true, times said", "judged"];
     text += &table(&header, rows);
-    let wrong = answers.iter().filter(|answer| answer.grade == Grade::Wrong);
-    let open = wrong.filter(|answer| answer.true_among_alternatives).count();
-    writeln!(text, "\nOf the wrong ones, {open} are `ambiguous` with the truth among the alternatives.")
-        .expect("a string");
+    text += &order(forms, answers);
     let laws = forms.iter().map(|form| [form.name, form.law, form.source].map(str::to_owned).to_vec());
     write!(text, "\nx is the voltage over 500 V.\n\n{}", table(&["form", "law", "source"], laws)).expect("a string");
     text
+}
+
+/// How wrong the wrong ones are.
+fn order(forms: &[Form], answers: &[Answer]) -> String {
+    let form = |answer: &Answer| forms.iter().find(|form| form.name == answer.form).expect("an answer has a form");
+    let wrong: Vec<&Answer> = answers.iter().filter(|answer| answer.grade == Grade::Wrong).collect();
+    let count = |which: &dyn Fn(&Answer) -> bool| wrong.iter().filter(|answer| which(answer)).count();
+    let behind = |answer: &Answer| answer.found.iter().any(|name| form(answer).is_named(name));
+    let all_true = |answer: &Answer| answer.found.iter().all(|name| form(answer).is_true(name));
+    format!(
+        "\nOf the {} wrong ones, {} have a right name further back, {} of these with nothing untrue beside it;\n\
+         {} are `ambiguous` with the truth among the alternatives.\n",
+        wrong.len(),
+        count(&behind),
+        count(&|answer| behind(answer) && all_true(answer)),
+        count(&|answer| answer.true_among_alternatives)
+    )
 }
 
 fn row(form: &Form, answers: &[Answer]) -> Vec<String> {
@@ -222,6 +236,7 @@ mod tests {
         };
         let wrong = says(json!({"verdict": "explained", "findings": [{"cause": "hum"}]})).unwrap();
         assert!(wrong.contains("| 2 | 0 | 0 | 0 | 2 | explained 2 | hum 2 | wrong name |"), "{wrong}");
+        assert!(wrong.contains("Of the 2 wrong ones, 0 have a right name further back"), "{wrong}");
         let right = says(json!({"verdict": "unexplained", "findings": [{"cause": forms[0].cause.name()}]})).unwrap();
         assert!(right.contains("| 2 | 2 | 0 | 0 | 0 | unexplained 2 |  | right |"), "{right}");
         assert!(says(json!({"verdict": "explained", "findings": [{"cause": "gremlins"}]})).is_err());
