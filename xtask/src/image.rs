@@ -69,8 +69,14 @@ pub(crate) fn example(name: &str, features: &str, opt: Opt) -> Result<PathBuf> {
     compile(features, opt, ["--example", name], &format!("examples/{name}"))
 }
 
+/// In a place of its own: cargo puts the images of all sets of features in one.
 fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str) -> Result<PathBuf> {
     let target = target_directory()?;
+    let folder = target.join(shell::MCU).join(opt.profile());
+    // Between building and copying nobody else may build.
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let turn = fs::File::create(folder.join("turn.lock")).context("cannot make a lock")?;
+    turn.lock().context("cannot wait for a lock")?;
     shell::run(shell::cargo().args(["build", "--quiet", "--package", "firmware"]).args(what).args([
         "--features",
         features,
@@ -79,7 +85,14 @@ fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str) -> Result<Path
         "--target",
         shell::MCU,
     ]))?;
-    Ok(target.join(shell::MCU).join(opt.profile()).join(file))
+    let (built, own) = (folder.join(file), folder.join("images").join(features).join(file));
+    let parent = own.parent().context("a file without folder")?;
+    fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
+    // A new file in place of the old one, which somebody may be running.
+    let new = own.with_extension("new");
+    fs::copy(&built, &new).with_context(|| format!("cannot copy {}", built.display()))?;
+    fs::rename(&new, &own).with_context(|| format!("cannot write {}", own.display()))?;
+    Ok(own)
 }
 
 /// Where cargo builds.

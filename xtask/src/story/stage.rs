@@ -84,7 +84,8 @@ impl Stage {
             Controller::Paper => ("up-down", &[]),
             Controller::Fast => ("up-down fast", &["fast"]),
         };
-        let elf = image::build_with(&[own, features].concat(), Board::Mps2, Opt::S)?;
+        let features = [&["story"], own, features].concat();
+        let elf = image::build_with(&features[1..], Board::Mps2, Opt::S)?;
         let (mut rows, mut top_v, mut tick) = (Vec::new(), 0f64, 0);
         rehearse(Script::parse(run).context("no such run")?, |_, done| {
             if tick % EVERY == 0 {
@@ -94,7 +95,7 @@ impl Stage {
             tick += 1;
         })?;
         let (time_s, voltage_v) = rows.into_iter().unzip();
-        let folder = image::target_directory()?.join("story");
+        let folder = image::target_directory()?.join(features.join("-"));
         Ok(Self { run, elf, folder, schedule: Schedule { time_s, voltage_v }, top_v })
     }
 
