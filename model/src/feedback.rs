@@ -38,14 +38,15 @@
 //! **Readings that are late.** A reading is compared with what the model said when the sensor sampled it, for which the
 //! state keeps the model's last [`MEMORY`] ticks. A *known* delay therefore is no model error at all.
 //!
-//! **Robustness.** The innovation `nu` is held inside the gate of the [watch] (Huber's bounded influence): no single
-//! reading moves the correction by more than `L` times the gate.
+//! **Robustness.** The innovation `nu` is held inside bounds (Huber's bounded influence), narrower where the spring may just
+//! be late: `influence`.
 //!
 //! **Faults.** The [watch] says in each tick whether the sensor is trusted. While it is not, `d` fades to nothing with
 //! [`Feedback::fade_s`], and the loop is the one without a sensor. Trusted again, `d` goes on from where it is. As `d` is
 //! the only thing that the sensor changes, and has no jumps, neither has the voltage.
 
 mod envelope;
+mod influence;
 pub mod swing;
 pub mod watch;
 
@@ -60,7 +61,7 @@ pub const MEMORY: usize = 32;
 /// A stiffness sensor and what is known of it, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feedback {
-    /// Standard deviation of one reading, rounding included, in V, 0.001 to 100.
+    /// Standard deviation of one reading, rounding included, in V, 0.001 to 100; at least half of what it is rounded to.
     pub noise_v: f64,
     /// How fast the model's error wanders, in V per root second, 0.001 to 1000.
     pub model_uncertainty: f64,
@@ -142,6 +143,7 @@ impl Reading {
 pub struct Config {
     gain: Rate,
     fade: Rate,
+    influence: influence::Config,
     watch: watch::Config,
     swing: swing::Config,
 }
@@ -153,6 +155,7 @@ pub struct State {
     /// What the model said, in a ring.
     model: [Signal; MEMORY],
     newest: u8,
+    influence: influence::State,
     watch: watch::State,
     swing: swing::State,
 }
@@ -160,10 +163,12 @@ pub struct State {
 impl Config {
     /// Of a sensor that [`Feedback::check`] accepts.
     pub(crate) fn new(feedback: &Feedback, sample_time: SampleTime) -> Self {
+        let watch = watch::Config::new(feedback, sample_time);
         Self {
             gain: Rate::new(feedback.gain()),
             fade: Rate::new(sample_time.part_of_way(feedback.fade_s)),
-            watch: watch::Config::new(feedback, sample_time),
+            influence: influence::Config::new(feedback.interval_s, watch.noise()),
+            watch,
             swing: swing::Config::new(feedback.interval_s, sample_time),
         }
     }
@@ -181,9 +186,10 @@ impl Config {
         let believed = self.watch.judge(&mut state.watch, sample);
         let step = match (state.watch.sensor(), believed) {
             (Sensor::Trusted, Some(mismatch)) => {
-                let gate = self.watch.gate(&state.watch);
                 self.swing.hear(&mut state.swing, mismatch, self.watch.noise());
-                state.swing.soften(self.gain.step(mismatch.saturating_sub(correction).max(-gate).min(gate)))
+                let (innovation, model) = (mismatch.saturating_sub(correction), state.model_at(0));
+                let counts = self.influence.bounded(&mut state.influence, innovation, model, state.watch.moved());
+                state.swing.soften(self.gain.step(counts))
             }
             (Sensor::Trusted, None) => Accumulator::ZERO,
             _ => self.fade.step(Signal::ZERO.saturating_sub(correction)),

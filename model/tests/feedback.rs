@@ -12,6 +12,12 @@ fn reading(read_v: f64, age: u16) -> Reading {
     Reading { stiffness: ScaledStiffness(Volts::new(read_v).unwrap().0), age }
 }
 
+/// From -1 to 1.
+fn uniform(random: &mut u64) -> f64 {
+    *random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*random >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
 fn with(feedback: Feedback) -> Settings {
     Settings { feedback: Some(feedback), ..Settings::PAPER }
 }
@@ -62,8 +68,7 @@ proptest! {
         let (mut model, mut random, mut shaken, mut age) = (0.0, seed, 1.0, 0u16);
         for (said, ticks, target) in stretches {
             for _ in 0..ticks {
-                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                let noise = (random >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
+                let noise = uniform(&mut random);
                 age = age.saturating_add(1);
                 let measured = match said {
                     Said::Nothing => None,
@@ -215,21 +220,42 @@ fn faults_are_found_in_time_and_leave_no_bump() {
     }
 }
 
-/// Equal readings are a fault only while the model moves.
+/// Equal readings are a fault: soon at rest, sooner while the model moves.
 #[test]
-fn a_stuck_sensor_is_found_by_the_movement() {
-    let mut bench = Bench::settled();
-    let stuck = Some(reading(bench.truth(), 0));
-    for _ in 0..5000 {
-        assert_eq!(bench.step(300.0, |_| stuck), Some(Sensor::Trusted));
+fn a_stuck_sensor_is_found_at_rest_and_sooner_by_a_movement() {
+    for (target, within) in [(300.0, watch::IDENTICAL_AT_REST), (400.0, watch::IDENTICAL)] {
+        let mut bench = Bench::settled();
+        let (stuck, start) = (Some(reading(bench.truth(), 0)), bench.model);
+        let found = bench.until(target, Sensor::Failed(Fault::Stuck), |_| stuck);
+        let moved = (bench.model - start).abs();
+        assert!(found <= u32::from(within) || (within == watch::IDENTICAL && moved < 6.5), "{found} {moved}");
     }
-    let start = bench.model;
-    let found = bench.until(400.0, Sensor::Failed(Fault::Stuck), |_| stuck);
-    assert!(
-        found <= u32::from(watch::IDENTICAL) || (bench.model - start).abs() < 6.5,
-        "{found} {}",
-        bench.model - start
-    );
+}
+
+/// As coarse as the settings allow: twice the noise, from the middle of a step.
+#[test]
+fn a_rounded_sensor_is_not_stuck() {
+    let (mut bench, mut random) = (Bench::settled(), 1u64);
+    // Rounding to 2 V makes 0.577 V of the 1 V.
+    let white_v = (1.0f64 - 4.0 / 12.0).sqrt();
+    for tick in 0..100_000 {
+        let noise: f64 = (0..12).map(|_| uniform(&mut random)).sum::<f64>() / 2.0;
+        let rounded = |bench: &Bench| Some(reading(2.0 * ((bench.truth() + white_v * noise) / 2.0).round(), 0));
+        assert_eq!(bench.step(300.0, rounded), Some(Sensor::Trusted), "tick {tick}");
+    }
+}
+
+/// To one side and to the other in the midst of a step: no spring does that, so the movement is no excuse.
+#[test]
+fn a_shaken_sensor_is_found_while_the_model_moves() {
+    let mut bench = Bench::settled();
+    for _ in 0..50 {
+        bench.step(400.0, |bench| Some(reading(bench.truth(), 0)));
+    }
+    let shaken =
+        |bench: &Bench| Some(reading(bench.truth() + if bench.tick.is_multiple_of(2) { 30.0 } else { -30.0 }, 0));
+    let found = bench.until(400.0, Sensor::Failed(Fault::Jumping), shaken);
+    assert!(found <= u32::from(watch::REJECTED), "{found}");
 }
 
 /// One wrong reading in ten is not believed, and not answered by a fault.

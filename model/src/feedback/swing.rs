@@ -43,7 +43,7 @@ pub(super) struct State {
 
 impl Config {
     pub(super) fn new(interval_s: f64, sample_time: SampleTime) -> Self {
-        let envelope = envelope::Config::new(sample_time);
+        let envelope = envelope::Config::new(sample_time.seconds());
         Self { envelope, mean: Rate::new(part_of_way(interval_s, PAUSE_S)), pause: (PAUSE_S / interval_s) as u32 }
     }
 

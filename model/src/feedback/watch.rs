@@ -9,9 +9,14 @@
 //! | --- | --- | --- |
 //! | [`Absent`](Fault::Absent) | no new reading | `oldest_s` and [`SILENT`] intervals |
 //! | [`Stale`](Fault::Stale) | no new reading, and what comes is older than `oldest_s` | the same |
-//! | [`Stuck`](Fault::Stuck) | [`IDENTICAL`] readings equal to the bit, while the model moved by more than `6 noise_v` | [`IDENTICAL`] intervals and that movement |
-//! | [`Jumping`](Fault::Jumping) | [`REJECTED`] readings in a row whose mismatch `m - y` is a gate away from that of the last believed ones | [`REJECTED`] intervals |
+//! | [`Stuck`](Fault::Stuck) | [`IDENTICAL_AT_REST`] readings equal to the bit, or [`IDENTICAL`] while the model moved by more than `6 noise_v` | as many intervals, and that movement |
+//! | [`Jumping`](Fault::Jumping) | [`REJECTED`] readings in a row whose mismatch `m - y` is a gate away from that of the last believed ones, or abruptly away both from that and from the reading before | [`REJECTED`] intervals |
 //! | [`OutOfRange`](Fault::OutOfRange) | [`REJECTED`] readings in a row outside of what the sensor can read | [`REJECTED`] intervals |
+//!
+//! Readings in noise of `noise_v` repeat by rounding only. To twice the noise, and from the middle of a step, one in a row of
+//! 100 does so with 0.78^99, once in 10^10; a sensor that rounds more coarsely than that is taken for stuck, and so it is
+//! better than believed. *Abruptly* is by more than `9 noise_v` and what a mode of [`FASTEST_MODE_HZ`] makes of the movement
+//! in an interval: a spring that comes late may jump once, but not to and fro.
 //!
 //! A single rejected reading is an outlier: it is not believed, and forgotten after [`AMENDS`] good ones; so more than one
 //! in five are a fault too, in the end. A sensor is trusted again, and at first, after [`TRUSTED`] good readings in a row.
@@ -19,17 +24,19 @@
 //! spring itself may have changed.
 //!
 //! What cannot be seen: a sensor that shifts its readings slowly, or by less than the gate, which is wide while the model
-//! moves. A model that is wrong looks the same.
+//! moves. A model that is wrong, or a spring that comes late, looks the same.
 
 use super::envelope::{self, Envelope};
 use super::{Feedback, Reading};
-use crate::coefficient::{Rate, upper};
+use crate::coefficient::{Rate, Weight, saturated, upper};
 use crate::units::{Accumulator, SampleTime, Signal, part_of_way, signal};
 
 /// Intervals without a new reading that are borne, beside `oldest_s`.
 pub const SILENT: u32 = 4;
 /// Equal readings in a row that are a fault, if the model moves.
 pub const IDENTICAL: u16 = 8;
+/// Equal readings in a row that are a fault even at rest.
+pub const IDENTICAL_AT_REST: u16 = 100;
 /// Rejected readings in a row that are a fault.
 pub const REJECTED: u16 = 4;
 /// Good readings that make a rejected one forgotten.
@@ -38,6 +45,8 @@ pub const AMENDS: u16 = 4;
 pub const TRUSTED: u16 = 50;
 /// Standard deviations that a reading may be off.
 const SIGMAS: f64 = 6.0;
+/// Of an oscillation that the model may lack, in Hz.
+pub const FASTEST_MODE_HZ: f64 = 5.0;
 /// Believed readings that a mismatch is compared with, about.
 const RECENT: f64 = 4.0;
 /// Time constant with which a jump becomes the new state of things, in s.
@@ -102,6 +111,8 @@ pub(super) struct Config {
     /// Ticks without a new reading that are borne.
     silence: u32,
     envelope: envelope::Config,
+    /// What part of its range an oscillation makes in an interval, at the most.
+    swings: Weight,
     recent: Rate,
     forgive: Rate,
 }
@@ -116,6 +127,8 @@ pub(super) struct State {
     mismatch: Accumulator,
     rejected: u16,
     good: u16,
+    /// Of the last reading.
+    last: Signal,
     /// The last reading, how often in a row it came, and what the model said at first.
     same: u16,
     reading: Signal,
@@ -138,6 +151,12 @@ impl State {
     #[inline]
     pub(super) fn sensor(&self) -> Sensor {
         self.doubt.0.map_or(Sensor::Trusted, Sensor::Failed)
+    }
+
+    /// What the model has covered of late.
+    #[inline]
+    pub(super) fn moved(&self) -> &Envelope {
+        &self.envelope
     }
 
     #[inline]
@@ -163,7 +182,8 @@ impl Config {
             highest: signal(highest_v),
             oldest,
             silence: u32::from(oldest).saturating_add(silent),
-            envelope: envelope::Config::new(sample_time),
+            envelope: envelope::Config::new(sample_time.seconds()),
+            swings: Weight::new((core::f64::consts::TAU * FASTEST_MODE_HZ * interval_s).min(2.0)),
             recent: Rate::new(1.0 / RECENT),
             forgive: Rate::new(part_of_way(interval_s, FORGIVE_S)),
         }
@@ -173,12 +193,6 @@ impl Config {
     #[inline]
     pub(super) fn noise(&self) -> Signal {
         self.noise
-    }
-
-    /// The gate now.
-    #[inline]
-    pub(super) fn gate(&self, state: &State) -> Signal {
-        state.envelope.gate(self.noise)
     }
 
     /// One tick passes; the mismatch of a sample that is new and believed.
@@ -228,6 +242,13 @@ impl Config {
         }
     }
 
+    /// By how much the mismatch may change from one reading to the next.
+    #[inline]
+    fn abrupt(&self, envelope: &Envelope) -> Signal {
+        let range = envelope.range();
+        self.noise.saturating_add(self.noise >> 1).saturating_add(saturated(self.swings.of(range)))
+    }
+
     /// What speaks against a new sample.
     #[inline]
     fn wrong(&self, state: &mut State, sample: &Sample, away: Signal) -> Option<Fault> {
@@ -239,12 +260,17 @@ impl Config {
         if reading < self.lowest || reading > self.highest {
             return Some(Fault::OutOfRange);
         }
-        if state.same >= IDENTICAL && distance(sample.model, state.model) > self.noise {
+        // What has been stuck has to vary as noise does.
+        let moved = distance(sample.model, state.model) > self.noise || state.doubt.0 == Some(Fault::Stuck);
+        if state.same >= if moved { IDENTICAL } else { IDENTICAL_AT_REST } {
             return Some(Fault::Stuck);
         }
         // A movement must not let a reading back in that has jumped.
-        let gate = if state.doubt.0 == Some(Fault::Jumping) { self.noise } else { self.gate(state) };
-        (away.saturating_abs() > gate).then_some(Fault::Jumping)
+        let gate = if state.doubt.0 == Some(Fault::Jumping) { self.noise } else { state.envelope.gate(self.noise) };
+        let away = away.saturating_abs();
+        let jumped = distance(sample.mismatch, state.last).min(away) > self.abrupt(&state.envelope);
+        state.last = sample.mismatch;
+        (jumped || away > gate).then_some(Fault::Jumping)
     }
 
     /// The model is at `now` in this tick.

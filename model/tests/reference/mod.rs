@@ -21,9 +21,12 @@ pub(crate) struct Reference {
     covered: (f64, f64),
     asked: (f64, f64),
     correction: f64,
+    innovations: (f64, f64),
     /// When the last reading was sampled.
     sampled: i64,
     believed: f64,
+    /// Of the last reading inside of the sensor's range and not stuck.
+    mismatch: f64,
     /// Trusted, or the last word against it: `None` stands for silence.
     failed: Option<Option<Verdict>>,
     bad: u32,
@@ -48,8 +51,10 @@ impl Reference {
             covered: (0.0, 0.0),
             asked: (0.0, 0.0),
             correction: 0.0,
+            innovations: (0.0, 0.0),
             sampled: 0,
             believed: 0.0,
+            mismatch: 0.0,
             failed: Some(None),
             bad: 0,
             good: 0,
@@ -75,35 +80,30 @@ impl Reference {
     /// The model's stiffness of this tick.
     pub(crate) fn moved(&mut self, model: f64) {
         self.model.push(model);
-        self.covered = self.cover(self.covered, model);
-    }
-
-    fn cover(&self, (lowest, highest): (f64, f64), now: f64) -> (f64, f64) {
-        let back = |envelope: f64| now + (envelope - now) * (-2.0 * self.tick_s).exp();
-        (back(lowest).min(now), back(highest).max(now))
+        self.covered = cover(self.covered, model, self.tick_s);
     }
 
     fn noise_gate(&self) -> f64 {
         6.0 * self.feedback.noise_v
     }
 
-    fn gate(&self) -> f64 {
-        self.noise_gate() + 2.0 * (self.covered.1 - self.covered.0)
-    }
-
     /// The target, a reading and its age in ticks.
     pub(crate) fn hear(&mut self, target: f64, measured: Option<(f64, u32)>) {
-        self.asked = self.cover(self.asked, target);
+        self.asked = cover(self.asked, target, self.tick_s);
         // The first tick is 1.
         let now = self.model.len() as i64;
         let believed = self.judge(now, measured);
         if !self.trusted() {
             self.correction *= (-self.tick_s / self.feedback.fade_s).exp();
         } else if let Some(mismatch) = believed {
-            let gate = self.gate();
-            self.swing(mismatch, self.noise_gate() + 2.0 * (self.asked.1 - self.asked.0));
-            let innovation = (mismatch - self.correction).clamp(-gate, gate);
-            self.correction += self.feedback.gain() * 0.25f64.powi(self.quartered) * innovation;
+            let noise = self.noise_gate();
+            self.swing(mismatch, noise + 2.0 * (self.asked.1 - self.asked.0));
+            let (innovation, model) = (mismatch - self.correction, self.model.last().copied().unwrap_or(0.0));
+            self.innovations = cover(self.innovations, innovation, self.feedback.interval_s);
+            let ahead = |moved: f64, was_behind: f64| if was_behind > noise { noise } else { noise + moved };
+            let above = ahead(model - self.covered.0, -self.innovations.0);
+            let below = ahead(self.covered.1 - model, self.innovations.1);
+            self.correction += self.feedback.gain() * 0.25f64.powi(self.quartered) * innovation.clamp(-below, above);
         }
     }
 
@@ -157,16 +157,19 @@ impl Reference {
             _ => (read, model, 1),
         };
         self.equal = Some((read, first, times));
-        let gate = if self.failed == Some(Some(Verdict::Jumping)) { self.noise_gate() } else { self.gate() };
+        let (noise, range) = (self.noise_gate(), self.covered.1 - self.covered.0);
         if read < self.feedback.lowest_v || read > self.feedback.highest_v {
-            Verdict::OutOfRange
-        } else if times >= 8 && (model - first).abs() > self.noise_gate() {
-            Verdict::Stuck
-        } else if (read - model - self.believed).abs() > gate {
-            Verdict::Jumping
-        } else {
-            Verdict::Good
+            return Verdict::OutOfRange;
         }
+        let varies = (model - first).abs() > noise || self.failed == Some(Some(Verdict::Stuck));
+        if times >= if varies { 8 } else { 100 } {
+            return Verdict::Stuck;
+        }
+        let gate = if self.failed == Some(Some(Verdict::Jumping)) { noise } else { noise + 2.0 * range };
+        let swings = (std::f64::consts::TAU * 5.0 * self.feedback.interval_s).min(2.0) * range;
+        let (away, since) = ((read - model - self.believed).abs(), (read - model - self.mismatch).abs());
+        self.mismatch = read - model;
+        if away > gate || away.min(since) > 1.5 * noise + swings { Verdict::Jumping } else { Verdict::Good }
     }
 
     fn swing(&mut self, mismatch: f64, gate: f64) {
@@ -191,4 +194,10 @@ impl Reference {
             }
         }
     }
+}
+
+/// A lowest and highest value of late, a signal's next one `interval_s` later.
+fn cover((lowest, highest): (f64, f64), now: f64, interval_s: f64) -> (f64, f64) {
+    let back = |envelope: f64| now + (envelope - now) * (-2.0 * interval_s).exp();
+    (back(lowest).min(now), back(highest).max(now))
 }

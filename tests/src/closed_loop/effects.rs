@@ -100,10 +100,14 @@ mod tests {
             assert!(with.steady_v < noise_v, "{cause}: {with:?}, without {without:?}");
             assert!(trusted > 0.99, "{cause} is taken for a fault of the sensor: {trusted}");
         }
-        // What excites itself is calmed.
+        // What is only late is not driven beyond, and what excites itself is calmed.
         for cause in [Cause::Resonance, Cause::Delay] {
-            let with = one(&fast, Some(cause), 21..22).unwrap().with;
+            let Outcome { without, with, .. } = one(&fast, Some(cause), 21..22).unwrap();
             assert!(with.steady_v < noise_v, "{cause}: {with:?}");
+            assert!(
+                with.overshoot_percent < without.overshoot_percent + 20.0,
+                "{cause}: {with:?}, without {without:?}"
+            );
         }
     }
 }

@@ -156,15 +156,15 @@ mod tests {
         let settings = Settings { feedback: Some(feedback), ..Settings::PAPER };
         for it in all(&settings, 21, &[140.0]).unwrap() {
             let within = match it.failure.fault() {
-                // Nothing moves: equal readings may be right.
-                None | Some(Fault::Stuck) => continue,
+                None => continue,
+                Some(Fault::Stuck) => f64::from(watch::IDENTICAL_AT_REST) * feedback.interval_s,
                 Some(Fault::Absent | Fault::Stale) => {
                     feedback.oldest_s + f64::from(watch::SILENT) * feedback.interval_s + 1e-3
                 }
                 Some(Fault::Jumping | Fault::OutOfRange) => f64::from(watch::REJECTED) * feedback.interval_s,
             };
             assert!(it.seen_s.is_some_and(|seen_s| seen_s < within + 1e-9), "{it:?}, not within {within} s");
-            assert!(it.moved_v < 0.1 && it.bump_v < 1.0, "{it:?}");
+            assert!(it.moved_v < 0.2 && it.bump_v < 1.0, "{it:?}");
             assert!(it.back_s.is_some_and(|back_s| back_s < 0.1), "{it:?}");
         }
     }
