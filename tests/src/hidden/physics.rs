@@ -38,7 +38,8 @@ impl Law {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(missing_docs, reason = "the variants' docs say it")]
 pub enum Tau {
-    /// A straight line through `low_s` at 0 V and `high_s` at 500 V.
+    /// A straight line through `low_s` at 0 V and `high_s` at 500 V, which beyond ends at half of the shorter one: on its way
+    /// to 1000 V it might become negative, which is no spring.
     Linear { low_s: f64, high_s: f64 },
     /// low_s (high_s/low_s)^(u/500 V).
     Exponential { low_s: f64, high_s: f64 },
@@ -48,7 +49,7 @@ impl Tau {
     /// At `u`, in s.
     pub fn at(self, u: f64) -> f64 {
         match self {
-            Self::Linear { low_s, high_s } => low_s + (high_s - low_s) * u / FULL_V,
+            Self::Linear { low_s, high_s } => (low_s + (high_s - low_s) * u / FULL_V).max(low_s.min(high_s) / 2.0),
             Self::Exponential { low_s, high_s } => low_s * (high_s / low_s).powf(u / FULL_V),
         }
     }
@@ -114,6 +115,16 @@ pub struct Resonance {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_time_constant_stays_positive_at_any_voltage() {
+        for (low_s, high_s) in [(9.9, 3.0), (3.0, 9.9)] {
+            for u in [0.0, 250.0, 500.0, 700.0, 1000.0] {
+                assert!(Tau::Linear { low_s, high_s }.at(u) >= 1.5, "{low_s} {high_s} {u}");
+                assert!(Tau::Exponential { low_s, high_s }.at(u) > 0.9, "{low_s} {high_s} {u}");
+            }
+        }
+    }
 
     #[test]
     fn laws_meet_at_both_ends_and_bend_as_stated_between() {
