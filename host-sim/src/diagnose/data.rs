@@ -31,8 +31,9 @@ const SHORTEST_STRETCH: usize = 3;
 const FEW_ROWS: usize = 200;
 const FEWEST_STAIRS: usize = 4;
 
-/// Pieces of the command for a first look at a long record.
+/// Pieces of the command for a first look at a long record, and what they may be off by, as a part of the full scale.
 const THINNED_PIECES: usize = 8_000;
+const THINNED_BLUR: f64 = 1e-3;
 
 /// Fewest readings at rest that tell whether the spring is at rest too.
 const FEWEST_AT_REST: usize = 8;
@@ -97,7 +98,7 @@ impl Data {
         let begun = first_v != 0.0 || still_falling(&time_s, &voltage_v, &reading);
         let command = match every {
             1 => Signal::new(&schedule, &time_s, before),
-            _ => Signal::coarse(&schedule, &time_s, before, THINNED_PIECES),
+            _ => Signal::coarse(&schedule, &time_s, before, THINNED_PIECES, THINNED_BLUR * full_scale_v),
         };
         let fold = folds(&voltage_v);
         let folds = fold.iter().max().map_or(1, |&last| usize::from(last) + 1);

@@ -23,6 +23,12 @@ pub struct Piece {
     pub to: f64,
 }
 
+impl From<&Stretch> for Piece {
+    fn from(stretch: &Stretch) -> Self {
+        Self { duration_s: stretch.duration_s, from: stretch.from_v, to: stretch.to_v() }
+    }
+}
+
 /// Adjoining pieces.
 #[derive(Debug, Default)]
 pub struct Signal {
@@ -48,28 +54,29 @@ impl Clone for Signal {
 impl Signal {
     /// The schedule's voltage, divided at `times_s`, in V.
     pub fn new(schedule: &Schedule, times_s: &[f64], before: f64) -> Self {
-        Self::coarse(schedule, times_s, before, MOST_PIECES)
+        Self::coarse(schedule, times_s, before, MOST_PIECES, 0.0)
     }
 
-    /// The same in about so many pieces where more would be finer.
-    pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize) -> Self {
+    /// The same in about so many pieces where more would be finer, and where a chord is off by `blur_v` at most.
+    pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize, blur_v: f64) -> Self {
         let duration = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
         let longest = LONGEST_PIECE_S.max(duration / pieces as f64);
         let mut signal = Self { before, ..Self::default() };
         let mut reader = schedule.reader();
+        let mut stretches = Vec::new();
         for pair in times_s.windows(2) {
             signal.start_row();
-            reader.at(pair[0]);
-            for stretch in reader.clone().stretches(pair[0], pair[1]) {
-                if signal.lengthened(&stretch, longest) {
-                    continue;
-                }
-                let parts = (stretch.duration_s / longest).ceil().max(1.0);
-                let duration_s = stretch.duration_s / parts;
-                for part in 0..parts as usize {
-                    let from = stretch.from_v + stretch.slope * duration_s * part as f64;
-                    signal.pieces.push(Piece { duration_s, from, to: from + stretch.slope * duration_s });
-                }
+            let parts = ((pair[1] - pair[0]) / longest * (1.0 - 1e-9)).ceil().max(1.0);
+            // The last ends with the row, to the bit: a voltage may jump there.
+            let start = |part: usize| match part as f64 / parts {
+                1.0 => pair[1],
+                of => pair[0] + (pair[1] - pair[0]) * of,
+            };
+            for part in 0..parts as usize {
+                reader.at(start(part));
+                stretches.clear();
+                stretches.extend(reader.clone().stretches(start(part), start(part + 1)));
+                signal.push(&stretches, blur_v);
             }
         }
         if let Some(&last) = times_s.last() {
@@ -80,16 +87,25 @@ impl Signal {
         signal
     }
 
-    /// True if a flat stretch could be added to the last piece of the same row.
-    fn lengthened(&mut self, stretch: &Stretch, longest: f64) -> bool {
-        let row = self.rows.last().map_or(0, |&row| row as usize);
-        let Some(last) = self.pieces[row..].last_mut() else { return false };
-        let same = stretch.slope == 0.0 && last.from == last.to && last.from == stretch.from_v;
-        let fits = same && last.duration_s + stretch.duration_s <= longest * (1.0 + 1e-9);
-        if fits {
-            last.duration_s += stretch.duration_s;
+    /// As one piece if that is off by `blur_v` at most, else one by one.
+    fn push(&mut self, stretches: &[Stretch], blur_v: f64) {
+        let [first, .., last] = stretches else {
+            return self.pieces.extend(stretches.iter().map(Piece::from));
+        };
+        let duration_s: f64 = stretches.iter().map(|stretch| stretch.duration_s).sum();
+        let chord = Piece { duration_s, from: first.from_v, to: last.to_v() };
+        let slope = (chord.to - chord.from) / duration_s;
+        let mut at = chord.from;
+        let straight = stretches.iter().all(|stretch| {
+            let start = (stretch.from_v - at).abs();
+            at += slope * stretch.duration_s;
+            start.max((stretch.to_v() - at).abs()) <= blur_v
+        });
+        if straight {
+            self.pieces.push(chord);
+        } else {
+            self.pieces.extend(stretches.iter().map(Piece::from));
         }
-        fits
     }
 
     /// The value just after each row's moment.
