@@ -27,7 +27,9 @@ pub enum Stage {
 /// What of a run an effect changes. Runs that differ in later things alone share the earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Acts {
-    /// By [`Effect::change`].
+    /// By [`Effect::change`], up to the amplifier's output.
+    OnAmplifier,
+    /// By [`Effect::change`], behind it.
     OnChain,
     /// By [`Effect::respond`] alone.
     OnResponse,
@@ -108,7 +110,7 @@ pub trait Effect: Sync {
 
     /// What of a run it changes.
     fn acts(&self) -> Acts {
-        Acts::OnChain
+        if self.stage() == Stage::Amplifier { Acts::OnAmplifier } else { Acts::OnChain }
     }
 
     /// What it does, in words that follow "because".

@@ -110,7 +110,8 @@ pub struct Simulator<'a> {
     pub base: &'a Base,
     signal: Signal,
     levels_v: Vec<f64>,
-    /// What the last chain made of the command.
+    /// What the last amplifier made of the command, and the last chain of that.
+    amplified: Kept<Signal>,
     chained: Kept<Signal>,
     /// Readings before any effect on them, of the last response.
     response: Kept<Vec<f64>>,
@@ -173,8 +174,8 @@ impl Model {
 impl<'a> Simulator<'a> {
     /// For one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
-        let (chained, response) = (Kept::default(), Kept::default());
-        Self { data, base, signal: Signal::default(), levels_v: Vec::new(), chained, response, runs: 0 }
+        let (amplified, chained, response) = (Kept::default(), Kept::default(), Kept::default());
+        Self { data, base, signal: Signal::default(), levels_v: Vec::new(), amplified, chained, response, runs: 0 }
     }
 
     /// What a model predicts for each row, in V.
@@ -204,9 +205,13 @@ impl<'a> Simulator<'a> {
         let known = self.chained.is_of(ahead_v, model, Acts::OnChain);
         let signal = &mut self.chained.made;
         if !known {
-            signal.clone_from(&data.command);
             let chain = model.chain(self.base, data);
-            chain.amplify(signal);
+            // Whatever the spring was ahead by.
+            if !self.amplified.is_of(0.0, model, Acts::OnAmplifier) {
+                self.amplified.made.clone_from(&data.command);
+                chain.amplify(&mut self.amplified.made);
+            }
+            signal.clone_from(&self.amplified.made);
             chain.respond(signal, ahead_v, &mut self.levels_v);
         }
         if model.blocks.iter().all(|(block, _)| block.effect().acts() != Acts::OnResponse) {
@@ -238,9 +243,19 @@ mod tests {
                 model.with(Block { effect: index_of(cause).unwrap(), form: 0 }, point.to_vec())
             })
         };
-        let (gain, swing, hum): (_, _, (_, &[f64])) =
-            (("gain-error", &[1.2][..]), ("resonance", &[-1.0, -1.0][..]), ("hum", &[0.1, 3.0, 0.0]));
-        let models = [of(&[]), of(&[hum]), of(&[gain, hum]), of(&[gain, swing, hum]), of(&[gain]), of(&[swing])];
+        type Named<'a> = (&'a str, &'a [f64]);
+        let [gain, swing, hum, late]: [Named; 4] =
+            [("gain-error", &[1.2]), ("resonance", &[-1.0, -1.0]), ("hum", &[0.1, 3.0, 0.0]), ("delay", &[0.7])];
+        let models = [
+            of(&[]),
+            of(&[hum]),
+            of(&[gain, hum]),
+            of(&[gain, swing, hum]),
+            of(&[late, gain]),
+            of(&[late]),
+            of(&[gain]),
+            of(&[swing]),
+        ];
         let mut kept = Simulator::new(&data, &base);
         let (mut got, mut expected) = (Vec::new(), Vec::new());
         for first in &models {
