@@ -179,7 +179,7 @@ impl<'a> Engine<'a> {
 
     /// Every row's part in the fit.
     pub fn terms(&self, noise: &Noise, residual: &[f64]) -> Vec<Term> {
-        let white = noise.whitened(&self.observed.errors(residual));
+        let white = noise.innovations(&self.observed.errors(residual));
         (0..residual.len()).map(|row| noise.term(self.observed.kinds[row], residual[row], white[row])).collect()
     }
 

@@ -21,12 +21,16 @@ pub struct Leftover {
     pub share: f64,
     /// Root of the mean square of what they explain of the residual itself, in V.
     pub rms: f64,
+    /// True if chance does as much too often to be sure that it is noise: in one of fifteen records, in all short ones.
+    pub doubtful: bool,
     /// True if chance would do as much once in ten thousand records, once in a hundred short ones.
     pub significant: bool,
 }
 
 /// Standard normal quantile of one in ten thousand.
 const RARE: f64 = 3.72;
+/// Explained beyond this, it may be structure.
+const DOUBTFUL: f64 = 1.5;
 /// Standard normal quantile of one in a hundred, for records too short for more.
 const UNLIKELY: f64 = 2.33;
 /// Parts that time and voltage are divided into.
@@ -77,19 +81,21 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     })?;
     let share = (gain / total.max(1e-300)).clamp(0.0, 1.0);
     let rms = share.sqrt() * fit.noise.marginal;
+    let surprise = quantile(gain / variance, count as f64);
     let leftover = Leftover {
         place: most.place.clone(),
         // What rounding hides is no matter.
         share: if fit.noise.cell > 0.0 { share.min((rms / fit.noise.cell).powi(2) * 3.0) } else { share },
         rms,
-        significant: quantile(gain / variance, count as f64) > RARE,
+        significant: surprise > RARE,
+        doubtful: surprise > DOUBTFUL,
     };
     Some(line(data, fit, &target, leftover))
 }
 
 /// A short record is asked only whether errors are like the ones before them (von Neumann's ratio).
 fn alike(fit: &Fit) -> Option<Leftover> {
-    let errors = &fit.noise.whitened(&fit.residual);
+    let errors = &fit.noise.innovations(&fit.residual);
     let squares: f64 = errors.iter().map(|error| error * error).sum();
     let steps: f64 = errors.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     let share = 1.0 - 0.5 * steps / squares.max(1e-300);
@@ -99,6 +105,7 @@ fn alike(fit: &Fit) -> Option<Leftover> {
         share,
         rms: share.max(0.0).sqrt() * (squares / rows).sqrt(),
         significant: share * rows.sqrt() > UNLIKELY,
+        doubtful: true,
     })
 }
 
@@ -111,7 +118,7 @@ fn line(data: &Data, fit: &Fit, target: &[f64], found: Leftover) -> Leftover {
     // As many lines as half the rows were looked at.
     if power - (data.rows() as f64 / 2.0).ln() > 12.0 && share > found.share {
         let place = format!("at a frequency of {:.3} Hz", peak.frequency_hz);
-        return Leftover { place, share, rms: share.sqrt() * fit.noise.sigma, significant: true };
+        return Leftover { place, share, rms: share.sqrt() * fit.noise.sigma, significant: true, doubtful: true };
     }
     found
 }

@@ -36,7 +36,7 @@ pub(super) fn noise_report(noise: &Noise) -> NoiseReport {
 }
 
 pub(super) fn residual_report(data: &Data, fit: &Fit) -> ResidualReport {
-    let white = fit.noise.whitened(&fit.residual);
+    let white = fit.noise.innovations(&fit.residual);
     let changes: Vec<f64> = (0..data.rows())
         .map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] })
         .collect();

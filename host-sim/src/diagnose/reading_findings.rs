@@ -62,7 +62,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> V
     }
     if let Some((_, wide)) = fit.noise.wide {
         let errors = observed.errors(&fit.residual);
-        let white = fit.noise.whitened(&errors);
+        let white = fit.noise.innovations(&errors);
         let (far, kept): (Vec<usize>, Vec<usize>) =
             (0..white.len()).partition(|&row| white[row].abs() > FAR * fit.noise.sigma);
         let kept: Vec<f64> = kept.into_iter().map(|row| errors[row]).collect();

@@ -38,6 +38,7 @@ pub fn test(errors: &[f64], memory: &Memory) -> Option<Leftover> {
         share,
         rms: share.sqrt() * scale_of_squares(errors),
         significant: true,
+        doubtful: true,
     };
     let slow = slow(errors);
     if slow > SLOW {

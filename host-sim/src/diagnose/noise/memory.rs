@@ -10,6 +10,7 @@
 //! with zeros and poles in turn (Oustaloup 2000), from the record's length up to half a row.
 
 use super::octaves::Octaves;
+use super::scale as robust_scale;
 use crate::diagnose::sums::dot;
 
 /// A filter that turns noise with a memory into independent innovations.
@@ -38,6 +39,8 @@ const SPAN: f64 = 4.0;
 const BLOCK: usize = 1024;
 /// Beyond these, in robust scales, a residual does not teach the memory.
 const CLIP: f64 = 4.0;
+/// Neighbours to each side of a row.
+const AROUND: usize = 2;
 /// What a fractional difference must be likelier by than an autoregression alone, in nats: structure that is not yet
 /// explained looks like it too.
 const PRICE_OF_POWER: f64 = 8.0;
@@ -50,7 +53,8 @@ impl Memory {
         if residual.len() < ROWS {
             return Self::default();
         }
-        let clipped: Vec<f64> = residual.iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
+        let clipped: Vec<f64> =
+            without_wild(residual).into_iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
         let rows = residual.len();
         let (ar, cost) = autoregression(&correlation(&clipped, LONGEST.min(rows / ROWS_PER_LAG)), rows);
         let alone = Self { ar, ..Self::default() };
@@ -92,6 +96,16 @@ impl Memory {
         self.ar.len() + usize::from(self.power > 0.0)
     }
 
+    /// What the memory does not foretell of values with outliers, which foretell nothing: those are off by all that they are.
+    pub fn innovations(&self, values: &[f64]) -> Vec<f64> {
+        if self.is_none() {
+            return values.to_vec();
+        }
+        let tame = without_wild(values);
+        let white = self.whitened(&tame);
+        white.into_iter().zip(values.iter().zip(tame)).map(|(white, (value, tame))| white + value - tame).collect()
+    }
+
     /// What the memory does not foretell. Before the first row, everything is taken to have been as it is there.
     pub fn whitened(&self, residual: &[f64]) -> Vec<f64> {
         let mut rough = residual.to_vec();
@@ -124,6 +138,21 @@ impl Memory {
         }
         white
     }
+}
+
+/// Values of which those wild beside their neighbours are their neighbours' median: an outlier has no memory, and many of
+/// them hide that of the noise (the cleaner of Martin and Thomson, *Proceedings of the IEEE* 70, 1982, in its simplest form).
+fn without_wild(values: &[f64]) -> Vec<f64> {
+    let median = |row: usize| {
+        let first = row.saturating_sub(AROUND).min(values.len() - 2 * AROUND - 1);
+        let mut around: [f64; 2 * AROUND + 1] = std::array::from_fn(|k| values[first + k]);
+        *around.select_nth_unstable_by(AROUND, f64::total_cmp).1
+    };
+    let medians: Vec<f64> = (0..values.len()).map(median).collect();
+    let off: Vec<f64> = values.iter().zip(&medians).map(|(value, median)| value - median).collect();
+    let wild = CLIP * robust_scale(&off);
+    let tame = |((value, median), off): ((&f64, f64), &f64)| if off.abs() > wild { median } else { *value };
+    values.iter().zip(medians).zip(&off).map(tame).collect()
 }
 
 /// Zeros and poles of `(1 - B)^power`.

@@ -95,7 +95,10 @@ impl Noise {
             return noise.with_tail(f64::INFINITY, FINEST_V);
         }
         noise.memory = Memory::fitted(residual, noise.sigma);
-        noise.fit_tail(&exact(&noise.whitened(residual), observed));
+        noise.fit_tail(&exact(&noise.memory.innovations(residual), observed));
+        if noise.wide.is_none() {
+            noise.fit_tail(&exact(&noise.whitened(residual), observed));
+        }
         noise.marginal = scale_of_squares(&exact(residual, observed)).max(noise.sigma);
         noise
     }
@@ -103,7 +106,7 @@ impl Noise {
     /// The same law with the scale that suits a residual, and the log-likelihood of all rows under it.
     pub fn rescaled(&self, residual: &[f64], observed: &Observed) -> (Self, f64) {
         let errors = &*observed.errors(residual);
-        let white = self.whitened(errors);
+        let white = self.innovations(errors);
         let mut noise = self.clone();
         if noise.cell > 0.0 {
             noise.rescale_cells(errors, observed);
@@ -116,9 +119,14 @@ impl Noise {
         (noise, value)
     }
 
-    /// Innovations: what the noise's memory does not foretell.
-    pub fn whitened(&self, residual: &[f64]) -> Vec<f64> {
-        self.memory.whitened(residual)
+    /// What the noise's memory does not foretell.
+    pub fn whitened(&self, change: &[f64]) -> Vec<f64> {
+        self.memory.whitened(change)
+    }
+
+    /// The same of a residual: its outliers foretell nothing.
+    pub fn innovations(&self, residual: &[f64]) -> Vec<f64> {
+        if self.wide.is_some() { self.memory.innovations(residual) } else { self.whitened(residual) }
     }
 
     /// The part of a row in a fit: `residual` as it is, `innovation` whitened.
@@ -165,7 +173,7 @@ impl Noise {
 
     /// Log-likelihood of all rows.
     pub fn log_likelihood(&self, residual: &[f64], observed: &Observed) -> f64 {
-        self.log_of(residual, &self.whitened(&observed.errors(residual)), observed)
+        self.log_of(residual, &self.innovations(&observed.errors(residual)), observed)
     }
 
     /// The same, of a residual that is whitened already.
@@ -189,7 +197,7 @@ impl Noise {
 
     /// Log-likelihood of each row.
     pub fn logs<'a>(&'a self, residual: &'a [f64], observed: &'a Observed) -> impl Iterator<Item = f64> + 'a {
-        let white = self.whitened(&observed.errors(residual));
+        let white = self.innovations(&observed.errors(residual));
         (0..residual.len()).map(move |row| self.term(observed.kinds[row], residual[row], white[row]).log)
     }
 

@@ -5,6 +5,7 @@ use super::promise::Metric;
 use crate::diagnose::effect::Scene;
 use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::{Engine, Fit};
+use crate::diagnose::leftover;
 use crate::diagnose::model::{Block, Model};
 use crate::diagnose::noise::{Noise, negligible, scale};
 
@@ -39,6 +40,9 @@ pub trait Judge {
 
     /// What the blocks of a fit leave for being of another form than the spring's, in nats: each further block costs it.
     fn misfit(&self, fit: &Fit) -> f64;
+
+    /// True if what a fit leaves may be structure.
+    fn doubts(&mut self, fit: &Fit) -> bool;
 
     /// What prices have to be multiplied by for what a fit leaves, at least 1.
     fn caution(&mut self, fit: &Fit) -> f64;
@@ -79,6 +83,10 @@ impl Judge for Engine<'_> {
         let explained: f64 =
             self.simulation.iter().zip(&fit.residual).map(|(before, after)| (before - after).powi(2)).sum();
         0.5 * explained * (MISFIT / fit.noise.marginal.max(fit.noise.cell)).powi(2)
+    }
+
+    fn doubts(&mut self, fit: &Fit) -> bool {
+        leftover::test(self, fit).is_none_or(|left| left.doubtful)
     }
 
     fn caution(&mut self, fit: &Fit) -> f64 {

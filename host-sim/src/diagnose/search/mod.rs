@@ -140,6 +140,11 @@ impl<'j, J: Judge> Search<'j, J> {
         let mut beam = vec![root];
         let mut waited = 0;
         for _ in 0..MOST_BLOCKS {
+            // What leaves nothing but noise is extended, and no other: none can be much likelier.
+            let doubts = self.judge.doubts(&best.fit);
+            if !doubts {
+                beam = vec![best.clone()];
+            }
             let mut next = self.next(&beam);
             // One that makes a loss for a while would only be taken back.
             next = next.into_iter().map(|it| if it.score > best.score { self.pruned(it) } else { it }).collect();
@@ -156,7 +161,7 @@ impl<'j, J: Judge> Search<'j, J> {
                 progress(&best);
             } else {
                 waited += 1;
-                if waited > 1 || best.fit.noise.memory.is_none() {
+                if waited > 1 || best.fit.noise.memory.is_none() || !doubts {
                     break;
                 }
             }

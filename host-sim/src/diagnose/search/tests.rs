@@ -62,6 +62,10 @@ impl Judge for Told {
         self.misfit
     }
 
+    fn doubts(&mut self, _: &Fit) -> bool {
+        true
+    }
+
     fn caution(&mut self, _: &Fit) -> f64 {
         self.caution
     }
