@@ -14,6 +14,7 @@ use super::quality::{noise_report, quality, residual_report};
 use super::reading_findings::reading_findings;
 use super::report::{Extended, Finding, Report, SCHEMA, Verdict};
 use super::search::{Lead, Scored, Search, effects};
+use super::spikes;
 use super::standing::{self, Standing};
 use super::swallowed;
 use crate::plant_file::PlantFile;
@@ -90,14 +91,17 @@ pub(super) fn diagnose(
     let held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
     let known = [(&baseline, &*held_out[0]), (&best.fit, &*held_out[1])];
     let standings = standing::standings(engine, contenders, known);
+    let spikes = spikes::test(engine, &best.fit);
+    let in_time = spikes.is_some();
     let left = swallowed::test(&observed.errors(&best.fit.residual), &best.fit.noise.memory)
+        .or(spikes)
         .or_else(|| leftover::test(engine, &best.fit).filter(|left| left.significant))
         .filter(|left| left.rms > FINEST_V);
     let quality_before = quality(engine, &baseline, &held_out[0], false);
     let quality_after = quality(engine, &best.fit, &held_out[1], true);
     let mut findings: Vec<Finding> =
         weights.iter().map(|(effect, without, left_out)| finding(engine, &best, *effect, without, left_out)).collect();
-    findings.extend(reading_findings(&data, observed, &best.fit));
+    findings.extend(reading_findings(&data, observed, &best.fit, in_time));
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
 
     if never_reverses(&data) {

@@ -12,7 +12,7 @@ use super::data::Data;
 use super::signal::Signal;
 
 /// Where in the chain an effect acts. Two effects of one stage are harder to tell apart than two of different stages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
     /// Between the command and the spring's electrodes.
     Amplifier,

@@ -14,7 +14,7 @@
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
-//! | [`leftover`], [`swallowed`], [`spectrum`] | what no effect explains |
+//! | [`leftover`], [`swallowed`], [`spikes`], [`spectrum`] | what no effect explains |
 //! | `informative`, `alternatives` | whether a record can tell anything; what it leaves open |
 //! | `finding`, `reading_findings`, `interval`, `quality` | a cause and what it is worth; parameters with intervals; errors |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
@@ -52,6 +52,7 @@ pub mod report;
 pub mod search;
 pub mod signal;
 pub mod spectrum;
+pub mod spikes;
 pub mod standing;
 mod start;
 mod sums;

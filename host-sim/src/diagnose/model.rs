@@ -244,15 +244,19 @@ mod tests {
             })
         };
         type Named<'a> = (&'a str, &'a [f64]);
-        let [gain, swing, hum, late]: [Named; 4] =
-            [("gain-error", &[1.2]), ("resonance", &[-1.0, -1.0]), ("hum", &[0.1, 3.0, 0.0]), ("delay", &[0.7])];
+        let [gain, swing, hum, cut]: [Named; 4] = [
+            ("gain-error", &[1.2]),
+            ("resonance", &[-1.0, -1.0]),
+            ("hum", &[0.1, 3.0, 0.0]),
+            ("amplifier-limit", &[60.0]),
+        ];
         let models = [
             of(&[]),
             of(&[hum]),
             of(&[gain, hum]),
             of(&[gain, swing, hum]),
-            of(&[late, gain]),
-            of(&[late]),
+            of(&[cut, gain]),
+            of(&[cut]),
             of(&[gain]),
             of(&[swing]),
         ];

@@ -8,14 +8,13 @@ use super::noise::{FINEST_V, scale_of_squares};
 use super::observed::Observed;
 use super::quality::Z;
 use super::report::{Finding, Parameter};
+use super::spikes::FAR;
 
 /// A step of the readings this many of the noise's scales wide is worth naming.
 const COARSE_STEP: f64 = 0.5;
-/// A reading this many of the noise's scales off is an outlier, once there are outliers.
-const FAR: f64 = 4.0;
 
-/// What the readings themselves show.
-pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> Vec<Finding> {
+/// What the readings themselves show; those far off `in_time` with the command are no outliers.
+pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_time: bool) -> Vec<Finding> {
     let mut findings = Vec::new();
     let raw = scale_of_squares(&fit.residual);
     let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
@@ -60,7 +59,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit) -> V
             ),
         });
     }
-    if let Some((_, wide)) = fit.noise.wide {
+    if let Some((_, wide)) = fit.noise.wide.filter(|_| !in_time) {
         let errors = observed.errors(&fit.residual);
         let white = fit.noise.innovations(&errors);
         let (far, kept): (Vec<usize>, Vec<usize>) =

@@ -18,6 +18,8 @@ use crate::diagnose::signal::{Lag, Piece, Signal};
 
 pub(super) struct Resonance;
 
+/// What overshoots a step by less than a sixth is a lag, and no swing to be seen.
+const MOST_DAMPED: f64 = 0.5;
 const WHOLE: usize = 0;
 const QUICK: usize = 2;
 /// From where on a quick change is looked for, in s.
@@ -55,7 +57,8 @@ impl Effect for Resonance {
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (lowest, highest) = range(data);
-        let mut coordinates = vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(1e-3, 0.95)];
+        let mut coordinates =
+            vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(1e-3, MOST_DAMPED)];
         if form != WHOLE {
             coordinates.push(Coordinate::new(0.0, 1.5));
         }

@@ -4,10 +4,14 @@ use std::collections::{HashMap, HashSet};
 
 use super::Scored;
 use super::judge::Judge;
+use crate::diagnose::effect::Stage;
 use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::model::{Block, Model};
 
+/// A block in the same stage as another may mend the other's form rather than be one more cause: so many times what it leaves
+/// is charged beside.
+const ALIKE: f64 = 15.0;
 /// A fit that is likelier by so many nats than the one that was judged is judged anew.
 const ANEW: f64 = 1.0;
 
@@ -30,7 +34,9 @@ impl Seen {
     pub(super) fn price(&self, judge: &impl Judge, fit: &Fit) -> f64 {
         let blocks = &fit.model.blocks;
         let further = blocks.len().saturating_sub(1) as f64;
-        let misfit = if further > 0.0 { further * judge.misfit(fit) } else { 0.0 };
+        let stages: HashSet<Stage> = blocks.iter().map(|(block, _)| block.effect().stage()).collect();
+        let times = further + ALIKE * (blocks.len() - stages.len()) as f64;
+        let misfit = if times > 0.0 { times * judge.misfit(fit) } else { 0.0 };
         misfit + self.caution * blocks.iter().map(|(block, _)| judge.price(block)).sum::<f64>()
     }
 
