@@ -1,9 +1,12 @@
 //! How good a simulation is: its errors, the noise that they show, and tests of what they should not show.
 
+use std::ops::RangeInclusive;
+
 use super::data::Data;
 use super::fit::{Engine, Fit};
 use super::noise::{FINEST_V, Noise, scale_of_squares};
 use super::report::{NoiseReport, Quality, ResidualReport};
+use super::sums::dot;
 
 /// 97.5 % of the standard normal.
 pub(super) const Z: f64 = 1.96;
@@ -40,15 +43,14 @@ pub(super) fn residual_report(data: &Data, fit: &Fit) -> ResidualReport {
     let changes: Vec<f64> = (0..data.rows())
         .map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] })
         .collect();
-    let correlation = |a: &[f64], b: &[f64], lag: usize| {
-        let lag = lag.min(a.len());
-        let product: f64 = a[lag..].iter().zip(b).map(|(a, b)| a * b).sum();
-        let size = (a.iter().map(|a| a * a).sum::<f64>() * b.iter().map(|b| b * b).sum::<f64>()).sqrt();
-        product / size.max(1e-300)
+    // Of the errors with what was `lag` rows before.
+    let correlation = |earlier: &[f64], lags: RangeInclusive<usize>| {
+        let size = (dot(&white, &white) * dot(earlier, earlier)).sqrt().max(1e-300);
+        lags.map(|lag| dot(&white[lag.min(white.len())..], earlier) / size).collect()
     };
     ResidualReport {
-        autocorrelation: (1..=LAGS).map(|lag| correlation(&white, &white, lag)).collect(),
-        input_correlation: (0..=LAGS).map(|lag| correlation(&white, &changes, lag)).collect(),
+        autocorrelation: correlation(&white, 1..=LAGS),
+        input_correlation: correlation(&changes, 0..=LAGS),
         band: Z / (data.rows().max(1) as f64).sqrt(),
     }
 }
