@@ -87,24 +87,13 @@ impl Signal {
         signal
     }
 
-    /// As one piece if that is off by `blur_v` at most, else one by one.
+    /// What follows without a jump as one piece if that is off by `blur_v` at most, else one by one.
     fn push(&mut self, stretches: &[Stretch], blur_v: f64) {
-        let [first, .., last] = stretches else {
-            return self.pieces.extend(stretches.iter().map(Piece::from));
-        };
-        let duration_s: f64 = stretches.iter().map(|stretch| stretch.duration_s).sum();
-        let chord = Piece { duration_s, from: first.from_v, to: last.to_v() };
-        let slope = (chord.to - chord.from) / duration_s;
-        let mut at = chord.from;
-        let straight = stretches.iter().all(|stretch| {
-            let start = (stretch.from_v - at).abs();
-            at += slope * stretch.duration_s;
-            start.max((stretch.to_v() - at).abs()) <= blur_v
-        });
-        if straight {
-            self.pieces.push(chord);
-        } else {
-            self.pieces.extend(stretches.iter().map(Piece::from));
+        for stretches in stretches.chunk_by(|a, b| (b.from_v - a.to_v()).abs() <= 2.0 * blur_v) {
+            match chord(stretches, blur_v) {
+                Some(chord) => self.pieces.push(chord),
+                None => self.pieces.extend(stretches.iter().map(Piece::from)),
+            }
         }
     }
 
@@ -213,6 +202,21 @@ impl Signal {
     }
 }
 
+/// One piece instead of several, if it is off by `blur_v` at most.
+fn chord(stretches: &[Stretch], blur_v: f64) -> Option<Piece> {
+    let (first, last) = (stretches.first()?, stretches.last()?);
+    let duration_s: f64 = stretches.iter().map(|stretch| stretch.duration_s).sum();
+    let chord = Piece { duration_s, from: first.from_v, to: last.to_v() };
+    let slope = (chord.to - chord.from) / duration_s;
+    let mut at = chord.from;
+    let straight = stretches.iter().all(|stretch| {
+        let start = (stretch.from_v - at).abs();
+        at += slope * stretch.duration_s;
+        start.max((stretch.to_v() - at).abs()) <= blur_v
+    });
+    straight.then_some(chord)
+}
+
 /// A first-order low-pass of unit gain, `tau dx/dt = u - x`, exact for straight pieces.
 #[derive(Clone, Copy, Debug)]
 pub struct Lag {
@@ -273,6 +277,23 @@ mod tests {
     #[test]
     fn a_row_sees_the_voltage_just_after_its_jump() {
         assert_eq!(rows(&step()), [0.0, 100.0, 100.0, 100.0, 0.0]);
+    }
+
+    /// 1 V every 10 ms, then a jump back, in steps of 0.5 s.
+    #[test]
+    fn a_first_look_takes_small_steps_for_a_ramp_and_no_jump() {
+        let row = |row: usize| format!("{},{}\n", 0.01 * row as f64, if row < 130 { row } else { 0 });
+        let text = format!("time_s,voltage_v\n{}", (0..200).map(row).collect::<String>());
+        let schedule = Schedule::from_record(&Record::parse("r", &text, "stiffness").unwrap(), Between::Hold);
+        let pieces = |blur_v| Signal::coarse(&schedule, &[0.0, 0.5, 1.0, 1.5], 0.0, 3, blur_v).pieces;
+        let ramp = Piece { duration_s: 0.5, from: 0.0, to: 49.0 };
+        let [fine, coarse] = [0.0, 1.1].map(pieces);
+        assert!((ramp.duration_s - coarse[0].duration_s).abs() < 1e-9 && coarse[0].to == ramp.to, "{:?}", coarse[0]);
+        assert_eq!(coarse[1].from, 50.0);
+        let ends: Vec<(f64, f64)> = coarse[2..].iter().map(|piece| (piece.from, piece.to)).collect();
+        assert_eq!(ends, [(100.0, 129.0), (0.0, 0.0), (0.0, 0.0)]);
+        // Without blur what stays the same is one piece still.
+        assert_eq!(fine.len(), 130 + 2);
     }
 
     #[test]

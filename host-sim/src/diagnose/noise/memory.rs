@@ -216,6 +216,21 @@ mod tests {
         assert!(Memory::fitted(&normals(4000), 1.0).is_none());
     }
 
+    #[test]
+    fn outliers_have_no_memory_and_hide_none() {
+        let mut values = normals(3000);
+        for row in 1..values.len() {
+            values[row] += 0.9 * values[row - 1];
+        }
+        let tame = values.clone();
+        values.iter_mut().skip(7).step_by(31).for_each(|value| *value += 40.0);
+        let memory = Memory::fitted(&values, 2.3);
+        assert!((memory.ar[0] - 0.9).abs() < 0.05 && memory.power == 0.0, "{memory:?}");
+        let wild = |white: Vec<f64>| white.iter().filter(|white| white.abs() > 8.0).count();
+        assert_eq!(wild(memory.innovations(&values)), 2993usize.div_ceil(31));
+        assert!(wild(memory.whitened(&values)) > 180 && wild(memory.innovations(&tame)) == 0);
+    }
+
     /// Fractional noise by its definition: `(1 - B)^-d = sum psi_k B^k, psi_k = psi_(k-1) (k - 1 + d) / k`.
     #[test]
     fn a_power_law_is_recovered_and_whitened() {
