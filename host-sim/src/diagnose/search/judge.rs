@@ -86,7 +86,9 @@ impl Judge for Engine<'_> {
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {
-        leftover::test(self, fit).is_none_or(|left| left.doubtful)
+        // Before any effect is found, a memory may be the effect's own.
+        let unfound = fit.model.blocks.is_empty() && !fit.noise.memory.is_none();
+        unfound || leftover::test(self, fit).is_none_or(|left| left.doubtful)
     }
 
     fn caution(&mut self, fit: &Fit) -> f64 {
