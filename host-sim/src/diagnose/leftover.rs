@@ -28,7 +28,7 @@ pub struct Leftover {
 }
 
 /// Standard normal quantile of one in ten thousand.
-const RARE: f64 = 3.72;
+pub(super) const RARE: f64 = 3.72;
 /// Explained beyond this, it may be structure.
 const DOUBTFUL: f64 = 1.5;
 /// Standard normal quantile of one in a hundred, for records too short for more.

@@ -8,7 +8,7 @@ use super::noise::{FINEST_V, scale_of_squares};
 use super::observed::Observed;
 use super::quality::Z;
 use super::report::{Finding, Parameter};
-use super::spikes::FAR;
+use super::spikes::far_off;
 
 /// A step of the readings this many of the noise's scales wide is worth naming.
 const COARSE_STEP: f64 = 0.5;
@@ -61,12 +61,11 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
     }
     if let Some((_, wide)) = fit.noise.wide.filter(|_| !in_time) {
         let errors = observed.errors(&fit.residual);
-        let white = fit.noise.innovations(&errors);
-        let (far, kept): (Vec<usize>, Vec<usize>) =
-            (0..white.len()).partition(|&row| white[row].abs() > FAR * fit.noise.sigma);
-        let kept: Vec<f64> = kept.into_iter().map(|row| errors[row]).collect();
-        let fraction = far.len() as f64 / white.len() as f64;
-        let spread = (fraction * (1.0 - fraction) / white.len() as f64).sqrt();
+        let far = far_off(&fit.noise, &errors);
+        let kept: Vec<f64> = errors.iter().zip(&far).filter(|(_, far)| !**far).map(|(error, _)| *error).collect();
+        let (rows, off) = (errors.len(), errors.len() - kept.len());
+        let fraction = off as f64 / rows as f64;
+        let spread = (fraction * (1.0 - fraction) / rows as f64).sqrt();
         findings.push(Finding {
             cause: "outliers",
             probability: 1.0,
@@ -74,8 +73,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
             rmse_before: stopped_raw,
             rmse_after: scale_of_squares(&kept),
             evidence: format!(
-                "{} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
-                far.len(),
+                "{off} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
                 wide / fit.noise.sigma
             ),
         });

@@ -10,16 +10,16 @@
 
 use super::data::Data;
 use super::fit::{Engine, Fit};
-use super::leftover::Leftover;
+use super::leftover::{Leftover, RARE};
+use super::noise::Noise;
+use super::sums::dot;
 
 /// A reading this many of the noise's scales off is far off.
-pub(super) const FAR: f64 = 4.0;
+const FAR: f64 = 4.0;
 /// A change of the voltage, as a part of the full scale.
 const CHANGE: f64 = 0.01;
 /// Rows from the change, as it leaves the amplifier, that are just after it.
 const AFTER: f64 = 4.0;
-/// Normal quantile of one in ten thousand.
-const RARE: f64 = 3.72;
 /// Part of the far readings that must lie just after a change.
 const MOST: f64 = 0.5;
 
@@ -28,37 +28,41 @@ pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
     fit.noise.wide?;
     let data = engine.data;
     let errors = engine.observed.errors(&fit.residual);
-    let white = fit.noise.innovations(&errors);
+    let far = far_off(&fit.noise, &errors);
     let after = after_changes(data, fit.model.chain(engine.simulator.base, data).delay_s);
-    let far: Vec<usize> = (0..white.len()).filter(|&row| white[row].abs() > FAR * fit.noise.sigma).collect();
-    let count = far.iter().filter(|&&row| after[row]).count() as f64;
-    let (all, part) = (far.len() as f64, after.iter().filter(|after| **after).count() as f64 / after.len() as f64);
+    let count = far.iter().zip(&after).filter(|(far, after)| **far && **after).count() as f64;
+    let of_rows = |rows: &[bool]| rows.iter().filter(|row| **row).count() as f64;
+    let (all, part) = (of_rows(&far), of_rows(&after) / after.len() as f64);
     let surprise = (count - all * part) / (all * part * (1.0 - part)).sqrt();
     if !(count > MOST * all && surprise > RARE) {
         return None;
     }
-    let squares = |rows: &mut dyn Iterator<Item = usize>| rows.map(|row| errors[row].powi(2)).sum::<f64>();
-    let [of_far, of_all] = [squares(&mut far.iter().copied()), squares(&mut (0..errors.len()))];
+    let of_far: f64 = errors.iter().zip(&far).filter(|(_, far)| **far).map(|(error, _)| error * error).sum();
     Some(Leftover {
         place: format!("in {count} readings far off just after changes of the voltage"),
-        share: of_far / of_all,
+        share: of_far / dot(&errors, &errors),
         rms: (of_far / errors.len() as f64).sqrt(),
         significant: true,
         doubtful: true,
     })
 }
 
+/// Rows whose readings are far off, by what these leave.
+pub(super) fn far_off(noise: &Noise, errors: &[f64]) -> Vec<bool> {
+    noise.innovations(errors).iter().map(|innovation| innovation.abs() > FAR * noise.sigma).collect()
+}
+
 /// Rows that are just after a change of the voltage, which leaves the amplifier `delay_s` late.
 fn after_changes(data: &Data, delay_s: f64) -> Vec<bool> {
     let mut after = vec![false; data.rows()];
+    let first_from = |time: f64| data.time_s.partition_point(|&at| at < time);
     for row in 1..data.rows() {
         if (data.voltage_v[row] - data.voltage_v[row - 1]).abs() <= CHANGE * data.full_scale_v {
             continue;
         }
-        let from = data.time_s[row] + delay_s - data.sample_s;
-        let until = data.time_s[row] + delay_s + AFTER * data.sample_s;
-        let rows = (row..data.rows()).skip_while(|&row| data.time_s[row] < from);
-        rows.take_while(|&row| data.time_s[row] < until).for_each(|row| after[row] = true);
+        let leaves = data.time_s[row] + delay_s;
+        let rows = first_from(leaves - data.sample_s).max(row)..first_from(leaves + AFTER * data.sample_s);
+        after[rows].fill(true);
     }
     after
 }

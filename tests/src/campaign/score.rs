@@ -11,17 +11,17 @@ use crate::hidden::{Cause, Hidden};
 
 /// What of a report is scored.
 #[derive(Debug, Deserialize)]
-struct Report {
-    verdict: String,
-    findings: Vec<Finding>,
+pub(super) struct Report {
+    pub(super) verdict: String,
+    pub(super) findings: Vec<Finding>,
     #[serde(default)]
-    alternatives: Vec<Vec<String>>,
+    pub(super) alternatives: Vec<Vec<String>>,
     extended: Option<Extended>,
 }
 
 #[derive(Debug, Deserialize)]
-struct Finding {
-    cause: String,
+pub(super) struct Finding {
+    pub(super) cause: String,
     #[serde(default)]
     parameters: BTreeMap<String, Parameter>,
 }

@@ -9,9 +9,10 @@ use std::fmt::Write;
 use anyhow::{Result, bail};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::part::seed;
+use super::score::Report;
 use super::seam::Diagnose;
 use super::tables::table;
 use crate::hidden::strangers::Form;
@@ -48,19 +49,6 @@ pub enum Grade {
     Wrong,
 }
 
-#[derive(Deserialize)]
-struct Report {
-    verdict: String,
-    findings: Vec<Finding>,
-    #[serde(default)]
-    alternatives: Vec<Vec<String>>,
-}
-
-#[derive(Deserialize)]
-struct Finding {
-    cause: String,
-}
-
 impl Grade {
     fn of(form: &Form, found: &[String]) -> Self {
         match found {
@@ -85,7 +73,7 @@ pub fn run(
 ) -> Result<Vec<Answer>> {
     let one = |(index, form): (usize, &Form)| -> Result<Answer> {
         let seed = seed(first, 10, index);
-        let Report { verdict, findings, alternatives } = serde_json::from_value(diagnose(&form.draw(seed))?)?;
+        let Report { verdict, findings, alternatives, .. } = serde_json::from_value(diagnose(&form.draw(seed))?)?;
         let found: Vec<String> = findings.into_iter().map(|finding| finding.cause).collect();
         progress.inc(1);
         if let Some(name) = found.iter().find(|name| Cause::named(name).is_none()) {

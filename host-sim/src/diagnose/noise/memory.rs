@@ -103,7 +103,7 @@ impl Memory {
         }
         let tame = without_wild(values);
         let white = self.whitened(&tame);
-        white.into_iter().zip(values.iter().zip(tame)).map(|(white, (value, tame))| white + value - tame).collect()
+        white.into_iter().zip(values.iter().zip(tame)).map(|(white, (value, tame))| white + (value - tame)).collect()
     }
 
     /// What the memory does not foretell. Before the first row, everything is taken to have been as it is there.

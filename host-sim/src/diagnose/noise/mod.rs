@@ -95,9 +95,14 @@ impl Noise {
             return noise.with_tail(f64::INFINITY, FINEST_V);
         }
         noise.memory = Memory::fitted(residual, noise.sigma);
-        noise.fit_tail(&exact(&noise.memory.innovations(residual), observed));
+        let innovations = noise.memory.innovations(residual);
+        noise.fit_tail(&exact(&innovations, observed));
         if noise.wide.is_none() {
-            noise.fit_tail(&exact(&noise.whitened(residual), observed));
+            let white = noise.whitened(residual);
+            // Mostly nothing is wild, and they are the same.
+            if white != innovations {
+                noise.fit_tail(&exact(&white, observed));
+            }
         }
         noise.marginal = scale_of_squares(&exact(residual, observed)).max(noise.sigma);
         noise
