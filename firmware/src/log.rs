@@ -90,16 +90,17 @@ pub fn queue(event: Event) {
     }
 }
 
-/// The first line after a reset.
-pub fn boot(reset: &'static str, last_fault: u8) {
+/// The first line after a reset; `controller` leads the spring.
+pub fn boot(reset: &'static str, last_fault: u8, controller: &'static str) {
     let (version, git) = (env!("CARGO_PKG_VERSION"), env!("GIT_REVISION"));
     info!(
-        "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32}",
+        "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32} controller={=str}",
         version,
         git,
         reset,
         last_fault,
-        crate::RATE_HZ
+        crate::RATE_HZ,
+        controller
     );
 }
 

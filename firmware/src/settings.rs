@@ -1,22 +1,29 @@
 //! What an image runs: spring, controller and amplifier, and how they are supervised.
 
-#[cfg(feature = "feedback")]
-use model::Feedback;
 #[cfg(feature = "fast")]
-use model::{Approach, Compensation};
-use model::{Settings, supervisor};
+use model::Approach;
+use model::{Amplifier, Compensation, Feedback, Settings, supervisor};
 
+/// Of the amplifier that is driven: to be changed with it.
+const AMPLIFIER: Amplifier = Amplifier::PAPER;
 /// Of every run under the paper's controller.
-pub const SETTINGS: Settings = Settings::PAPER;
-/// Of what is flashed.
-#[cfg(not(feature = "feedback"))]
-pub const FLASHED: Settings = SETTINGS;
-/// Of what is flashed: with a sensor, which corrects nothing until a board has one.
-#[cfg(feature = "feedback")]
-pub const FLASHED: Settings = sensing(SETTINGS);
-/// Under the time-optimal controller.
+pub const SETTINGS: Settings = Settings { amplifier: AMPLIFIER, ..Settings::PAPER };
+/// Of every run under the time-optimal controller.
 #[cfg(feature = "fast")]
-const FAST: Settings = Settings { compensation: Compensation::TimeOptimal(Approach::DEAD_BEAT), ..SETTINGS };
+pub const FAST: Settings = Settings { compensation: Compensation::TimeOptimal(Approach::DEAD_BEAT), ..SETTINGS };
+
+/// Of what a host commands: what is flashed, and the emulated board at its link.
+#[cfg(not(feature = "fast"))]
+pub const FLASHED: Settings = sensing(SETTINGS);
+/// Of what a host commands: what is flashed, and the emulated board at its link.
+#[cfg(feature = "fast")]
+pub const FLASHED: Settings = sensing(FAST);
+/// A stiffness sensor, which corrects nothing until a board has one.
+#[cfg(not(feature = "feedback"))]
+const SENSOR: Option<Feedback> = None;
+/// A stiffness sensor, which corrects nothing until a board has one.
+#[cfg(feature = "feedback")]
+const SENSOR: Option<Feedback> = Some(Feedback::TYPICAL);
 /// Supervision of every run.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 
@@ -35,13 +42,21 @@ pub static LEADERS: &[Leader] = &[
     #[cfg(feature = "fast")]
     Leader { run: "up-down fast", settings: &FAST },
     #[cfg(feature = "feedback")]
-    Leader { run: "up-down sensor", settings: &FLASHED },
+    Leader { run: "up-down sensor", settings: &const { sensing(SETTINGS) } },
     #[cfg(all(feature = "fast", feature = "feedback"))]
     Leader { run: "up-down fast sensor", settings: &const { sensing(FAST) } },
 ];
 
-/// The same with a stiffness sensor.
-#[cfg(feature = "feedback")]
+/// The same with the sensor, if there is one.
 const fn sensing(settings: Settings) -> Settings {
-    Settings { feedback: Some(Feedback::TYPICAL), ..settings }
+    Settings { feedback: SENSOR, ..settings }
+}
+
+/// The controller's name, as `vsj` has it.
+pub const fn controller(settings: &Settings) -> &'static str {
+    match settings.compensation {
+        Compensation::None => "none",
+        Compensation::ProportionalIntegral(_) => "paper",
+        Compensation::TimeOptimal(_) => "fast",
+    }
 }

@@ -7,7 +7,7 @@ use model::{Amplifier, OutOfRange, Settings};
 
 use crate::control::Control;
 use crate::log;
-use crate::settings::{SETTINGS, SUPERVISION};
+use crate::settings::{FLASHED, SUPERVISION};
 use crate::store::{Pages, Store};
 
 /// What a start comes to.
@@ -55,7 +55,7 @@ pub fn control<P: Pages>(
 pub fn check(payload: &[u8]) -> Result<(), Reason> {
     let found = WireModel::read(payload);
     let Some(found) = &found else { return Err(Reason::ModelDamaged) };
-    Control::check(&SETTINGS, found).map_err(|error| Reason::of_model(&error))
+    Control::check(&FLASHED, found).map_err(|error| Reason::of_model(&error))
 }
 
 #[inline(never)]

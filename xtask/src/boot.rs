@@ -7,11 +7,13 @@ mod host;
 use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
+use firmware::settings;
 use host_sim::log::Formats;
 use serde::Deserialize;
 
+use crate::controller::Controller;
 use crate::image::{self, Board, Opt};
-use crate::{audit, elf, emulator, python, shell};
+use crate::{audit, elf, emulator, python, shell, size};
 
 /// Between two ticks, in us.
 const PERIOD_US: f64 = 1000.0;
@@ -67,11 +69,14 @@ impl Events {
 }
 
 /// `cargo xtask boot`.
-pub(crate) fn run() -> Result<()> {
-    let elf = image::build(Board::Nucleo, Opt::S)?;
+pub(crate) fn run(controller: Controller) -> Result<()> {
+    let elf = image::build_with(controller.features(), Board::Nucleo, Opt::S)?;
     let bytes = image::read(&elf)?;
     let flash = elf::flash(&bytes)?;
     ensure!(flash.address == 0x0800_0000, "the image begins at {:#x}", flash.address);
+    let size = size::measure(controller, &[], Board::Nucleo)?;
+    size.check()?;
+    println!("size: {size}; no way into a panic from the control tick ({} functions), no heap", audit::run(&bytes)?);
     let bin = elf.with_extension("boot.bin");
     fs::write(&bin, &flash.bytes).with_context(|| format!("cannot write {}", bin.display()))?;
 
@@ -90,8 +95,8 @@ pub(crate) fn run() -> Result<()> {
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
-    println!("{}", quiet(&events("quiet")?, &bytes).context("without a mishap")?);
-    println!("host: {}", host::check(&events("host")?).context("with a host")?);
+    println!("{}", quiet(&events("quiet")?, &bytes, controller).context("without a mishap")?);
+    println!("host: {}", host::check(&events("host")?, controller).context("with a host")?);
     let hang_us = f64::from(firmware::LONGEST_HANG_MS) * 1e3;
     for (name, within_us, log) in [
         ("panic", KILL_US, "panic at injected.rs:7"),
@@ -106,10 +111,13 @@ pub(crate) fn run() -> Result<()> {
 }
 
 /// Boots, stays safe without a host, keeps its pace and feeds the watchdog.
-fn quiet(events: &Events, image: &[u8]) -> Result<String> {
+fn quiet(events: &Events, image: &[u8], controller: Controller) -> Result<String> {
     events.safe()?;
     let log = events.log(image)?;
-    ensure!(log.first().is_some_and(|line| line.contains("reset=power-on last_fault=0")), "the log begins {log:?}");
+    let said = format!("controller={}", settings::controller(controller.settings()));
+    for part in ["reset=power-on last_fault=0", &said] {
+        ensure!(log.first().is_some_and(|line| line.contains(part)), "no `{part}` where the log begins, {log:?}");
+    }
     ensure!(log.iter().any(|line| line.contains("summary tick=1000 overruns=0")), "no summary in {log:?}");
     ensure!(events.times("reset").len() == 1, "it was reset");
     // Start-up writes zero once; the first tick's place depends on it.

@@ -9,6 +9,7 @@ use link::WireModel;
 use model::Volts;
 use serde_json::{Value, json};
 
+use crate::controller::Controller;
 use crate::emulator::{self, Run, SAFE, Written};
 use crate::image::{self, Board, Opt};
 use crate::{blocks, rivals, setup};
@@ -22,6 +23,9 @@ pub(crate) struct Args {
     /// Play nothing: wait for `vsj link unix:PATH` on this socket until Ctrl-C
     #[arg(long, value_name = "PATH", conflicts_with = "json")]
     link: Option<PathBuf>,
+    /// Who leads the spring meanwhile
+    #[arg(long, value_enum, default_value = "paper", requires = "link")]
+    controller: Controller,
     /// Count instructions a tick of this controller beside those of other crates and of double precision
     #[arg(long, conflicts_with = "link")]
     rivals: bool,
@@ -42,7 +46,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.blocks {
         return blocks::run(args.opt, args.json);
     }
-    let elf = image::build(Board::Mps2, args.opt)?;
+    let elf = image::build_with(args.controller.features(), Board::Mps2, args.opt)?;
     if let Some(socket) = &args.link {
         let socket = std::path::absolute(socket)?;
         eprintln!("talk to it with: vsj link unix:{} status", socket.display());

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 
+use crate::controller::Controller;
 use crate::image::{self, Board, Opt};
 use crate::shell;
 
@@ -9,8 +10,8 @@ use crate::shell;
 const CHIP: &str = "STM32G474RETx";
 
 /// `cargo xtask flash`.
-pub(crate) fn run() -> Result<()> {
-    let elf = image::build(Board::Nucleo, Opt::S)?;
+pub(crate) fn run(controller: Controller) -> Result<()> {
+    let elf = image::build_with(controller.features(), Board::Nucleo, Opt::S)?;
     shell::run(shell::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
         .context("probe-rs flashes the board (cargo install probe-rs-tools --locked)")
 }

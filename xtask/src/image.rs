@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
+use crate::controller::Controller;
 use crate::{elf, shell};
 
 /// What the optimiser aims at.
@@ -60,21 +61,22 @@ pub(crate) fn build(board: Board, opt: Opt) -> Result<PathBuf> {
 
 /// As [`build`], with these features of the firmware's.
 pub(crate) fn build_with(features: &[&str], board: Board, opt: Opt) -> Result<PathBuf> {
-    let features = [&[board.name()], features].concat().join(",");
-    compile(&features, opt, ["--bin", board.name()], board.name())
+    let features = [&[board.name()], features].concat();
+    compile(&features.join(","), opt, ["--bin", board.name()], board.name(), &features.join("-"))
 }
 
 /// As [`build`], of an example of the firmware, with these features of it.
 pub(crate) fn example(name: &str, features: &str, opt: Opt) -> Result<PathBuf> {
-    compile(features, opt, ["--example", name], &format!("examples/{name}"))
+    compile(features, opt, ["--example", name], &format!("examples/{name}"), name)
 }
 
-/// In a place of its own: cargo puts the images of all sets of features in one.
-fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str) -> Result<PathBuf> {
+/// Under a name of its own: cargo gives the images of all sets of features the same.
+fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str, name: &str) -> Result<PathBuf> {
     let target = target_directory()?;
     let folder = target.join(shell::MCU).join(opt.profile());
+    let images = folder.join("image");
+    fs::create_dir_all(&images).with_context(|| format!("cannot make {}", images.display()))?;
     // Between building and copying nobody else may build.
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let turn = fs::File::create(folder.join("turn.lock")).context("cannot make a lock")?;
     turn.lock().context("cannot wait for a lock")?;
     shell::run(shell::cargo().args(["build", "--quiet", "--package", "firmware"]).args(what).args([
@@ -85,9 +87,7 @@ fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str) -> Result<Path
         "--target",
         shell::MCU,
     ]))?;
-    let (built, own) = (folder.join(file), folder.join("images").join(features).join(file));
-    let parent = own.parent().context("a file without folder")?;
-    fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
+    let (built, own) = (folder.join(file), images.join(name));
     // A new file in place of the old one, which somebody may be running.
     let new = own.with_extension("new");
     fs::copy(&built, &new).with_context(|| format!("cannot copy {}", built.display()))?;
@@ -102,9 +102,9 @@ pub(crate) fn target_directory() -> Result<PathBuf> {
 }
 
 /// `cargo xtask image`.
-pub(crate) fn run() -> Result<()> {
+pub(crate) fn run(controller: Controller) -> Result<()> {
     for board in Board::ALL {
-        let path = build(board, Opt::S)?;
+        let path = build_with(controller.features(), board, Opt::S)?;
         let flash = elf::flash(&read(&path)?).with_context(|| format!("in {}", path.display()))?;
         let (bin, hex) = (path.with_extension("bin"), path.with_extension("hex"));
         write(&bin, &flash.bytes)?;

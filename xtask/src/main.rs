@@ -4,6 +4,7 @@ mod audit;
 mod bench;
 mod blocks;
 mod boot;
+mod controller;
 mod drill;
 mod elf;
 mod emulate;
@@ -36,7 +37,7 @@ Examples:
   cargo xtask setup            make a fresh machine ready
   cargo xtask test             everything that must pass before a change goes in
   cargo xtask emulate          the firmware on the report's stair, under QEMU
-  cargo xtask image            the MCU's images: ELF, bin, hex
+  cargo xtask image            the MCU's images: ELF, bin, hex; --controller fast for the time-optimal ones
   cargo xtask boot             that image on register models: safe at boot and after a fault?
   cargo xtask bench --json     speed beside Python, as JSON
 
@@ -101,21 +102,43 @@ Examples:
   cargo xtask story --all --json")]
     Story(story::Args),
     /// Write the image to the real board and show its log (probe-rs)
-    Flash,
+    ///
+    /// The log's first line says which controller runs. A stored model stays; one that the controller cannot run is a fault
+    /// until it is acknowledged.
+    #[command(after_help = "\
+Examples:
+  cargo xtask flash
+  cargo xtask flash --controller fast                  as fast as the amplifier allows")]
+    Flash(controller::Args),
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 64 KB, RAM below 16 KB and the stack in its place. With --fast it only measures.
+    /// Exits with 1 unless flash stays below 64 KB (96 KB with the time-optimal controller), RAM below 16 KB and the stack in
+    /// its place.
+    #[command(after_help = "\
+Examples:
+  cargo xtask size --json
+  cargo xtask size --controller fast                   with the time-optimal controller
+  cargo xtask size --feedback                          with a stiffness sensor")]
     Size(size::Args),
     /// Make the MCU's images: ELF, bin and hex
     ///
-    /// Prints their paths.
-    Image,
+    /// Prints their paths; each controller's image has a name of its own.
+    #[command(after_help = "\
+Examples:
+  cargo xtask image                                    nucleo-g474re, mps2-an386
+  cargo xtask image --controller fast                  nucleo-g474re-fast, mps2-an386-fast")]
+    Image(controller::Args),
     /// Run the very image that is flashed, on models of the STM32G474's registers
     ///
-    /// Boot, 1.2 s without a host; a host that arms it over LPUART1 and sets targets, every code the host model's; then a
-    /// panic, a hard fault and two hangs while voltage is out. Exits with 1 unless the output is as it must be each time; says
-    /// what this cannot show. Installs Unicorn into a venv under the target directory.
-    Boot,
+    /// It fits, and its tick cannot panic; boot, 1.2 s without a host; a host that arms it over LPUART1 and sets targets, every
+    /// code the host model's under this controller, most of them another one's under the other; then a panic, a hard fault and
+    /// two hangs while voltage is out. Exits with 1 unless the output is as it must be each time; says what this cannot show.
+    /// Installs Unicorn into a venv under the target directory.
+    #[command(after_help = "\
+Examples:
+  cargo xtask boot
+  cargo xtask boot --controller fast                   the image of the time-optimal controller")]
+    Boot(controller::Args),
     /// Compare the host's speed with Python's
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Exits with 1 if Rust is slower
@@ -138,10 +161,10 @@ fn main() -> ExitCode {
         Command::Drill(args) => drill::run(&args),
         Command::Talk => talk::command(),
         Command::Story(args) => story::run(&args),
-        Command::Flash => flash::run(),
+        Command::Flash(args) => flash::run(args.controller),
         Command::Size(args) => size::run(&args),
-        Command::Image => image::run(),
-        Command::Boot => boot::run(),
+        Command::Image(args) => image::run(args.controller),
+        Command::Boot(args) => boot::run(args.controller),
         Command::Bench(args) => bench::run(&args),
     };
     match result {

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 
+use crate::controller::Controller;
 use crate::emulate::Comparison;
 use crate::image::{self, Board, Opt};
 use crate::{audit, drill, emulator, rivals, size, talk};
@@ -27,11 +28,7 @@ pub(crate) fn run() -> Result<()> {
             eprintln!("link: {}", talk::run(&elf).context("the host's link")?);
         }
     }
-    for board in Board::ALL {
-        size::check(&size::measure(&[], board)?)?;
-    }
-    audit::run(&image::read(&image::build(Board::Nucleo, Opt::S)?)?).context("nucleo-g474re")?;
-    Ok(())
+    size::measure(Controller::Paper, &[], Board::Mps2)?.check()
 }
 
 fn bit_for_bit(elf: &std::path::Path, script: &str) -> Result<()> {

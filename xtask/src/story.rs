@@ -22,9 +22,10 @@ use anyhow::{Context, Result};
 use end_to_end::hidden::Cause;
 use rayon::prelude::*;
 
+use crate::controller::Controller;
 use crate::setup;
 use better_model::Teller;
-use stage::{Controller, name};
+use stage::name;
 
 /// Told in every test: one of each block that a model can be extended by.
 const IN_TEST: [Cause; 3] = [Cause::Hysteresis, Cause::TimeConstant, Cause::ChargeLeakage];

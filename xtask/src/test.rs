@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 
+use crate::controller::Controller;
 use crate::{boot, proof, setup, shell, story};
 
 /// One call of cargo.
@@ -38,7 +39,7 @@ pub(crate) fn help() -> String {
         let env = env.map(|(key, value)| format!("{key}={value} ")).unwrap_or_default();
         let _ = writeln!(help, "  {name:<10} {env}cargo {}", args.join(" "));
     }
-    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot\n  story      cargo xtask story, as approved; a sensor that falls silent\n"
+    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot, for each controller\n  story      cargo xtask story, as approved; a sensor that falls silent\n"
 }
 
 /// `cargo xtask test`.
@@ -55,7 +56,9 @@ pub(crate) fn run() -> Result<()> {
     begin(total - 2, "firmware");
     proof::run()?;
     begin(total - 1, "boot");
-    boot::run()?;
+    for controller in Controller::ALL {
+        boot::run(controller)?;
+    }
     begin(total, "story");
     story::check()?;
     eprintln!("all {total} steps passed in {} s", start.elapsed().as_secs());

@@ -18,7 +18,7 @@ use firmware::mps2::uart::Uart;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
 use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
 use firmware::script::Script;
-use firmware::settings::SETTINGS;
+use firmware::settings::{self, FLASHED};
 use firmware::start;
 use firmware::store::Store;
 use firmware::{hang_guard, stack_guard, tasks};
@@ -43,7 +43,6 @@ enum Mode {
 fn main() -> ! {
     let mut board = Mps2::init();
     let (reset, last_fault) = reset_cause();
-    log::boot(reset, last_fault.map_or(0, |fault| fault.code()));
 
     let mut buffer = [0; 64];
     let name = semihosting::command_line(&mut buffer);
@@ -53,14 +52,15 @@ fn main() -> ! {
         (None, Some(script)) => Mode::Play(script),
         (None, None) => semihosting::exit(EXIT_NO_SCRIPT),
     };
+    let settings = match &mode {
+        Mode::Play(script) => script.settings(),
+        Mode::Link => &FLASHED,
+    };
+    log::boot(reset, last_fault.map_or(0, |fault| fault.code()), settings::controller(settings));
     if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
     let mut store = Store::new(Flash::init());
-    let settings = match &mode {
-        Mode::Play(script) => script.settings(),
-        Mode::Link => &SETTINGS,
-    };
     let started = start::control(settings, &store, last_fault);
     let (control, desk) = match started
         .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start)?))).transpose())

@@ -14,7 +14,7 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
-use firmware::settings::FLASHED;
+use firmware::settings::{self, FLASHED};
 use firmware::start;
 use firmware::store::Store;
 use firmware::tasks;
@@ -44,7 +44,7 @@ fn main() -> ! {
     kill();
     let (reset, last_fault) = reset_cause();
     let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
-    log::boot(reset, last_fault.map_or(0, Fault::code));
+    log::boot(reset, last_fault.map_or(0, Fault::code), settings::controller(&FLASHED));
     if let Some(mut core) = Peripherals::take() {
         stack_guard::set(&mut core.MPU);
         hang_guard::start(&mut core.SYST, clocks::CORE_HZ);

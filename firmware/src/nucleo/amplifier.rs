@@ -10,16 +10,17 @@ use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::{ADC1, DAC1, PA0, PA1, PA4, PB5};
+use model::Volts;
 use model::supervisor::{Drive, Monitors};
 use model::units::Signal;
-use model::{Settings, Volts};
 
 use crate::board;
+use crate::settings::FLASHED;
 
 /// Number of the enable's pin on port B.
 const ENABLE_PIN: usize = 5;
 /// Volts of the spring for the whole range of the ADC, which is the DAC's.
-const FULL_SCALE_V: i32 = Settings::PAPER.amplifier.full_scale_v as i32;
+const FULL_SCALE_V: i32 = FLASHED.amplifier.full_scale_v as i32;
 /// Current in uA for half the range of the ADC.
 const HALF_SCALE_UA: i32 = 5000;
 

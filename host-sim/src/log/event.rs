@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "lowercase")]
 pub enum Event {
-    /// `boot version=.. git=.. reset=.. last_fault=.. rate_hz=..`: the firmware starts.
+    /// `boot version=.. git=.. reset=.. last_fault=.. rate_hz=.. controller=..`: the firmware starts.
     Boot(Boot),
     /// `state .. -> ..`: the supervisor goes from one state to another.
     State {
@@ -85,6 +85,9 @@ pub struct Boot {
     pub last_fault: u8,
     /// Ticks per second.
     pub rate_hz: u32,
+    /// Who leads the spring; older firmware does not tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub controller: Option<String>,
 }
 
 /// End of an emulated run.
@@ -163,6 +166,7 @@ impl Values {
                 reset: self.text("reset=")?,
                 last_fault: self.number("last_fault=")?,
                 rate_hz: self.number("rate_hz=")?,
+                controller: self.text("controller="),
             }),
             "state" => Event::State { from: self.text("state")?, to: self.text("->")? },
             "fault" => {
@@ -234,6 +238,16 @@ mod tests {
             ),
             Event::Done(done)
         );
+    }
+
+    #[test]
+    fn older_firmware_does_not_tell_its_controller() {
+        let format = "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32}";
+        let values = ["0.1.0", "36094dc", "power-on", "0", "1000", "fast"];
+        let controller = |event| if let Event::Boot(boot) = event { boot.controller } else { panic!("{event:?}") };
+        assert_eq!(controller(event(format, &values[..5])), None);
+        let newer = format!("{format} controller={{=str}}");
+        assert_eq!(controller(event(&newer, &values)).as_deref(), Some("fast"));
     }
 
     #[test]

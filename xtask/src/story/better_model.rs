@@ -15,7 +15,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::lock_step::{Moment, NEVER};
-use super::stage::{Controller, EVERY, Errors, Stage, name};
+use super::stage::{EVERY, Errors, Stage, name};
+use crate::controller::Controller;
 use crate::{emulator, image, shell, talk};
 
 /// What came of one effect.

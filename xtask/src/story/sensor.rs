@@ -10,7 +10,8 @@ use firmware::RATE_HZ;
 use serde::Serialize;
 
 use super::lock_step::{Moment, NEVER};
-use super::stage::{Controller, Errors, Stage, Way, name};
+use super::stage::{Errors, Stage, Way, name};
+use crate::controller::Controller;
 use crate::{audit, image};
 
 /// The sensor's silence, in ticks: from the midst of the time at 500 V over the next step.

@@ -16,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::lock_step::{self, Moment};
+use crate::controller::Controller;
 use crate::emulate::Comparison;
 use crate::image::{self, Board, Opt};
 
@@ -25,15 +26,6 @@ pub(super) const EVERY: usize = 50;
 const NOISE_PERCENT: f64 = 0.2;
 /// The part of each step that counts as settled, in ticks before its end.
 const SETTLED: usize = 2 * RATE_HZ as usize;
-
-/// Who leads the spring.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Controller {
-    /// The paper's
-    Paper,
-    /// The time-optimal one, in an image of its own
-    Fast,
-}
 
 /// True stiffness less target, in V.
 #[derive(Clone, Copy, Serialize)]
@@ -80,11 +72,11 @@ pub(super) struct Stage {
 impl Stage {
     /// With these features of the firmware, beside those that the controller needs.
     pub(super) fn new(controller: Controller, features: &[&str]) -> Result<Self> {
-        let (run, own): (_, &[&str]) = match controller {
-            Controller::Paper => ("up-down", &[]),
-            Controller::Fast => ("up-down fast", &["fast"]),
+        let run = match controller {
+            Controller::Paper => "up-down",
+            Controller::Fast => "up-down fast",
         };
-        let features = [&["story"], own, features].concat();
+        let features = [&["story"], controller.features(), features].concat();
         let elf = image::build_with(&features[1..], Board::Mps2, Opt::S)?;
         let (mut rows, mut top_v, mut tick) = (Vec::new(), 0f64, 0);
         rehearse(Script::parse(run).context("no such run")?, |_, done| {
