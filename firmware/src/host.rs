@@ -9,7 +9,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer, with_timeout};
 use link::reply::Firmware;
-use link::{About, Desk, Keep, ModelId, Reason, Step, Telemetry, View};
+use link::{About, Controller, Desk, Keep, ModelId, Reason, Step, Telemetry, View};
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::supervisor::State;
 use model::{OutOfRange, Spring};
@@ -132,7 +132,7 @@ async fn hand_over(letter: Letter, heard: bool) -> View {
 /// # Errors
 /// [`OutOfRange`] names the setting.
 #[inline(never)]
-pub fn desk(start: &Start) -> Result<Option<&'static mut Desk>, OutOfRange> {
+pub fn desk(start: &Start, controller: Controller) -> Result<Option<&'static mut Desk>, OutOfRange> {
     let amplifier = &start.amplifier;
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, amplifier.min_v, amplifier.max_v)?;
     let part = |text: &str| text.parse().unwrap_or(0);
@@ -142,6 +142,7 @@ pub fn desk(start: &Start) -> Result<Option<&'static mut Desk>, OutOfRange> {
         minor: part(env!("CARGO_PKG_VERSION_MINOR")),
         patch: part(env!("CARGO_PKG_VERSION_PATCH")),
         revision: revision.unwrap_or(0),
+        controller,
     };
     let about = About {
         firmware,

@@ -9,6 +9,7 @@ use defmt::{error, info, warn};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
+use link::Controller;
 use micromath::F32Ext;
 use model::supervisor::Fault;
 use model::{Sensor, Volts};
@@ -91,7 +92,7 @@ pub fn queue(event: Event) {
 }
 
 /// The first line after a reset; `controller` leads the spring.
-pub fn boot(reset: &'static str, last_fault: u8, controller: &'static str) {
+pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
     let (version, git) = (env!("CARGO_PKG_VERSION"), env!("GIT_REVISION"));
     info!(
         "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32} controller={=str}",
@@ -100,7 +101,7 @@ pub fn boot(reset: &'static str, last_fault: u8, controller: &'static str) {
         reset,
         last_fault,
         crate::RATE_HZ,
-        controller
+        controller.name()
     );
 }
 

@@ -1,8 +1,8 @@
 //! What an image runs: spring, controller and amplifier, and how they are supervised.
 
+use model::{Amplifier, Feedback, Settings, supervisor};
 #[cfg(feature = "fast")]
-use model::Approach;
-use model::{Amplifier, Compensation, Feedback, Settings, supervisor};
+use model::{Approach, Compensation};
 
 /// Of the amplifier that is driven: to be changed with it.
 const AMPLIFIER: Amplifier = Amplifier::PAPER;
@@ -50,13 +50,4 @@ pub static LEADERS: &[Leader] = &[
 /// The same with the sensor, if there is one.
 const fn sensing(settings: Settings) -> Settings {
     Settings { feedback: SENSOR, ..settings }
-}
-
-/// The controller's name, as `vsj` has it.
-pub const fn controller(settings: &Settings) -> &'static str {
-    match settings.compensation {
-        Compensation::None => "none",
-        Compensation::ProportionalIntegral(_) => "paper",
-        Compensation::TimeOptimal(_) => "fast",
-    }
 }

@@ -45,7 +45,7 @@ pub use field::Field;
 pub use frame::{Frame, Message, Packet, Unreadable};
 pub use order::Order;
 pub use receiver::Receiver;
-pub use reply::{Models, Reason, Reply, State, Status, Telemetry};
+pub use reply::{Controller, Models, Reason, Reply, State, Status, Telemetry};
 pub use request::Request;
 pub use sequence::Sequence;
 pub use session::{Action, Session};
@@ -53,4 +53,4 @@ pub use value::{Desired, WireVolts};
 pub use wire_model::{ModelId, WireModel};
 
 /// Version of the protocol. Any change of a golden frame in `tests/golden.rs` needs a new one.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;

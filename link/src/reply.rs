@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use model::OutOfRange;
 use model::supervisor::{self, Supervisor};
+use model::{Compensation, OutOfRange};
 use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
@@ -145,6 +145,40 @@ pub struct Firmware {
     pub patch: u8,
     /// First eight hexadecimal digits of the git revision; 0 if it is not known.
     pub revision: u32,
+    /// Who leads the spring.
+    pub controller: Controller,
+}
+
+/// Which pre-compensator leads the spring.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Controller {
+    /// None.
+    #[default]
+    None,
+    /// The paper's.
+    Paper,
+    /// The time-optimal one.
+    Fast,
+}
+
+impl Controller {
+    /// Of these settings.
+    pub const fn of(compensation: &Compensation) -> Self {
+        match compensation {
+            Compensation::None => Self::None,
+            Compensation::ProportionalIntegral(_) => Self::Paper,
+            Compensation::TimeOptimal(_) => Self::Fast,
+        }
+    }
+
+    /// As `vsj` has it on its command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Paper => "paper",
+            Self::Fast => "fast",
+        }
+    }
 }
 
 /// One sample of the loop: all of the same tick.

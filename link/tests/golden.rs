@@ -7,8 +7,8 @@ use by_hand::by_hand;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    Desired, Fault, Field, Frame, Message, ModelId, Models, Reason, Reply, Request, Sequence, State, Status, Telemetry,
-    WireVolts,
+    Controller, Desired, Fault, Field, Frame, Message, ModelId, Models, Reason, Reply, Request, Sequence, State,
+    Status, Telemetry, WireVolts,
 };
 
 fn check<M: Message>(message: &M, kind: u8, golden: &str) {
@@ -55,7 +55,7 @@ fn replies() {
         limits: 9,
     };
     let status = Status {
-        firmware: Firmware { major: 1, minor: 2, patch: 3, revision: 0x1234_5678 },
+        firmware: Firmware { major: 1, minor: 2, patch: 3, revision: 0x1234_5678, controller: Controller::Fast },
         rate_hz: 1000,
         silence_limit_ticks: 500,
         lowest: WireVolts(5),
@@ -98,7 +98,7 @@ fn replies() {
             "010e050000000000000000000000000000f03f",
         ),
         (Reply::Refused(Reason::NotStored), "010f"),
-        (Reply::Status(status), "02010203f8acd19101e807f4030a0c040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
+        (Reply::Status(status), "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
         (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f09"),
         (Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }), "03f0a20401808080ac0201040106ff1f09"),
         (
@@ -121,7 +121,7 @@ fn replies() {
 fn a_whole_frame() {
     let frame = Frame::new(Sequence(1), &Request::Hello);
     assert_eq!(frame.as_bytes(), by_hand(link::VERSION, b'Q', 1, &[0]));
-    assert_eq!(frame.as_bytes(), [0, 4, 2, b'Q', 1, 1, 5, 0x71, 0x7f, 0x96, 0x0f, 0]);
+    assert_eq!(frame.as_bytes(), [0, 4, 3, b'Q', 1, 1, 5, 0xdd, 0x10, 0x87, 0x37, 0]);
 }
 
 #[test]

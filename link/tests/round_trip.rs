@@ -5,7 +5,9 @@ mod common;
 use link::frame::MAX_FRAME;
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{Desired, Fault, Frame, Message, Receiver, Reply, Request, Sequence, State, Status, Telemetry, WireVolts};
+use link::{
+    Controller, Desired, Fault, Frame, Message, Receiver, Reply, Request, Sequence, State, Status, Telemetry, WireVolts,
+};
 use proptest::prelude::*;
 
 fn arrive<M: Message>(frame: &Frame) -> Vec<(Sequence, M)> {
@@ -66,7 +68,7 @@ fn the_largest_message_fits_a_frame() {
         limits: u8::MAX,
     };
     let status = Status {
-        firmware: Firmware { major: 255, minor: 255, patch: 255, revision: most },
+        firmware: Firmware { major: 255, minor: 255, patch: 255, revision: most, controller: Controller::Fast },
         rate_hz: most,
         silence_limit_ticks: most,
         lowest: volts,
@@ -85,8 +87,8 @@ fn the_largest_message_fits_a_frame() {
             unknown: most,
         },
     };
-    const { assert!(118 <= MAX_FRAME) };
+    const { assert!(119 <= MAX_FRAME) };
     let length = |reply| Frame::new(Sequence(u16::MAX), &reply).as_bytes().len();
-    assert_eq!(length(Reply::Status(status)), 118);
+    assert_eq!(length(Reply::Status(status)), 119);
     assert_eq!(length(Reply::Telemetry(sample)), 48);
 }

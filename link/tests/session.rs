@@ -179,7 +179,7 @@ fn only_accepted_and_repeated_frames_are_signs_of_life() {
     mcu.hear(9, &Request::Heartbeat);
     mcu.hear(11, &SET);
     mcu.hear(9, &Request::Disarm);
-    mcu.hear_frame(&Frame::with_version(3, Sequence(12), &SET));
+    mcu.hear_frame(&Frame::with_version(link::VERSION + 1, Sequence(12), &SET));
     mcu.hear(12, &ACK);
     assert_eq!(mcu.session.silent_ticks(2100), Some(400));
 }

@@ -7,7 +7,6 @@ mod host;
 use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
-use firmware::settings;
 use host_sim::log::Formats;
 use serde::Deserialize;
 
@@ -114,7 +113,7 @@ pub(crate) fn run(controller: Controller) -> Result<()> {
 fn quiet(events: &Events, image: &[u8], controller: Controller) -> Result<String> {
     events.safe()?;
     let log = events.log(image)?;
-    let said = format!("controller={}", settings::controller(controller.settings()));
+    let said = format!("controller={}", link::Controller::of(&controller.settings().compensation).name());
     for part in ["reset=power-on last_fault=0", &said] {
         ensure!(log.first().is_some_and(|line| line.contains(part)), "no `{part}` where the log begins, {log:?}");
     }

@@ -18,11 +18,11 @@ use firmware::mps2::uart::Uart;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
 use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
 use firmware::script::Script;
-use firmware::settings::{self, FLASHED};
+use firmware::settings::FLASHED;
 use firmware::start;
 use firmware::store::Store;
 use firmware::{hang_guard, stack_guard, tasks};
-use link::Desk;
+use link::{Controller, Desk};
 
 use core::sync::atomic::Ordering;
 
@@ -56,14 +56,15 @@ fn main() -> ! {
         Mode::Play(script) => script.settings(),
         Mode::Link => &FLASHED,
     };
-    log::boot(reset, last_fault.map_or(0, |fault| fault.code()), settings::controller(settings));
+    let controller = Controller::of(&settings.compensation);
+    log::boot(reset, last_fault.map_or(0, |fault| fault.code()), controller);
     if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
     let mut store = Store::new(Flash::init());
     let started = start::control(settings, &store, last_fault);
     let (control, desk) = match started
-        .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start)?))).transpose())
+        .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start, controller)?))).transpose())
     {
         Ok(Some(both)) => both,
         Ok(None) => semihosting::exit(1),

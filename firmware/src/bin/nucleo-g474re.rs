@@ -14,13 +14,16 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
-use firmware::settings::{self, FLASHED};
+use firmware::settings::FLASHED;
 use firmware::start;
 use firmware::store::Store;
 use firmware::tasks;
 use firmware::{hang_guard, last_words, log, stack_guard};
-use link::Desk;
+use link::{Controller, Desk};
 use model::supervisor::Fault;
+
+/// Leads the spring.
+const CONTROLLER: Controller = Controller::of(&FLASHED.compensation);
 
 /// Runs the control task, on the interrupt of a peripheral that is not used.
 static HIGH: InterruptExecutor = InterruptExecutor::new();
@@ -44,7 +47,7 @@ fn main() -> ! {
     kill();
     let (reset, last_fault) = reset_cause();
     let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
-    log::boot(reset, last_fault.map_or(0, Fault::code), settings::controller(&FLASHED));
+    log::boot(reset, last_fault.map_or(0, Fault::code), CONTROLLER);
     if let Some(mut core) = Peripherals::take() {
         stack_guard::set(&mut core.MPU);
         hang_guard::start(&mut core.SYST, clocks::CORE_HZ);
@@ -56,7 +59,9 @@ fn main() -> ! {
     let high = HIGH.start(interrupt::CORDIC);
     let mut store = Store::new(flash);
     let started = start::control(&FLASHED, &store, last_fault);
-    match started.and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start)?))).transpose()) {
+    match started
+        .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start, CONTROLLER)?))).transpose())
+    {
         // Built once.
         Ok(None) => {}
         Ok(Some((control, desk))) => {

@@ -35,6 +35,8 @@ pub struct StatusReport {
     pub protocol: u8,
     /// Version and git revision of the program.
     pub firmware: String,
+    /// Who leads the spring: `paper` or `fast`.
+    pub controller: &'static str,
     /// Ticks per second, in Hz.
     pub rate_hz: u32,
     /// Host silence that is allowed, in s.
@@ -108,6 +110,7 @@ impl StatusReport {
         Self {
             protocol: link::VERSION,
             firmware: format!("{}.{}.{}{revision}", firmware.major, firmware.minor, firmware.patch),
+            controller: firmware.controller.name(),
             rate_hz: status.rate_hz,
             silence_limit_s: f64::from(status.silence_limit_ticks) / f64::from(status.rate_hz.max(1)),
             lowest_v: status.lowest.to_f64(),
@@ -124,7 +127,7 @@ impl StatusReport {
     /// A few lines of text.
     pub fn text(&self) -> String {
         let Self { firmware, protocol, rate_hz, silence_limit_s, overruns, fault, last_fault, sample, link, .. } = self;
-        let Self { lowest_v, highest_v, .. } = self;
+        let Self { controller, lowest_v, highest_v, .. } = self;
         let measured = sample.measured_v.map_or_else(|| "no sensor".to_owned(), |volts| format!("{volts:.3} V"));
         let limits = if sample.limits.is_empty() { "none".to_owned() } else { sample.limits.join(", ") };
         format!(
@@ -134,7 +137,7 @@ impl StatusReport {
              stiffness  {:.3} V estimated; measured: {measured}\n\
              limits     {limits}\n\
              running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
-             firmware   {firmware}, protocol {protocol}, host may be silent for {silence_limit_s} s\n\
+             firmware   {firmware}, controller {controller}, protocol {protocol}, host may be silent for {silence_limit_s} s\n\
              link       {} accepted, {} repeated, {} damaged, {} oversize, {} bad version, {} out of order, {} unknown\n",
             sample.state,
             sample.target_v,

@@ -68,7 +68,9 @@ fn a_session(mcu: &Mcu) {
     assert_eq!((&status["sample"]["state"], &status["fault"]), (&"disarmed".into(), &"none".into()));
     assert_eq!((&status["protocol"], &status["rate_hz"]), (&link::VERSION.into(), &1000.into()));
     assert_eq!((&status["firmware"], &status["silence_limit_s"]), (&"0.1.0 (0000abcd)".into(), &5.0.into()));
-    assert!(good(port, &["status"]).contains("disarmed, fault none"));
+    assert_eq!(status["controller"], "paper");
+    let text = good(port, &["status"]);
+    assert!(text.contains("disarmed, fault none") && text.contains("controller paper"), "{text}");
 
     assert!(bad(1, port, &["set", "300"]).contains("refused: not armed"));
     assert_eq!(json(port, &["arm"])["state"], "armed");
@@ -269,7 +271,8 @@ fn another_version_and_a_wrong_baud_rate_are_named() {
         let sequence = request.iter().find_map(|&byte| receiver.on_byte(byte).map(|packet| packet.sequence));
         Frame::with_version(7, sequence.unwrap(), &Reply::Status(Status::default())).as_bytes().to_vec()
     });
-    assert!(bad(1, &port, &["status"]).contains("the MCU speaks version 7 of the protocol, this program 2"));
+    let told = format!("the MCU speaks version 7 of the protocol, this program {}", link::VERSION);
+    assert!(bad(1, &port, &["status"]).contains(&told));
     let port = fake(&folder.path().join("baud"), |_| vec![0xf3; 90]);
     assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no sound answer to 2 requests, but 90 bytes"));
     // A line that echoes.

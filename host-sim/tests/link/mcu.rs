@@ -14,7 +14,7 @@ use firmware::control::{Control, Orders, Senses, Untimed};
 use firmware::store::{PAGE, Pages, Side, Store, WORD, Worn};
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{About, Desk, Fault, Keep, Order, Reason, State, Step, Telemetry, View, WireModel};
+use link::{About, Controller, Desk, Fault, Keep, Order, Reason, State, Step, Telemetry, View, WireModel};
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Settings, Spring, supervisor};
 use serialport::{SerialPort, TTYPort};
@@ -242,7 +242,7 @@ impl Chip {
         }
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
         let about = About {
-            firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd },
+            firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd, controller: Controller::Paper },
             rate_hz: 1000,
             silence_limit_ticks: setup.silence_ms,
             last_fault: Fault::NONE,

@@ -2,7 +2,9 @@
 
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{Desired, Fault, Field, ModelId, Models, Reason, Reply, Request, State, Status, Telemetry, WireVolts};
+use link::{
+    Controller, Desired, Fault, Field, ModelId, Models, Reason, Reply, Request, State, Status, Telemetry, WireVolts,
+};
 use proptest::prelude::*;
 
 /// Any finite or infinite number. NaN is left out because it does not equal itself; it has its own test.
@@ -81,13 +83,18 @@ fn telemetry() -> impl Strategy<Value = Telemetry> {
     )
 }
 
+fn controller() -> impl Strategy<Value = Controller> {
+    prop_oneof![Just(Controller::None), Just(Controller::Paper), Just(Controller::Fast)]
+}
+
 fn status() -> impl Strategy<Value = Status> {
-    (any::<[u8; 3]>(), any::<[u32; 4]>(), volts(), volts(), fault(), fault(), telemetry(), any::<[u32; 7]>()).prop_map(
-        |([major, minor, patch], numbers, lowest, highest, fault, last_fault, sample, counts)| {
+    let program = (any::<[u8; 3]>(), controller());
+    (program, any::<[u32; 4]>(), volts(), volts(), fault(), fault(), telemetry(), any::<[u32; 7]>()).prop_map(
+        |(([major, minor, patch], controller), numbers, lowest, highest, fault, last_fault, sample, counts)| {
             let [revision, rate_hz, silence_limit_ticks, overruns] = numbers;
             let [accepted, repeated, damaged, oversize, bad_version, out_of_order, unknown] = counts;
             Status {
-                firmware: Firmware { major, minor, patch, revision },
+                firmware: Firmware { major, minor, patch, revision, controller },
                 rate_hz,
                 silence_limit_ticks,
                 lowest,

@@ -66,7 +66,8 @@ pub(super) fn check(events: &Events, controller: Controller) -> Result<String> {
             }
             _ => Orders { heard: true, ..Orders::default() },
         };
-        expect(number, request, reply).with_context(|| format!("{request:?} is answered with {reply:?}"))?;
+        expect(number, request, reply, controller)
+            .with_context(|| format!("{request:?} is answered with {reply:?}"))?;
     }
 
     let on_host = drives(controller, &orders)?;
@@ -108,10 +109,13 @@ fn drives(controller: Controller, orders: &[Orders]) -> Result<Vec<(u16, bool)>>
 }
 
 /// What the MCU says after `request`.
-fn expect(number: u16, request: &Request, reply: &Reply) -> Result<()> {
+fn expect(number: u16, request: &Request, reply: &Reply, controller: Controller) -> Result<()> {
     let target = |volts: f64| Reply::Ack { state: State::Armed, target: WireVolts::from_f64(volts) };
     let good = match (request, reply) {
-        (Request::Hello, Reply::Status(status)) => status.sample.state == State::Disarmed,
+        (Request::Hello, Reply::Status(status)) => {
+            let who = link::Controller::of(&controller.settings().compensation);
+            status.sample.state == State::Disarmed && status.firmware.controller == who
+        }
         (Request::Arm, reply) => *reply == target(0.0),
         (Request::Set(Desired::ScaledVolts(volts)), reply) => *reply == target(*volts),
         (Request::Heartbeat, reply) => *reply == target(TARGETS_V[usize::from(number > 6)]),
