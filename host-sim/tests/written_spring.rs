@@ -10,8 +10,8 @@ use host_sim::diagnose::{Input, cure};
 use host_sim::plant_file;
 use host_sim::record::{Record, Row};
 
-/// The relaxation alone, with each other table, with two kinds of relaxation, with all.
-const FILES: [&str; 9] = [
+/// The relaxation alone, with each other table, with three kinds of relaxation, with all.
+const FILES: [&str; 10] = [
     "",
     "[memory]\ndirect = 0.5\nthresholds_v = [20.0, 45.0]\nweights = [0.3, 0.2]\n",
     "[memory]\ndirect = 0.0\nthresholds_v = [30.0]\nweights = [1.0]\n",
@@ -20,12 +20,17 @@ const FILES: [&str; 9] = [
     "[amplifier]\nlimit_v = 430.0\nslew_v_per_s = 60.0\ndelay_s = 0.5\n",
     "tau_high_s = 8.0\n",
     "weights = [0.8, 0.1]\n",
+    "weights = [0.5, 0.2, 0.1, 0.1]\n",
     "[memory]\ndirect = 0.5\nthresholds_v = [20.0]\nweights = [0.5]\n[law]\nvoltage_v = [0, 200, 500]\n\
      stiffness = [0, 180, 520]\n[leakage]\nshare = 0.1\ntau_s = 30.0\n[amplifier]\nslew_v_per_s = 500.0\ndelay_s = 0.5\n",
 ];
 
 fn base(tables: &str) -> Base {
-    let tau_s = if tables.starts_with("weights") { "[5.5, 60.0]" } else { "5.5" };
+    let tau_s = match tables.split_once(']').map_or(0, |(weights, _)| weights.matches("0.").count()) {
+        4 if tables.starts_with("weights") => "[5.5, 60.0, 0.5, 600.0]",
+        2 if tables.starts_with("weights") => "[5.5, 60.0]",
+        _ => "5.5",
+    };
     let text = format!("schema = 1\n[relaxation]\nshare = 0.1\ntau_s = {tau_s}\n{tables}");
     Base::new(plant_file::parse("base", &text).expect("a plant file")).expect("a base")
 }

@@ -27,17 +27,15 @@ impl Base {
     /// The chain of a plant file.
     ///
     /// # Errors
-    /// [`crate::BadInput`] for one with more than two relaxations, or with a memory that no other can stand behind.
+    /// [`crate::BadInput`] for one with a memory that no other can stand behind.
     pub fn new(file: PlantFile) -> Result<Self> {
         if !Bank::of(file.memory.as_ref()).rises() {
             bad_input!(
                 "--plant: memory that falls as the voltage rises; expected direct >= 0, also with the weights added to it"
             );
         }
-        match Relaxation::of(&file.relaxation) {
-            Some(relaxation) => Ok(Self { file, relaxation }),
-            None => bad_input!("--plant: {} time constants; expected one or two", file.relaxation.tau_s.len()),
-        }
+        let relaxation = Relaxation::of(&file.relaxation);
+        Ok(Self { file, relaxation })
     }
 
     /// The file, to be extended.

@@ -1,7 +1,7 @@
 //! The chain from the command to the stiffness, in the order of [`model::extended`]:
 //!
 //! ```text
-//! command -> limit -> slew -> delay -> memory -> law -> leakage -> relaxation -> stiffness
+//! command -> limit -> slew -> output's lag -> delay -> memory -> law -> leakage -> relaxation -> stiffness
 //! ```
 //!
 //! A plant file says what it is at first, effects change it; it runs, and writes itself into a plant file. So what is
@@ -12,15 +12,19 @@ use super::bank::Bank;
 use super::law::Law;
 use super::leakage::{Loss, Lost};
 use super::relaxation::Relaxation;
-use super::signal::Signal;
+use super::signal::{Lag, Signal};
 use crate::plant_file::{Amplifier, Leakage, PlantFile};
 
 /// Everything between the command and the stiffness that a plant file can hold.
 pub struct Chain<'a> {
     /// Largest voltage of the amplifier, either way, in V.
     pub limit_v: f64,
-    /// Its fastest change, in V/s.
-    pub slew_v_per_s: f64,
+    /// Its fastest rise, in V/s.
+    pub rising_v_per_s: f64,
+    /// And fall, in V/s.
+    pub falling_v_per_s: f64,
+    /// Time constant of its output's resistance with the spring's capacitance, in s.
+    pub output_tau_s: f64,
     /// How late it answers, in s.
     pub delay_s: f64,
     /// Hysteresis.
@@ -41,9 +45,12 @@ impl<'a> Chain<'a> {
     pub fn of(file: &'a PlantFile, relaxation: Relaxation) -> Self {
         let amplifier = file.amplifier.as_ref();
         let number = |of: fn(&Amplifier) -> Option<f64>, else_value| amplifier.and_then(of).unwrap_or(else_value);
+        let slew_v_per_s = number(|amplifier| amplifier.slew_v_per_s, f64::INFINITY);
         Self {
             limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
-            slew_v_per_s: number(|amplifier| amplifier.slew_v_per_s, f64::INFINITY),
+            rising_v_per_s: slew_v_per_s,
+            falling_v_per_s: slew_v_per_s,
+            output_tau_s: 0.0,
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
             memory: Bank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
@@ -56,7 +63,8 @@ impl<'a> Chain<'a> {
     pub fn write(&self, file: &mut PlantFile, full_scale_v: f64) {
         let amplifier = Amplifier {
             limit_v: Some(self.limit_v).filter(|limit| limit.is_finite()),
-            slew_v_per_s: Some(self.slew_v_per_s).filter(|slew| slew.is_finite()),
+            // Of two rates a file holds the faster: it is a bound for both.
+            slew_v_per_s: Some(self.rising_v_per_s.max(self.falling_v_per_s)).filter(|slew| slew.is_finite()),
             delay_s: Some(self.delay_s).filter(|delay| *delay > 0.0),
         };
         file.amplifier = (amplifier != Amplifier::default()).then_some(amplifier);
@@ -85,8 +93,12 @@ impl<'a> Chain<'a> {
         if self.limit_v.is_finite() {
             signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
         }
-        if self.slew_v_per_s.is_finite() {
-            *signal = signal.slewed(self.slew_v_per_s);
+        if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {
+            *signal = signal.slewed(self.rising_v_per_s, self.falling_v_per_s);
+        }
+        if self.output_tau_s > 0.0 {
+            let mut output = Lag::at(self.output_tau_s, signal.before);
+            signal.pass(|piece| output.pass(piece));
         }
         if self.delay_s > 0.0 {
             *signal = signal.delayed(self.delay_s * (1.0 - ROUNDING));

@@ -1,13 +1,25 @@
 //! The relaxation: what comes at once, and the lags that bring the rest.
 //!
 //! ```text
-//! y = share q + (1 - share - creep) lag(tau(q); q) + creep lag(creep_tau; q)
+//! y = share q + (1 - share - sum part_i) lag(tau(q); q) + sum part_i lag(tau_i; q)
 //! ```
 //!
-//! `q` is the stiffness that would be reached in the end. The paper's plant has `creep = 0` and one `tau`.
+//! `q` is the stiffness that would be reached in the end. The paper's plant has no further part and one `tau`.
 
 use super::signal::{Lag, Piece, Signal};
 use crate::plant_file::{self, PlantFile};
+
+/// A part that a lag of its own brings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Part {
+    /// Of everything; 0 for none.
+    pub part: f64,
+    /// Its time constant, in s.
+    pub tau_s: f64,
+}
+
+/// What the tick can hold beside the first lag.
+pub const FURTHER: usize = 3;
 
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,10 +32,8 @@ pub struct Relaxation {
     pub tau_high_s: f64,
     /// Between the two: geometric if true, else straight.
     pub geometric: bool,
-    /// Part that a second lag brings.
-    pub creep: f64,
-    /// Its time constant, in s.
-    pub creep_tau_s: f64,
+    /// Parts that further lags bring, one after the other.
+    pub further: [Part; FURTHER],
 }
 
 impl Relaxation {
@@ -32,7 +42,7 @@ impl Relaxation {
 
     /// One share, one time constant.
     pub fn plain(share: f64, tau_s: f64) -> Self {
-        Self { share, tau_s, tau_high_s: tau_s, geometric: false, creep: 0.0, creep_tau_s: 10.0 * tau_s }
+        Self { share, tau_s, tau_high_s: tau_s, geometric: false, further: Default::default() }
     }
 
     /// Time constant at a voltage, in s.
@@ -46,30 +56,37 @@ impl Relaxation {
         tau.max(0.02 * self.tau_s)
     }
 
+    /// The further parts that are there.
+    pub fn parts(&self) -> impl Iterator<Item = Part> {
+        self.further.into_iter().filter(|part| part.part != 0.0)
+    }
+
+    /// What the first lag brings.
+    fn main(&self) -> f64 {
+        1.0 - self.share - self.parts().map(|part| part.part).sum::<f64>()
+    }
+
     /// Writes itself into a plant file.
     pub fn extend(&self, file: &mut PlantFile) {
-        let main = 1.0 - self.share - self.creep;
-        let (tau_s, weights) = match self.creep {
-            0.0 => (vec![self.tau_s], Vec::new()),
-            creep => (vec![self.tau_s, self.creep_tau_s], vec![main, creep]),
+        let mut tau_s = vec![self.tau_s];
+        tau_s.extend(self.parts().map(|part| part.tau_s));
+        let weights = match tau_s.len() {
+            1 => Vec::new(),
+            _ => std::iter::once(self.main()).chain(self.parts().map(|part| part.part)).collect(),
         };
         let tau_high_s = self.varies().then_some(self.tau_high_s);
         file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s };
     }
 
-    /// The relaxation of a plant file; `None` for one with more than two time constants.
-    pub fn of(file: &plant_file::Relaxation) -> Option<Self> {
-        let (&tau_s, rest) = file.tau_s.split_first()?;
+    /// The relaxation of a plant file, which has been checked.
+    pub fn of(file: &plant_file::Relaxation) -> Self {
+        let tau_s = file.tau_s.first().copied().unwrap_or_default();
         let mut relaxation = Self { tau_high_s: file.tau_high_s.unwrap_or(tau_s), ..Self::plain(file.share, tau_s) };
-        match (rest, file.weights.as_slice()) {
-            ([], []) => Some(relaxation),
-            (&[creep_tau_s], &[_, creep]) => {
-                relaxation.creep = creep;
-                relaxation.creep_tau_s = creep_tau_s;
-                Some(relaxation)
-            }
-            _ => None,
+        let parts = file.tau_s.iter().zip(&file.weights).skip(1);
+        for (further, (&tau_s, &part)) in relaxation.further.iter_mut().zip(parts) {
+            *further = Part { part, tau_s };
         }
+        relaxation
     }
 
     /// True if the time constant depends on the voltage.
@@ -81,15 +98,15 @@ impl Relaxation {
     /// needed only if the time constant varies.
     pub fn pass(&self, signal: &mut Signal, levels_v: &[f64]) {
         let before = signal.before;
-        let main = 1.0 - self.share - self.creep;
+        let (share, main) = (self.share, self.main());
         let mut lag = Lag::at(self.tau_s, before);
-        if self.creep == 0.0 && !self.varies() {
+        let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, Lag::at(it.tau_s, before))).collect();
+        if further.is_empty() && !self.varies() {
             return signal.pass(|piece| {
                 let (start, end) = lag.pass(piece);
-                (self.share * piece.from + main * start, self.share * piece.to + main * end)
+                (share * piece.from + main * start, share * piece.to + main * end)
             });
         }
-        let mut slow = Lag::at(self.creep_tau_s, before);
         let mut levels = levels_v.iter().copied().filter(|_| self.varies());
         let mut level = f64::NAN;
         signal.pass(|piece: Piece| {
@@ -100,11 +117,11 @@ impl Relaxation {
                 lag = lag.with_tau(self.tau_at(level));
             }
             let (start, end) = lag.pass(piece);
-            let (mut from, mut to) = (self.share * piece.from + main * start, self.share * piece.to + main * end);
-            if self.creep != 0.0 {
-                let (start, end) = slow.pass(piece);
-                from += self.creep * start;
-                to += self.creep * end;
+            let (mut from, mut to) = (share * piece.from + main * start, share * piece.to + main * end);
+            for (part, lag) in &mut further {
+                let (start, end) = lag.pass(piece);
+                from += *part * start;
+                to += *part * end;
             }
             (from, to)
         });

@@ -159,8 +159,8 @@ impl Signal {
         later
     }
 
-    /// The signal followed at no more than `rate_per_s`.
-    pub fn slewed(&self, rate_per_s: f64) -> Self {
+    /// The signal followed at no more than these rates, in V/s.
+    pub fn slewed(&self, rising: f64, falling: f64) -> Self {
         let mut slewed = self.emptied();
         let mut now = self.before;
         let mut rows = self.rows.iter().peekable();
@@ -170,9 +170,9 @@ impl Signal {
             }
             let slope = if duration_s > 0.0 { (to - from) / duration_s } else { 0.0 };
             let mut left = duration_s;
-            if from != now || slope.abs() > rate_per_s {
+            if from != now || slope > rising || -slope > falling {
                 let ahead = if from == now { slope } else { from - now };
-                let rate = rate_per_s.copysign(ahead);
+                let rate = if ahead > 0.0 { rising } else { -falling };
                 // Until the straight line of the input is met.
                 let closing = rate - slope;
                 let meets = if closing * ahead > 0.0 { (from - now) / closing } else { f64::INFINITY };
@@ -305,11 +305,24 @@ mod tests {
 
     #[test]
     fn a_slew_limit_arrives_when_it_must() {
-        let got = rows(&step().slewed(40.0));
+        let got = rows(&step().slewed(40.0, 40.0));
         for (got, expected) in got.iter().zip([0.0, 0.0, 40.0, 80.0, 100.0]) {
             assert!((got - expected).abs() < 1e-9, "{got} {expected}");
         }
-        assert_eq!(rows(&step().slewed(1e6)), [0.0, 0.0, 100.0, 100.0, 100.0]);
+        assert_eq!(rows(&step().slewed(1e6, 1e6)), [0.0, 0.0, 100.0, 100.0, 100.0]);
+    }
+
+    #[test]
+    fn rise_and_fall_have_their_own_rates() {
+        let mut up_and_down = step();
+        let falls = up_and_down.rows[3] as usize;
+        up_and_down.pieces[falls..].iter_mut().for_each(|piece| (piece.from, piece.to) = (0.0, 0.0));
+        for (rising, falling, expected) in
+            [(40.0, 70.0, [0.0, 0.0, 40.0, 80.0, 10.0]), (70.0, 40.0, [0.0, 0.0, 70.0, 100.0, 60.0])]
+        {
+            let got = rows(&up_and_down.slewed(rising, falling));
+            assert!(got.iter().zip(expected).all(|(got, expected)| (got - expected).abs() < 1e-9), "{got:?}");
+        }
     }
 
     #[test]

@@ -1,15 +1,37 @@
-//! The real voltage changes at a bounded rate: `|du/dt| <= slew`. Its lag grows with the step; a delay's does not.
+//! The real voltage follows the command slowly. Its lag grows with the step; a delay's does not.
+//!
+//! | form | law |
+//! | --- | --- |
+//! | both ways | `-slew <= du/dt <= slew` |
+//! | two rates | `-falling <= du/dt <= slew` |
+//! | output resistance | `tau du/dt = command - u`: a full stroke starts at `slew = full / tau` |
 
 use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
 
 pub(super) struct AmplifierSlew;
 
+const BOTH_WAYS: usize = 0;
+const TWO_RATES: usize = 1;
+const RESISTANCE: usize = 2;
+/// Slower outputs would be taken for the spring, in s.
+const SLOWEST_OUTPUT_S: f64 = 1.0;
+/// Of two rates, how far apart they are looked for.
+const APART: f64 = 3.0;
+
+fn stroke(data: &Data) -> f64 {
+    data.full_scale_v.max(1e-6)
+}
+
 /// Rates, in V/s, at which a full stroke takes the whole record or a tenth of a sample.
 fn range(data: &Data) -> (f64, f64) {
-    let stroke = data.full_scale_v.max(1e-6);
-    (stroke / data.duration_s().max(1e-6), 10.0 * stroke / data.sample_s)
+    (stroke(data) / data.duration_s().max(1e-6), 10.0 * stroke(data) / data.sample_s)
+}
+
+/// Time constants of the output, in s: shorter ones are a delay to the rows.
+fn taus(data: &Data) -> (f64, f64) {
+    (data.sample_s, SLOWEST_OUTPUT_S.max(2.0 * data.sample_s))
 }
 
 impl Effect for AmplifierSlew {
@@ -29,26 +51,64 @@ impl Effect for AmplifierSlew {
         "single steps of very different heights: a slew lag grows with the step"
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+    fn forms(&self) -> usize {
+        3
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        if form == RESISTANCE {
+            let (shortest, longest) = taus(data);
+            return vec![Coordinate::log(shortest, longest)];
+        }
         let (slowest, fastest) = range(data);
-        vec![Coordinate::log(slowest, fastest)]
+        vec![Coordinate::log(slowest, fastest); if form == TWO_RATES { 2 } else { 1 }]
     }
 
-    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
         let (slowest, fastest) = range(data);
-        let (from, to) = ((2.0 * slowest).ln(), (0.8 * fastest).ln());
-        (0..20).map(|part| vec![from + (to - from) * f64::from(part) / 19.0]).collect()
+        let rates = (2.0 * slowest, 0.8 * fastest);
+        match form {
+            BOTH_WAYS => between(rates, 20).map(|rate| vec![rate]).collect(),
+            RESISTANCE => between(taus(data), 10).map(|tau| vec![tau]).collect(),
+            _ => between(rates, 10)
+                .flat_map(|rate| [APART.ln(), -APART.ln()].map(|apart| vec![rate, rate + apart]))
+                .collect(),
+        }
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("slew_v_per_s", "V/s", point[0].exp())]
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        let value = point[0].exp();
+        match form {
+            RESISTANCE => vec![
+                Quantity::new("slew_v_per_s", "V/s", stroke(data) / value),
+                Quantity::new("output_tau_s", "s", value),
+            ],
+            TWO_RATES => vec![
+                Quantity::new("slew_v_per_s", "V/s", value),
+                Quantity::new("falling_v_per_s", "V/s", point[1].exp()),
+            ],
+            _ => vec![Quantity::new("slew_v_per_s", "V/s", value)],
+        }
     }
 
-    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
-        None
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, _: &Chain) -> Option<toml::Value> {
+        (form != BOTH_WAYS).then(|| table(self, form, point, data))
     }
 
-    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        chain.slew_v_per_s = chain.slew_v_per_s.min(point[0].exp());
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        let value = point[0].exp();
+        if form == RESISTANCE {
+            chain.output_tau_s = value;
+            return;
+        }
+        let falling = point.get(1).map_or(value, |falling| falling.exp());
+        chain.rising_v_per_s = chain.rising_v_per_s.min(value);
+        chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
     }
+}
+
+/// Logarithms, evenly from one end of a range to the other.
+fn between((from, to): (f64, f64), count: u32) -> impl Iterator<Item = f64> {
+    let (from, to) = (from.ln(), to.ln());
+    (0..count).map(move |part| from + (to - from) * f64::from(part) / f64::from(count - 1))
 }

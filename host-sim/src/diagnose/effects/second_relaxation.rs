@@ -1,17 +1,22 @@
 //! Part of the response relaxes with another, slower time constant (creep); the settled value stays.
 //!
-//! ```text
-//! of the rest:    y = share q + (1 - share - creep) lag(tau; q) + creep lag(slow; q)
-//! of everything:  y = (1 - creep) (share q + (1 - share) lag(tau; q)) + creep lag(slow; q)
-//! ```
+//! | form | what relaxes |
+//! | --- | --- |
+//! | of the rest | `y = share_0 q + (1 - share_0 - creep) lag(tau; q) + creep lag(slow; q)` |
+//! | of everything | `y = (1 - creep) (share_0 q + (1 - share_0) lag(tau; q)) + creep lag(slow; q)` |
+//! | by decades | as of everything, in three equal parts: `slow / 10`, `slow`, `10 slow` (logarithmic creep) |
+//! | spread | of the rest, in two equal parts, to both sides: `slow` and `tau^2 / slow` (a broad relaxation) |
 
 use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::relaxation::Part;
 
 pub(super) struct SecondRelaxation;
 
 const OF_THE_REST: usize = 0;
+const OF_EVERYTHING: usize = 1;
+const BY_DECADES: usize = 2;
 /// It is the slower one.
 const FASTEST_S: f64 = 5.5;
 
@@ -33,7 +38,7 @@ impl Effect for SecondRelaxation {
     }
 
     fn forms(&self) -> usize {
-        2
+        4
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
@@ -57,10 +62,19 @@ impl Effect for SecondRelaxation {
     }
 
     fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        chain.relaxation.creep = point[0];
-        chain.relaxation.creep_tau_s = point[1].exp();
-        if form != OF_THE_REST {
-            chain.relaxation.share *= 1.0 - point[0];
+        let (creep, slow_s) = (point[0], point[1].exp());
+        let relaxation = &mut chain.relaxation;
+        let parts = |times: &[f64]| {
+            let part = |&tau_s: &f64| Part { part: creep / times.len() as f64, tau_s };
+            std::array::from_fn(|index| times.get(index).map(part).unwrap_or_default())
+        };
+        relaxation.further = match form {
+            OF_THE_REST | OF_EVERYTHING => parts(&[slow_s]),
+            BY_DECADES => parts(&[0.1 * slow_s, slow_s, 10.0 * slow_s]),
+            _ => parts(&[slow_s, relaxation.tau_s * relaxation.tau_s / slow_s]),
+        };
+        if form == OF_EVERYTHING || form == BY_DECADES {
+            relaxation.share *= 1.0 - creep;
         }
     }
 }
