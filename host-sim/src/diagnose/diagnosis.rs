@@ -8,7 +8,7 @@ use super::fit::{Engine, Fit};
 use super::informative::{Silent, silent};
 use super::leftover::{self, Leftover};
 use super::model::Model;
-use super::noise::{FINEST_V, scale_of_squares};
+use super::noise::FINEST_V;
 use super::observed::{Kind, Observed};
 use super::quality::{noise_report, quality, residual_report};
 use super::reading_findings::reading_findings;
@@ -19,8 +19,6 @@ use super::standing::{self, Standing};
 use super::swallowed;
 use crate::plant_file::PlantFile;
 
-/// A model whose error is so many times that of the simulation as it was is none.
-const WORSE: f64 = 1.005;
 /// What must be left of the whitened residual's variance to be called unexplained.
 const MATERIAL: f64 = 0.1;
 
@@ -72,15 +70,10 @@ pub(super) fn diagnose(
         return unsearched(data, observed, engine, baseline, &silent);
     }
     let mut search = Search::new(engine);
-    let mut best = match given {
+    let best = match given {
         None => search.run(progress),
         Some(lead) => search.from(lead, progress),
     };
-    // Likelier but farther off is no cure.
-    let [before, after] = [&baseline, &best.fit].map(|fit| scale_of_squares(&observed.errors(&fit.residual)));
-    if after > WORSE * before {
-        best = search.root();
-    }
     let mut alternatives = rivals(&search, &best);
     let mut weights = Vec::new();
     for effect in effects(&best.fit.model) {
@@ -93,7 +86,7 @@ pub(super) fn diagnose(
     let standings = standing::standings(engine, contenders, known);
     let spikes = spikes::test(engine, &best.fit);
     let in_time = spikes.is_some();
-    let left = swallowed::test(&observed.errors(&best.fit.residual), &best.fit.noise.memory)
+    let left = swallowed::test(&data, &observed.errors(&best.fit.residual), &best.fit.noise.memory)
         .or(spikes)
         .or_else(|| leftover::test(engine, &best.fit).filter(|left| left.significant))
         .filter(|left| left.rms > FINEST_V);

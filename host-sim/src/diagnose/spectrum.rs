@@ -6,6 +6,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use super::data::Data;
+use super::sums::dot;
 
 /// A line in the spectrum: `cosine cos(2 pi f t) + sine sin(2 pi f t)`, t from the first reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,23 +22,68 @@ pub struct Peak {
 /// Rows between which an oscillation is turned.
 const TURNS: usize = 64;
 
-/// The strongest lines, one at a time: each is taken off before the next is looked for.
-pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
+/// Shorter records have no lines.
+const ROWS: usize = 16;
+/// Neighbours of a line to each side, in widths of a line.
+const NEIGHBOURS: usize = 16;
+
+/// Power in bins, and how many of them a line is wide. Finer than the record's own resolution, so that a line between two
+/// bins is not missed.
+fn powers(residual: &[f64], data: &Data) -> (Vec<f64>, usize) {
     let rows = residual.len();
-    if rows < 16 {
-        return Vec::new();
-    }
-    // Finer than the record's own resolution, so that a line between two bins is not missed.
     let length = (2 * rows).next_power_of_two();
     let mut buffer: Vec<Complex<f64>> = on_a_grid(residual, data);
     buffer.resize(length, Complex::default());
     FftPlanner::new().plan_fft_forward(length).process(&mut buffer);
-    let mut power: Vec<f64> = buffer[..length / 2].iter().map(Complex::norm_sqr).collect();
-    let width = length / rows;
+    (buffer[..length / 2].iter().map(Complex::norm_sqr).collect(), length / rows)
+}
+
+/// A line beside its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// In Hz.
+    pub frequency_hz: f64,
+    /// How many times as strong as its neighbours it is. In noise, however coloured, that is exponential: 20 times is one
+    /// chance in 1e8.
+    pub alone: f64,
+    /// Its part of the square.
+    pub share: f64,
+}
+
+/// The line that stands most alone, of those that come back at least so often in the record.
+pub fn loneliest(residual: &[f64], data: &Data, periods: usize) -> Option<Line> {
+    if residual.len() < ROWS {
+        return None;
+    }
+    let (power, width) = powers(residual, data);
+    let mut before = vec![0.0];
+    before.extend(power.iter().scan(0.0, |sum, power| {
+        *sum += power;
+        Some(*sum)
+    }));
+    let sum = |from: usize, to: usize| (before[to] - before[from], (to - from) as f64);
+    let alone = |bin: usize| {
+        let reach = |widths: usize| (bin.saturating_sub(widths * width), (bin + widths * width).min(power.len()));
+        let ((from, to), (own_from, own_to)) = (reach(NEIGHBOURS), reach(2));
+        let (left, right) = (sum(from, own_from), sum(own_to, to));
+        power[bin] * (left.1 + right.1) / (left.0 + right.0).max(f64::MIN_POSITIVE)
+    };
+    let (bin, alone) =
+        (periods * width..power.len()).map(|bin| (bin, alone(bin))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let share = 2.0 * power[bin] / (residual.len() as f64 * dot(residual, residual)).max(f64::MIN_POSITIVE);
+    Some(Line { frequency_hz: bin as f64 / (2.0 * power.len() as f64 * data.sample_s), alone, share })
+}
+
+/// The strongest lines, one at a time: each is taken off before the next is looked for.
+pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
+    if residual.len() < ROWS {
+        return Vec::new();
+    }
+    let (mut power, width) = powers(residual, data);
     let mut found = Vec::new();
     for _ in 0..count {
         let Some((bin, _)) = power.iter().enumerate().skip(width).max_by(|a, b| a.1.total_cmp(b.1)) else { break };
-        let frequency_hz = bin as f64 / (length as f64 * data.sample_s);
+        let frequency_hz = bin as f64 / (2.0 * power.len() as f64 * data.sample_s);
         found.push(line(residual, data, frequency_hz));
         for near in bin.saturating_sub(2 * width)..(bin + 2 * width).min(power.len()) {
             power[near] = 0.0;

@@ -37,11 +37,13 @@ pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
     if !(count > MOST * all && surprise > RARE) {
         return None;
     }
-    let of_far: f64 = errors.iter().zip(&far).filter(|(_, far)| **far).map(|(error, _)| error * error).sum();
+    // Beside what the noise's memory does not foretell: that may have learnt to follow from the spike on.
+    let white = fit.noise.innovations(&errors);
+    let of_far: f64 = white.iter().zip(&far).filter(|(_, far)| **far).map(|(white, _)| white * white).sum();
     Some(Leftover {
         place: format!("in {count} readings far off just after changes of the voltage"),
-        share: of_far / dot(&errors, &errors),
-        rms: (of_far / errors.len() as f64).sqrt(),
+        share: of_far / dot(&white, &white),
+        rms: (of_far / white.len() as f64).sqrt(),
         significant: true,
         doubtful: true,
     })

@@ -1,20 +1,23 @@
 //! Structure that passes for the noise's memory.
 //!
 //! An autoregression foretells a slow error, whatever its cause, as well as it foretells slow noise: whitened, nothing is
-//! left of it. Two things give it away. Noise with a memory forgets within the record, so that its means over long parts
-//! are small beside itself; and its memory is the same in both halves of the record:
+//! left of it. Three things give it away. Noise with a memory forgets within the record, so that its means over long parts
+//! are small beside itself; its memory is the same in both halves of the record; and it has no line in its spectrum:
 //!
 //! ```text
 //! slow    = mean_k(mean_k^2) / mean(e^2)                             over PARTS parts of the record
 //! changed = sum_halves rows/2 ln(var(e whitened by the other half's memory) / var(e whitened by its own))     [nats]
+//! alone   = max_f(power(f) / mean power of the frequencies around f)
 //! ```
 //!
 //! 1/f noise, the slowest that a sensor has, stays below 0.6 and 40 nats in 2400 rows; so does a first-order
 //! autoregression with a coefficient of 0.99.
 
+use super::data::Data;
 use super::leftover::Leftover;
 use super::noise::memory::Memory;
 use super::noise::{scale, scale_of_squares};
+use super::spectrum;
 
 /// Long parts of the record.
 const PARTS: usize = 8;
@@ -25,11 +28,14 @@ const SLOW: f64 = 0.75;
 /// A memory that changes by so much, in nats and in nats a row, is none.
 const CHANGED: f64 = 60.0;
 const CHANGED_PER_ROW: f64 = 0.02;
+/// A line that is so many times as strong as its neighbours, and comes back so often in the record, is none either.
+const ALONE: f64 = 30.0;
+const PERIODS: usize = 10;
 /// Errors beyond so many scales do not count.
 const CLIP: f64 = 4.0;
 
 /// Tests what a model leaves, where that has a memory.
-pub fn test(errors: &[f64], memory: &Memory) -> Option<Leftover> {
+pub fn test(data: &Data, errors: &[f64], memory: &Memory) -> Option<Leftover> {
     if errors.len() < FEWEST_ROWS || memory.is_none() {
         return None;
     }
@@ -49,7 +55,8 @@ pub fn test(errors: &[f64], memory: &Memory) -> Option<Leftover> {
         let new = scale_of_squares(&memory.whitened(errors)) / scale_of_squares(errors);
         return Some(found("as a rhythm that changes along the record", (1.0 - new * new).max(0.0)));
     }
-    None
+    let line = spectrum::loneliest(errors, data, PERIODS).filter(|line| line.alone > ALONE)?;
+    Some(found(&format!("at a frequency of {:.3} Hz", line.frequency_hz), line.share))
 }
 
 fn slow(errors: &[f64]) -> f64 {
@@ -74,6 +81,8 @@ fn changed(errors: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::data::Input;
+    use crate::record::{Record, Row};
 
     /// Independent errors of unit variance, nearly normal.
     fn errors(rows: usize) -> Vec<f64> {
@@ -88,7 +97,13 @@ mod tests {
     fn verdict(of_row: impl Fn(f64) -> f64) -> Option<String> {
         let errors: Vec<f64> =
             errors(2401).iter().enumerate().map(|(row, e)| e + of_row(row as f64 / 2401.0)).collect();
-        test(&errors, &Memory::fitted(&errors, scale(&errors))).map(|found| found.place)
+        tested(&errors).map(|found| found.place)
+    }
+
+    fn tested(errors: &[f64]) -> Option<Leftover> {
+        let row = |row: usize| Row { line: row, time_s: 0.1 * row as f64, voltage_v: 0.0, measured: Some(0.0) };
+        let record = Record { name: String::new(), rows: (0..errors.len()).map(row).collect() };
+        test(&Data::new(&record, Input::Hold), errors, &Memory::fitted(errors, scale(errors)))
     }
 
     #[test]
@@ -98,6 +113,8 @@ mod tests {
             assert!(slow.as_ref().is_some_and(|place| place.contains("slow swing")), "{slow:?}");
         }
         let chirp = verdict(|t| 10.0 * (TAU * (2.4 * t + 30.0 * t * t)).sin());
+        let line = verdict(|t| 4.0 * (TAU * 300.3 * t).sin());
+        assert!(line.as_ref().is_some_and(|place| place.contains("1.251 Hz")), "{line:?}");
         assert!(chirp.as_ref().is_some_and(|place| place.contains("rhythm")), "{chirp:?}");
     }
 
@@ -112,7 +129,7 @@ mod tests {
                     last
                 })
                 .collect();
-            assert_eq!(test(&coloured, &Memory::fitted(&coloured, scale(&coloured))), None, "{coefficient}");
+            assert_eq!(tested(&coloured), None, "{coefficient}");
         }
     }
 }

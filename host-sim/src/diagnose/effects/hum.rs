@@ -8,6 +8,8 @@ pub(super) struct Hum;
 
 /// Peaks of the spectrum that are tried.
 const PEAKS: usize = 3;
+/// Fewest periods in a record: what comes back less often may be the schedule's, through another law of the spring.
+const FEWEST: f64 = 10.0;
 
 impl Effect for Hum {
     fn cause(&self) -> &'static str {
@@ -32,14 +34,14 @@ impl Effect for Hum {
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
         let most = 2.0 * data.full_scale_v.max(1.0);
-        let frequency = Coordinate::new(1.5 / data.duration_s().max(1e-9), 0.5 / data.sample_s);
+        let frequency = Coordinate::new(0.9 * FEWEST / data.duration_s().max(1e-9), 0.5 / data.sample_s);
         vec![frequency, Coordinate::new(-most, most), Coordinate::new(-most, most)]
     }
 
     fn starts(&self, _: usize, Scene { data, residual, .. }: &Scene) -> Vec<Vec<f64>> {
         spectrum::peaks(residual, data, PEAKS)
             .into_iter()
-            .filter(|peak| peak.frequency_hz > 2.0 / data.duration_s())
+            .filter(|peak| peak.frequency_hz > FEWEST / data.duration_s())
             .map(|peak| vec![peak.frequency_hz, peak.cosine, peak.sine])
             .collect()
     }

@@ -124,6 +124,11 @@ impl Noise {
         (noise, value)
     }
 
+    /// What is not seen in it, in V, however many rows show it.
+    pub fn floor_v(&self) -> f64 {
+        self.marginal.max(self.cell)
+    }
+
     /// What the noise's memory does not foretell.
     pub fn whitened(&self, change: &[f64]) -> Vec<f64> {
         self.memory.whitened(change)

@@ -7,7 +7,8 @@ use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::{Engine, Fit};
 use crate::diagnose::leftover;
 use crate::diagnose::model::{Block, Model};
-use crate::diagnose::noise::{Noise, negligible, scale};
+use crate::diagnose::noise::{Noise, negligible, scale, scale_of_squares};
+use crate::diagnose::swallowed;
 
 /// What a block costs, in nats, beside its places and forms: so many are tried.
 const PRICE: f64 = 4.3;
@@ -15,6 +16,10 @@ const PRICE: f64 = 4.3;
 const PRICE_OF_COORDINATE: f64 = 1.8;
 /// Part of what blocks change that may be off because the spring's form is another than theirs.
 const MISFIT: f64 = 0.005;
+/// And no more than this part of the noise: a larger misfit would be seen as a memory of its own.
+const MISFIT_SEEN: f64 = 0.3;
+/// A fit whose error is so many times that of the simulation as it was is no cure, however likely the noise's memory makes it.
+const WORSE: f64 = 1.005;
 /// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
 /// And to those who are not patient must promise this part of its price.
@@ -38,8 +43,12 @@ pub trait Judge {
     /// What a block costs, in nats.
     fn price(&self, block: &Block) -> f64;
 
-    /// What the blocks of a fit leave for being of another form than the spring's, in nats: each further block costs it.
-    fn misfit(&self, fit: &Fit) -> f64;
+    /// What the blocks of a fit leave for being of another form than the spring's, in nats, beside noise of
+    /// `floor_v`: each further block costs it.
+    fn misfit(&self, fit: &Fit, floor_v: f64) -> f64;
+
+    /// False if a fit is farther off than the simulation as it was.
+    fn cures(&self, fit: &Fit) -> bool;
 
     /// True if what a fit leaves may be structure.
     fn doubts(&mut self, fit: &Fit) -> bool;
@@ -66,7 +75,7 @@ impl Judge for Engine<'_> {
         // Who is not patient trusts the law of the noise, and a promise.
         let law = if patient { Noise::first_look() } else { fit.noise.clone() };
         if !patient {
-            let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit) };
+            let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit, fit.noise.floor_v()) };
             extensions.retain(|it| it.promise > PART_OF_PRICE * (Judge::price(self, &it.block) + misfit));
         }
         let extensions = extensions.into_iter();
@@ -79,16 +88,25 @@ impl Judge for Engine<'_> {
         PRICE + PRICE_OF_COORDINATE * fitted as f64 + effect.places(self.data) + (effect.forms() as f64).ln()
     }
 
-    fn misfit(&self, fit: &Fit) -> f64 {
+    fn misfit(&self, fit: &Fit, floor_v: f64) -> f64 {
         let explained: f64 =
             self.simulation.iter().zip(&fit.residual).map(|(before, after)| (before - after).powi(2)).sum();
-        0.5 * explained * (MISFIT / fit.noise.marginal.max(fit.noise.cell)).powi(2)
+        let rows = fit.residual.len() as f64;
+        0.5 * (explained * (MISFIT / floor_v).powi(2)).min(rows * MISFIT_SEEN * MISFIT_SEEN)
+    }
+
+    fn cures(&self, fit: &Fit) -> bool {
+        let [before, after] =
+            [&self.simulation, &fit.residual].map(|residual| scale_of_squares(&self.observed.errors(residual)));
+        after <= WORSE * before
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {
         // Before any effect is found, a memory may be the effect's own.
         let unfound = fit.model.blocks.is_empty() && !fit.noise.memory.is_none();
-        unfound || leftover::test(self, fit).is_none_or(|left| left.doubtful)
+        let errors = self.observed.errors(&fit.residual);
+        let swallowed = || swallowed::test(self.data, &errors, &fit.noise.memory).is_some();
+        unfound || swallowed() || leftover::test(self, fit).is_none_or(|left| left.doubtful)
     }
 
     fn caution(&mut self, fit: &Fit) -> f64 {

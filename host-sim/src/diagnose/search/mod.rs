@@ -79,7 +79,7 @@ impl<'j, J: Judge> Search<'j, J> {
             let best = self.pass(&mut progress);
             let caution = self.judge.caution(&best.fit);
             if caution <= self.seen.caution || best.fit.model.blocks.is_empty() {
-                return best;
+                return self.charged_anew(best, &mut progress);
             }
             self.extended.clear();
             self.seen.charge(self.judge, caution);
@@ -98,6 +98,23 @@ impl<'j, J: Judge> Search<'j, J> {
                 progress(&best);
             }
         }
+        self.carried_on(best, &mut progress)
+    }
+
+    /// The best when all is charged alike; another one than was found is carried on.
+    fn charged_anew(&mut self, found: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
+        self.seen.charge(self.judge, self.seen.caution);
+        let best = self.ranked().first().map_or_else(|| found.clone(), |&best| best.clone());
+        if best.fit.model.structure() == found.fit.model.structure() {
+            return best;
+        }
+        progress(&best);
+        self.extended.clear();
+        self.carried_on(best, progress)
+    }
+
+    /// The structure with one block more while that raises the score, and with none too many.
+    fn carried_on(&mut self, mut best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
         for _ in 0..MOST_BLOCKS {
             let better = self.children(&best).into_iter().next().filter(|child| child.score > best.score);
             let Some(better) = better else { break };

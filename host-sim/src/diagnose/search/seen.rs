@@ -21,26 +21,31 @@ pub(super) struct Seen {
     scored: HashMap<Vec<Block>, Scored>,
     /// What prices are multiplied by: noise whose memory is longer than its law can say makes chance finds look better.
     pub(super) caution: f64,
+    /// The least that any structure has left, in V: what a misfit has to show against, whoever is charged for it.
+    floor_v: f64,
 }
 
 impl Default for Seen {
     fn default() -> Self {
-        Self { scored: HashMap::new(), caution: 1.0 }
+        Self { scored: HashMap::new(), caution: 1.0, floor_v: f64::INFINITY }
     }
 }
 
 impl Seen {
-    /// What a fit's blocks cost, in nats.
+    /// What a fit's blocks cost, in nats; beyond any price if they are no cure.
     pub(super) fn price(&self, judge: &impl Judge, fit: &Fit) -> f64 {
+        if !judge.cures(fit) {
+            return f64::INFINITY;
+        }
         let blocks = &fit.model.blocks;
         let further = blocks.len().saturating_sub(1) as f64;
         let stages: HashSet<Stage> = blocks.iter().map(|(block, _)| block.effect().stage()).collect();
         let times = further + ALIKE * (blocks.len() - stages.len()) as f64;
-        let misfit = if times > 0.0 { times * judge.misfit(fit) } else { 0.0 };
+        let misfit = if times > 0.0 { times * judge.misfit(fit, self.floor_v) } else { 0.0 };
         misfit + self.caution * blocks.iter().map(|(block, _)| judge.price(block)).sum::<f64>()
     }
 
-    /// Charges everything anew.
+    /// Charges everything anew: what was judged first did not know the floor.
     pub(super) fn charge(&mut self, judge: &impl Judge, caution: f64) {
         self.caution = caution;
         let mut scored = std::mem::take(&mut self.scored);
@@ -79,6 +84,7 @@ impl Seen {
 
     fn scored(&mut self, judge: &mut impl Judge, fit: Fit) -> Scored {
         let held_out = judge.held_out(&fit);
+        self.floor_v = self.floor_v.min(fit.noise.floor_v());
         let score = held_out - self.price(judge, &fit);
         let scored = Scored { fit, held_out, score };
         self.scored.insert(scored.fit.model.structure(), scored.clone());

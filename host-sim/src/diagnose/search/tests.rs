@@ -13,7 +13,12 @@ const PRICE: f64 = 10.0;
 struct Told {
     worth: Vec<(BTreeSet<usize>, f64)>,
     caution: f64,
+    /// Beside noise of 1 V.
     misfit: f64,
+    /// Without this effect, noise of 10 V is left.
+    quiet: Option<usize>,
+    /// With this effect a model is no cure.
+    worse: Option<usize>,
     /// From this log-likelihood on, nothing but noise is left.
     clean: f64,
     fits: usize,
@@ -29,6 +34,8 @@ fn told(worth: &[(&[&str], f64)]) -> Told {
         worth: worth.iter().map(|(causes, worth)| (set(causes), *worth)).collect(),
         caution: 1.0,
         misfit: 0.0,
+        quiet: None,
+        worse: None,
         clean: f64::INFINITY,
         fits: 0,
     }
@@ -41,7 +48,9 @@ impl Judge for Told {
         let of_part = self.worth.iter().filter(|(part, _)| part.is_subset(&has));
         let log_likelihood =
             of_part.map(|(part, worth)| worth + (has.len() - part.len()) as f64).fold(has.len() as f64, f64::max);
-        Fit { model, residual: Vec::new(), noise: Noise::first_look(), log_likelihood, plain: log_likelihood }
+        let mut noise = Noise::first_look();
+        noise.marginal = if self.quiet.is_none_or(|effect| has.contains(&effect)) { 1.0 } else { 10.0 };
+        Fit { model, residual: Vec::new(), noise, log_likelihood, plain: log_likelihood }
     }
 
     fn fit_again(&mut self, first: Fit) -> Fit {
@@ -61,8 +70,12 @@ impl Judge for Told {
         PRICE
     }
 
-    fn misfit(&self, _: &Fit) -> f64 {
-        self.misfit
+    fn misfit(&self, _: &Fit, floor_v: f64) -> f64 {
+        self.misfit / (floor_v * floor_v)
+    }
+
+    fn cures(&self, fit: &Fit) -> bool {
+        !self.worse.is_some_and(|effect| fit.model.has(effect))
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {
@@ -129,6 +142,28 @@ fn a_further_block_costs_what_the_form_of_the_others_may_leave() {
     (judge.misfit, alike.misfit) = (1.0, 1.0);
     assert_eq!(found(&mut judge), ["hysteresis", "drift"]);
     assert_eq!(found(&mut alike), ["hysteresis"]);
+}
+
+#[test]
+fn what_the_form_may_leave_shows_beside_the_least_noise_for_all() {
+    let sets: [(&[&str], f64); 3] = [
+        (&["amplifier-limit"], 300.0),
+        (&["amplifier-limit", "charge-leakage"], 500.0),
+        (&["amplifier-limit", "charge-leakage", "hum"], 700.0),
+    ];
+    // Whose noise is 10 V would pay a hundredth for it, and seem the better one.
+    let mut judge = Told { misfit: 100.0, quiet: Some(effect("hum")), ..told(&sets) };
+    assert_eq!(found(&mut judge), ["amplifier-limit", "charge-leakage", "hum"]);
+    judge.misfit = 210.0;
+    assert_eq!(found(&mut judge), ["amplifier-limit"]);
+}
+
+#[test]
+fn what_is_farther_off_than_the_simulation_is_no_cure() {
+    let mut judge = told(&[(&["hum"], 300.0), (&["drift"], 50.0), (&["hum", "drift"], 400.0)]);
+    assert_eq!(found(&mut judge), ["drift", "hum"]);
+    judge.worse = Some(effect("hum"));
+    assert_eq!(found(&mut judge), ["drift"]);
 }
 
 #[test]
