@@ -14,6 +14,7 @@ use end_to_end::campaign::seam::diagnose;
 use end_to_end::campaign::{rivals, strangers, tables};
 use end_to_end::hidden::noise::{Kind, Noise};
 use end_to_end::hidden::record::Recipe;
+use end_to_end::hidden::strangers::Form;
 use end_to_end::hidden::{self, Cause, Hidden};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -64,8 +65,8 @@ struct Cli {
 /// The record to write.
 #[derive(clap::Args)]
 struct Wanted {
-    /// What to hide in the record; may be repeated, without it nothing is hidden
-    #[arg(long, value_name = "CAUSE", requires = "write", value_parser = cause)]
+    /// What to hide in the record; may be repeated, without it nothing is hidden. Of strangers, only the forms of these
+    #[arg(long, value_name = "CAUSE", value_parser = cause)]
     cause: Vec<Cause>,
     /// The record's seed
     #[arg(long, default_value_t = 1, value_name = "N", requires = "write")]
@@ -88,6 +89,9 @@ struct Wanted {
     /// A form of the effect that is not the plain one
     #[arg(long, requires = "write")]
     other_form: bool,
+    /// Instead, a stranger by the name of its form, in white noise of 0.2 %: "output resistance"
+    #[arg(long, value_name = "NAME", requires = "write", value_parser = stranger, conflicts_with_all = ["cause", "size", "rows"])]
+    stranger: Option<Form>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -133,6 +137,12 @@ impl From<NoiseKind> for Kind {
             NoiseKind::HeavyTailed => Self::HeavyTailed,
         }
     }
+}
+
+fn stranger(name: &str) -> Result<Form, String> {
+    let forms = hidden::strangers::all();
+    let names: Vec<&str> = forms.iter().map(|form| form.name).collect();
+    forms.iter().find(|form| form.name == name).copied().ok_or_else(|| format!("expected one of: {}", names.join(", ")))
 }
 
 fn cause(name: &str) -> Result<Cause, String> {
@@ -209,9 +219,14 @@ impl Cli {
             Part::Small => self.climbs(part, &[0.2]),
             Part::Noise => self.climbs(part, &[0.1, 0.2, 0.5, 1.0]),
             Part::Strangers => {
-                let forms = hidden::strangers::all();
-                let bar = bar("strangers", forms.len() * self.count(5))?;
-                let answers = strangers::run(&forms, first, self.count(5), &diagnose, &bar)?;
+                let (mut forms, causes) = (hidden::strangers::all(), &self.record.cause);
+                let mut jobs = strangers::jobs(&forms, first, self.count(5));
+                if !causes.is_empty() {
+                    forms.retain(|form| causes.contains(&form.cause));
+                    jobs.retain(|(form, _)| causes.contains(&form.cause));
+                }
+                let bar = bar("strangers", jobs.len())?;
+                let answers = strangers::run(&jobs, &diagnose, &bar)?;
                 bar.finish_and_clear();
                 let (markdown, wrong) = (strangers::page(&forms, &answers), strangers::wrong(&forms, &answers));
                 Ok(Done { part, markdown, wrong, aims: Vec::new(), json: json!(answers) })
@@ -304,9 +319,14 @@ fn write(folder: &Path, wanted: &Wanted) -> Result<()> {
         rows: wanted.rows as usize,
         uneven: wanted.uneven,
     };
-    let hidden: Hidden = recipe.draw(wanted.seed).at(wanted.size);
-    let names: Vec<_> = hidden.effects.iter().map(|effect| effect.cause.name()).collect();
-    let what = if names.is_empty() { "nothing".to_owned() } else { names.join("+") };
+    let (what, hidden): (String, Hidden) = match wanted.stranger {
+        Some(form) => (form.name.replace(' ', "-"), form.draw(wanted.seed)),
+        None => {
+            let hidden = recipe.draw(wanted.seed).at(wanted.size);
+            let names: Vec<_> = hidden.effects.iter().map(|effect| effect.cause.name()).collect();
+            (if names.is_empty() { "nothing".to_owned() } else { names.join("+") }, hidden)
+        }
+    };
     for path in hidden.write(folder, &format!("{what}-{}", wanted.seed))? {
         println!("wrote {}", path.display());
     }

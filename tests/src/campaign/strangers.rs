@@ -60,19 +60,18 @@ impl Grade {
     }
 }
 
-/// `count` records of each form, diagnosed on all cores. Answers come in the order of the forms.
+/// `count` records of each form, with their seeds.
+pub fn jobs(forms: &[Form], first: u64, count: usize) -> Vec<(Form, u64)> {
+    let forms = forms.iter().flat_map(|form| std::iter::repeat_n(*form, count));
+    forms.enumerate().map(|(index, form)| (form, seed(first, 10, index))).collect()
+}
+
+/// Their diagnoses, on all cores, in the order of the jobs.
 ///
 /// # Errors
 /// A record is refused, or the report is none.
-pub fn run(
-    forms: &[Form],
-    first: u64,
-    count: usize,
-    diagnose: &Diagnose<'_>,
-    progress: &ProgressBar,
-) -> Result<Vec<Answer>> {
-    let one = |(index, form): (usize, &Form)| -> Result<Answer> {
-        let seed = seed(first, 10, index);
+pub fn run(jobs: &[(Form, u64)], diagnose: &Diagnose<'_>, progress: &ProgressBar) -> Result<Vec<Answer>> {
+    let one = |&(ref form, seed): &(Form, u64)| -> Result<Answer> {
         let Report { verdict, findings, alternatives, .. } = serde_json::from_value(diagnose(&form.draw(seed))?)?;
         let found: Vec<String> = findings.into_iter().map(|finding| finding.cause).collect();
         progress.inc(1);
@@ -85,8 +84,7 @@ pub fn run(
         let grade = Grade::of(form, &found);
         Ok(Answer { form: form.name, seed, verdict, found, true_among_alternatives, grade })
     };
-    let jobs: Vec<_> = forms.iter().flat_map(|form| std::iter::repeat_n(form, count)).enumerate().collect();
-    jobs.into_par_iter().map(one).collect()
+    jobs.par_iter().map(one).collect()
 }
 
 /// The table of the answers, then what each form is.
@@ -224,7 +222,8 @@ mod tests {
     fn a_page_counts_what_was_said() {
         let forms = &all()[..1];
         let says = |report: serde_json::Value| {
-            run(forms, 1, 2, &|_| Ok(report.clone()), &ProgressBar::hidden()).map(|answers| page(forms, &answers))
+            run(&jobs(forms, 1, 2), &|_| Ok(report.clone()), &ProgressBar::hidden())
+                .map(|answers| page(forms, &answers))
         };
         let wrong = says(json!({"verdict": "explained", "findings": [{"cause": "hum"}]})).unwrap();
         assert!(wrong.contains("| 2 | 0 | 0 | 0 | 2 | explained 2 | hum 2 | wrong name |"), "{wrong}");
