@@ -8,7 +8,7 @@ use super::fit::{Engine, Fit};
 use super::informative::{Silent, silent};
 use super::leftover::{self, Leftover};
 use super::model::Model;
-use super::noise::FINEST_V;
+use super::noise::{FINEST_V, scale_of_squares};
 use super::observed::{Kind, Observed};
 use super::quality::{noise_report, quality, residual_report};
 use super::reading_findings::reading_findings;
@@ -19,6 +19,8 @@ use super::standing::{self, Standing};
 use super::swallowed;
 use crate::plant_file::PlantFile;
 
+/// A model whose error is so many times that of the simulation as it was is none.
+const WORSE: f64 = 1.005;
 /// What must be left of the whitened residual's variance to be called unexplained.
 const MATERIAL: f64 = 0.1;
 
@@ -70,10 +72,15 @@ pub(super) fn diagnose(
         return unsearched(data, observed, engine, baseline, &silent);
     }
     let mut search = Search::new(engine);
-    let best = match given {
+    let mut best = match given {
         None => search.run(progress),
         Some(lead) => search.from(lead, progress),
     };
+    // Likelier but farther off is no cure.
+    let [before, after] = [&baseline, &best.fit].map(|fit| scale_of_squares(&observed.errors(&fit.residual)));
+    if after > WORSE * before {
+        best = search.root();
+    }
     let mut alternatives = rivals(&search, &best);
     let mut weights = Vec::new();
     for effect in effects(&best.fit.model) {

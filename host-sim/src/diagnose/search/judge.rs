@@ -7,7 +7,7 @@ use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::{Engine, Fit};
 use crate::diagnose::leftover;
 use crate::diagnose::model::{Block, Model};
-use crate::diagnose::noise::{Noise, negligible, scale, scale_of_squares};
+use crate::diagnose::noise::{Noise, negligible, scale};
 use crate::diagnose::swallowed;
 
 /// What a block costs, in nats, beside its places and forms: so many are tried.
@@ -18,8 +18,6 @@ const PRICE_OF_COORDINATE: f64 = 1.8;
 const MISFIT: f64 = 0.005;
 /// And no more than this part of the noise: a larger misfit would be seen as a memory of its own.
 const MISFIT_SEEN: f64 = 0.3;
-/// A fit whose error is so many times that of the simulation as it was is no cure, however likely the noise's memory makes it.
-const WORSE: f64 = 1.005;
 /// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
 /// And to those who are not patient must promise this part of its price.
@@ -46,9 +44,6 @@ pub trait Judge {
     /// What the blocks of a fit leave for being of another form than the spring's, in nats, beside noise of
     /// `floor_v`: each further block costs it.
     fn misfit(&self, fit: &Fit, floor_v: f64) -> f64;
-
-    /// False if a fit is farther off than the simulation as it was.
-    fn cures(&self, fit: &Fit) -> bool;
 
     /// True if what a fit leaves may be structure.
     fn doubts(&mut self, fit: &Fit) -> bool;
@@ -93,12 +88,6 @@ impl Judge for Engine<'_> {
             self.simulation.iter().zip(&fit.residual).map(|(before, after)| (before - after).powi(2)).sum();
         let rows = fit.residual.len() as f64;
         0.5 * (explained * (MISFIT / floor_v).powi(2)).min(rows * MISFIT_SEEN * MISFIT_SEEN)
-    }
-
-    fn cures(&self, fit: &Fit) -> bool {
-        let [before, after] =
-            [&self.simulation, &fit.residual].map(|residual| scale_of_squares(&self.observed.errors(residual)));
-        after <= WORSE * before
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {

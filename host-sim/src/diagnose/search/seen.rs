@@ -32,11 +32,8 @@ impl Default for Seen {
 }
 
 impl Seen {
-    /// What a fit's blocks cost, in nats; beyond any price if they are no cure.
+    /// What a fit's blocks cost, in nats.
     pub(super) fn price(&self, judge: &impl Judge, fit: &Fit) -> f64 {
-        if !judge.cures(fit) {
-            return f64::INFINITY;
-        }
         let blocks = &fit.model.blocks;
         let further = blocks.len().saturating_sub(1) as f64;
         let stages: HashSet<Stage> = blocks.iter().map(|(block, _)| block.effect().stage()).collect();

@@ -17,8 +17,6 @@ struct Told {
     misfit: f64,
     /// Without this effect, noise of 10 V is left.
     quiet: Option<usize>,
-    /// With this effect a model is no cure.
-    worse: Option<usize>,
     /// From this log-likelihood on, nothing but noise is left.
     clean: f64,
     fits: usize,
@@ -35,7 +33,6 @@ fn told(worth: &[(&[&str], f64)]) -> Told {
         caution: 1.0,
         misfit: 0.0,
         quiet: None,
-        worse: None,
         clean: f64::INFINITY,
         fits: 0,
     }
@@ -72,10 +69,6 @@ impl Judge for Told {
 
     fn misfit(&self, _: &Fit, floor_v: f64) -> f64 {
         self.misfit / (floor_v * floor_v)
-    }
-
-    fn cures(&self, fit: &Fit) -> bool {
-        !self.worse.is_some_and(|effect| fit.model.has(effect))
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {
@@ -156,14 +149,6 @@ fn what_the_form_may_leave_shows_beside_the_least_noise_for_all() {
     assert_eq!(found(&mut judge), ["amplifier-limit", "charge-leakage", "hum"]);
     judge.misfit = 210.0;
     assert_eq!(found(&mut judge), ["amplifier-limit"]);
-}
-
-#[test]
-fn what_is_farther_off_than_the_simulation_is_no_cure() {
-    let mut judge = told(&[(&["hum"], 300.0), (&["drift"], 50.0), (&["hum", "drift"], 400.0)]);
-    assert_eq!(found(&mut judge), ["drift", "hum"]);
-    judge.worse = Some(effect("hum"));
-    assert_eq!(found(&mut judge), ["drift"]);
 }
 
 #[test]
