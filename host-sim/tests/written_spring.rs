@@ -26,10 +26,10 @@ const FILES: [&str; 10] = [
 ];
 
 fn base(tables: &str) -> Base {
-    let tau_s = match tables.split_once(']').map_or(0, |(weights, _)| weights.matches("0.").count()) {
-        4 if tables.starts_with("weights") => "[5.5, 60.0, 0.5, 600.0]",
-        2 if tables.starts_with("weights") => "[5.5, 60.0]",
-        _ => "5.5",
+    let tau_s = match tables.lines().next().filter(|first| first.starts_with("weights")) {
+        Some(weights) if weights.matches(',').count() == 3 => "[5.5, 60.0, 0.5, 600.0]",
+        Some(_) => "[5.5, 60.0]",
+        None => "5.5",
     };
     let text = format!("schema = 1\n[relaxation]\nshare = 0.1\ntau_s = {tau_s}\n{tables}");
     Base::new(plant_file::parse("base", &text).expect("a plant file")).expect("a base")

@@ -166,6 +166,12 @@ pub trait Effect: Sync {
     fn read(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}
 }
 
+/// Logarithms of a range, so many, evenly from one end to the other.
+pub fn logarithms((from, to): (f64, f64), count: u32) -> impl Iterator<Item = f64> {
+    let (from, to) = (from.ln(), to.ln());
+    (0..count).map(move |part| from + (to - from) * f64::from(part) / f64::from(count - 1))
+}
+
 /// The user's parameters, as a plant file keeps what it does not model.
 pub fn table<E: Effect + ?Sized>(effect: &E, form: usize, point: &[f64], data: &Data) -> toml::Value {
     let quantities = effect.quantities(form, point, data).into_iter();

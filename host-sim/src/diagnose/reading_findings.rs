@@ -61,7 +61,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
     }
     if let Some((_, wide)) = fit.noise.wide.filter(|_| !in_time) {
         let errors = observed.errors(&fit.residual);
-        let far = far_off(&fit.noise, &errors);
+        let far = far_off(&fit.noise, &fit.noise.innovations(&errors));
         let kept: Vec<f64> = errors.iter().zip(&far).filter(|(_, far)| !**far).map(|(error, _)| *error).collect();
         let (rows, off) = (errors.len(), errors.len() - kept.len());
         let fraction = off as f64 / rows as f64;

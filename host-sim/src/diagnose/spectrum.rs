@@ -19,6 +19,8 @@ pub struct Peak {
     pub sine: f64,
 }
 
+/// What comes back less often in a record may be the schedule's, through another law of the spring.
+pub const FEWEST_PERIODS: usize = 10;
 /// Rows between which an oscillation is turned.
 const TURNS: usize = 64;
 
@@ -50,8 +52,8 @@ pub struct Line {
     pub share: f64,
 }
 
-/// The line that stands most alone, of those that come back at least so often in the record.
-pub fn loneliest(residual: &[f64], data: &Data, periods: usize) -> Option<Line> {
+/// The line that stands most alone, of those that come back often enough in the record.
+pub fn loneliest(residual: &[f64], data: &Data) -> Option<Line> {
     if residual.len() < ROWS {
         return None;
     }
@@ -69,7 +71,7 @@ pub fn loneliest(residual: &[f64], data: &Data, periods: usize) -> Option<Line> 
         power[bin] * (left.1 + right.1) / (left.0 + right.0).max(f64::MIN_POSITIVE)
     };
     let (bin, alone) =
-        (periods * width..power.len()).map(|bin| (bin, alone(bin))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (FEWEST_PERIODS * width..power.len()).map(|bin| (bin, alone(bin))).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let share = 2.0 * power[bin] / (residual.len() as f64 * dot(residual, residual)).max(f64::MIN_POSITIVE);
     Some(Line { frequency_hz: bin as f64 / (2.0 * power.len() as f64 * data.sample_s), alone, share })
 }

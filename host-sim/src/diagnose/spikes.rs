@@ -28,7 +28,8 @@ pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
     fit.noise.wide?;
     let data = engine.data;
     let errors = engine.observed.errors(&fit.residual);
-    let far = far_off(&fit.noise, &errors);
+    let white = fit.noise.innovations(&errors);
+    let far = far_off(&fit.noise, &white);
     let after = after_changes(data, fit.model.chain(engine.simulator.base, data).delay_s);
     let count = far.iter().zip(&after).filter(|(far, after)| **far && **after).count() as f64;
     let of_rows = |rows: &[bool]| rows.iter().filter(|row| **row).count() as f64;
@@ -38,7 +39,6 @@ pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
         return None;
     }
     // Beside what the noise's memory does not foretell: that may have learnt to follow from the spike on.
-    let white = fit.noise.innovations(&errors);
     let of_far: f64 = white.iter().zip(&far).filter(|(_, far)| **far).map(|(white, _)| white * white).sum();
     Some(Leftover {
         place: format!("in {count} readings far off just after changes of the voltage"),
@@ -49,9 +49,9 @@ pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
     })
 }
 
-/// Rows whose readings are far off, by what these leave.
-pub(super) fn far_off(noise: &Noise, errors: &[f64]) -> Vec<bool> {
-    noise.innovations(errors).iter().map(|innovation| innovation.abs() > FAR * noise.sigma).collect()
+/// Rows whose readings are far off, by their innovations.
+pub(super) fn far_off(noise: &Noise, innovations: &[f64]) -> Vec<bool> {
+    innovations.iter().map(|innovation| innovation.abs() > FAR * noise.sigma).collect()
 }
 
 /// Rows that are just after a change of the voltage, which leaves the amplifier `delay_s` late.

@@ -28,9 +28,8 @@ const SLOW: f64 = 0.75;
 /// A memory that changes by so much, in nats and in nats a row, is none.
 const CHANGED: f64 = 60.0;
 const CHANGED_PER_ROW: f64 = 0.02;
-/// A line that is so many times as strong as its neighbours, and comes back so often in the record, is none either.
+/// A line that is so many times as strong as its neighbours is none either.
 const ALONE: f64 = 30.0;
-const PERIODS: usize = 10;
 /// Errors beyond so many scales do not count.
 const CLIP: f64 = 4.0;
 
@@ -55,7 +54,7 @@ pub fn test(data: &Data, errors: &[f64], memory: &Memory) -> Option<Leftover> {
         let new = scale_of_squares(&memory.whitened(errors)) / scale_of_squares(errors);
         return Some(found("as a rhythm that changes along the record", (1.0 - new * new).max(0.0)));
     }
-    let line = spectrum::loneliest(errors, data, PERIODS).filter(|line| line.alone > ALONE)?;
+    let line = spectrum::loneliest(errors, data).filter(|line| line.alone > ALONE)?;
     Some(found(&format!("at a frequency of {:.3} Hz", line.frequency_hz), line.share))
 }
 

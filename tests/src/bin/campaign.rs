@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
-use clap::{Parser, ValueEnum};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, ValueEnum};
 use end_to_end::campaign::aim::{self, Aim};
 use end_to_end::campaign::ladder::{self, RUNGS};
 use end_to_end::campaign::part::{self, Job};
@@ -172,7 +173,13 @@ struct Done {
 fn main() -> ExitCode {
     // `cargo campaign -- singles` is meant as `cargo campaign singles`.
     let arguments = std::env::args().enumerate().filter(|(index, text)| !(*index == 1 && text == "--"));
-    aim::exit_code(run(&Cli::parse_from(arguments.map(|(_, text)| text))))
+    let cli = Cli::parse_from(arguments.map(|(_, text)| text));
+    let picks = cli.write.is_some() || cli.parts.iter().all(|part| *part == Part::Strangers);
+    if !cli.record.cause.is_empty() && !picks {
+        let told = "--cause: expected --write, or strangers as the only part";
+        Cli::command().error(ErrorKind::ArgumentConflict, told).exit();
+    }
+    aim::exit_code(run(&cli))
 }
 
 /// True if every aim was met.

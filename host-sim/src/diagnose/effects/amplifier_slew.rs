@@ -8,7 +8,7 @@
 
 use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
+use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage, logarithms, table};
 
 pub(super) struct AmplifierSlew;
 
@@ -68,9 +68,9 @@ impl Effect for AmplifierSlew {
         let (slowest, fastest) = range(data);
         let rates = (2.0 * slowest, 0.8 * fastest);
         match form {
-            BOTH_WAYS => between(rates, 20).map(|rate| vec![rate]).collect(),
-            RESISTANCE => between(taus(data), 10).map(|tau| vec![tau]).collect(),
-            _ => between(rates, 10)
+            BOTH_WAYS => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
+            RESISTANCE => logarithms(taus(data), 10).map(|tau| vec![tau]).collect(),
+            _ => logarithms(rates, 10)
                 .flat_map(|rate| [APART.ln(), -APART.ln()].map(|apart| vec![rate, rate + apart]))
                 .collect(),
         }
@@ -105,10 +105,4 @@ impl Effect for AmplifierSlew {
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);
         chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
     }
-}
-
-/// Logarithms, evenly from one end of a range to the other.
-fn between((from, to): (f64, f64), count: u32) -> impl Iterator<Item = f64> {
-    let (from, to) = (from.ln(), to.ln());
-    (0..count).map(move |part| from + (to - from) * f64::from(part) / f64::from(count - 1))
 }

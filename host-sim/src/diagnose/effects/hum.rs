@@ -8,8 +8,8 @@ pub(super) struct Hum;
 
 /// Peaks of the spectrum that are tried.
 const PEAKS: usize = 3;
-/// Fewest periods in a record: what comes back less often may be the schedule's, through another law of the spring.
-const FEWEST: f64 = 10.0;
+/// Fewest periods in a record.
+const FEWEST: f64 = spectrum::FEWEST_PERIODS as f64;
 
 impl Effect for Hum {
     fn cause(&self) -> &'static str {

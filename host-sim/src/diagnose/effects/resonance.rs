@@ -13,7 +13,7 @@
 use std::f64::consts::TAU;
 
 use crate::diagnose::data::Data;
-use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage, logarithms};
 use crate::diagnose::signal::{Lag, Piece, Signal};
 
 pub(super) struct Resonance;
@@ -70,8 +70,7 @@ impl Effect for Resonance {
 
     fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
         let (lowest, highest) = range(data);
-        let (from, to) = ((8.0 * lowest).ln(), (0.95 * highest).ln());
-        let frequencies = (0..24).map(|part| from + (to - from) * f64::from(part) / 23.0);
+        let frequencies = logarithms((8.0 * lowest, 0.95 * highest), 24);
         let (dampings, rest): (&[f64], &[f64]) = match form {
             WHOLE => (&[0.05, 0.3], &[]),
             QUICK => (&[0.1], &[1.0, QUICK_S.ln()]),
