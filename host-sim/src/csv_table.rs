@@ -151,6 +151,11 @@ impl Row<'_> {
         self.value(column, &format!("a number from -{most} to {most}"), |number: &f64| number.abs() <= most)
     }
 
+    /// The same, or none where a dash says so.
+    pub(crate) fn number_or_dash(&self, column: usize, most: f64) -> Result<Option<f64>> {
+        (self.text(column) != "-").then(|| self.number_within(column, most)).transpose()
+    }
+
     /// A whole number.
     pub(crate) fn whole(&self, column: usize) -> Result<usize> {
         self.value(column, "a whole number", |_| true)

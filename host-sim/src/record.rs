@@ -17,7 +17,7 @@ pub struct Row {
     pub time_s: f64,
     /// Commanded voltage in V.
     pub voltage_v: f64,
-    /// Scaled stiffness in V, where the file has the column.
+    /// Scaled stiffness in V, where the file has the column, and in it a number: `-` says that nothing was read.
     pub measured: Option<f64>,
 }
 
@@ -122,7 +122,7 @@ impl Record {
                 line: row.line,
                 time_s: row.number(time)?,
                 voltage_v: row.number_within(voltage, MOST_V)?,
-                measured: measured.map(|column| row.number_within(column, MOST_V)).transpose()?,
+                measured: measured.map_or(Ok(None), |column| row.number_or_dash(column, MOST_V))?,
             };
             if let Some(last) = rows.last()
                 && row.time_s <= last.time_s
@@ -165,6 +165,8 @@ mod tests {
         let text = "time_s,voltage_v,gauge\n0,0,7\n1,0,8\n";
         assert_eq!(Record::parse("r", text, "gauge").unwrap().rows[1].measured, Some(8.0));
         assert_eq!(Record::parse("r", text, MEASURED).unwrap().rows[1].measured, None);
+        let gap = Record::parse("r", "time_s,voltage_v,stiffness\n0,0,-\n1,0,-8\n", MEASURED).unwrap();
+        assert_eq!(gap.rows.iter().map(|row| row.measured).collect::<Vec<_>>(), [None, Some(-8.0)]);
         let error = Record::parse("r", text, "scale").unwrap_err().to_string();
         assert!(error.contains("no column `scale`; expected a header with time_s, voltage_v, scale"), "{error}");
     }

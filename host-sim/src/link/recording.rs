@@ -36,7 +36,7 @@ pub struct Summary {
     pub seconds: f64,
     /// Samples that did not arrive: damaged on the way, or never sent because the line was full.
     pub lost: u64,
-    /// Samples without a reading of the sensor, which had some before.
+    /// Rows without a reading of the sensor, which had some before: `-`.
     pub without_reading: u64,
     /// `measured` by the sensor, or the controller's `estimate` where there is none.
     pub stiffness: &'static str,
@@ -99,14 +99,12 @@ impl Recording {
             self.summary.lost += periods.saturating_sub(1);
         }
         let stiffness = if self.measured { sample.measured } else { Some(sample.estimate) };
-        let Some(stiffness) = stiffness else {
-            self.summary.without_reading += 1;
-            return Ok(());
-        };
+        self.summary.without_reading += u64::from(stiffness.is_none());
+        let stiffness = stiffness.map_or("-".into(), |stiffness| format!("{:.6}", stiffness.to_f64()));
         let time_s = (sample.tick - first) as f64 / self.rate_hz;
         // Nine decimals hide what floats make of decimal times.
         let time = (time_s * 1e9).round() / 1e9;
-        self.put(&format!("{time},{:.6},{:.6}\n", sample.applied.to_f64(), stiffness.to_f64()))?;
+        self.put(&format!("{time},{:.6},{stiffness}\n", sample.applied.to_f64()))?;
         self.last_tick = sample.tick;
         self.summary.rows += 1;
         self.summary.seconds = time;
@@ -163,10 +161,12 @@ mod tests {
         recording.add(&Telemetry { measured: None, ..sample(5070) }).unwrap();
         let read = Record::open(&path, MEASURED).unwrap();
         let times: Vec<f64> = read.rows.iter().map(|row| row.time_s).collect();
-        assert_eq!(times, [0.0, 0.01, 0.05, 0.061]);
+        assert_eq!(times, [0.0, 0.01, 0.05, 0.061, 0.07]);
         assert_eq!((read.rows[1].voltage_v, read.rows[1].measured), (100.0, Some(8.0)));
+        // The spring feels the voltage, whether its sensor reads or not.
+        assert_eq!((read.rows[4].voltage_v, read.rows[4].measured), (100.0, None));
         let Summary { rows, lost, without_reading, .. } = recording.summary();
-        assert_eq!((*rows, *lost, *without_reading), (4, 3, 1));
+        assert_eq!((*rows, *lost, *without_reading), (5, 3, 1));
     }
 
     #[test]

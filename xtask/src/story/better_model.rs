@@ -7,17 +7,19 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use end_to_end::hidden::{Block, Cause};
-use firmware::RATE_HZ;
 use host_sim::plant_file;
 use link::{ModelId, WireModel};
 use model::Plant;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::lock_step::{Moment, NEVER};
+use super::lock_step::{Moment, NEVER, TICK_S};
 use super::stage::{EVERY, Errors, Stage, name};
 use crate::controller::Controller;
 use crate::{emulator, image, shell, talk};
+
+/// From the beginning of a tick to its reading, in s: just before the voltage may change again.
+const READ_S: f64 = 0.999 * TICK_S;
 
 /// What came of one effect.
 #[derive(Serialize)]
@@ -84,14 +86,22 @@ impl Teller {
 
     fn diagnose(&self, folder: &Path, moments: &[Moment]) -> Result<Value> {
         let mut text = String::from("time_s,voltage_v,stiffness\n");
-        for (tick, moment) in moments.iter().enumerate().step_by(EVERY) {
-            let time_s = tick as f64 / f64::from(RATE_HZ);
-            text += &format!("{time_s},{},{}\n", moment.commanded_v, moment.read_v);
+        let mut last_v = f64::NAN;
+        for (tick, moment) in moments.iter().enumerate() {
+            let from_s = tick as f64 * TICK_S;
+            // The controller may turn within a few ticks: each change of the voltage is a row, though without a reading.
+            if moment.commanded_v != last_v {
+                text += &format!("{from_s:.6},{},-\n", moment.commanded_v);
+                last_v = moment.commanded_v;
+            }
+            if tick % EVERY == 0 {
+                text += &format!("{:.6},{},{}\n", from_s + READ_S, moment.commanded_v, moment.read_v);
+            }
         }
         let record = folder.join("record.csv");
         fs::write(&record, text)?;
         let mut vsj = self.vsj(folder);
-        vsj.args(["diagnose", "record.csv", "--input", "linear", "--out", "diagnosis", "--json"]);
+        vsj.args(["diagnose", "record.csv", "--out", "diagnosis", "--json"]);
         shell::json(&mut vsj)
     }
 

@@ -23,7 +23,7 @@ const PIPES: [&str; 2] = ["to-spring", "from-spring"];
 /// On the way to the board.
 const NO_READING: i32 = i32::MIN;
 /// Between two ticks, in s.
-const TICK_S: f64 = 1.0 / SETTINGS.rate_hz;
+pub(super) const TICK_S: f64 = 1.0 / SETTINGS.rate_hz;
 
 /// Of a sensor that always answers.
 pub(super) const NEVER: Range<usize> = 0..0;
