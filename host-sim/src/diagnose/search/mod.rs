@@ -88,23 +88,24 @@ impl<'j, J: Judge> Search<'j, J> {
 
     /// The best structure when others, found on a part of the rows, are given: those are judged, and extended once more.
     pub fn from(&mut self, Lead { models, caution }: Lead, mut progress: impl FnMut(&Scored)) -> Scored {
-        self.seen.caution = caution;
         self.patient = false;
-        let mut best = self.root();
+        self.seen.caution = caution;
+        self.root();
         for model in models {
-            let scored = self.seen.judge(self.judge, model);
-            if scored.score > best.score {
-                best = scored;
-                progress(&best);
-            }
+            self.seen.judge(self.judge, model);
         }
+        // All rows may show a memory of the noise that a part of them, far apart, could not.
+        let caution = caution.max(self.judge.caution(&self.best().fit));
+        self.seen.charge(self.judge, caution);
+        let best = self.best();
+        progress(&best);
         self.carried_on(best, &mut progress)
     }
 
     /// The best when all is charged alike; another one than was found is carried on.
     fn charged_anew(&mut self, found: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
         self.seen.charge(self.judge, self.seen.caution);
-        let best = self.ranked().first().map_or_else(|| found.clone(), |&best| best.clone());
+        let best = self.best();
         if best.fit.model.structure() == found.fit.model.structure() {
             return best;
         }
@@ -138,6 +139,12 @@ impl<'j, J: Judge> Search<'j, J> {
     /// The structure without one of its effects, the rest fitted again.
     pub fn left_out(&mut self, scored: &Scored, effect: usize) -> Scored {
         self.seen.judge(self.judge, scored.fit.model.without(effect))
+    }
+
+    /// The best structure that was judged.
+    fn best(&self) -> Scored {
+        let ranked = self.ranked();
+        (*ranked.first().expect("the search starts from no effect at all")).clone()
     }
 
     /// The best structure of each set of effects, the best set first.

@@ -165,4 +165,9 @@ fn a_lead_is_judged_and_extended() {
     let best = Search::new(&mut judge).from(lead, |_| ());
     assert_eq!(effects(&best.fit.model), [effect("delay"), effect("hum")]);
     assert!((best.score - (90.0 - 2.0 * PRICE)).abs() < 1e-9);
+    // All rows show a memory of the noise that the part did not.
+    judge.caution = 4.5;
+    let lead = Lead { models: vec![model("drift"), model("delay")], caution: 1.0 };
+    let best = Search::new(&mut judge).from(lead, |_| ());
+    assert_eq!(effects(&best.fit.model), [effect("delay")]);
 }
