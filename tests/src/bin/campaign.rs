@@ -107,6 +107,8 @@ enum Part {
     Pairs,
     /// Three effects of different blocks: 100
     Triples,
+    /// Two effects in records of 20 000 rows, white and coloured noise: 1 of every pair
+    Long,
     /// One effect in short, uneven, coloured, heavy-tailed, noisy records: 5 of each cause
     Stress,
     /// How small an effect may be: 20 of each cause and size
@@ -221,6 +223,7 @@ impl Cli {
             Part::Nulls => self.jobs(part, &part::nulls(first, self.count(500)), aim::nulls),
             Part::Pairs => self.jobs(part, &part::pairs(first, self.count(3)), aim::pairs),
             Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), aim::triples),
+            Part::Long => self.jobs(part, &part::long(first, self.count(1)), aim::pairs),
             Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
             Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.climbs(part, &[0.2]),
@@ -259,7 +262,7 @@ impl Cli {
             bail!("no record was diagnosed: {failure}");
         }
         let what = match part {
-            Part::Nulls => "noise",
+            Part::Nulls | Part::Long => "noise",
             Part::Pairs | Part::Triples => "blocks",
             Part::Stress => "record",
             _ => "cause",

@@ -73,6 +73,18 @@ pub fn pairs(first: u64, count: usize) -> Vec<Job> {
     numbered(first, 4, jobs)
 }
 
+/// `count` records of 20 000 rows of every two causes of different blocks: white and coloured noise (both kinds) in turn.
+pub fn long(first: u64, count: usize) -> Vec<Job> {
+    let kinds = [Kind::White, Kind::Coloured, Kind::OneOverF].into_iter().cycle();
+    let longer = |(job, kind): (Job, Kind)| {
+        let recipe = Recipe { noise: job.recipe.noise.of(kind), rows: 20_000, ..job.recipe };
+        Job { group: kind.name().to_owned(), recipe, ..job }
+    };
+    let mut jobs = numbered(first, 11, pairs(first, count).into_iter().zip(kinds).map(longer).collect());
+    jobs.sort_by_key(|job| job.recipe.noise.kind as u8);
+    jobs
+}
+
 /// `count` records of three causes of three different blocks, drawn at random.
 pub fn triples(first: u64, count: usize) -> Vec<Job> {
     let mut random = ChaCha8Rng::seed_from_u64(seed(first, 5, 0));
@@ -169,7 +181,8 @@ mod tests {
         assert_eq!(pairs(1, 1).len(), 9 + 21 + 15 + 21 + 15 + 35);
         assert!(pairs(1, 1).iter().all(|job| blocks(job) == 2));
         assert!(triples(1, 50).iter().all(|job| blocks(job) == 3));
-        let all = [singles(1, 20), forms(1, 20), nulls, pairs(1, 5), triples(1, 100), stress(1, 5)].concat();
+        let all =
+            [singles(1, 20), forms(1, 20), nulls, pairs(1, 5), triples(1, 100), stress(1, 5), long(1, 1)].concat();
         let mut seeds: Vec<_> = all.iter().map(|job| job.seed).collect();
         seeds.sort_unstable();
         seeds.dedup();

@@ -62,25 +62,11 @@ impl Memory {
             return alone;
         }
         // The power by the spectrum, which is quick; its price by what it really leaves.
-        let spectrum = Octaves::of(&clipped);
-        let by_spectrum = |power: f64| autoregression(&spectrum.correlation(power, LONGEST_BESIDE), rows).1;
-        let mut best = (f64::INFINITY, 0.0);
-        let mut step = 0.2;
-        let mut tried: Vec<f64> = (1..=5).map(|part| step * f64::from(part)).collect();
-        while step > 0.02 {
-            for power in tried {
-                let cost = by_spectrum(power);
-                if cost < best.0 {
-                    best = (cost, power);
-                }
-            }
-            step /= 2.0;
-            tried = vec![best.1 - step, best.1 + step];
-        }
-        if best.0 + PRICE_OF_POWER > cost + UNSURE {
+        let (by_spectrum, power) = likeliest_power(&Octaves::of(&clipped, 0.0), rows);
+        if by_spectrum + PRICE_OF_POWER > cost + UNSURE {
             return alone;
         }
-        let mut memory = Self { power: best.1, ar: Vec::new(), sections: sections(best.1, rows) };
+        let mut memory = Self { power, ar: Vec::new(), sections: sections(power, rows) };
         let (ar, with_power) = autoregression(&correlation(&memory.whitened(&clipped), LONGEST_BESIDE), rows);
         memory.ar = ar;
         if with_power + PRICE_OF_POWER < cost { memory } else { alone }
@@ -172,6 +158,34 @@ fn sections(power: f64, rows: usize) -> Vec<(f64, f64)> {
 fn correlation(values: &[f64], longest: usize) -> Vec<f64> {
     let at = |lag: usize| dot(&values[..values.len() - lag], &values[lag..]) / values.len() as f64;
     (0..=longest).map(at).collect()
+}
+
+/// What a signal in independent noise of a scale costs, in nats, when nothing but a memory is there to foretell it.
+pub fn price(signal: &[f64], scale: f64) -> f64 {
+    let (rows, noise) = (signal.len(), scale * scale);
+    let spectrum = Octaves::of(signal, noise);
+    let alone = autoregression(&spectrum.correlation(0.0, LONGEST.min(rows / ROWS_PER_LAG)), rows).1;
+    let with_power = if rows < ROWS_FOR_POWER { alone } else { likeliest_power(&spectrum, rows).0 + PRICE_OF_POWER };
+    (alone.min(with_power) - 0.5 * rows as f64 * noise.ln()).max(0.0)
+}
+
+/// The order of the fractional difference that suits a spectrum, an autoregression behind it, and the price of both in nats.
+fn likeliest_power(spectrum: &Octaves, rows: usize) -> (f64, f64) {
+    let cost = |power: f64| autoregression(&spectrum.correlation(power, LONGEST_BESIDE), rows).1;
+    let mut best = (f64::INFINITY, 0.0);
+    let mut step = 0.2;
+    let mut tried: Vec<f64> = (1..=5).map(|part| step * f64::from(part)).collect();
+    while step > 0.02 {
+        for power in tried {
+            let cost = cost(power);
+            if cost < best.0 {
+                best = (cost, power);
+            }
+        }
+        step /= 2.0;
+        tried = vec![best.1 - step, best.1 + step];
+    }
+    best
 }
 
 /// Autoregression of as many rows as there are lags at most, and the negative log-likelihood it leaves, its own price in it,
@@ -266,5 +280,19 @@ mod tests {
         let memory = Memory { ar: vec![0.5, 0.2], power: 0.4, sections: sections(0.4, 500) };
         let level = memory.whitened(&[1.0; 500]);
         assert!(level.iter().all(|value| (value - level[499]).abs() < 1e-9 && value.abs() < 0.1), "{:?}", &level[..9]);
+    }
+
+    /// Weak or quick, it costs its power beside the noise's; slow and strong, a few numbers that foretell it.
+    #[test]
+    fn a_signal_costs_what_a_memory_pays() {
+        let weak: Vec<f64> = normals(3000).iter().map(|value| 0.2 * value).collect();
+        let power = 0.5 * dot(&weak, &weak);
+        assert!((0.9..1.01).contains(&(price(&weak, 1.0) / power)), "{} {power}", price(&weak, 1.0));
+        let strong = |rows: u32| -> Vec<f64> {
+            (0..rows).map(|row| 5.0 * (f64::from(row) / f64::from(rows) * std::f64::consts::TAU).sin()).collect()
+        };
+        let [few, many] = [3000, 30_000].map(|rows| price(&strong(rows), 1.0));
+        let power = 0.5 * dot(&strong(3000), &strong(3000));
+        assert!(few < 0.03 * power && many < 3.0 * few, "{few} {many} {power}");
     }
 }

@@ -20,8 +20,8 @@ pub(super) struct Octaves {
 }
 
 impl Octaves {
-    /// Of some values; their mean counts as the lowest frequency.
-    pub(super) fn of(values: &[f64]) -> Self {
+    /// Of some values, and independent noise of this variance beside them; their mean counts as the lowest frequency.
+    pub(super) fn of(values: &[f64], variance: f64) -> Self {
         // Twice as long, so that the end does not meet the start.
         let length = (2 * values.len()).next_power_of_two();
         let mut buffer: Vec<Complex<f64>> = values.iter().map(|&value| Complex::new(value, 0.0)).collect();
@@ -33,7 +33,7 @@ impl Octaves {
         // Sums of power, and of power times frequency.
         for (index, value) in buffer[..=length / 2].iter().enumerate() {
             let sides = if index == 0 || 2 * index == length { 1.0 } else { 2.0 };
-            let power = sides * value.norm_sqr() / (length * values.len()) as f64;
+            let power = sides * (value.norm_sqr() / values.len() as f64 + variance) / length as f64;
             let frequency = line * (index as f64).max(0.5);
             match bands.last_mut() {
                 Some(band) if frequency < end => *band = (band.0 + power * frequency, band.1 + power),
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn without_a_difference_it_is_the_correlation_itself() {
         let values = normals(3000);
-        let of_bands = Octaves::of(&values).correlation(0.0, 12);
+        let of_bands = Octaves::of(&values, 0.0).correlation(0.0, 12);
         for (lag, of_bands) in of_bands.into_iter().enumerate() {
             let exact: f64 = values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / 3000.0;
             assert!((of_bands - exact).abs() < 2e-3, "{lag}: {of_bands} {exact}");
@@ -84,7 +84,7 @@ mod tests {
         let values = normals(3000);
         let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let exact: f64 = steps.iter().map(|step| step * step).sum::<f64>() / 3000.0;
-        let of_bands = Octaves::of(&values).correlation(1.0, 12)[0];
+        let of_bands = Octaves::of(&values, 0.0).correlation(1.0, 12)[0];
         assert!((of_bands - exact).abs() < 5e-3, "{of_bands} {exact}");
     }
 }

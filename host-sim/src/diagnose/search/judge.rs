@@ -7,7 +7,7 @@ use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::{Engine, Fit};
 use crate::diagnose::leftover;
 use crate::diagnose::model::{Block, Model};
-use crate::diagnose::noise::{Noise, negligible, scale};
+use crate::diagnose::noise::{Noise, memory, negligible, scale, scale_of_squares};
 use crate::diagnose::swallowed;
 
 /// What a block costs, in nats, beside its places and forms: so many are tried.
@@ -41,9 +41,9 @@ pub trait Judge {
     /// What a block costs, in nats.
     fn price(&self, block: &Block) -> f64;
 
-    /// What the blocks of a fit leave for being of another form than the spring's, in nats, beside noise of
-    /// `floor_v`: each further block costs it.
-    fn misfit(&self, fit: &Fit, floor_v: f64) -> f64;
+    /// What the blocks of a fit leave for being of another form than the spring's, in nats, so many `times` as strong in
+    /// power, beside noise of `floor_v`: each further block costs it.
+    fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64;
 
     /// True if what a fit leaves may be structure.
     fn doubts(&mut self, fit: &Fit) -> bool;
@@ -70,7 +70,7 @@ impl Judge for Engine<'_> {
         // Who is not patient trusts the law of the noise, and a promise.
         let law = if patient { Noise::first_look() } else { fit.noise.clone() };
         if !patient {
-            let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit, fit.noise.floor_v()) };
+            let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit, 1.0, fit.noise.floor_v()) };
             extensions.retain(|it| it.promise > PART_OF_PRICE * (Judge::price(self, &it.block) + misfit));
         }
         let extensions = extensions.into_iter();
@@ -83,11 +83,11 @@ impl Judge for Engine<'_> {
         PRICE + PRICE_OF_COORDINATE * fitted as f64 + effect.places(self.data) + (effect.forms() as f64).ln()
     }
 
-    fn misfit(&self, fit: &Fit, floor_v: f64) -> f64 {
-        let explained: f64 =
-            self.simulation.iter().zip(&fit.residual).map(|(before, after)| (before - after).powi(2)).sum();
-        let rows = fit.residual.len() as f64;
-        0.5 * (explained * (MISFIT / floor_v).powi(2)).min(rows * MISFIT_SEEN * MISFIT_SEEN)
+    fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {
+        let explained: Vec<f64> =
+            self.simulation.iter().zip(&fit.residual).map(|(before, after)| before - after).collect();
+        let part = MISFIT.min(MISFIT_SEEN * floor_v / scale_of_squares(&explained).max(f64::MIN_POSITIVE));
+        memory::price(&explained, floor_v / (part * times.sqrt()))
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {

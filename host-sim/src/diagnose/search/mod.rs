@@ -99,6 +99,13 @@ impl<'j, J: Judge> Search<'j, J> {
         self.seen.charge(self.judge, caution);
         let best = self.best();
         progress(&best);
+        let best = self.carried_on(best, &mut progress);
+        if !self.judge.doubts(&best.fit) {
+            return best;
+        }
+        // What is too quick for the part may hide in the noise's memory.
+        self.patient = true;
+        self.extended.clear();
         self.carried_on(best, &mut progress)
     }
 

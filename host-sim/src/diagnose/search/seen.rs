@@ -38,7 +38,7 @@ impl Seen {
         let further = blocks.len().saturating_sub(1) as f64;
         let stages: HashSet<Stage> = blocks.iter().map(|(block, _)| block.effect().stage()).collect();
         let times = further + ALIKE * (blocks.len() - stages.len()) as f64;
-        let misfit = if times > 0.0 { times * judge.misfit(fit, self.floor_v) } else { 0.0 };
+        let misfit = if times > 0.0 { judge.misfit(fit, times, self.floor_v) } else { 0.0 };
         misfit + self.caution * blocks.iter().map(|(block, _)| judge.price(block)).sum::<f64>()
     }
 

@@ -19,6 +19,8 @@ struct Told {
     quiet: Option<usize>,
     /// From this log-likelihood on, nothing but noise is left.
     clean: f64,
+    /// Only the patient are told of this effect.
+    secret: Option<usize>,
     fits: usize,
 }
 
@@ -34,6 +36,7 @@ fn told(worth: &[(&[&str], f64)]) -> Told {
         misfit: 0.0,
         quiet: None,
         clean: f64::INFINITY,
+        secret: None,
         fits: 0,
     }
 }
@@ -58,8 +61,10 @@ impl Judge for Told {
         fit.log_likelihood
     }
 
-    fn extended(&mut self, fit: &Fit, _: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
-        let blocks = (0..EFFECTS.len()).filter(|&effect| wanted(effect)).map(|effect| Block { effect, form: 0 });
+    fn extended(&mut self, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+        let told = |effect: &usize| wanted(*effect) && (patient || self.secret != Some(*effect));
+        let blocks =
+            (0..EFFECTS.len()).filter(told).collect::<Vec<_>>().into_iter().map(|effect| Block { effect, form: 0 });
         blocks.map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
     }
 
@@ -67,8 +72,8 @@ impl Judge for Told {
         PRICE
     }
 
-    fn misfit(&self, _: &Fit, floor_v: f64) -> f64 {
-        self.misfit / (floor_v * floor_v)
+    fn misfit(&self, _: &Fit, times: f64, floor_v: f64) -> f64 {
+        times * self.misfit / (floor_v * floor_v)
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {
@@ -160,14 +165,19 @@ fn a_special_case_is_not_added_to_what_contains_it() {
 #[test]
 fn a_lead_is_judged_and_extended() {
     let mut judge = told(&[(&["delay"], 50.0), (&["delay", "hum"], 90.0), (&["drift"], 40.0)]);
-    let model = |cause: &str| Model::default().with(Block { effect: effect(cause), form: 0 }, Vec::new());
-    let lead = Lead { models: vec![model("drift"), model("delay")], caution: 1.0 };
-    let best = Search::new(&mut judge).from(lead, |_| ());
+    let from = |judge: &mut Told| {
+        let model = |cause: &str| Model::default().with(Block { effect: effect(cause), form: 0 }, Vec::new());
+        Search::new(judge).from(Lead { models: vec![model("drift"), model("delay")], caution: 1.0 }, |_| ())
+    };
+    let best = from(&mut judge);
     assert_eq!(effects(&best.fit.model), [effect("delay"), effect("hum")]);
     assert!((best.score - (90.0 - 2.0 * PRICE)).abs() < 1e-9);
+    // What hides in the noise's memory is looked for while something seems to be left.
+    judge.secret = Some(effect("hum"));
+    assert_eq!(effects(&from(&mut judge).fit.model), [effect("delay"), effect("hum")]);
+    judge.clean = 50.0;
+    assert_eq!(effects(&from(&mut judge).fit.model), [effect("delay")]);
     // All rows show a memory of the noise that the part did not.
-    judge.caution = 4.5;
-    let lead = Lead { models: vec![model("drift"), model("delay")], caution: 1.0 };
-    let best = Search::new(&mut judge).from(lead, |_| ());
-    assert_eq!(effects(&best.fit.model), [effect("delay")]);
+    (judge.secret, judge.caution) = (None, 4.5);
+    assert_eq!(effects(&from(&mut judge).fit.model), [effect("delay")]);
 }
