@@ -14,6 +14,8 @@ use micromath::F32Ext;
 use model::supervisor::Fault;
 use model::{Sensor, Volts};
 
+use crate::settings::AMPLIFIER;
+
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
 /// What the control task has to say.
@@ -91,7 +93,7 @@ pub fn queue(event: Event) {
     }
 }
 
-/// The first line after a reset; `controller` leads the spring.
+/// The first lines after a reset; `controller` leads the spring.
 pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
     let (version, git) = (env!("CARGO_PKG_VERSION"), env!("GIT_REVISION"));
     info!(
@@ -103,6 +105,10 @@ pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
         crate::RATE_HZ,
         controller.name()
     );
+    // The report's goes without saying.
+    if cfg!(feature = "kilovolt") {
+        info!("amplifier limit_v={=u16}", const { AMPLIFIER.max_v as u16 });
+    }
 }
 
 /// A fault, from the control task's queue or from the one who found it.

@@ -236,7 +236,7 @@ impl Random {
         match event {
             0..512 => command = Some(Command::Arm),
             512..544 => command = Some(Command::Disarm),
-            // -32 to 991 V: beyond the range on both sides.
+            // -32 to 991 V: beyond the range of 700 V on both sides.
             544..1056 => target = Some(Volts(model::units::Signal::from_bits((value >> 2) as i32 - (32 << 20)))),
             1056..1064 => self.open_until = tick + 1 + (value >> 26),
             1064..1072 => self.silent_until = tick + (value >> 21),

@@ -8,10 +8,11 @@ use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
 use host_sim::log::Formats;
+use model::{Amplifier, Settings};
 use serde::Deserialize;
 
-use crate::controller::Controller;
 use crate::image::{self, Board, Opt};
+use crate::variant::Variant;
 use crate::{audit, elf, emulator, python, shell, size};
 
 /// Between two ticks, in us.
@@ -68,12 +69,14 @@ impl Events {
 }
 
 /// `cargo xtask boot`.
-pub(crate) fn run(controller: Controller) -> Result<()> {
-    let elf = image::build_with(controller.features(), Board::Nucleo, Opt::S)?;
+pub(crate) fn run(variant: Variant) -> Result<()> {
+    let Settings { amplifier, .. } = variant.settings();
+    println!("image of the {} controller, {} to {} V", variant.leader().name(), amplifier.min_v, amplifier.max_v);
+    let elf = image::build_with(&variant.features(), Board::Nucleo, Opt::S)?;
     let bytes = image::read(&elf)?;
     let flash = elf::flash(&bytes)?;
     ensure!(flash.address == 0x0800_0000, "the image begins at {:#x}", flash.address);
-    let size = size::measure(controller, &[], Board::Nucleo)?;
+    let size = size::measure(variant, &[], Board::Nucleo)?;
     size.check()?;
     println!("size: {size}; no way into a panic from the control tick ({} functions), no heap", audit::run(&bytes)?);
     let bin = elf.with_extension("boot.bin");
@@ -94,8 +97,8 @@ pub(crate) fn run(controller: Controller) -> Result<()> {
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
-    println!("{}", quiet(&events("quiet")?, &bytes, controller).context("without a mishap")?);
-    println!("host: {}", host::check(&events("host")?, controller).context("with a host")?);
+    println!("{}", quiet(&events("quiet")?, &bytes, variant).context("without a mishap")?);
+    println!("host: {}", host::check(&events("host")?, variant).context("with a host")?);
     let hang_us = f64::from(firmware::LONGEST_HANG_MS) * 1e3;
     for (name, within_us, log) in [
         ("panic", KILL_US, "panic at injected.rs:7"),
@@ -110,13 +113,17 @@ pub(crate) fn run(controller: Controller) -> Result<()> {
 }
 
 /// Boots, stays safe without a host, keeps its pace and feeds the watchdog.
-fn quiet(events: &Events, image: &[u8], controller: Controller) -> Result<String> {
+fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<String> {
     events.safe()?;
     let log = events.log(image)?;
-    let said = format!("controller={}", link::Controller::of(&controller.settings().compensation).name());
+    let said = format!("controller={}", variant.leader().name());
     for part in ["reset=power-on last_fault=0", &said] {
         ensure!(log.first().is_some_and(|line| line.contains(part)), "no `{part}` where the log begins, {log:?}");
     }
+    // The report's goes without saying.
+    let limit_v = log.iter().find_map(|line| line.strip_prefix("amplifier limit_v=")?.parse().ok());
+    let limit_v: f64 = limit_v.unwrap_or(Amplifier::PAPER.max_v);
+    ensure!(limit_v == variant.settings().amplifier.max_v, "an amplifier of {limit_v} V, says the log, {log:?}");
     ensure!(log.iter().any(|line| line.contains("summary tick=1000 overruns=0")), "no summary in {log:?}");
     ensure!(events.times("reset").len() == 1, "it was reset");
     // Start-up writes zero once; the first tick's place depends on it.

@@ -9,13 +9,14 @@ use link::WireModel;
 use model::Volts;
 use serde_json::{Value, json};
 
-use crate::controller::Controller;
 use crate::emulator::{self, Run, SAFE, Written};
 use crate::image::{self, Board, Opt};
+use crate::variant::Variant;
 use crate::{blocks, rivals, setup};
 
 /// Options of `cargo xtask emulate`.
 #[derive(clap::Args)]
+#[command(mut_group("Variant", |group| group.requires("link")))]
 pub(crate) struct Args {
     /// Print the result as JSON; the log goes to stderr
     #[arg(long)]
@@ -23,9 +24,8 @@ pub(crate) struct Args {
     /// Play nothing: wait for `vsj link unix:PATH` on this socket until Ctrl-C
     #[arg(long, value_name = "PATH", conflicts_with = "json")]
     link: Option<PathBuf>,
-    /// Who leads the spring meanwhile
-    #[arg(long, value_enum, default_value = "paper", requires = "link")]
-    controller: Controller,
+    #[command(flatten)]
+    variant: Variant,
     /// Count instructions a tick of this controller beside those of other crates and of double precision
     #[arg(long, conflicts_with = "link")]
     rivals: bool,
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.blocks {
         return blocks::run(args.opt, args.json);
     }
-    let elf = image::build_with(args.controller.features(), Board::Mps2, args.opt)?;
+    let elf = image::build_with(&args.variant.features(), Board::Mps2, args.opt)?;
     if let Some(socket) = &args.link {
         let socket = std::path::absolute(socket)?;
         eprintln!("talk to it with: vsj link unix:{} status", socket.display());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::controller::Controller;
+use crate::variant::Variant;
 use crate::{elf, shell};
 
 /// What the optimiser aims at.
@@ -102,9 +102,9 @@ pub(crate) fn target_directory() -> Result<PathBuf> {
 }
 
 /// `cargo xtask image`.
-pub(crate) fn run(controller: Controller) -> Result<()> {
+pub(crate) fn run(variant: Variant) -> Result<()> {
     for board in Board::ALL {
-        let path = build_with(controller.features(), board, Opt::S)?;
+        let path = build_with(&variant.features(), board, Opt::S)?;
         let flash = elf::flash(&read(&path)?).with_context(|| format!("in {}", path.display()))?;
         let (bin, hex) = (path.with_extension("bin"), path.with_extension("hex"));
         write(&bin, &flash.bytes)?;

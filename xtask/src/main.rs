@@ -4,7 +4,6 @@ mod audit;
 mod bench;
 mod blocks;
 mod boot;
-mod controller;
 mod drill;
 mod elf;
 mod emulate;
@@ -22,10 +21,13 @@ mod story;
 mod talk;
 mod test;
 mod thumb;
+mod variant;
 
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+use variant::Variant;
 
 /// The project's chores, one command each.
 #[derive(Parser)]
@@ -37,7 +39,7 @@ Examples:
   cargo xtask setup            make a fresh machine ready
   cargo xtask test             everything that must pass before a change goes in
   cargo xtask emulate          the firmware on the report's stair, under QEMU
-  cargo xtask image            the MCU's images: ELF, bin, hex; --controller fast for the time-optimal ones
+  cargo xtask image            the MCU's images: ELF, bin, hex; --controller fast, --limit-v 1000 for others
   cargo xtask boot             that image on register models: safe at boot and after a fault?
   cargo xtask bench --json     speed beside Python, as JSON
 
@@ -103,13 +105,14 @@ Examples:
     Story(story::Args),
     /// Write the image to the real board and show its log (probe-rs)
     ///
-    /// The log's first line says which controller runs. A stored model stays; one that the controller cannot run is a fault
-    /// until it is acknowledged.
+    /// The log's first line says which controller runs, a second one that the amplifier reaches 1000 V. A stored model stays;
+    /// one that the controller cannot run is a fault until it is acknowledged.
     #[command(after_help = "\
 Examples:
   cargo xtask flash
-  cargo xtask flash --controller fast                  as fast as the amplifier allows")]
-    Flash(controller::Args),
+  cargo xtask flash --controller fast                  as fast as the amplifier allows
+  cargo xtask flash --controller fast --limit-v 1000   with an amplifier of 1000 V")]
+    Flash(Variant),
     /// Flash, RAM and worst stack of each image
     ///
     /// Exits with 1 unless flash stays below 64 KB (96 KB with the time-optimal controller), RAM below 16 KB and the stack in
@@ -118,27 +121,30 @@ Examples:
 Examples:
   cargo xtask size --json
   cargo xtask size --controller fast                   with the time-optimal controller
+  cargo xtask size --controller fast --limit-v 1000    the same for an amplifier of 1000 V
   cargo xtask size --feedback                          with a stiffness sensor")]
     Size(size::Args),
     /// Make the MCU's images: ELF, bin and hex
     ///
-    /// Prints their paths; each controller's image has a name of its own.
+    /// Prints their paths; each image has a name of its own.
     #[command(after_help = "\
 Examples:
   cargo xtask image                                    nucleo-g474re, mps2-an386
-  cargo xtask image --controller fast                  nucleo-g474re-fast, mps2-an386-fast")]
-    Image(controller::Args),
+  cargo xtask image --controller fast                  nucleo-g474re-fast, mps2-an386-fast
+  cargo xtask image --controller fast --limit-v 1000   nucleo-g474re-fast-kilovolt, mps2-an386-fast-kilovolt")]
+    Image(Variant),
     /// Run the very image that is flashed, on models of the STM32G474's registers
     ///
     /// It fits, and its tick cannot panic; boot, 1.2 s without a host; a host that arms it over LPUART1 and sets targets, every
-    /// code the host model's under this controller, most of them another one's under the other; then a panic, a hard fault and
-    /// two hangs while voltage is out. Exits with 1 unless the output is as it must be each time; says what this cannot show.
-    /// Installs Unicorn into a venv under the target directory.
+    /// code the host model's under this controller with this amplifier, many of them others in any other image; then a panic,
+    /// a hard fault and two hangs while voltage is out. Exits with 1 unless the output is as it must be each time; says what
+    /// this cannot show. Installs Unicorn into a venv under the target directory.
     #[command(after_help = "\
 Examples:
   cargo xtask boot
-  cargo xtask boot --controller fast                   the image of the time-optimal controller")]
-    Boot(controller::Args),
+  cargo xtask boot --controller fast                   the image of the time-optimal controller
+  cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V")]
+    Boot(Variant),
     /// Compare the host's speed with Python's
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Exits with 1 if Rust is slower
@@ -161,10 +167,10 @@ fn main() -> ExitCode {
         Command::Drill(args) => drill::run(&args),
         Command::Talk => talk::command(),
         Command::Story(args) => story::run(&args),
-        Command::Flash(args) => flash::run(args.controller),
+        Command::Flash(variant) => flash::run(variant),
         Command::Size(args) => size::run(&args),
-        Command::Image(args) => image::run(args.controller),
-        Command::Boot(args) => boot::run(args.controller),
+        Command::Image(variant) => image::run(variant),
+        Command::Boot(variant) => boot::run(variant),
         Command::Bench(args) => bench::run(&args),
     };
     match result {

@@ -2,9 +2,9 @@
 
 use anyhow::{Context, Result, ensure};
 
-use crate::controller::Controller;
 use crate::emulate::Comparison;
 use crate::image::{self, Board, Opt};
+use crate::variant::{Controller, Variant};
 use crate::{audit, drill, emulator, rivals, size, talk};
 
 /// Most instructions that one tick of the model may take.
@@ -28,7 +28,7 @@ pub(crate) fn run() -> Result<()> {
             eprintln!("link: {}", talk::run(&elf).context("the host's link")?);
         }
     }
-    size::measure(Controller::Paper, &[], Board::Mps2)?.check()
+    size::measure(Variant::of(Controller::Paper), &[], Board::Mps2)?.check()
 }
 
 fn bit_for_bit(elf: &std::path::Path, script: &str) -> Result<()> {

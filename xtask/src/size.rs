@@ -5,8 +5,8 @@ use std::fmt;
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 
-use crate::controller::Controller;
 use crate::image::{self, Board, Opt};
+use crate::variant::{Controller, Variant};
 use crate::{elf, stack};
 
 /// Bytes of flash that an image may take, of 512 KB.
@@ -25,9 +25,8 @@ pub(crate) struct Args {
     /// Print the table as JSON
     #[arg(long)]
     json: bool,
-    /// Who leads the spring
-    #[arg(long, value_enum, default_value = "paper")]
-    controller: Controller,
+    #[command(flatten)]
+    variant: Variant,
     /// The same as `--controller fast`
     #[arg(long, conflicts_with = "controller", hide = true)]
     fast: bool,
@@ -48,9 +47,12 @@ pub(crate) struct Size {
 
 /// `cargo xtask size`.
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let controller = if args.fast { Controller::Fast } else { args.controller };
+    let mut variant = args.variant;
+    if args.fast {
+        variant.controller = Controller::Fast;
+    }
     let features: &[&str] = if args.feedback { &["feedback"] } else { &[] };
-    let sizes = Board::ALL.into_iter().map(|board| measure(controller, features, board)).collect::<Result<Vec<_>>>()?;
+    let sizes = Board::ALL.into_iter().map(|board| measure(variant, features, board)).collect::<Result<Vec<_>>>()?;
     if args.json {
         println!("{}", Value::from(sizes.iter().map(report).collect::<Vec<_>>()));
     } else {
@@ -59,16 +61,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     sizes.iter().try_for_each(Size::check)
 }
 
-/// Builds and measures one image with these features of the firmware's, beside those that the controller needs.
-pub(crate) fn measure(controller: Controller, features: &[&str], board: Board) -> Result<Size> {
-    let path = image::build_with(&[controller.features(), features].concat(), board, Opt::S)?;
+/// Builds and measures one image with these features of the firmware's, beside those that it needs.
+pub(crate) fn measure(variant: Variant, features: &[&str], board: Board) -> Result<Size> {
+    let path = image::build_with(&[&variant.features(), features].concat(), board, Opt::S)?;
     let bytes = image::read(&path)?;
     let bottom = elf::symbol(&bytes, "_stack_end")?;
     let top = elf::symbol(&bytes, "_stack_start")?;
     Ok(Size {
         board,
         flash: elf::flash(&bytes)?.bytes.len() as u32,
-        most_flash: most_flash(controller),
+        most_flash: most_flash(variant.controller),
         statics: elf::ram(&bytes)?,
         stack: top - bottom,
         worst: stack::worst(&bytes).context("the stack's depth")?,

@@ -22,8 +22,8 @@ use anyhow::{Context, Result};
 use end_to_end::hidden::Cause;
 use rayon::prelude::*;
 
-use crate::controller::Controller;
 use crate::setup;
+use crate::variant::Controller;
 use better_model::Teller;
 use stage::name;
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 
-use crate::controller::Controller;
+use crate::variant::{Controller, Variant};
 use crate::{boot, proof, setup, shell, story};
 
 /// One call of cargo.
@@ -57,7 +57,7 @@ pub(crate) fn run() -> Result<()> {
     proof::run()?;
     begin(total - 1, "boot");
     for controller in Controller::ALL {
-        boot::run(controller)?;
+        boot::run(Variant::of(controller))?;
     }
     begin(total, "story");
     story::check()?;

@@ -7,12 +7,12 @@ use anyhow::{Context, Result, bail, ensure};
 use firmware::control::{Control, Orders, Senses, Untimed};
 use firmware::settings::SUPERVISION;
 use link::{Desired, Frame, Packet, Receiver, Reply, Request, Sequence, State, WireVolts};
-use model::Volts;
 use model::supervisor::Command;
+use model::{Settings, Volts};
 use serde_json::{Value, json};
 
 use super::{Event, Events};
-use crate::controller::Controller;
+use crate::variant::Variant;
 
 /// A byte at 115 200 bit/s, in us.
 const BYTE_US: f64 = 1e7 / 115_200.0;
@@ -42,8 +42,8 @@ pub(super) fn frames() -> Value {
     (0..).zip(schedule()).map(frame).collect()
 }
 
-/// Every answer is the expected one, and every code of every tick the host's under `controller`. Says what was seen.
-pub(super) fn check(events: &Events, controller: Controller) -> Result<String> {
+/// Every answer is the expected one, and every code of every tick the host's for `variant`. Says what was seen.
+pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     let (_, ticking) = events.split("watchdog started")?;
     let written = written(&ticking)?;
     let answers = answers(&ticking)?;
@@ -66,11 +66,10 @@ pub(super) fn check(events: &Events, controller: Controller) -> Result<String> {
             }
             _ => Orders { heard: true, ..Orders::default() },
         };
-        expect(number, request, reply, controller)
-            .with_context(|| format!("{request:?} is answered with {reply:?}"))?;
+        expect(number, request, reply, variant).with_context(|| format!("{request:?} is answered with {reply:?}"))?;
     }
 
-    let on_host = drives(controller, &orders)?;
+    let on_host = drives(variant, &orders)?;
     for (tick, ((code, enabled), (us, host_code, host_enabled))) in on_host.iter().zip(&written).enumerate() {
         if (*code, *enabled) != (*host_code, *host_enabled) {
             bail!(
@@ -80,41 +79,42 @@ pub(super) fn check(events: &Events, controller: Controller) -> Result<String> {
     }
     let driven = on_host.iter().filter(|(code, enabled)| *enabled && *code > 0).count();
     ensure!(driven > 1000, "{driven} ticks with voltage show little");
-    // A run that is all limit, or the same under every controller, would show nothing of this one.
-    let highest = (1u16 << controller.settings().amplifier.dac_bits) - 1;
+    // A run that is all limit, or the same in every image, would show nothing of this one.
+    let highest = (1u16 << variant.settings().amplifier.dac_bits) - 1;
     let inside = on_host.iter().filter(|(code, enabled)| *enabled && (1..highest).contains(code)).count();
     ensure!(inside > 500, "{inside} codes inside of the range show little");
     let mut telling = usize::MAX;
-    for other in Controller::ALL.into_iter().filter(|other| *other != controller) {
+    for other in variant.others() {
         let differ = drives(other, &orders)?.iter().zip(&on_host).filter(|(other, own)| other != own).count();
-        ensure!(differ > 500, "only {differ} codes would be others under another controller");
+        ensure!(differ > 500, "only {differ} codes would be others in another image");
         telling = telling.min(differ);
     }
     ensure!(written.last().is_some_and(|(_, code, enabled)| *code == 0 && !enabled), "silence does not disarm");
     let [first, second] = TARGETS_V;
     Ok(format!(
         "{} requests over LPUART1 armed it, set {first} V and {second} V and fell silent: {driven} codes with voltage, all \
-         {} of the run as on the host, where {telling} of them are others under the other controller",
+         {} of the run as on the host, where at least {telling} of them are others for any other controller or limit",
         schedule.len(),
         written.len()
     ))
 }
 
-/// Code and enable of every tick, as this machine has them under `controller`.
-fn drives(controller: Controller, orders: &[Orders]) -> Result<Vec<(u16, bool)>> {
-    let mut control = Control::new(controller.settings(), &SUPERVISION, None)?;
+/// Code and enable of every tick, as this machine has them for `variant`.
+fn drives(variant: Variant, orders: &[Orders]) -> Result<Vec<(u16, bool)>> {
+    let mut control = Control::new(&variant.settings(), &SUPERVISION, None)?;
     let senses = Senses { interlock_closed: true, ..Senses::default() };
     let drive = |orders| control.tick(orders, &senses, &mut Untimed).drive;
     Ok(orders.iter().map(drive).map(|drive| (drive.code().0, drive.enabled())).collect())
 }
 
 /// What the MCU says after `request`.
-fn expect(number: u16, request: &Request, reply: &Reply, controller: Controller) -> Result<()> {
+fn expect(number: u16, request: &Request, reply: &Reply, variant: Variant) -> Result<()> {
     let target = |volts: f64| Reply::Ack { state: State::Armed, target: WireVolts::from_f64(volts) };
     let good = match (request, reply) {
         (Request::Hello, Reply::Status(status)) => {
-            let who = link::Controller::of(&controller.settings().compensation);
-            status.sample.state == State::Disarmed && status.firmware.controller == who
+            let Settings { amplifier, .. } = variant.settings();
+            let reach = [status.lowest, status.highest] == [amplifier.min_v, amplifier.max_v].map(WireVolts::from_f64);
+            status.sample.state == State::Disarmed && status.firmware.controller == variant.leader() && reach
         }
         (Request::Arm, reply) => *reply == target(0.0),
         (Request::Set(Desired::ScaledVolts(volts)), reply) => *reply == target(*volts),

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use super::lock_step::{Moment, NEVER, TICK_S};
 use super::stage::{EVERY, Errors, Stage, name};
-use crate::controller::Controller;
+use crate::variant::Controller;
 use crate::{emulator, image, shell, talk};
 
 /// From the beginning of a tick to its reading, in s: just before the voltage may change again.

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::lock_step::{Moment, NEVER};
 use super::stage::{Errors, Stage, Way, name};
-use crate::controller::Controller;
+use crate::variant::Controller;
 use crate::{audit, image};
 
 /// The sensor's silence, in ticks: from the midst of the time at 500 V over the next step.

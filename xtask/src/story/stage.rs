@@ -16,9 +16,9 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::lock_step::{self, Moment};
-use crate::controller::Controller;
 use crate::emulate::Comparison;
 use crate::image::{self, Board, Opt};
+use crate::variant::Controller;
 
 /// Ticks between two rows of a record.
 pub(super) const EVERY: usize = 50;
