@@ -9,7 +9,7 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`request`], [`reply`] | the messages |
+//! | [`request`], [`reply`], [`reason`] | the messages |
 //! | [`value`] | voltages and desired stiffness as they travel |
 //! | [`wire_model`] | a spring's model as it is sent and stored |
 //! | [`fault`], [`field`] | codes of what went wrong in the MCU, and of what is wrong with a model |
@@ -30,6 +30,7 @@ pub mod fault;
 pub mod field;
 pub mod frame;
 pub mod order;
+pub mod reason;
 pub mod receiver;
 pub mod reply;
 pub mod request;
@@ -44,8 +45,9 @@ pub use fault::Fault;
 pub use field::Field;
 pub use frame::{Frame, Message, Packet, Unreadable};
 pub use order::Order;
+pub use reason::Reason;
 pub use receiver::Receiver;
-pub use reply::{Controller, Models, Reason, Reply, State, Status, Telemetry};
+pub use reply::{Controller, Models, Reply, State, Status, Telemetry};
 pub use request::Request;
 pub use sequence::Sequence;
 pub use session::{Action, Session};
@@ -53,4 +55,4 @@ pub use value::{Desired, WireVolts};
 pub use wire_model::{ModelId, WireModel};
 
 /// Version of the protocol. Any change of a golden frame in `tests/golden.rs` needs a new one.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;

@@ -8,13 +8,13 @@
 //! | `Acknowledge` | nothing | nothing | disarm if it is this fault, else refused: other fault |
 //! | any other | nothing | nothing | nothing |
 //!
-//! The supervisor may still refuse to arm, in its own tick; [`Reason::of_refusal`] says it to the host.
+//! The supervisor may still refuse to arm or to acknowledge, in its own tick; [`Reason::of_refusal`] says it to the host.
 
 use model::supervisor::{Command, Refusal, State};
 use model::{Spring, Volts};
 
 use crate::fault::Fault;
-use crate::reply::Reason;
+use crate::reason::Reason;
 use crate::request::Request;
 
 /// What the control tick is told.
@@ -52,12 +52,13 @@ impl Order {
 }
 
 impl Reason {
-    /// Why the supervisor did not arm; `fault` is the one that is present, if any.
+    /// Why the supervisor did not follow; `fault` is the one that is present, if any.
     pub fn of_refusal(refusal: Refusal, fault: Fault) -> Self {
         match refusal {
             Refusal::Faulted => Self::Faulted(fault),
             Refusal::InterlockOpen => Self::InterlockOpen,
             Refusal::HostSilent => Self::HostSilent,
+            Refusal::Live => Self::Live,
         }
     }
 }

@@ -23,8 +23,9 @@ use core::cmp::Ordering;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{Frame, Message, Packet, Unreadable};
+use crate::reason::Reason;
 use crate::receiver::Receiver;
-use crate::reply::{Reason, Reply, Telemetry};
+use crate::reply::{Reply, Telemetry};
 use crate::request::Request;
 use crate::sequence::Sequence;
 

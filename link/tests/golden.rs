@@ -98,6 +98,7 @@ fn replies() {
             "010e050000000000000000000000000000f03f",
         ),
         (Reply::Refused(Reason::NotStored), "010f"),
+        (Reply::Refused(Reason::Live), "0110"),
         (Reply::Status(status), "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
         (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f09"),
         (Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }), "03f0a20401808080ac0201040106ff1f09"),
@@ -121,7 +122,7 @@ fn replies() {
 fn a_whole_frame() {
     let frame = Frame::new(Sequence(1), &Request::Hello);
     assert_eq!(frame.as_bytes(), by_hand(link::VERSION, b'Q', 1, &[0]));
-    assert_eq!(frame.as_bytes(), [0, 4, 3, b'Q', 1, 1, 5, 0xdd, 0x10, 0x87, 0x37, 0]);
+    assert_eq!(frame.as_bytes(), [0, 4, 4, b'Q', 1, 1, 5, 0x99, 0x1e, 0xf1, 0x9f, 0]);
 }
 
 #[test]

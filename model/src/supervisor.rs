@@ -14,15 +14,22 @@
 //! ```
 //!
 //! Zero volts and a disabled amplifier in every state but `Armed`. The first fault stays until a disarm acknowledges it;
-//! arming again is a command of its own. In one tick a fault wins over every command, and disarm over arm.
+//! arming again is a command of its own. In one tick a fault wins over every command, and disarm over arm. An amplifier
+//! that holds a voltage all the same is a fault in every state; while it does, nothing is armed or acknowledged.
 //!
 //! No heap, no float, no panic in a tick; times are counted in ticks.
 
 mod fault;
+mod inputs;
+mod monitors;
 mod settings;
 
 pub use fault::Fault;
+pub use inputs::{Command, Inputs};
+pub use monitors::Monitors;
 pub use settings::{Config, Settings};
+
+use monitors::Watch;
 
 use crate::amplifier::Limits;
 use crate::controller::Output;
@@ -39,16 +46,7 @@ pub enum State {
     Faulted(Fault),
 }
 
-/// What a person or a host orders.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// Let voltages out.
-    Arm,
-    /// Take the voltage away; acknowledges a fault.
-    Disarm,
-}
-
-/// Why an arm command was not followed.
+/// Why a command was not followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Refusal {
@@ -58,49 +56,8 @@ pub enum Refusal {
     InterlockOpen = 2,
     /// No frame from the host within its time.
     HostSilent = 3,
-}
-
-/// What the amplifier says about itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Monitors {
-    /// Voltage at its output, in V.
-    pub voltage: Volts,
-    /// Current into the spring, in uA.
-    pub current_ua: i32,
-}
-
-/// What a tick knows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Inputs {
-    /// Given since the last tick.
-    pub command: Option<Command>,
-    /// Static voltage of the desired stiffness.
-    pub target: Volts,
-    /// Ticks since the last valid frame of the host.
-    pub ticks_since_host: u32,
-    /// The safety circuit is closed.
-    pub interlock_closed: bool,
-    /// Ticks that were left out just before this one.
-    pub missed_ticks: u32,
-    /// Readings of the amplifier, where it has monitors.
-    pub monitors: Option<Monitors>,
-    /// What somebody else found: a task that does not check in, refused settings.
-    pub fault: Option<Fault>,
-}
-
-impl Default for Inputs {
-    /// Nothing ordered, nobody heard, interlock open: nothing that could let a voltage out.
-    fn default() -> Self {
-        Self {
-            command: None,
-            target: Volts::ZERO,
-            ticks_since_host: u32::MAX,
-            interlock_closed: false,
-            missed_ticks: 0,
-            monitors: None,
-            fault: None,
-        }
-    }
+    /// The amplifier's monitors do not read zero.
+    Live = 4,
 }
 
 /// What the controller is to do in this tick.
@@ -145,8 +102,7 @@ pub struct Supervisor {
     ramp: Option<Accumulator>,
     pursued: Volts,
     misses: u32,
-    disagreed: u32,
-    driven: Volts,
+    watch: Watch,
     refusal: Option<Refusal>,
 }
 
@@ -157,16 +113,7 @@ impl Supervisor {
             None => State::Disarmed,
             Some(fault) => State::Faulted(fault),
         };
-        Self {
-            config,
-            state,
-            ramp: None,
-            pursued: Volts::ZERO,
-            misses: 0,
-            disagreed: 0,
-            driven: Volts::ZERO,
-            refusal: None,
-        }
+        Self { config, state, ramp: None, pursued: Volts::ZERO, misses: 0, watch: Watch::NEW, refusal: None }
     }
 
     /// The state after the last tick.
@@ -179,7 +126,7 @@ impl Supervisor {
         self.ramp.is_some()
     }
 
-    /// Why the last tick's arm command was not followed.
+    /// Why the last tick's command was not followed.
     pub const fn refusal(&self) -> Option<Refusal> {
         self.refusal
     }
@@ -199,25 +146,25 @@ impl Supervisor {
     pub fn decide(&mut self, inputs: &Inputs) -> Decision {
         self.refusal = None;
         let was_armed = self.state == State::Armed;
-        // Both watch in every state, so that nothing that happened while disarmed is held against a new start.
+        // Misses are counted in every state, so that none while disarmed is held against a new start.
         let overrun = self.too_many_misses(inputs.missed_ticks);
-        let disagreement = self.disagrees(inputs.monitors);
+        let disagreement = self.watch.look(&self.config, inputs.monitors);
         if let Some(fault) = inputs.fault {
             self.fail(fault);
         }
-        if self.state == State::Armed {
-            if !inputs.interlock_closed {
-                self.fail(Fault::Interlock);
-            } else if disagreement {
-                self.fail(Fault::Monitor);
-            } else if overrun {
-                self.fail(Fault::Overrun);
-            }
+        if self.state == State::Armed && !inputs.interlock_closed {
+            self.fail(Fault::Interlock);
+        }
+        if disagreement {
+            self.fail(Fault::Monitor);
+        }
+        if self.state == State::Armed && overrun {
+            self.fail(Fault::Overrun);
         }
         // A fault of this very tick is not acknowledged by a command that was given before anybody could know of it.
         if self.state == State::Armed || !was_armed {
             match inputs.command {
-                Some(Command::Disarm) if inputs.fault.is_none() => self.state = State::Disarmed,
+                Some(Command::Disarm) if inputs.fault.is_none() => self.disarm(),
                 Some(Command::Arm) => self.arm(inputs),
                 _ => {}
             }
@@ -236,10 +183,10 @@ impl Supervisor {
     #[inline]
     pub fn release(&mut self, output: &Output) -> Drive {
         if self.state != State::Armed {
-            self.driven = Volts::ZERO;
+            self.watch.expect(None);
             return Drive::SAFE;
         }
-        self.driven = output.applied;
+        self.watch.expect(Some(output.applied));
         Drive { code: output.code, enabled: true }
     }
 
@@ -261,12 +208,20 @@ impl Supervisor {
             State::Faulted(_) => Some(Refusal::Faulted),
             State::Disarmed if !inputs.interlock_closed => Some(Refusal::InterlockOpen),
             State::Disarmed if self.silent(inputs) => Some(Refusal::HostSilent),
+            State::Disarmed if self.watch.disagrees() => Some(Refusal::Live),
             State::Disarmed => {
                 self.state = State::Armed;
-                (self.misses, self.disagreed) = (0, 0);
+                self.misses = 0;
                 None
             }
         };
+    }
+
+    fn disarm(&mut self) {
+        match self.state {
+            State::Faulted(_) if self.watch.disagrees() => self.refusal = Some(Refusal::Live),
+            _ => self.state = State::Disarmed,
+        }
     }
 
     fn silent(&self, inputs: &Inputs) -> bool {
@@ -292,15 +247,6 @@ impl Supervisor {
     fn too_many_misses(&mut self, missed: u32) -> bool {
         self.misses = self.misses.saturating_sub(1).saturating_add(missed.saturating_mul(self.config.miss_cost));
         self.misses > self.config.miss_limit
-    }
-
-    fn disagrees(&mut self, monitors: Option<Monitors>) -> bool {
-        let far = monitors.is_some_and(|monitors| {
-            let off = monitors.voltage.0.saturating_sub(self.driven.0).saturating_abs();
-            off > self.config.tolerance || monitors.current_ua.saturating_abs() > self.config.max_current_ua
-        });
-        self.disagreed = if far { self.disagreed.saturating_add(1) } else { 0 };
-        self.disagreed > self.config.monitor_ticks
     }
 }
 

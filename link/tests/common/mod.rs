@@ -65,6 +65,7 @@ fn reason() -> impl Strategy<Value = Reason> {
             highest
         }),
         Just(Reason::NotStored),
+        Just(Reason::Live),
     ]
 }
 

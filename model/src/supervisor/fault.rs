@@ -47,3 +47,17 @@ impl Fault {
         Self::ALL.into_iter().find(|fault| fault.code() == code)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_lead_back_to_their_faults() {
+        for fault in Fault::ALL {
+            assert_eq!(Fault::from_code(fault.code()), Some(fault));
+        }
+        assert_eq!((Fault::from_code(0), Fault::from_code(8)), (None, None));
+        assert_eq!(Fault::ALL.map(Fault::code), [1, 2, 3, 4, 5, 6, 7], "these numbers are a promise");
+    }
+}

@@ -20,11 +20,13 @@ pub struct Settings {
     pub max_current_a: f64,
     /// How long, in s, a monitor may disagree, one sample time to 10; longer than the amplifier takes to settle.
     pub monitor_time_s: f64,
+    /// The same while nothing may leave, in s, one sample time to 60; longer than a voltage that was taken away takes to go.
+    pub discharge_time_s: f64,
 }
 
 impl Settings {
     /// Half a second without a host, then 700 V/s down; five missed ticks, one forgotten a second; 35 V, 5 % of the
-    /// report's range, and 2 mA for 50 ms.
+    /// report's range, and 2 mA for 50 ms, or for a second while nothing may leave.
     pub const DEFAULT: Self = Self {
         host_timeout_s: 0.5,
         ramp_v_per_s: 700.0,
@@ -33,6 +35,7 @@ impl Settings {
         monitor_tolerance_v: 35.0,
         max_current_a: 2e-3,
         monitor_time_s: 0.05,
+        discharge_time_s: 1.0,
     };
 
     /// Scales the settings for the tick.
@@ -41,7 +44,7 @@ impl Settings {
     /// [`OutOfRange`] names the field.
     pub fn check(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
         let Self { host_timeout_s, ramp_v_per_s, missed_ticks_allowed, forget_missed_s, .. } = *self;
-        let Self { monitor_tolerance_v, max_current_a, monitor_time_s, .. } = *self;
+        let Self { monitor_tolerance_v, max_current_a, monitor_time_s, discharge_time_s, .. } = *self;
         let seconds = sample_time.seconds();
         OutOfRange::check("host_timeout_s", host_timeout_s, 0.01..=60.0, "s")?;
         OutOfRange::check("ramp_v_per_s", ramp_v_per_s, 10.0..=1e5, "V/s")?;
@@ -50,6 +53,7 @@ impl Settings {
         OutOfRange::check("monitor_tolerance_v", monitor_tolerance_v, 1.0..=1000.0, "V")?;
         OutOfRange::check("max_current_a", max_current_a, 1e-6..=1.0, "A")?;
         OutOfRange::check("monitor_time_s", monitor_time_s, seconds..=10.0, "s")?;
+        OutOfRange::check("discharge_time_s", discharge_time_s, seconds..=60.0, "s")?;
         let ticks = |time_s| steps(time_s, 1.0 / seconds) as u32;
         let forget = ticks(forget_missed_s);
         Ok(Config {
@@ -60,6 +64,7 @@ impl Settings {
             tolerance: signal(monitor_tolerance_v),
             max_current_ua: steps(max_current_a, 1e6) as i32,
             monitor_ticks: ticks(monitor_time_s),
+            discharge_ticks: ticks(discharge_time_s),
         })
     }
 }
@@ -75,4 +80,27 @@ pub struct Config {
     pub(super) tolerance: Signal,
     pub(super) max_current_ua: i32,
     pub(super) monitor_ticks: u32,
+    pub(super) discharge_ticks: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_settings_are_named() {
+        let good = Settings::DEFAULT;
+        for (field, wrong) in [
+            ("host_timeout_s", Settings { host_timeout_s: 0.0, ..good }),
+            ("host_timeout_s", Settings { host_timeout_s: f64::NAN, ..good }),
+            ("ramp_v_per_s", Settings { ramp_v_per_s: -1.0, ..good }),
+            ("missed_ticks_allowed", Settings { missed_ticks_allowed: 0, ..good }),
+            ("forget_missed_s", Settings { forget_missed_s: 61.0, ..good }),
+            ("monitor_tolerance_v", Settings { monitor_tolerance_v: 0.0, ..good }),
+            ("max_current_a", Settings { max_current_a: 2.0, ..good }),
+            ("monitor_time_s", Settings { monitor_time_s: 0.0, ..good }),
+        ] {
+            assert_eq!(wrong.check(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field, field, "{wrong:?}");
+        }
+    }
 }

@@ -1,0 +1,51 @@
+//! Whatever comes in, in whatever order.
+
+use super::*;
+use proptest::prelude::*;
+
+fn any_inputs() -> impl Strategy<Value = Inputs> {
+    let command = prop_oneof![
+        6 => Just(None), 3 => Just(Some(Command::Arm)), 1 => Just(Some(Command::Disarm))
+    ];
+    let monitors = prop_oneof![3 => Just(None), 1 => (any::<i32>(), any::<i32>()).prop_map(Some)];
+    let fault = prop_oneof![30 => Just(None), 1 => (0..7usize).prop_map(|i| Some(Fault::ALL[i]))];
+    (command, any::<i32>(), prop_oneof![0..1000u32, any::<u32>()], 0..20u8, 0..40u32, monitors, fault).prop_map(
+        |(command, target, ticks_since_host, interlock, missed, monitors, fault)| Inputs {
+            command,
+            target: Volts(Signal::from_bits(target)),
+            ticks_since_host,
+            interlock_closed: interlock > 0,
+            missed_ticks: missed.saturating_sub(37),
+            monitors: monitors
+                .map(|(v, current_ua)| Monitors { voltage: Volts(Signal::from_bits(v)), current_ua: current_ua >> 12 }),
+            fault,
+        },
+    )
+}
+
+proptest! {
+    /// A voltage leaves only in `Armed`, never with the interlock open or a fault reported, `Armed` is entered only from
+    /// `Disarmed` by an arm command, and neither it nor an acknowledgement comes while the amplifier holds a voltage.
+    #[test]
+    fn no_order_of_events_lets_a_voltage_out(events in prop::collection::vec(any_inputs(), 1..400)) {
+        let mut supervisor = Supervisor::new(config(), None);
+        for inputs in events {
+            let before = supervisor.state();
+            let (decision, drive) = tick(&mut supervisor, inputs);
+            let armed = supervisor.state() == State::Armed;
+            let live = inputs.monitors.is_some_and(|it| it.voltage > volts(35.0) || it.current_ua.abs() > 2000);
+            prop_assert_eq!(drive.enabled(), armed);
+            prop_assert_eq!(decision == Decision::Rest, !armed);
+            prop_assert!(armed || drive == Drive::SAFE);
+            prop_assert!(!(armed && (!inputs.interlock_closed || inputs.fault.is_some())));
+            if armed && before != State::Armed {
+                prop_assert_eq!((before, inputs.command, live), (State::Disarmed, Some(Command::Arm), false));
+            }
+            if let State::Faulted(fault) = before {
+                let after = supervisor.state();
+                let acknowledged = inputs.command == Some(Command::Disarm) && !live;
+                prop_assert!(after == State::Faulted(fault) || (acknowledged && after == State::Disarmed));
+            }
+        }
+    }
+}

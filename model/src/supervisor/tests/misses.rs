@@ -1,0 +1,30 @@
+//! Ticks that were left out.
+
+use super::*;
+
+#[test]
+fn few_missed_ticks_are_forgiven_and_forgotten_many_are_a_fault() {
+    let miss = |missed_ticks| Inputs { missed_ticks, ..good() };
+    let mut supervisor = armed();
+    tick(&mut supervisor, miss(5));
+    assert_eq!(supervisor.state(), State::Armed);
+    tick(&mut supervisor, miss(1));
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Overrun));
+
+    let mut supervisor = armed();
+    for _ in 0..50 {
+        tick(&mut supervisor, miss(1));
+        for _ in 0..999 {
+            tick(&mut supervisor, good());
+        }
+    }
+    assert_eq!(supervisor.state(), State::Armed, "one a second goes on for ever");
+
+    let mut supervisor = armed();
+    tick(&mut supervisor, miss(u32::MAX));
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Overrun));
+    tick(&mut supervisor, disarm());
+    tick(&mut supervisor, arm());
+    tick(&mut supervisor, good());
+    assert_eq!(supervisor.state(), State::Armed, "what is acknowledged is forgotten");
+}

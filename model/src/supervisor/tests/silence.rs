@@ -1,0 +1,72 @@
+//! A host that falls silent.
+
+use super::*;
+
+/// 0.5 s of patience, then 300 V at 700 V/s: 428 ticks on the ramp.
+#[test]
+fn a_silent_host_is_followed_by_a_ramp_to_zero_and_a_disarm() {
+    let mut supervisor = armed();
+    let mut silent = good();
+    for ticks in 1..=500 {
+        silent.ticks_since_host = ticks;
+        assert_eq!(tick(&mut supervisor, silent).0, Decision::Pursue(volts(300.0)));
+    }
+    let mut before = volts(300.0);
+    for ticks in 501..=928 {
+        silent.ticks_since_host = ticks;
+        let (decision, drive) = tick(&mut supervisor, silent);
+        let Decision::Pursue(target) = decision else { panic!("{ticks}: {decision:?}") };
+        assert!(target < before && target > Volts::ZERO && drive.enabled(), "{ticks}: {target:?}");
+        assert_eq!(supervisor.label(), "ramping");
+        before = target;
+    }
+    silent.ticks_since_host = 929;
+    assert_eq!(tick(&mut supervisor, silent), (Decision::Rest, Drive::SAFE));
+    assert_eq!(supervisor.state(), State::Disarmed, "silence is no fault");
+    assert_eq!(tick(&mut supervisor, good()).1, Drive::SAFE, "a host that is back has to arm");
+}
+
+#[test]
+fn a_host_that_comes_back_on_the_ramp_goes_on() {
+    let mut supervisor = armed();
+    tick(&mut supervisor, good());
+    for ticks in 501..600 {
+        tick(&mut supervisor, Inputs { ticks_since_host: ticks, ..good() });
+    }
+    assert!(supervisor.ramping());
+    assert_eq!(tick(&mut supervisor, good()).0, Decision::Pursue(volts(300.0)));
+    assert_eq!(supervisor.label(), "armed");
+}
+
+#[test]
+fn a_silent_host_does_not_hide_an_open_interlock() {
+    let mut supervisor = armed();
+    let silent = Inputs { ticks_since_host: 550, ..good() };
+    tick(&mut supervisor, silent);
+    tick(&mut supervisor, Inputs { interlock_closed: false, ..silent });
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Interlock));
+    assert!(!supervisor.ramping());
+}
+
+/// The slowest ramp, 10 V/s at 10 kHz, is 1 mV a tick.
+#[test]
+fn the_slowest_ramp_keeps_its_rate() {
+    let settings = Settings { ramp_v_per_s: 10.0, ..Settings::DEFAULT };
+    let config = settings.check(SampleTime::from_rate(10_000.0).unwrap()).unwrap();
+    let mut supervisor = Supervisor::new(config, None);
+    tick(&mut supervisor, arm());
+    let silent = Inputs { ticks_since_host: u32::MAX, ..good() };
+    for _ in 0..10_000 {
+        tick(&mut supervisor, silent);
+    }
+    let Decision::Pursue(target) = supervisor.decide(&silent) else { panic!("{supervisor:?}") };
+    assert!((target.to_f64() - 290.0).abs() < 2e-3, "{target:?}");
+}
+
+#[test]
+fn a_target_below_zero_is_at_the_end_of_its_ramp() {
+    let mut supervisor = armed();
+    tick(&mut supervisor, Inputs { target: volts(-10.0), ..good() });
+    tick(&mut supervisor, Inputs { ticks_since_host: 501, target: volts(-10.0), ..good() });
+    assert_eq!(supervisor.state(), State::Disarmed);
+}
