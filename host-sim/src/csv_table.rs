@@ -11,7 +11,7 @@ use anyhow::Result;
 use csv::StringRecord;
 
 use crate::bad_input;
-use crate::bad_input::BadInput;
+use crate::bad_input::{BadInput, excerpt};
 
 /// Longer files are refused: a row of a record takes 40 bytes, its diagnosis 500.
 const MOST_ROWS: usize = 1_000_000;
@@ -66,14 +66,17 @@ pub(crate) struct Row<'t> {
 impl<'a> Table<'a> {
     /// Starts with the header; `name` is what messages call the table.
     pub(crate) fn new(name: &'a str, text: &'a str) -> Result<Self> {
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+        // Rows of another length are told where their cells can be seen.
+        let mut builder = csv::ReaderBuilder::new();
+        builder.comment(Some(b'#')).trim(csv::Trim::All).flexible(true);
+        let mut reader = builder.from_reader(text.as_bytes());
         let mut lines = Lines { text, byte: 0, line: 1 };
         let header = reader.headers().map_err(|error| unreadable(name, &mut lines, &error))?.clone();
         let twice =
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
         if let Some((_, column)) = header.iter().enumerate().find(twice) {
             let line = lines.at(header.position());
+            let column = excerpt(column);
             bad_input!("{name}, line {line}: column `{column}` stands there twice; expected every column once");
         }
         Ok(Self { name, header, reader, record: StringRecord::new(), lines })
@@ -105,7 +108,11 @@ impl<'a> Table<'a> {
         if self.columns().all(str::is_empty) {
             return BadInput(format!("{name}: no header; expected one with {expected}"));
         }
-        let (line, found) = (self.lines.at(self.header.position()), self.columns().collect::<Vec<_>>().join(","));
+        let line = self.lines.at(self.header.position());
+        if self.columns().any(unclosed) {
+            return BadInput(format!("{name}, line {line}: {UNCLOSED}; expected a header with {expected}"));
+        }
+        let found = excerpt(&self.columns().collect::<Vec<_>>().join(","));
         BadInput(format!(
             "{name}, line {line}: no column `{column}`; expected a header with {expected}, found `{found}`"
         ))
@@ -116,8 +123,14 @@ impl<'a> Table<'a> {
         match self.reader.read_record(&mut self.record) {
             Ok(false) => Ok(None),
             Ok(true) => {
-                let line = self.lines.at(self.record.position());
-                Ok(Some(Row { name: self.name, header: &self.header, record: &self.record, line }))
+                let (name, line) = (self.name, self.lines.at(self.record.position()));
+                let (found, expected) = (self.record.len(), self.header.len());
+                if found != expected {
+                    let why =
+                        if self.record.iter().any(unclosed) { format!(" with {UNCLOSED}") } else { String::new() };
+                    bad_input!("{name}, line {line}: {found} field(s){why}; expected {expected} as in the header");
+                }
+                Ok(Some(Row { name, header: &self.header, record: &self.record, line }))
             }
             Err(error) => Err(unreadable(self.name, &mut self.lines, &error).into()),
         }
@@ -125,13 +138,14 @@ impl<'a> Table<'a> {
 }
 
 fn unreadable(name: &str, lines: &mut Lines<'_>, error: &csv::Error) -> BadInput {
-    let line = lines.at(error.position());
-    BadInput(match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("{name}, line {line}: {len} field(s); expected {expected_len} as in the header")
-        }
-        _ => format!("{name}, line {line}: {error}; expected CSV"),
-    })
+    BadInput(format!("{name}, line {}: {error}; expected CSV", lines.at(error.position())))
+}
+
+/// What a cell of several lines is called.
+const UNCLOSED: &str = "a line break, as behind a quote that is not closed";
+
+fn unclosed(cell: &str) -> bool {
+    cell.contains(['\n', '\r'])
 }
 
 impl Row<'_> {
@@ -153,7 +167,11 @@ impl Row<'_> {
 
     /// The same, or none where a dash says so.
     pub(crate) fn number_or_dash(&self, column: usize, most: f64) -> Result<Option<f64>> {
-        (self.text(column) != "-").then(|| self.number_within(column, most)).transpose()
+        match self.text(column) {
+            "-" => Ok(None),
+            "" => self.value(column, "a finite number; expected `-` where nothing was read", |_: &f64| false).map(Some),
+            _ => self.number_within(column, most).map(Some),
+        }
     }
 
     /// A whole number.
@@ -163,8 +181,12 @@ impl Row<'_> {
 
     fn value<T: FromStr>(&self, column: usize, what: &str, fits: impl Fn(&T) -> bool) -> Result<T> {
         let Some(value) = self.text(column).parse().ok().filter(fits) else {
-            let Self { name, line, .. } = self;
-            bad_input!("{name}, line {line}, column {}: `{}` is not {what}", &self.header[column], self.text(column))
+            let (text, Self { name, line, .. }) = (self.text(column), self);
+            let column = excerpt(&self.header[column]);
+            if unclosed(text) {
+                bad_input!("{name}, line {line}, column {column}: {UNCLOSED}; expected {what}");
+            }
+            bad_input!("{name}, line {line}, column {column}: `{}` is not {what}", excerpt(text))
         };
         Ok(value)
     }

@@ -10,7 +10,7 @@ use model::{
 };
 
 use crate::bad_input;
-use crate::bad_input::BadInput;
+use crate::bad_input::{BadInput, number};
 pub use crate::judged::{Judged, StartsFrom, continuous, reference_at, with_plant};
 use crate::schedule::Schedule;
 
@@ -70,7 +70,8 @@ impl<P: Judged> Experiment<P> {
 
         let last = self.schedule.last_tick(rate_hz);
         if last >= MOST_TICKS {
-            bad_input!("{} takes {last} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}", self.name);
+            let (name, ticks) = (&self.name, number(last));
+            bad_input!("{name} takes {ticks} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}");
         }
         let targets = self.schedule.at_ticks(rate_hz);
         let ticks = targets.len();

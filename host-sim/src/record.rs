@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::bad_input;
+use crate::bad_input::number;
 use crate::csv_table::{Table, read};
 use crate::schedule::Schedule;
 
@@ -66,8 +67,9 @@ impl Record {
             let [before, after] = [-near_s, near_s].map(|near| schedule.reader().at(time_s + near));
             if !(before.min(after) - ROUNDING_V..=before.max(after) + ROUNDING_V).contains(&voltage_v) {
                 bad_input!(
-                    "{}, line {line}, column voltage_v: {voltage_v} V at {time_s} s; expected {after} V as in {name}",
-                    self.name
+                    "{}, line {line}, column voltage_v: {voltage_v} V at {} s; expected {after} V as in {name}",
+                    self.name,
+                    number(time_s)
                 );
             }
         }
@@ -130,8 +132,8 @@ impl Record {
                 bad_input!(
                     "{name}, line {}, column time_s: {} follows {}; expected increasing times",
                     row.line,
-                    row.time_s,
-                    last.time_s
+                    number(row.time_s),
+                    number(last.time_s)
                 );
             }
             rows.push(row);
@@ -216,7 +218,26 @@ mod tests {
                 "line 3, column voltage_v: `-2e6` is not a number from -1000000 to 1000000",
             ),
             ("time_s,voltage_v,stiffness\n0,1,1e300\n", "line 2, column stiffness: `1e300`"),
-            ("time_s,voltage_v,stiffness\n0,1,\n1,2,3\n", "line 2, column stiffness: `` is not a finite number"),
+            (
+                "time_s,voltage_v,stiffness\n0,1,\n1,2,3\n",
+                "line 2, column stiffness: `` is not a finite number; expected `-` where nothing was read",
+            ),
+            ("time_s,voltage_v\n1e300,1\n0,1\n", "line 3, column time_s: 0 follows 1e300; expected increasing times"),
+            (&format!("time_s,voltage_v\n0,{}\n1,2\n", "7".repeat(400)), &format!("`{}...` is", "7".repeat(40))),
+            (&format!("{}\n0,1\n", "t".repeat(400)), &format!("found `{}...`", "t".repeat(40))),
+            (&format!("{0},{0}\n0,1\n", "t".repeat(400)), &format!("column `{}...` stands", "t".repeat(40))),
+            (
+                "time_s,voltage_v\n0,\"1\n1,2\n",
+                "line 2, column voltage_v: a line break, as behind a quote that is not closed; expected a finite number",
+            ),
+            (
+                "time_s,voltage_v\n0,1\n\"1,2\n2,3\n",
+                "line 3: 1 field(s) with a line break, as behind a quote that is not closed; expected 2",
+            ),
+            (
+                "time_s,\"voltage_v\n0,1\n",
+                "line 1: a line break, as behind a quote that is not closed; expected a header with time_s, voltage_v",
+            ),
         ] {
             let got = message(text);
             assert!(got.starts_with("data.csv") && got.contains(expected), "{text:?}: {got}");

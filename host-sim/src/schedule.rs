@@ -3,6 +3,7 @@
 use anyhow::Result;
 
 use crate::bad_input;
+use crate::bad_input::number;
 use crate::record::Record;
 
 /// One straight piece, from `start_s` up to but not including `end_s`.
@@ -147,7 +148,8 @@ impl Schedule {
         for (time, volts) in ends.chain([(self.end_s(), self.end_v)]) {
             if !(lowest_v..=highest_v).contains(&volts) {
                 bad_input!(
-                    "{name} asks for {volts} V at {time} s; expected {lowest_v} to {highest_v} V, the amplifier's range"
+                    "{name} asks for {volts} V at {} s; expected {lowest_v} to {highest_v} V, the amplifier's range",
+                    number(time)
                 );
             }
         }

@@ -152,6 +152,7 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
     fs::write(folder.path().join("long.csv"), "time_s,voltage_v\n0,0\n1e9,0\n").unwrap();
     fs::write(folder.path().join("bad.toml"), "schema = 1\n[relaxation]\nshare = -1.0\ntau_s = 5.5\n").unwrap();
     fs::write(folder.path().join("lines.csv"), "time_s,voltage_v\n\"1\n2\",100\n3,100\n").unwrap();
+    fs::write(folder.path().join("huge.csv"), "time_s,voltage_v\n0,0\n1e300,100\n").unwrap();
     fs::write(folder.path().join("s.csv"), "time_s,voltage_v\n0,0\n5,100\n").unwrap();
     fs::write(folder.path().join("latin.csv"), b"time_s,voltage_v\n# \xb5s\n0,0\n5,100\n").unwrap();
     fs::write(folder.path().join("file"), "").unwrap();
@@ -174,9 +175,14 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         (&["--min-v", "50"], "the stair asks for 0 V at 0 s; expected 50 to 700 V"),
         (&["--slew-v-per-s", "0"], "slew_v_per_s = 0 is not allowed"),
         (&["--dac-bits", "40"], "dac_bits = 40 is not allowed: expected 8 to 16 bits"),
-        (&["--input", "lines.csv"], "column time_s: `1 2` is not a finite number"),
+        (
+            &["--input", "lines.csv"],
+            "lines.csv, line 2, column time_s: a line break, as behind a quote that is not closed; expected",
+        ),
         (&["--input", "s.csv", "--column", "gauge"], "s.csv, line 1: no column `gauge`"),
         (&["--every", "-1"], "--every -1: expected a positive number of seconds"),
+        (&["--every", "-1e300"], "--every -1e300: expected a positive number of seconds"),
+        (&["--input", "huge.csv"], "huge.csv takes 1e303 ticks at 1000 Hz; expected at most 10000000"),
         (&["--controller", "magic"], "invalid value 'magic' for '--controller <CONTROLLER>'"),
         (&["--out", "file/sub"], "file/sub: cannot be made"),
         (&["--between", "linear"], "--between is of no use with --input stair: expected --input FILE.csv"),

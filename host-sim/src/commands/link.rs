@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use host_sim::bad_input;
+use host_sim::bad_input::number;
 use host_sim::link::{Client, Failure, Patience, Port, StatusReport};
 use link::{Desired, Fault, Reason, Request, State, Status, WireVolts};
 use serde::Serialize;
@@ -270,7 +271,7 @@ fn stopped() -> bool {
 /// A positive time, `most` seconds at the most; an infinite one is as long as a `Duration` goes.
 fn seconds(option: &str, value: f64, most: f64) -> Result<Duration> {
     if !(value > 0.0 && value <= most) {
-        bad_input!("{option} {value}: expected a positive number of seconds");
+        bad_input!("{option} {}: expected a positive number of seconds", number(value));
     }
     Ok(Duration::try_from_secs_f64(value).unwrap_or(Duration::MAX))
 }

@@ -6,6 +6,7 @@ use super::{print, wrote};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::bad_input;
+use host_sim::bad_input::number;
 use host_sim::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
 use host_sim::output::files::{Files, write_csv};
 use host_sim::output::{plots, terminal};
@@ -144,7 +145,7 @@ impl Arguments {
         match self.every {
             None => Ok(1),
             Some(every) if every.is_finite() && every > 0.0 => Ok((every * self.rate_hz).round().max(1.0) as usize),
-            Some(every) => bad_input!("--every {every}: expected a positive number of seconds"),
+            Some(every) => bad_input!("--every {}: expected a positive number of seconds", number(every)),
         }
     }
 }

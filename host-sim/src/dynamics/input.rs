@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::bad_input;
-use crate::bad_input::check;
+use crate::bad_input::{check, number};
 use crate::record::{MEASURED, Record};
 use crate::schedule::{Between, Piece, Schedule};
 
@@ -74,17 +74,15 @@ impl Input {
     pub fn check_pace(&self, every_s: f64, shortest_s: f64) -> Result<()> {
         check("every_s", every_s, 1e-6..=1e6, "s")?;
         let duration = self.duration_s();
+        let (name, whole) = (&self.name, number(duration));
         if duration / every_s > 1e6 {
-            bad_input!(
-                "every_s = {every_s} is not allowed: expected at least a millionth of the {duration} s of {}",
-                self.name
-            );
+            bad_input!("every_s = {every_s} is not allowed: expected at least a millionth of the {whole} s of {name}");
         }
         if duration / shortest_s > 1e5 {
             bad_input!(
-                "the model's time constant of {shortest_s} s is too short for {}, which takes {duration} s: expected at least \
-                 a hundred thousandth",
-                self.name
+                "the model's time constant of {} s is too short for {name}, which takes {whole} s: expected at least a \
+                 hundred thousandth",
+                number(shortest_s)
             );
         }
         Ok(())
@@ -104,8 +102,10 @@ impl Input {
             for (time, level) in [(piece.start_s, piece.from_v), (piece.end_s, piece.to_v)] {
                 if level.is_nan() || level <= 0.0 {
                     bad_input!(
-                        "{}: level {level} at {time} s is no stiffness; expected more than 0 (or the model pi-plant)",
-                        self.name
+                        "{}: level {} at {} s is no stiffness; expected more than 0 (or the model pi-plant)",
+                        self.name,
+                        number(level),
+                        number(time)
                     );
                 }
             }
