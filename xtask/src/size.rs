@@ -27,9 +27,6 @@ pub(crate) struct Args {
     json: bool,
     #[command(flatten)]
     variant: Variant,
-    /// The same as `--controller fast`
-    #[arg(long, conflicts_with = "controller", hide = true)]
-    fast: bool,
     /// Of images with a stiffness sensor in the loop, for which the bounds are the same
     #[arg(long)]
     feedback: bool,
@@ -47,12 +44,9 @@ pub(crate) struct Size {
 
 /// `cargo xtask size`.
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let mut variant = args.variant;
-    if args.fast {
-        variant.controller = Controller::Fast;
-    }
     let features: &[&str] = if args.feedback { &["feedback"] } else { &[] };
-    let sizes = Board::ALL.into_iter().map(|board| measure(variant, features, board)).collect::<Result<Vec<_>>>()?;
+    let sizes =
+        Board::ALL.into_iter().map(|board| measure(args.variant, features, board)).collect::<Result<Vec<_>>>()?;
     if args.json {
         println!("{}", Value::from(sizes.iter().map(report).collect::<Vec<_>>()));
     } else {
