@@ -154,11 +154,11 @@ fn features(data: &Data) -> Vec<Group> {
     let rows = data.rows();
     let duration = data.duration_s().max(1e-9);
     let start = data.time_s.first().copied().unwrap_or(0.0);
-    let per_row = |value: &dyn Fn(usize) -> f64| (0..rows).map(value).collect::<Vec<f64>>();
+    let per_row = |value: &mut dyn FnMut(usize) -> f64| (0..rows).map(value).collect::<Vec<f64>>();
     let change = |row: usize| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] };
     let followed = |tau_s: f64, input: &dyn Fn(usize) -> f64| {
         let mut lag = Lag::at(tau_s, 0.0);
-        per_row_mut(rows, |row| {
+        per_row(&mut |row| {
             let duration_s = if row + 1 < rows { data.time_s[row + 1] - data.time_s[row] } else { 0.0 };
             let value = input(row);
             lag.pass(Piece { duration_s, from: value, to: value }).0
@@ -169,13 +169,12 @@ fn features(data: &Data) -> Vec<Group> {
     let after = [2.0, 10.0, 50.0].into_iter().flat_map(|samples| {
         [followed(samples * sample, &change), followed(samples * sample, &|row| change(row).abs())]
     });
+    let direction = direction(data);
+    let directed = direction.iter().zip(&data.voltage_v).map(|(sign, voltage)| sign * voltage).collect();
     let mut groups = vec![
         Group { place: "in what the voltage was before".into(), columns: past.to_vec() },
         Group { place: "just after changes of the voltage".into(), columns: after.collect() },
-        Group {
-            place: "in the direction of the last change".into(),
-            columns: vec![direction(data), direction(data).iter().zip(&data.voltage_v).map(|(a, b)| a * b).collect()],
-        },
+        Group { place: "in the direction of the last change".into(), columns: vec![direction, directed] },
     ];
     for part in 0..PARTS {
         let (from, to) = (part as f64 / PARTS as f64, (part + 1) as f64 / PARTS as f64);
@@ -183,19 +182,15 @@ fn features(data: &Data) -> Vec<Group> {
         let (early, late) = (start + from * duration, start + to * duration);
         groups.push(Group {
             place: format!("from {early:.1} s to {late:.1} s"),
-            columns: vec![per_row(&|row| inside((data.time_s[row] - start) / duration))],
+            columns: vec![per_row(&mut |row| inside((data.time_s[row] - start) / duration))],
         });
         let scale = data.full_scale_v.max(1e-9);
         groups.push(Group {
             place: format!("at voltages from {:.0} V to {:.0} V", from * scale, to * scale),
-            columns: vec![per_row(&|row| inside(data.voltage_v[row].abs() / scale))],
+            columns: vec![per_row(&mut |row| inside(data.voltage_v[row].abs() / scale))],
         });
     }
     groups
-}
-
-fn per_row_mut(rows: usize, value: impl FnMut(usize) -> f64) -> Vec<f64> {
-    (0..rows).map(value).collect()
 }
 
 /// The sign of the last change of the voltage.
