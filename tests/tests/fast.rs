@@ -106,11 +106,14 @@ fn what_cannot_be_run_is_one_line_and_exit_code_2() {
             "--approach-s: approach_s = 2 is not allowed: expected 0 to 1 s",
         ),
         (&["stair", "--controller", "fast", "--plant", "falling.toml"], "--plant: law.stiffness = 250 is not allowed"),
-        (&["compare", "--plant", "falling.toml"], "law.stiffness = 250 is not allowed"),
+        (&["compare", "--plant", "falling.toml"], "--plant: law.stiffness = 250 is not allowed"),
         (&["compare", "--limit-v", "400"], "expected 0 to 400 V"),
-        (&["tune", "--plant", "falling.toml"], "law.stiffness = 250 is not allowed"),
+        (&["tune", "--plant", "falling.toml"], "--plant: law.stiffness = 250 is not allowed"),
         (&["tune", "--plant", "no.toml"], "no.toml: cannot be read"),
-        (&["tune", "--limit-v", "2000"], "full_scale_v = 2000 is not allowed"),
+        (&["compare", "--limit-v", "nan"], "--limit-v: full_scale_v = NaN is not allowed"),
+        (&["compare", "--slew-v-per-s", "0"], "--slew-v-per-s: slew_v_per_s = 0 is not allowed"),
+        (&["tune", "--limit-v", "2000"], "--limit-v: full_scale_v = 2000 is not allowed"),
+        (&["tune", "--rate-hz", "5"], "--rate-hz: rate_hz = 5 is not allowed"),
         (&["tune", "--overshoot-percent", "NaN"], "--overshoot-percent NaN: expected 0 to 100"),
     ] {
         let output = run(folder.path(), arguments);

@@ -7,7 +7,7 @@ use host_sim::output::comparison;
 use host_sim::plant_file;
 use model::Amplifier;
 
-use super::print;
+use super::{SETTINGS, named, print};
 
 /// Compare all controllers on the stair of ideal steps, and with the fastest that any could be
 #[derive(Args, Debug)]
@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
-    let comparison = compare(&file, arguments.rate_hz, &amplifiers)?;
+    let comparison = compare(&file, arguments.rate_hz, &amplifiers).map_err(|error| named(error, SETTINGS))?;
     if arguments.json {
         return print(&format!("{}\n", serde_json::to_string(&comparison)?));
     }

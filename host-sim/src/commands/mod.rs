@@ -30,12 +30,27 @@ fn wrote(paths: &[PathBuf]) -> String {
     paths.iter().map(|path| format!("wrote {}\n", path.display())).collect()
 }
 
-/// Says which option sets the field that an error begins with; `options` are fields with theirs.
+/// Says which option sets the field that an error begins with; `options` are fields, or tables of them, with theirs.
 fn named(error: anyhow::Error, options: &[(&str, &str)]) -> anyhow::Error {
     let text = error.to_string();
     let field = text.split(' ').next().unwrap_or_default();
-    match options.iter().find(|(name, _)| *name == field) {
+    let table = field.split_inclusive('.').next().unwrap_or_default();
+    match options.iter().find(|(name, _)| *name == field || *name == table) {
         Some((_, option)) => BadInput(format!("{option}: {text}")).into(),
         None => error,
     }
 }
+
+/// Of the fields of [`model::Settings`], the options that `stair`, `compare` and `tune` have in common.
+const SETTINGS: &[(&str, &str)] = &[
+    ("rate_hz", "--rate-hz"),
+    ("full_scale_v", "--limit-v"),
+    ("max_v", "--limit-v"),
+    ("slew_v_per_s", "--slew-v-per-s"),
+    ("share", "--plant"),
+    ("time_constant_s", "--plant"),
+    ("relaxation.", "--plant"),
+    ("memory.", "--plant"),
+    ("law.", "--plant"),
+    ("leakage.", "--plant"),
+];

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{print, wrote};
+use super::{SETTINGS, named, print, wrote};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
+use host_sim::BadInput;
 use host_sim::bad_input;
 use host_sim::bad_input::number;
 use host_sim::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
@@ -185,7 +186,7 @@ fn run_plant<P: Judged>(
     };
     let experiment = Experiment { name, schedule, settings };
     if let Err(error) = experiment.settings.check() {
-        bad_input!("{}{error}", option(error.field));
+        return Err(named(BadInput(error.to_string()).into(), &[SETTINGS, OWN].concat()));
     }
 
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
@@ -212,21 +213,14 @@ fn run_plant<P: Judged>(
     }
 }
 
-/// The option that sets a field of the settings.
-fn option(field: &str) -> &'static str {
-    match field {
-        "rate_hz" => "--rate-hz: ",
-        "full_scale_v" | "max_v" => "--limit-v: ",
-        "min_v" => "--min-v: ",
-        "slew_v_per_s" => "--slew-v-per-s: ",
-        "dac_bits" => "--dac-bits: ",
-        "proportional_gain" => "--kp: ",
-        "integral_gain_per_s" => "--ki: ",
-        "approach_s" => "--approach-s: ",
-        field if field == "share" || field == "time_constant_s" || field.contains('.') => "--plant: ",
-        _ => "",
-    }
-}
+/// The options that no other command has for fields of the settings.
+const OWN: &[(&str, &str)] = &[
+    ("min_v", "--min-v"),
+    ("dac_bits", "--dac-bits"),
+    ("proportional_gain", "--kp"),
+    ("integral_gain_per_s", "--ki"),
+    ("approach_s", "--approach-s"),
+];
 
 /// True if Table 3's simulated columns should come out.
 fn is_the_reports(settings: &Settings) -> bool {

@@ -11,7 +11,7 @@ use host_sim::plant_file;
 use host_sim::tune::{Question, tune};
 use model::Amplifier;
 
-use super::{print, wrote};
+use super::{SETTINGS, named, print, wrote};
 
 /// Choose gains and settings for a spring and an amplifier, with margins, and what an error of the model costs
 #[derive(Args, Debug)]
@@ -54,7 +54,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let amplifier =
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
-    let answer = tune(&Question { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent })?;
+    let question = Question { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent };
+    let answer = tune(&question).map_err(|error| named(error, SETTINGS))?;
     let json = format!("{}\n", serde_json::to_string(&answer)?);
     let text = tuning::text(&answer, &arguments.plant);
     let mut written = String::new();
