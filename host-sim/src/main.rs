@@ -71,6 +71,11 @@ fn usage(error: &clap::Error) -> ExitCode {
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
+    eprintln!("{}: {}", Cli::command().get_name(), what_is_wrong(error));
+    ExitCode::from(2)
+}
+
+fn what_is_wrong(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let what: Vec<&str> = text
         .lines()
@@ -78,9 +83,9 @@ fn usage(error: &clap::Error) -> ExitCode {
         .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
         .filter(|line| !line.is_empty())
         .collect();
-    let what = what.join(" ");
-    eprintln!("{}: {}; see `--help`", Cli::command().get_name(), what.trim_start_matches("error: "));
-    ExitCode::from(2)
+    // What comes before a command that is missing may be missing too.
+    let usage = text.lines().find(|line| line.starts_with("Usage:") && error.kind() == ErrorKind::MissingSubcommand);
+    format!("{}; {}", what.join(" ").trim_start_matches("error: "), usage.unwrap_or("see `--help`"))
 }
 
 #[cfg(test)]
@@ -89,6 +94,18 @@ mod tests {
 
     /// Columns of a terminal: a longer line is broken, and cannot be copied.
     const COLUMNS: usize = 80;
+
+    #[test]
+    fn what_is_missing_is_named() {
+        for (line, missing) in [
+            ("vsj link", "'vsj link' requires a subcommand but one was not provided [subcommands: status,"),
+            ("vsj link", "; Usage: vsj link [OPTIONS] <PORT> <COMMAND>"),
+            ("vsj diagnose", "not provided: <DATA.csv>; see `--help`"),
+        ] {
+            let said = what_is_wrong(&Cli::try_parse_from(line.split(' ')).err().expect("something is missing"));
+            assert!(said.contains(missing) && !said.contains('\n'), "{line}: {said}");
+        }
+    }
 
     #[test]
     fn every_example_of_a_help_fits_the_terminal_and_is_a_command() {

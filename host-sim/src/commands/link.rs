@@ -17,7 +17,9 @@ use serde::Serialize;
 
 /// Talk to the MCU over its serial link: status, set, arm, disarm, watch, record, model
 #[derive(Args, Debug)]
-#[command(after_help = "\
+#[command(
+    arg_required_else_help = false,
+    after_help = "\
 Examples:
   vsj link /dev/ttyACM0 status
   vsj link /dev/ttyACM0 set 300 --arm --keep 60         arm, 300 V for a minute
@@ -31,7 +33,8 @@ long as a command that keeps talking, --keep, watch or record. Each request is s
 --timeout seconds; the MCU applies it once.
 
 Exit codes: 0 done, 1 refused, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a stiffness \
-out of reach.")]
+out of reach."
+)]
 pub(crate) struct Arguments {
     /// A serial device, unix:PATH or tcp:HOST:PORT
     #[arg(value_name = "PORT")]
