@@ -134,6 +134,8 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("one.csv"), "displacement_mm,force_un_0v\n1,1\n2,2\n3,3\n").unwrap();
     fs::write(folder.path().join("rest.csv"), "displacement_mm,force_un_0v,force_un_9v\n0,1,2\n0,2,1\n").unwrap();
+    let down = "displacement_mm,force_un_0v,force_un_9v\n1,-10,100\n2,-20,200\n3,-30,301\n";
+    fs::write(folder.path().join("down.csv"), down).unwrap();
     fs::write(folder.path().join("l.csv"), "material,youngs_modulus_gpa\nPET,3\n").unwrap();
     fs::write(folder.path().join("r.csv"), "# balance\ndisplacement_mm,force_un_0v,force_un_9v\n# mm,uN,uN\n1,x,2\n")
         .unwrap();
@@ -145,7 +147,7 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         (&["beam", "--density", "-1"], "--density: density_kg_per_m3 = -1"),
         (&["beam", "--force-un", "inf"], "--force-un: tip_n = inf"),
         (&["beam", "--gravity", "NaN"], "--gravity: gravity_m_per_s2 = NaN"),
-        (&["beam", "--at-mm", "60"], "--at-mm: at_mm = 60 is not allowed: expected 0 to 59.8"),
+        (&["beam", "--at-mm", "60"], "--at-mm: at_mm = 60 is not allowed: expected 0 to 59.8 mm"),
         (&["beam", "--tolerance", "0"], "--tolerance: tolerance = 0"),
         (&["beam", "--voltage-v", "-1"], "--voltage-v: voltage_v = -1"),
         (&["beam", "--interlayer", "-1"], "--interlayer: interlayer_pa_per_m = -1"),
@@ -158,6 +160,10 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         (
             &["beam", "--experiment", "rest.csv"],
             "rest.csv: the beam experiment: readings do not determine the fit; expected",
+        ),
+        (
+            &["beam", "--experiment", "down.csv"],
+            "down.csv: the beam experiment at 0 V: a spring constant of -0.0100 N/m: expected 0.0279 N/m (layers slide)",
         ),
         (&["beam", "--length-mm", "1e300"], "--length-mm: length_m = 1e297 is not allowed"),
         (&["joint", "--springs", "0"], "'--springs <N>': 0 is not in 1..=1000000000"),

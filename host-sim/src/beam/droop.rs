@@ -62,7 +62,8 @@ impl Deflection {
     pub fn at(&self, arc_m: f64) -> Result<Place> {
         let length = self.beam.length_m;
         // In mm as it is asked for; a last bit beyond the end is still the end.
-        check("at_mm", 1e3 * arc_m, 0.0..=1e3 * length * (1.0 + 1e-12), "mm along the beam")?;
+        let last_bit = if arc_m <= length * (1.0 + 1e-12) { arc_m.min(length) } else { arc_m };
+        check("at_mm", 1e3 * last_bit, 0.0..=1e3 * length, "mm along the beam")?;
         let cells = (self.exact.len() - 1) as f64;
         let cell = (arc_m / length * cells).floor().min(cells - 1.0);
         let part = arc_m / length * cells - cell;

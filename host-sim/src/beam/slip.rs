@@ -57,7 +57,7 @@ pub fn identify_pa_per_m(stack: &Stack, measured_n_per_m: f64) -> Result<f64> {
     let highest = 0.99 * bonded;
     if !(measured_n_per_m > sliding && measured_n_per_m < highest) {
         bad_input!(
-            "a spring constant of {measured_n_per_m} N/m: expected {sliding:.4} N/m (layers slide) to {highest:.4} N/m \
+            "a spring constant of {measured_n_per_m:.4} N/m: expected {sliding:.4} N/m (layers slide) to {highest:.4} N/m \
              (nearly bonded)"
         );
     }
@@ -145,7 +145,8 @@ impl Identified {
             (experiment.lines.first().context("a line")?, experiment.lines.last().context("a line")?);
         let identify = |line: &super::experiment::Line| {
             let stack = at(line.voltage_v)?;
-            let slip = |un_per_mm: f64| identify_pa_per_m(&stack, 1e-3 * un_per_mm);
+            let place = || format!("the beam experiment at {} V", line.voltage_v);
+            let slip = |un_per_mm: f64| identify_pa_per_m(&stack, 1e-3 * un_per_mm).with_context(place);
             let Interval { value, low, high } = line.un_per_mm;
             Ok::<_, anyhow::Error>(Interval { value: slip(value)?, low: slip(low)?, high: slip(high)? })
         };

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::BadInput;
 use host_sim::beam::cantilever::{Beam, Load};
 use host_sim::beam::layered::ELEMENTS;
 use host_sim::beam::readings;
@@ -99,9 +98,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
 /// Says which file an experiment that says too little came from.
 fn in_file(error: anyhow::Error, arguments: &Arguments) -> anyhow::Error {
     match &arguments.experiment {
-        Some(path) if error.to_string().starts_with("the beam experiment") => {
-            BadInput(format!("{}: {error}", path.display())).into()
-        }
+        Some(path) if error.to_string().starts_with("the beam experiment") => error.context(path.display().to_string()),
         _ => error,
     }
 }
