@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::cure::SMALL_ERROR_V;
+use super::effect::Stage;
 use super::effects::{EFFECTS, index_of};
 use super::report::{Extended, Finding, Report, Verdict};
 
@@ -58,15 +59,10 @@ pub fn in_fixed_point(extended: &Extended) -> Option<String> {
 
 /// What is wrong; what the cure is worth; what to do next.
 pub fn sentences(name: &str, report: &Report) -> Vec<String> {
-    let causes: Vec<String> = report
-        .findings
-        .iter()
-        .map(|finding| {
-            let meaning = index_of(finding.cause).map_or("", |index| EFFECTS[index].meaning());
-            format!("{} ({meaning})", finding.cause)
-        })
-        .collect();
-    let rows = report.rows;
+    let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
+    let in_readings = effects.clone().all(|effect| effect.stage() == Stage::Reading);
+    let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.meaning())).collect();
+    let (one, rows) = (causes.len() == 1, report.rows);
     let mut sentences = vec![match report.verdict {
         Verdict::Consistent if report.leftover.is_none() => {
             format!("The simulation agrees with {name}: nothing beyond noise in {rows} readings.")
@@ -79,15 +75,21 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
             format!("The simulation is wrong on {name}, and no known cause explains it.")
         }
         Verdict::Unexplained => {
-            format!("The simulation is wrong on {name}; {} explains only a part.", causes.join(", "))
+            let explain = if one { "explains" } else { "explain" };
+            format!("The simulation is wrong on {name}; {} {explain} only a part.", causes.join(", "))
         }
-        Verdict::Ambiguous if report.alternatives.iter().any(Vec::is_empty) => {
-            format!("The simulation may be wrong on {name}: {}.", causes.join("; "))
+        Verdict::Ambiguous | Verdict::Explained => {
+            let what = match (in_readings, report.alternatives.iter().any(Vec::is_empty)) {
+                (false, false) => format!("The simulation is wrong on {name}"),
+                (false, true) => format!("The simulation may be wrong on {name}"),
+                (true, false) => format!("The readings of {name} are at fault"),
+                (true, true) => format!("The readings of {name} may be at fault"),
+            };
+            format!("{what}: {}.", causes.join("; "))
         }
-        Verdict::Ambiguous | Verdict::Explained => format!("The simulation is wrong on {name}: {}.", causes.join("; ")),
     }];
     if !report.findings.is_empty() {
-        let it = if causes.len() == 1 { "it" } else { "them" };
+        let it = if one { "it" } else { "them" };
         let (before, after) = (&report.baseline, &report.extended.quality);
         sentences.push(if report.extended.gain > FORETOLD {
             format!(
@@ -97,7 +99,8 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
                 100.0 * report.extended.gain
             )
         } else if after.rmse > (1.0 - FORETOLD) * before.rmse {
-            format!("With {it} in the model, the error stays at {:.3} V.", after.rmse)
+            let whose = if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is the readings' own" };
+            format!("With {it} in the model, the error stays at {:.3} V{whose}.", after.rmse)
         } else {
             format!(
                 "With {it} in the model, the error falls from {:.3} to {:.3} V, but not on stretches that no fit has seen: no \
@@ -134,4 +137,63 @@ fn row(text: &mut String, finding: &Finding) {
         .collect();
     let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
     let _ = writeln!(text, "  {}", finding.evidence);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::super::report::{NoiseReport, Quality, ResidualReport, SCHEMA};
+    use super::*;
+
+    /// The first two sentences about causes that leave the error as it is.
+    fn said(verdict: Verdict, causes: &[&'static str], alternatives: &[Vec<&'static str>]) -> String {
+        let quality = Quality { rmse: 7.86, fit_percent: 90.0, held_out_rmse: 7.86, one_step_rmse: 7.86 };
+        let finding = |&cause: &&'static str| Finding {
+            cause,
+            probability: 1.0,
+            parameters: BTreeMap::new(),
+            rmse_before: 7.86,
+            rmse_after: 7.86,
+            evidence: String::new(),
+        };
+        let report = Report {
+            schema: SCHEMA,
+            rows: 600,
+            verdict,
+            baseline: quality,
+            findings: causes.iter().map(finding).collect(),
+            alternatives: alternatives.to_vec(),
+            next_experiment: None,
+            extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+            leftover: None,
+            noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
+            residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
+        };
+        sentences("r.csv", &report)[..2].join(" ")
+    }
+
+    #[test]
+    fn who_is_at_fault_is_said_of_readings_and_of_the_simulation() {
+        use Verdict::{Ambiguous, Explained, Unexplained};
+        let nothing = [Vec::new()];
+        for (verdict, causes, alternatives, expected) in [
+            (Explained, &["outliers", "hum"][..], &[][..], "The readings of r.csv are at fault: outliers (single"),
+            (Ambiguous, &["reading-offset"], &nothing, "The readings of r.csv may be at fault: reading-offset ("),
+            (Explained, &["outliers", "drift"], &[], "The simulation is wrong on r.csv: outliers (single"),
+            (Ambiguous, &["drift"], &nothing, "The simulation may be wrong on r.csv: drift ("),
+            (Unexplained, &["hum"], &[], "The simulation is wrong on r.csv; hum ("),
+        ] {
+            let said = said(verdict, causes, alternatives);
+            assert!(said.starts_with(expected), "{said}");
+            let whose = "stays at 7.860 V: nearly all of it is the readings' own.";
+            assert_eq!(said.ends_with(whose), verdict != Unexplained, "{said}");
+        }
+        for (causes, part) in
+            [(&["drift"][..], ") explains only a part."), (&["drift", "hum"], ") explain only a part.")]
+        {
+            let said = said(Unexplained, causes, &[]);
+            assert!(said.contains(part), "{said}");
+        }
+    }
 }
