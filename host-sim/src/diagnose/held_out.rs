@@ -3,7 +3,8 @@
 //! For each fold, the points are refitted without the fold's rows and judged on those rows alone. The refit is one
 //! Newton step from the fit to all rows: the likelihood without a few stretches is nearly the same parabola, moved by
 //! what those stretches had pulled. The prediction at the refitted points is a real run of the model. A block of which
-//! the other stretches tell nothing is not there: nobody who has not seen the stretch could know of it.
+//! the other stretches tell nothing is not there: nobody who has not seen the stretch could know of it. The choice of
+//! blocks has seen all rows: the clean split, learnt from the first 60 % and judged on the rest, is `cargo campaign rivals`.
 //!
 //! What only a search can place, a run of shifted readings, may lie within one stretch, which no other stretch foretells.
 //! So there are two judgements. [`Engine::judged_unseen`] chooses between structures: it leaves such a run where all rows
