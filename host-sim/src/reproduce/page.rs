@@ -77,6 +77,11 @@ impl Report {
 
     fn write_page(&self, out: &mut String) -> std::fmt::Result {
         writeln!(out, "# What of the source report comes out again\n")?;
+        writeln!(
+            out,
+            "The source report: X. Liu, *Modeling of a Piezoelectric Beam Spring*, BSc report 030RAM2016, University of \
+             Twente, August 2016.\n"
+        )?;
         writeln!(out, "Made by `cargo run --release -- reproduce --out docs/reproduce`; a test compares it.\n")?;
         writeln!(out, "{}", self.summary())?;
         writeln!(
