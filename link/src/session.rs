@@ -79,7 +79,9 @@ pub struct Session {
     accepted: Option<Accepted>,
     /// Number of the request that waits for its answer.
     asked: Sequence,
-    /// The answer to the last accepted request, kept for when it comes again.
+    /// It is the last accepted one: its answer is kept.
+    kept: bool,
+    /// The answer to the last accepted request, for when it comes again.
     answer: Frame,
     /// Any other frame on its way out.
     outgoing: Frame,
@@ -99,6 +101,7 @@ impl Session {
             receiver: Receiver::new(),
             accepted: None,
             asked: Sequence(0),
+            kept: false,
             answer: Frame::EMPTY,
             outgoing: Frame::EMPTY,
             counters: Counters {
@@ -149,7 +152,8 @@ impl Session {
             Verdict::Apply(request) => {
                 count(&mut self.counters.accepted);
                 self.asked = sequence;
-                if self.in_order(request, sequence) {
+                self.kept = self.in_order(request, sequence);
+                if self.kept {
                     self.accepted = Some(this);
                     self.answer = Frame::EMPTY;
                     self.heard_at = Some(now);
@@ -168,7 +172,7 @@ impl Session {
     /// The frame that answers the request which [`Action::Apply`] handed out last.
     pub fn answer(&mut self, reply: &Reply) -> &[u8] {
         let frame = Frame::new(self.asked, reply);
-        if self.accepted.is_some_and(|accepted| accepted.sequence == self.asked) {
+        if self.kept {
             self.answer.clone_from(&frame);
         }
         self.outgoing = frame;

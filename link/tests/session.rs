@@ -11,12 +11,14 @@ const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
 struct Mcu {
     session: Session,
     now: u64,
+    /// What it answers.
+    reply: Reply,
     applied: Vec<Request>,
 }
 
 impl Mcu {
     fn new() -> Self {
-        Self { session: Session::new(500), now: 0, applied: Vec::new() }
+        Self { session: Session::new(500), now: 0, reply: ACK, applied: Vec::new() }
     }
 
     fn greeted(sequence: u16) -> Self {
@@ -36,7 +38,7 @@ impl Mcu {
             match self.session.on_byte(byte, self.now) {
                 Some(Action::Apply(request)) => {
                     self.applied.push(request);
-                    sent.extend_from_slice(self.session.answer(&ACK));
+                    sent.extend_from_slice(self.session.answer(&self.reply));
                 }
                 Some(Action::Send(bytes)) => sent.extend_from_slice(bytes),
                 None => {}
@@ -71,16 +73,19 @@ fn a_repeated_request_is_answered_again_and_applied_once() {
     assert_eq!(mcu.session.counters(), Counters { accepted: 2, repeated: 2, ..Counters::default() });
 }
 
-/// Also when telemetry and refusals went out in between.
+/// Also when telemetry and refusals went out in between, and a Disarm that was late or used its number.
 #[test]
 fn the_answer_to_be_repeated_is_kept() {
     let mut mcu = Mcu::greeted(10);
     mcu.hear(11, &SET);
     mcu.session.telemetry(Telemetry::default(), 0);
     assert!(mcu.refusal(9, &SET).is_some());
-    mcu.hear(8, &Request::Disarm);
-    assert_eq!(mcu.hear(11, &SET), Some((11, ACK)));
-    assert_eq!(mcu.applied, [SET, Request::Disarm]);
+    mcu.reply = Reply::Ack { state: State::Disarmed, target: WireVolts(0) };
+    for used in [8, 11] {
+        assert_eq!(mcu.hear(used, &Request::Disarm), Some((used, mcu.reply)));
+        assert_eq!(mcu.hear(11, &SET), Some((11, ACK)), "after a Disarm with {used}");
+    }
+    assert_eq!(mcu.applied, [SET, Request::Disarm, Request::Disarm]);
 }
 
 #[test]
