@@ -48,7 +48,7 @@ pub struct Summary {
     pub squared_lateness_us2: u32,
     /// Ticks in a limit since boot.
     pub limited_ticks: u32,
-    /// As the supervisor names it.
+    /// As the link names it.
     pub state: &'static str,
     /// Pursued.
     pub target: Volts,

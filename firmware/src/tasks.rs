@@ -37,7 +37,7 @@ pub async fn control<B: Board>(
 ) -> (u32, u32) {
     ROLL_CALL.enrol(Member::Control);
     let mut pace = Pace::new(Instant::now().as_micros(), u64::from(1_000_000 / RATE_HZ));
-    let mut report = Report { state: control.supervisor().label(), ..Report::default() };
+    let mut report = Report { state: link::State::from(control.supervisor()).name(), ..Report::default() };
     let mut absent: u32 = 0;
     let mut ticks: u32 = 0;
     loop {
@@ -100,7 +100,7 @@ impl Report {
 
     fn tick(&mut self, number: u32, control: &Control, tick: &Tick) {
         let supervisor = control.supervisor();
-        let state = supervisor.label();
+        let state = link::State::from(supervisor).name();
         if state != self.state {
             queue(Event::State(self.state, state));
             self.state = state;

@@ -131,16 +131,6 @@ impl Supervisor {
         self.refusal
     }
 
-    /// For logs: `disarmed`, `armed`, `ramping` (armed, host silent), `faulted`.
-    pub const fn label(&self) -> &'static str {
-        match (self.state, self.ramping()) {
-            (State::Disarmed, _) => "disarmed",
-            (State::Armed, false) => "armed",
-            (State::Armed, true) => "ramping",
-            (State::Faulted(_), _) => "faulted",
-        }
-    }
-
     /// First half of a tick.
     #[inline]
     pub fn decide(&mut self, inputs: &Inputs) -> Decision {

@@ -6,7 +6,7 @@ use super::*;
 fn nothing_leaves_before_arming() {
     let mut supervisor = Supervisor::new(config(), None);
     assert_eq!(tick(&mut supervisor, good()), (Decision::Rest, Drive::SAFE));
-    assert_eq!(supervisor.label(), "disarmed");
+    assert_eq!(supervisor.state(), State::Disarmed);
 }
 
 #[test]
@@ -15,7 +15,7 @@ fn arming_starts_once_then_pursues_the_target() {
     assert_eq!(tick(&mut supervisor, arm()).0, Decision::Start(volts(300.0)));
     let (decision, drive) = tick(&mut supervisor, arm());
     assert_eq!(decision, Decision::Pursue(volts(300.0)), "arming twice changes nothing");
-    assert_eq!((drive.code(), drive.enabled(), supervisor.label()), (DacCode(1755), true, "armed"));
+    assert_eq!((drive.code(), drive.enabled(), supervisor.state()), (DacCode(1755), true, State::Armed));
 }
 
 #[test]
@@ -92,5 +92,5 @@ fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
 fn after_a_reset_by_a_fault_the_fault_still_stands() {
     let mut supervisor = Supervisor::new(config(), Some(Fault::HardFault));
     assert_eq!(tick(&mut supervisor, arm()).1, Drive::SAFE);
-    assert_eq!(supervisor.label(), "faulted");
+    assert_eq!(supervisor.state(), State::Faulted(Fault::HardFault));
 }
