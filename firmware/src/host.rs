@@ -147,7 +147,7 @@ pub fn desk(start: &Start, controller: Controller) -> Result<Option<&'static mut
     let about = About {
         firmware,
         rate_hz: RATE_HZ,
-        silence_limit_ticks: (SUPERVISION.host_timeout_s * f64::from(RATE_HZ)) as u32,
+        silence_limit_ticks: SUPERVISION.host_timeout_ticks(model::SampleTime::from_rate(f64::from(RATE_HZ))?),
         last_fault: start.last_fault.map_or(link::Fault::NONE, link::Fault::from),
         model: start.model,
     };

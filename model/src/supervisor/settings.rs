@@ -38,6 +38,11 @@ impl Settings {
         discharge_time_s: 1.0,
     };
 
+    /// Silence of the host in ticks, as the supervisor counts it.
+    pub fn host_timeout_ticks(&self, sample_time: SampleTime) -> u32 {
+        ticks(self.host_timeout_s, sample_time)
+    }
+
     /// Scales the settings for the tick.
     ///
     /// # Errors
@@ -54,10 +59,10 @@ impl Settings {
         OutOfRange::check("max_current_a", max_current_a, 1e-6..=1.0, "A")?;
         OutOfRange::check("monitor_time_s", monitor_time_s, seconds..=10.0, "s")?;
         OutOfRange::check("discharge_time_s", discharge_time_s, seconds..=60.0, "s")?;
-        let ticks = |time_s| steps(time_s, 1.0 / seconds) as u32;
+        let ticks = |time_s| ticks(time_s, sample_time);
         let forget = ticks(forget_missed_s);
         Ok(Config {
-            host_timeout: ticks(host_timeout_s),
+            host_timeout: self.host_timeout_ticks(sample_time),
             ramp_step: accumulator((ramp_v_per_s * seconds).min(1000.0)),
             miss_cost: forget,
             miss_limit: forget.saturating_mul(missed_ticks_allowed),
@@ -67,6 +72,11 @@ impl Settings {
             discharge_ticks: ticks(discharge_time_s),
         })
     }
+}
+
+/// Rounded.
+fn ticks(time_s: f64, sample_time: SampleTime) -> u32 {
+    steps(time_s, 1.0 / sample_time.seconds()) as u32
 }
 
 /// Checked limits, scaled for the tick.
@@ -102,5 +112,14 @@ mod tests {
         ] {
             assert_eq!(wrong.check(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field, field, "{wrong:?}");
         }
+    }
+
+    /// 0.29 times 100 is a little less than 29 in floating point.
+    #[test]
+    fn the_host_is_told_the_silence_that_is_counted() {
+        let settings = Settings { host_timeout_s: 0.29, ..Settings::DEFAULT };
+        let sample_time = SampleTime::from_rate(100.0).unwrap();
+        assert_eq!(settings.host_timeout_ticks(sample_time), 29);
+        assert_eq!(settings.check(sample_time).unwrap().host_timeout, 29);
     }
 }
