@@ -65,6 +65,10 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
+    /// Two that between them have every controller and every amplifier.
+    pub(crate) const BOOTED: [Self; 2] =
+        [Self::of(Controller::Paper), Self { controller: Controller::Fast, limit_v: Limit::Kilovolt }];
+
     /// With the report's amplifier.
     pub(crate) const fn of(controller: Controller) -> Self {
         Self { controller, limit_v: Limit::Paper }
@@ -118,6 +122,13 @@ mod tests {
         }
         let error = parse("--limit-v 850").unwrap_err().to_string();
         assert!(error.contains("850") && error.contains("[possible values: 700, 1000]"), "{error}");
+    }
+
+    #[test]
+    fn no_choice_is_left_unbooted() {
+        let booted = |choice: &dyn Fn(Variant) -> bool| Variant::BOOTED.into_iter().any(choice);
+        assert!(Controller::ALL.into_iter().all(|controller| booted(&|it| it.controller == controller)));
+        assert!(Limit::ALL.into_iter().all(|limit_v| booted(&|it| it.limit_v == limit_v)));
     }
 
     /// An image that is named for another amplifier and drives the same would be taken for it.
