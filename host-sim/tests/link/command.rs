@@ -4,53 +4,15 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use host_sim::record::{MEASURED, Record};
 use link::{Frame, Reply, State, Status};
-use serde_json::Value;
 use serialport::{SerialPort, TTYPort};
 
 use crate::mcu::{Mcu, Setup};
-
-fn vsj(port: &str, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
-    command.arg("link").arg(port).args(arguments);
-    command
-}
-
-fn run(port: &str, arguments: &[&str]) -> Output {
-    vsj(port, arguments).output().unwrap()
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-/// Asserts success; what came out.
-fn good(port: &str, arguments: &[&str]) -> String {
-    let output = run(port, arguments);
-    assert!(output.status.success(), "{arguments:?}: {output:?}");
-    stdout(&output)
-}
-
-fn json(port: &str, arguments: &[&str]) -> Value {
-    serde_json::from_str(&good(port, &[arguments, &["--json"]].concat())).unwrap()
-}
-
-/// Asserts an exit code and one line on stderr, nothing on stdout; that line.
-fn bad(code: i32, port: &str, arguments: &[&str]) -> String {
-    let output = run(port, arguments);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {output:?}");
-    let text = String::from_utf8(output.stderr).unwrap();
-    assert_eq!((text.lines().count(), output.stdout.len()), (1, 0), "{arguments:?}: {text}");
-    text
-}
-
-fn start(port: &str, arguments: &[&str]) -> Child {
-    vsj(port, arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-}
+use crate::vsj::{bad, good, json, start, stdout, vsj};
 
 #[test]
 fn a_session_over_a_socket() {
@@ -223,7 +185,7 @@ fn ctrl_c_ends_a_recording_with_its_summary() {
     assert!(interrupted.success());
     let recording = recording.wait_with_output().unwrap();
     assert!(recording.status.success(), "{recording:?}");
-    let summary: Value = serde_json::from_str(&stdout(&recording)).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&stdout(&recording)).unwrap();
     assert_eq!(summary["rows"].as_u64().unwrap() as usize, Record::open(&out, MEASURED).unwrap().rows.len());
 }
 
@@ -303,40 +265,4 @@ fn bad_arguments_send_nothing() {
     }
     bad(2, &mcu.port, &["record", "/nonexistent/x.csv"]);
     assert!(mcu.with(|shared| shared.ordered.is_empty()));
-}
-
-#[test]
-fn a_model_is_sent_checked_stored_and_run() {
-    let mcu = Mcu::on_socket(Setup::default());
-    let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path.display().to_string()
-    };
-    assert!(good(&mcu.port, &["model"]).starts_with("runs    the one that is built in\n"));
-
-    let spring = file("spring.toml", include_str!("../../../docs/plant.toml"));
-    let output = run(&mcu.port, &["model", &spring]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("not run by the MCU: amplifier.delay_s, drift"));
-    assert!(stdout(&output).starts_with("runs    number 1, format 1, 229 bytes, CRC "), "{output:?}");
-    let models = json(&mcu.port, &["model"]);
-    assert_eq!((&models["active"], &models["active"]["number"]), (&models["stored"], &Value::from(1)));
-
-    // Fine at the fastest rate, but too prompt for the gains that are built in: the MCU's own check says so.
-    let steep = file(
-        "steep.toml",
-        "schema = 1\n[law]\nvoltage_v = [0, 100]\nstiffness = [0, 900]\n[relaxation]\nshare = 0.1\ntau_s = 0.004\n",
-    );
-    let text = bad(2, &mcu.port, &["model", &steep]);
-    assert!(text.contains("steep.toml: the model cannot be run: proportional_gain has to lie within"), "{text}");
-    good(&mcu.port, &["arm"]);
-    let text = bad(1, &mcu.port, &["model", "paper"]);
-    assert!(text.contains("refused: armed; disarm it first"), "{text}");
-    good(&mcu.port, &["disarm"]);
-    assert_eq!(json(&mcu.port, &["model"]), models, "what is refused changes nothing");
-
-    assert!(good(&mcu.port, &["model", "paper"]).starts_with("runs    number 2, format 1, 25 bytes, CRC "));
-    let text = bad(2, &mcu.port, &["model", "nowhere.toml"]);
-    assert!(text.contains("nowhere.toml: cannot be read"), "{text}");
 }

@@ -4,3 +4,5 @@
 mod command;
 mod damage;
 mod mcu;
+mod model;
+mod vsj;

@@ -8,6 +8,9 @@ use link::{Reason, WireModel};
 
 use super::Talk;
 
+/// A spring nearer to rest than this, in V, counts as settled.
+const SETTLED_V: f64 = 1.0;
+
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
     /// A plant file, as `vsj diagnose --out` writes it, or `paper`
@@ -33,16 +36,49 @@ pub(super) fn run(talk: &mut Talk, arguments: &Arguments, model: Option<&WireMod
         None => talk.client.models(),
         Some(model) => talk.client.install(model),
     };
+    let name = talk.client.name();
     let models = match answer {
         Err(Failure::Refused(reason @ Reason::BadModel { .. })) => {
             bad_input!("{}: {reason}", arguments.plant.as_deref().unwrap_or_default())
         }
-        answer => answer.with_context(|| talk.client.name().to_owned())?,
+        answer => answer.with_context(|| name.to_owned())?,
     };
+    let estimate_v = talk.status.sample.estimate.to_f64();
+    if let Some(wait_s) = model.and_then(|model| unsettled_s(estimate_v, model)) {
+        eprintln!(
+            "vsj: {name}: the spring is still {estimate_v:.0} V stiff, and the MCU that has restarted takes it to be at rest; \
+             leave it disarmed for {wait_s:.0} s"
+        );
+    }
     if talk.json {
         println!("{}", serde_json::to_string(&models)?);
     } else {
         println!("runs    {}\nstored  {}", models.active, models.stored);
     }
     Ok(())
+}
+
+/// How long the slowest of a spring's relaxations takes to settle without voltage, in s, if it has not.
+fn unsettled_s(estimate_v: f64, model: &WireModel) -> Option<f64> {
+    let leak_s = model.leakage.map(|(_, time_constant_s)| time_constant_s);
+    let all_s = model.time_constants_s.iter().copied().chain(model.time_constant_high_s).chain(leak_s);
+    let distance = estimate_v.abs() / SETTLED_V;
+    (distance > 1.0).then(|| all_s.fold(0.0, f64::max) * distance.ln())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model::{ExtendedPlant, extended::Relaxation};
+
+    #[test]
+    fn a_spring_that_was_let_go_takes_its_slowest_time_constant_for_each_neper() {
+        let relaxation =
+            Relaxation { share: 0.1, time_constants_s: &[0.5, 5.5], weights: &[0.5, 0.4], time_constant_high_s: None };
+        let plant = ExtendedPlant { memory: None, law: None, leakage: None, relaxation };
+        let model = WireModel::new(&plant, None, None).unwrap();
+        let wait_s = unsettled_s(-450.0, &model).unwrap();
+        assert!((450.0 * (-wait_s / 5.5).exp() - 1.0).abs() < 1e-9, "{wait_s}");
+        assert_eq!(unsettled_s(0.9, &model), None);
+    }
 }
