@@ -13,7 +13,7 @@ use crate::field::Field;
 /// The order of the variants is their code on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reason {
-    /// The spring cannot reach this stiffness; what it can, in the unit of the request.
+    /// Static voltage beyond the amplifier's range; the range in the unit of the request.
     OutOfRange {
         /// Lowest reachable stiffness.
         lowest: f64,

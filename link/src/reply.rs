@@ -66,9 +66,9 @@ pub struct Status {
     pub rate_hz: u32,
     /// Ticks of host silence until the MCU acts on it.
     pub silence_limit_ticks: u32,
-    /// Lowest scaled stiffness in reach.
+    /// Lowest scaled stiffness that may be asked for: the amplifier's range, whatever the spring.
     pub lowest: WireVolts,
-    /// Highest scaled stiffness in reach.
+    /// Highest scaled stiffness that may be asked for.
     pub highest: WireVolts,
     /// Late ticks since the start.
     pub overruns: u32,

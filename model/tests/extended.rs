@@ -40,6 +40,22 @@ fn run(config: &Config<extended::Config>, state: &mut Running, target_v: f64, ti
     output
 }
 
+/// What a target may be is the amplifier's range: a spring that holds less in the end is led to the end of the range, which
+/// the limit tells. One that would hold more is not asked for it.
+#[test]
+fn a_target_that_the_spring_does_not_hold_ends_at_the_limit() {
+    for (leak, gain, target_v, ends_v) in [(0.3, 0.9, 650.0, 490.0), (0.0, 1.2, 800.0, 700.0)] {
+        let leakage = Some(Leakage { share: leak, time_constant_s: 20.0 });
+        let relaxation = Relaxation { weights: &[gain], share: 0.1, ..PLAIN.relaxation };
+        let plant = ExtendedPlant { leakage, relaxation, ..PLAIN };
+        let (config, mut state) = (settings(plant).check().unwrap(), Running::default());
+        let output = run(&config, &mut state, target_v, 300_000);
+        assert!((output.stiffness.to_f64() - ends_v).abs() < 0.5, "{output:?}");
+        let (beyond, moved) = (leak > 0.0, gain > 1.0);
+        assert_eq!((output.limits.any_of(Limits::UPPER), output.limits.any_of(Limits::TARGET)), (beyond, moved));
+    }
+}
+
 /// A plain spring, run as an extended one, does what the plain tick does.
 #[test]
 fn nothing_extended_is_the_plain_spring() {
