@@ -218,3 +218,24 @@ impl<E: Estimator> Loop<E> {
 pub(crate) fn whole_tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, input: Input) -> Output {
     config.tick(state, input)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::SETTINGS;
+    use model::Amplifier;
+
+    /// Taken for no limit it would put 700 V on a spring that asks for protection.
+    #[test]
+    fn a_limit_that_is_no_number_is_refused() {
+        let slow = Settings { amplifier: Amplifier { slew_v_per_s: Some(5000.0), ..SETTINGS.amplifier }, ..SETTINGS };
+        let model = |limit_v, slew_v_per_s| {
+            let time_constants_s = [5.5].into_iter().collect();
+            WireModel { share: 0.1, time_constants_s, limit_v, slew_v_per_s, ..WireModel::default() }
+        };
+        let check = |limit_v, slew| Control::check(&slow, &model(limit_v, slew)).map_err(|error| error.field);
+        assert_eq!(check(Some(650.0), Some(2000.0)), Ok(()));
+        assert_eq!(check(Some(f64::NAN), None), Err("max_v"));
+        assert_eq!(check(None, Some(f64::NAN)), Err("slew_v_per_s"));
+    }
+}

@@ -38,9 +38,11 @@ impl Amplifier {
 
     /// The stricter of this one's highest voltage and slew, and those that were found on the real one.
     pub fn found_with(self, limit_v: Option<f64>, slew_v_per_s: Option<f64>) -> Self {
+        // Not `f64::min`, which takes NaN for no limit at all: here it stays, and the check refuses it.
+        let stricter = |own: f64, found: f64| if found > own { own } else { found };
         Self {
-            max_v: limit_v.map_or(self.max_v, |limit| limit.min(self.max_v)),
-            slew_v_per_s: [self.slew_v_per_s, slew_v_per_s].into_iter().flatten().reduce(f64::min),
+            max_v: limit_v.map_or(self.max_v, |limit| stricter(self.max_v, limit)),
+            slew_v_per_s: [self.slew_v_per_s, slew_v_per_s].into_iter().flatten().reduce(stricter),
             ..self
         }
     }
