@@ -37,6 +37,13 @@ def broken(code):
     return mishap
 
 
+def stalled(board):
+    """A debugger that has taken the log on, in its blocking mode, and reads no more: the ring is full for ever."""
+    write, = struct.unpack("<I", board.uc.mem_read(RTT + 36, 4))
+    length, = struct.unpack("<I", board.uc.mem_read(RTT + 32, 4))
+    board.uc.mem_write(RTT + 40, struct.pack("<2I", (write + 1) % length, 2))
+
+
 def deaf(board):
     """Hangs with interrupts off."""
     board.uc.reg_write(UC_ARM_REG_PRIMASK, 1)
@@ -72,7 +79,7 @@ if __name__ == "__main__":
     HOST = [(us, bytes.fromhex(frame)) for us, frame in json.loads(sys.argv[5])]
     print(json.dumps({
         "quiet": play([], None, 1_200_000),
-        "host": play(HOST, None, 1_700_000),
+        "host": play(HOST, stalled, 1_700_000),
         "panic": play(HOST, panic, 400_000),
         "hard fault": play(HOST, broken(UNDEFINED), 400_000),
         "hang": play(HOST, broken(HANG), 500_000),

@@ -92,8 +92,8 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     ensure!(written.last().is_some_and(|(_, code, enabled)| *code == 0 && !enabled), "silence does not disarm");
     let [first, second] = TARGETS_V;
     Ok(format!(
-        "{} requests over LPUART1 armed it, set {first} V and {second} V and fell silent: {driven} codes with voltage, all \
-         {} of the run as on the host, where at least {telling} of them are others for any other controller or limit",
+        "{} requests over LPUART1 armed it, set {first} V and {second} V and fell silent, past a debugger that reads the log \
+         no more: {driven} codes with voltage, all {} of the run as on the host, where at least {telling} of them are others for any other controller or limit",
         schedule.len(),
         written.len()
     ))
