@@ -75,7 +75,7 @@ class Board:
         self.enabled, self.pending, self.priority, self.active = {SYSTICK_IRQ}, set(), {}, []
         self.candidate = None
         self.watchdog = None
-        self.outside, self.read_to = None, 0
+        self.outside, self.output, self.read_to = None, None, 0
         self.wants_reset = self.sleeping = False
         self.fault = None
         self.note("reset", cause)
@@ -353,13 +353,18 @@ class Board:
             self._settle()
 
     def _look_outside(self):
-        """What the enable's wire says: high only if the pin is an output and its bit is set."""
+        """What the enable's wire says: high only if the pin is an output and its bit is set. How the DAC drives its own."""
         port = GPIO + 0x400 * ENABLE[0]
         driven = self.regs.get(port, 0) >> 2 * ENABLE[1] & 3 == 1
         high = driven and bool(self.regs.get(port + 0x14, 0) >> ENABLE[1] & 1)
         if self.outside != (driven, high):
             self.outside = (driven, high)
             self.note("enable", "floats" if not driven else "on" if high else "off")
+        on, mode = self.regs.get(DAC1, 0) & 1, self.regs.get(DAC1 + 0x3C, 0) & 7
+        output = "off" if not on else {0: "buffered", 2: "unbuffered"}.get(mode, mode)
+        if self.output != output:
+            self.output = output
+            self.note("output", output)
 
     # --- Log ---
 

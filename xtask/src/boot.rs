@@ -136,6 +136,8 @@ fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<String> {
     let jitter = late.iter().copied().fold(0.0, f64::max) - late.iter().copied().fold(0.0, f64::min);
     ensure!(jitter < JITTER_US, "writes to the DAC are up to {jitter:.2} us off their grid of {PERIOD_US} us");
     ensure!(setup.0.iter().any(|Event(_, what, value)| what == "enable" && value == "off"), "the enable floats");
+    let outputs: Vec<&Event> = setup.0.iter().filter(|event| event.1 == "output").collect();
+    ensure!(outputs.last().is_some_and(|event| event.2 == "unbuffered"), "a buffer holds zero off zero: {outputs:?}");
     let fed = events.times("fed");
     ensure!(fed.len() > 10, "the watchdog is not fed");
     let longest = fed.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);

@@ -5,7 +5,7 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};
-use embassy_stm32::dac::{DacChannel, Value};
+use embassy_stm32::dac::{DacChannel, Mode, Value};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac;
@@ -45,7 +45,10 @@ impl Amplifier {
     ) -> Self {
         let enable = Output::new(enable, Level::Low, Speed::Low);
         let mut dac = DacChannel::new_blocking(dac, output);
+        // Behind the chip's buffer the first and the last 0.2 V would not come out: zero would be up to 6 % of the full scale.
+        dac.set_mode(Mode::NormalExternalUnbuffered);
         dac.set(Value::Bit12Right(0));
+        dac.enable();
         let adc = Adc::new(adc, AdcConfig::default());
         Self { dac, enable, adc, voltage: voltage.degrade_adc(), current: current.degrade_adc() }
     }

@@ -2,12 +2,15 @@
 //!
 //! | pin | what it is |
 //! | --- | --- |
-//! | PA4 | DAC1 channel 1, the amplifier's input: 0 to 3.3 V for 0 V to its full scale |
+//! | PA4 | DAC1 channel 1, the amplifier's input: 0 to 3.3 V for 0 V to its full scale, from up to 15 kOhm (unbuffered) |
 //! | PB5 | amplifier's enable, high is on; a pull-down on the amplifier's side keeps it off while the chip is in reset |
 //! | PB10 | interlock, high is closed; pulled down, so that a broken wire reads as open |
 //! | PA0, PA1 | ADC1, the amplifier's voltage and current monitors |
 //! | PA5 | LED, on while voltages may leave |
 //! | PA2, PA3 | LPUART1, the host's line, 115 200 bit/s: the debugger's USB port |
+//!
+//! The DAC's buffer ends 0.2 V before either supply, so it is off, and nothing but its own resistance drives PA4. An amplifier
+//! whose input takes current needs a follower at PA4: 1.5 MOhm cost 1 % of the voltage, 60 MOhm one code.
 //!
 //! | module | what it is |
 //! | --- | --- |
