@@ -49,6 +49,11 @@ pub trait Pages {
     /// What stands in a page.
     fn bytes(&self, side: Side) -> &[u8; PAGE];
 
+    /// Runs `read`, which reads the pages: a word that a power cut tore may come up, and is noise then.
+    fn forgiving<T>(&self, read: impl FnOnce() -> T) -> T {
+        read()
+    }
+
     /// Sets all its bytes to 0xff.
     ///
     /// # Errors
@@ -140,7 +145,8 @@ impl<P: Pages> Store<P> {
     }
 
     fn find(&self) -> Option<(Side, ModelId, &[u8])> {
-        let [a, b] = [Side::A, Side::B].map(|side| open(self.pages.bytes(side)).map(|(id, bytes)| (side, id, bytes)));
+        let found = |side| open(self.pages.bytes(side)).map(|(id, bytes)| (side, id, bytes));
+        let [a, b] = self.pages.forgiving(|| [Side::A, Side::B].map(found));
         match (a, b) {
             (Some(a), Some(b)) => Some(if b.1.number > a.1.number { b } else { a }),
             (a, b) => a.or(b),

@@ -9,7 +9,7 @@ import random
 import struct
 
 from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
-from unicorn import UC_HOOK_BLOCK, UC_HOOK_CODE, UC_HOOK_INTR, UC_HOOK_MEM_WRITE
+from unicorn import UC_HOOK_BLOCK, UC_HOOK_CODE, UC_HOOK_INTR, UC_HOOK_MEM_READ, UC_HOOK_MEM_WRITE
 from unicorn.arm_const import *
 
 from peripherals import SysTick, Timer, Uart
@@ -21,13 +21,14 @@ HARD_FAULT = 3
 FRAME = (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR)
 FLOATS = tuple(UC_ARM_REG_S0 + i for i in range(16))
 
-FLASH_OPTR = 0x4002_2020
+FLASH_ECCR, FLASH_OPTR = 0x4002_2018, 0x4002_2020
 RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0800, 0x5000_0000
 GPIO = 0x4800_0000
 TIM15, TIM15_IRQ = 0x4001_4000, 24  # The time driver's.
 LPUART1_IRQ = 91
 SCS = 0xE000_E000
 SYSTICK_IRQ = -1  # Exception 15.
+NMI_IRQ = -14  # Exception 2.
 BAUD = 115_200  # The host's.
 ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
 
@@ -72,7 +73,7 @@ class Board:
         self.timer.at = self.now
         self.systick = SysTick()
         self.uart = Uart(self.incoming, self.byte_of_host, lambda byte: self.note("sent", byte))
-        self.enabled, self.pending, self.priority, self.active = {SYSTICK_IRQ}, set(), {}, []
+        self.enabled, self.pending, self.priority, self.active = {NMI_IRQ, SYSTICK_IRQ}, set(), {NMI_IRQ: -2}, []
         self.candidate = None
         self.watchdog = None
         self.outside, self.output, self.read_to = None, None, 0
@@ -122,6 +123,16 @@ class Board:
                 self._exception_entry(16 + self.candidate[1], self.candidate[0])
         return None
 
+    def tear(self, at):
+        """A word of the flash has two wrong bits from now on."""
+        self.uc.hook_add(UC_HOOK_MEM_READ, lambda *_: self.two_wrong_bits(), begin=at, end=at + 7)
+
+    def two_wrong_bits(self):
+        """Were read: FLASH_ECCR.ECCD, and the interrupt that nothing masks."""
+        self.regs[FLASH_ECCR] = 1 << 31
+        self.pending.add(NMI_IRQ)
+        self._choose()
+
     def note(self, what, value):
         self.log.append((self.now * 1_000_000 / HZ, what, value))
 
@@ -170,7 +181,8 @@ class Board:
         """An interrupt can be taken now. Within an IT block it waits for its end."""
         if self.candidate is None:
             return False
-        return not self.uc.reg_read(UC_ARM_REG_PRIMASK) & 1 and not self.uc.reg_read(UC_ARM_REG_XPSR) & 0x0600_FC00
+        masked = self.uc.reg_read(UC_ARM_REG_PRIMASK) & 1 and self.candidate[0] >= 0
+        return not masked and not self.uc.reg_read(UC_ARM_REG_XPSR) & 0x0600_FC00
 
     def _choose(self):
         """The most urgent pending interrupt that may interrupt what is active."""
@@ -331,6 +343,8 @@ class Board:
             return  # Lost: its clock is not on yet.
         if at == RCC + 0x94 and value & 1 << 23:
             value &= 0xFF
+        elif at == FLASH_ECCR:
+            value = self.regs.get(at, 0) & ~(value & 0xC000_0000)  # Written ones clear.
         elif at == ADC1 + 0x08:
             value &= ~(1 << 31 | 0x1E)  # Calibration and conversion are over at once.
         elif at == IWDG:

@@ -14,6 +14,7 @@ from board import FLASH, RAM, Board
 
 POWER_ON = 1 << 27 | 1 << 26
 MISHAP_TICK = 300
+STORE = [FLASH + 0x7F000 + page * 0x800 for page in range(2)]  # The first word of each page, torn by a power cut.
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 
@@ -37,6 +38,11 @@ def broken(code):
     return mishap
 
 
+def rotten(board):
+    """A word of code or constants has two wrong bits."""
+    board.two_wrong_bits()
+
+
 def stalled(board):
     """A debugger that has taken the log on, in its blocking mode, and reads no more: the ring is full for ever."""
     write, = struct.unpack("<I", board.uc.mem_read(RTT + 36, 4))
@@ -50,9 +56,11 @@ def deaf(board):
     broken(HANG)(board)
 
 
-def play(host, mishap, until_us):
+def play(host, mishap, until_us, torn=()):
     """After the reset the flash is sound again, the memory as it was."""
     board = Board(IMAGE, RTT, host)
+    for at in torn:
+        board.tear(at)
     ticks = 0
 
     def tick(board):
@@ -82,6 +90,8 @@ if __name__ == "__main__":
         "host": play(HOST, stalled, 1_700_000),
         "panic": play(HOST, panic, 400_000),
         "hard fault": play(HOST, broken(UNDEFINED), 400_000),
+        "two wrong bits": play(HOST, rotten, 400_000),
+        "torn": play([], None, 200_000, STORE),
         "hang": play(HOST, broken(HANG), 500_000),
         "deaf": play(HOST, deaf, 500_000),
     }))

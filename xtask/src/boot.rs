@@ -103,10 +103,12 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     for (name, within_us, log) in [
         ("panic", KILL_US, "panic at injected.rs:7"),
         ("hard fault", KILL_US, "name=hard-fault"),
+        ("two wrong bits", KILL_US, "name=hard-fault"),
         ("hang", hang_us + KILL_US, "name=watchdog"),
     ] {
         println!("{name}: {}", stopped(&events(name)?, &bytes, within_us, log).context(name)?);
     }
+    println!("torn store: {}", torn(&events("torn")?, &bytes).context("torn")?);
     println!("hang with interrupts off: {}", deaf(&events("deaf")?, &bytes).context("deaf")?);
     println!("{CANNOT_SHOW}");
     Ok(())
@@ -163,6 +165,12 @@ fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<
     let boot = reborn_safe(&reborn, image, "reset=software")?;
     let gone = if gone < 1e3 { format!("{gone:.2} us") } else { format!("{:.1} ms", gone / 1e3) };
     Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
+}
+
+/// Words of the store that a power cut tore are read and forgiven.
+fn torn(events: &Events, image: &[u8]) -> Result<String> {
+    let boot = reborn_safe(events, image, "reset=power-on last_fault=0")?;
+    Ok(format!("words with two wrong bits are forgiven there alone; `{boot}`"))
 }
 
 /// Only the watchdog ends it.
