@@ -44,6 +44,7 @@ class Board:
             (us * HZ // 1_000_000 + byte * (i + 1), value) for us, frame in host for i, value in enumerate(frame)
         ]
         self.traps, self.trapped, self.sprung = {}, False, False
+        self.closed, self.monitors = True, {}
         self.now, self.end, self.deadline = 0, 0, 0
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M4)
@@ -287,12 +288,15 @@ class Board:
         if at == ADC1:
             return 0xF
         if at == ADC1 + 0x40:
-            # Channel 1 sees what the DAC puts out, channel 2 no current.
+            # Channel 1 sees what the DAC puts out, channel 2 no current; `monitors` says otherwise.
             channel = self.regs.get(ADC1 + 0x30, 0) >> 6 & 0x1F
-            return self.regs.get(DAC1 + 0x08, 0) if channel == 1 else 2048
+            return self.monitors.get(channel, self.regs.get(DAC1 + 0x08, 0) if channel == 1 else 2048)
         if at & ~0x1FFF == GPIO and at & 0x3FF == 0x10:
-            port = at - GPIO >> 10
-            return self.regs.get(at + 4, 0) | (1 << INTERLOCK[1] if port == INTERLOCK[0] else 0)
+            port, pin = INTERLOCK
+            # A broken wire reads as the pin's own pull has it, low with the pull-down only.
+            pull = self.regs.get((at & ~0x3FF) + 0x0C, 0) >> 2 * pin & 3
+            high = at - GPIO >> 10 == port and (self.closed or pull != 2)
+            return self.regs.get(at + 4, 0) | high << pin
         if at in (SCS + 0x10, SCS + 0x14):
             return self.systick.regs.get(at - SCS, 0)
         if 0xE000_E100 <= at < 0xE000_E300:

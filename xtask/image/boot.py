@@ -43,6 +43,21 @@ def rotten(board):
     board.two_wrong_bits()
 
 
+def opened(board):
+    """The interlock's wire breaks."""
+    board.closed = False
+
+
+def shorted(board):
+    """The voltage monitor sees none."""
+    board.monitors[1] = 0
+
+
+def arcing(board):
+    """The current monitor sees 3 mA, at 5 mA for half its range."""
+    board.monitors[2] = 2048 + 3 * 2048 // 5
+
+
 def stalled(board):
     """A debugger that has taken the log on, in its blocking mode, and reads no more: the ring is full for ever."""
     write, = struct.unpack("<I", board.uc.mem_read(RTT + 36, 4))
@@ -92,6 +107,9 @@ if __name__ == "__main__":
         "hard fault": play(HOST, broken(UNDEFINED), 400_000),
         "two wrong bits": play(HOST, rotten, 400_000),
         "torn": play([], None, 200_000, STORE),
+        "interlock": play(HOST, opened, 450_000),
+        "no voltage": play(HOST, shorted, 450_000),
+        "current": play(HOST, arcing, 450_000),
         "hang": play(HOST, broken(HANG), 500_000),
         "deaf": play(HOST, deaf, 500_000),
     }))

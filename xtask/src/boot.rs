@@ -7,6 +7,7 @@ mod host;
 use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
+use firmware::settings::SUPERVISION;
 use host_sim::log::Formats;
 use model::{Amplifier, Settings};
 use serde::Deserialize;
@@ -21,6 +22,8 @@ const PERIOD_US: f64 = 1000.0;
 const JITTER_US: f64 = 20.0;
 /// Of the watchdog, in us.
 const WATCHDOG_US: f64 = 100_000.0;
+/// That the amplifier's monitors may disagree for, with the tick that finds it, in us.
+const MONITOR_US: f64 = 1e6 * SUPERVISION.monitor_time_s + PERIOD_US;
 /// From a panic or fault to zero volts, in us; one instruction is 1/170.
 const KILL_US: f64 = 5.0;
 
@@ -31,6 +34,14 @@ not shown: real time (an instruction is one cycle here; no wait states, no conve
 /// Something that happened outside of the core.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 struct Event(f64, String, serde_json::Value);
+
+impl Event {
+    /// Lets voltage out.
+    fn drives(&self) -> bool {
+        let Self(_, what, value) = self;
+        (what == "dac" && value != 0) || value == "on"
+    }
+}
 
 /// The events of one run.
 #[derive(Clone, Debug, Deserialize)]
@@ -49,7 +60,7 @@ impl Events {
 
     /// Nothing but zero on the DAC, never enabled.
     fn safe(&self) -> Result<()> {
-        match self.0.iter().find(|Event(_, what, value)| (what == "dac" && value != 0) || value == "on") {
+        match self.0.iter().find(|event| event.drives()) {
             Some(Event(us, what, value)) => bail!("{what} {value} at {us:.2} us"),
             None => Ok(()),
         }
@@ -108,6 +119,13 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     ] {
         println!("{name}: {}", stopped(&events(name)?, &bytes, within_us, log).context(name)?);
     }
+    for (name, within_us, fault) in [
+        ("interlock", PERIOD_US + JITTER_US, "name=interlock"),
+        ("no voltage", MONITOR_US + JITTER_US, "name=monitor"),
+        ("current", MONITOR_US + JITTER_US, "name=monitor"),
+    ] {
+        println!("{name}: {}", faulted(&events(name)?, &bytes, within_us, fault).context(name)?);
+    }
     println!("torn store: {}", torn(&events("torn")?, &bytes).context("torn")?);
     println!("hang with interrupts off: {}", deaf(&events("deaf")?, &bytes).context("deaf")?);
     println!("{CANNOT_SHOW}");
@@ -165,6 +183,19 @@ fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<
     let boot = reborn_safe(&reborn, image, "reset=software")?;
     let gone = if gone < 1e3 { format!("{gone:.2} us") } else { format!("{:.1} ms", gone / 1e3) };
     Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
+}
+
+/// The supervisor takes the voltage away in time, and goes on without it whatever the host sends.
+fn faulted(events: &Events, image: &[u8], within_us: f64, fault: &str) -> Result<String> {
+    let (_, after) = mishap(events)?;
+    let last = after.0.iter().rposition(Event::drives).context("the voltage had gone before")?;
+    let without = Events(after.0[last + 1..].to_vec());
+    let us = gone(&without)? + without.0[0].0 - after.0[0].0;
+    ensure!(us <= within_us, "the voltage goes after {us:.0} us");
+    ensure!(without.times("dac").len() > 50 && without.times("reset").is_empty(), "it does not go on");
+    let log = after.log(image)?;
+    let line = log.iter().find(|line| line.contains(fault)).with_context(|| format!("no `{fault}` in {log:?}"))?;
+    Ok(format!("DAC zero and enable off {:.1} ms later; `{line}`", us / 1e3))
 }
 
 /// Words of the store that a power cut tore are read and forgiven.
