@@ -30,21 +30,22 @@ SCS = 0xE000_E000
 SYSTICK_IRQ = -1  # Exception 15.
 NMI_IRQ = -14  # Exception 2.
 BAUD = 115_200  # The host's.
+MONITOR_SCALE = 1000  # Volts of the amplifier at the ADC's full range.
 ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
 
 
 class Board:
     """One chip with the image in its flash. `log` gets (time in us, what, value) of everything that matters outside."""
 
-    def __init__(self, image, rtt, host):
-        """`host` sends (time in us of the first bit, frame)."""
+    def __init__(self, image, rtt, host, full_scale):
+        """`host` sends (time in us of the first bit, frame); the amplifier makes `full_scale` volts of the highest code."""
         self.image, self.rtt, self.log = image, rtt, []
         byte = self.byte_of_host = 10 * HZ // BAUD
         self.incoming = [
             (us * HZ // 1_000_000 + byte * (i + 1), value) for us, frame in host for i, value in enumerate(frame)
         ]
         self.traps, self.trapped, self.sprung = {}, False, False
-        self.closed, self.monitors = True, {}
+        self.closed, self.monitors, self.full_scale = True, {}, full_scale
         self.now, self.end, self.deadline = 0, 0, 0
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M4)
@@ -288,9 +289,11 @@ class Board:
         if at == ADC1:
             return 0xF
         if at == ADC1 + 0x40:
-            # Channel 1 sees what the DAC puts out, channel 2 no current; `monitors` says otherwise.
+            # Channel 1 sees what the amplifier makes of the DAC, channel 2 no current; `monitors` says otherwise.
             channel = self.regs.get(ADC1 + 0x30, 0) >> 6 & 0x1F
-            return self.monitors.get(channel, self.regs.get(DAC1 + 0x08, 0) if channel == 1 else 2048)
+            volts = self.regs.get(DAC1 + 0x08, 0) * self.full_scale / 4095
+            voltage = min(round(volts * 4096 / MONITOR_SCALE), 4095)
+            return self.monitors.get(channel, voltage if channel == 1 else 2048)
         if at & ~0x1FFF == GPIO and at & 0x3FF == 0x10:
             port, pin = INTERLOCK
             # A broken wire reads as the pin's own pull has it, low with the pull-down only.

@@ -1,7 +1,7 @@
-"""Boots an image and does it harm: boot.py IMAGE TICK PANIC RTT HOST prints what happened outside of the chip, as JSON.
+"""Boots an image and does it harm: boot.py IMAGE TICK PANIC RTT VOLTS HOST prints what happened outside of the chip, as JSON.
 
-TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's. HOST is what a
-host sends, as JSON: [time in us, bytes in hex] each.
+TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's. VOLTS is the full
+scale of its amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each.
 """
 
 import json
@@ -53,6 +53,11 @@ def shorted(board):
     board.monitors[1] = 0
 
 
+def mistaken(board):
+    """The amplifier is one of 1000 V."""
+    board.full_scale = 1000
+
+
 def arcing(board):
     """The current monitor sees 3 mA, at 5 mA for half its range."""
     board.monitors[2] = 2048 + 3 * 2048 // 5
@@ -73,7 +78,7 @@ def deaf(board):
 
 def play(host, mishap, until_us, torn=()):
     """After the reset the flash is sound again, the memory as it was."""
-    board = Board(IMAGE, RTT, host)
+    board = Board(IMAGE, RTT, host, FULL_SCALE)
     for at in torn:
         board.tear(at)
     ticks = 0
@@ -99,7 +104,8 @@ if __name__ == "__main__":
     with open(sys.argv[1], "rb") as file:
         IMAGE = file.read()
     TICK, PANIC, RTT = (int(word, 0) for word in sys.argv[2:5])
-    HOST = [(us, bytes.fromhex(frame)) for us, frame in json.loads(sys.argv[5])]
+    FULL_SCALE = float(sys.argv[5])
+    HOST = [(us, bytes.fromhex(frame)) for us, frame in json.loads(sys.argv[6])]
     print(json.dumps({
         "quiet": play([], None, 1_200_000),
         "host": play(HOST, stalled, 1_700_000),
@@ -109,6 +115,7 @@ if __name__ == "__main__":
         "torn": play([], None, 200_000, STORE),
         "interlock": play(HOST, opened, 450_000),
         "no voltage": play(HOST, shorted, 450_000),
+        "other amplifier": play(HOST, mistaken, 450_000) if FULL_SCALE < 1000 else None,
         "current": play(HOST, arcing, 450_000),
         "hang": play(HOST, broken(HANG), 500_000),
         "deaf": play(HOST, deaf, 500_000),

@@ -104,6 +104,7 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
             .args(["-B", "xtask/image/boot.py"])
             .arg(&bin)
             .args([ticks[0].address, panic.address, rtt].map(|address| format!("{address:#x}")))
+            .arg(amplifier.full_scale_v.to_string())
             .arg(host::frames().to_string()),
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
@@ -123,7 +124,12 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         ("interlock", PERIOD_US + JITTER_US, "name=interlock"),
         ("no voltage", MONITOR_US + JITTER_US, "name=monitor"),
         ("current", MONITOR_US + JITTER_US, "name=monitor"),
+        ("other amplifier", MONITOR_US + JITTER_US, "name=monitor"),
     ] {
+        // One of less than the image's leads nobody into danger.
+        if output[name].is_null() {
+            continue;
+        }
         println!("{name}: {}", faulted(&events(name)?, &bytes, within_us, fault).context(name)?);
     }
     println!("torn store: {}", torn(&events("torn")?, &bytes).context("torn")?);

@@ -1,6 +1,6 @@
 //! The amplifier: DAC and enable out, monitors in.
 //!
-//! Assumed of the amplifier, to be changed with it: its voltage monitor gives 3.3 V at the full scale, as the DAC does; its
+//! Assumed of the amplifier, to be changed with it: its voltage monitor gives 3.3 V at 1000 V, whatever its own range; its
 //! current monitor gives 1.65 V without current and 3.3 V at 5 mA.
 
 use embassy_stm32::Peri;
@@ -15,12 +15,12 @@ use model::supervisor::{Drive, Monitors};
 use model::units::Signal;
 
 use crate::board;
-use crate::settings::FLASHED;
 
 /// Number of the enable's pin on port B.
 const ENABLE_PIN: usize = 5;
-/// Volts of the spring for the whole range of the ADC, which is the DAC's.
-const FULL_SCALE_V: i32 = FLASHED.amplifier.full_scale_v as i32;
+/// Volts of the spring for the whole range of the ADC. Not those of the DAC, which are the image's: a monitor on that scale
+/// would agree with any amplifier. On its own it finds one of 1000 V behind an image for 700 V from 82 V on.
+const MONITOR_SCALE_V: i32 = 1000;
 /// Current in uA for half the range of the ADC.
 const HALF_SCALE_UA: i32 = 5000;
 
@@ -71,8 +71,8 @@ impl board::Amplifier for Amplifier {
         let time = SampleTime::CYCLES24_5;
         let voltage = i32::from(self.adc.blocking_read(&mut self.voltage, time));
         let current = i32::from(self.adc.blocking_read(&mut self.current, time));
-        // 12 bits times at most 1000 V, in 2^-20 V: 42 bits.
-        let bits = (i64::from(voltage * FULL_SCALE_V) << 20) >> 12;
+        // 12 bits times 1000 V, in 2^-20 V: 42 bits.
+        let bits = (i64::from(voltage * MONITOR_SCALE_V) << 20) >> 12;
         Some(Monitors {
             voltage: Volts(Signal::from_bits(bits as i32)),
             current_ua: (current - 2048) * HALF_SCALE_UA / 2048,
