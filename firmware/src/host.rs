@@ -11,8 +11,8 @@ use embassy_time::{Duration, Timer, with_timeout};
 use link::reply::Firmware;
 use link::{About, Controller, Desk, Keep, ModelId, Reason, Step, Telemetry, View};
 use model::stiffness::{Cantilever, YoungsModulus};
-use model::supervisor::State;
-use model::{OutOfRange, Spring};
+use model::supervisor::{Fault, State};
+use model::{OutOfRange, SampleTime, Settings, Spring};
 
 use crate::RATE_HZ;
 use crate::control::{Control, Orders, Tick};
@@ -20,9 +20,9 @@ use crate::post::{Letter, Post};
 use crate::roll_call::Member;
 use crate::settings::SUPERVISION;
 use crate::start::{self, Start};
-use crate::stop;
 use crate::store::{Pages, Store};
 use crate::tasks::{ROLL_CALL, Source};
+use crate::{log, stop};
 
 /// Longest wait for a byte: so often is looked whether telemetry is due.
 const LISTEN: Duration = Duration::from_millis(1);
@@ -126,13 +126,26 @@ async fn hand_over(letter: Letter, heard: bool) -> View {
     DONE.wait().await
 }
 
-/// The desk; `None` if somebody has it already. Not inlined: what it needs on the
-/// stack is not to stay there.
+/// Controller and desk, from what is stored; `None` if somebody has them already.
 ///
 /// # Errors
 /// [`OutOfRange`] names the setting.
+pub fn open<P: Pages>(
+    settings: &Settings,
+    store: &Store<P>,
+    last_fault: Option<Fault>,
+) -> Result<Option<(&'static mut Control, &'static mut Desk)>, OutOfRange> {
+    let Some(place) = singleton!(: Option<Control> = None) else { return Ok(None) };
+    let (control, start) = start::control(settings, store.newest(), last_fault, place)?;
+    if let Some(field) = start.refused {
+        log::refused(field);
+    }
+    Ok(desk(&start, Controller::of(&settings.compensation))?.map(|desk| (control, desk)))
+}
+
+/// Not inlined: what it needs on the stack is not to stay there.
 #[inline(never)]
-pub fn desk(start: &Start, controller: Controller) -> Result<Option<&'static mut Desk>, OutOfRange> {
+fn desk(start: &Start, controller: Controller) -> Result<Option<&'static mut Desk>, OutOfRange> {
     let amplifier = &start.amplifier;
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, amplifier.min_v, amplifier.max_v)?;
     let part = |text: &str| text.parse().unwrap_or(0);
@@ -147,9 +160,10 @@ pub fn desk(start: &Start, controller: Controller) -> Result<Option<&'static mut
     let about = About {
         firmware,
         rate_hz: RATE_HZ,
-        silence_limit_ticks: SUPERVISION.host_timeout_ticks(model::SampleTime::from_rate(f64::from(RATE_HZ))?),
-        last_fault: start.last_fault.map_or(link::Fault::NONE, link::Fault::from),
+        silence_limit_ticks: SUPERVISION.host_timeout_ticks(SampleTime::from_rate(f64::from(RATE_HZ))?),
+        last_fault: start.last_fault.map_or(link::Fault::NONE, Into::into),
         model: start.model,
+        stored: start.stored,
     };
     Ok(singleton!(: Desk = Desk::new(spring, about)))
 }

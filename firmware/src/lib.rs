@@ -9,6 +9,7 @@
 //! | [`post`] | between the host's task and the tick: an order made before a fault never acknowledges it |
 //! | [`roll_call`] | the watchdog is fed only when every task has checked in |
 //! | [`store`] | the model that outlives a power cut |
+//! | [`start`] | the controller, from what is stored |
 //! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
 //! | [`rehearsal`] | the same without a board, for the host |
 //! | [`settings`] | what an image runs |
@@ -17,7 +18,6 @@
 //! | `hang_guard` | a control task that hangs is stopped |
 //! | `stack_guard` | an overflow of the stack is a fault |
 //! | `log` | every log line, in one place |
-//! | `start` | the controller, from what is stored |
 //! | `tasks` | the control task and the housekeeping below it |
 //! | `host` | the host's task, and its orders as the control task sees them |
 //! | `mps2` | the emulated board |
@@ -41,6 +41,7 @@ pub mod rehearsal;
 pub mod roll_call;
 pub mod script;
 pub mod settings;
+pub mod start;
 pub mod store;
 
 #[cfg(feature = "mcu")]
@@ -57,8 +58,6 @@ pub mod mps2;
 pub mod nucleo;
 #[cfg(feature = "mcu")]
 pub mod stack_guard;
-#[cfg(feature = "mcu")]
-pub mod start;
 #[cfg(feature = "mcu")]
 pub mod stop;
 #[cfg(feature = "mcu")]

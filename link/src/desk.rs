@@ -49,6 +49,8 @@ pub struct About {
     pub last_fault: Fault,
     /// The model that runs.
     pub model: ModelId,
+    /// The one that was stored at the start, if it was refused, too.
+    pub stored: ModelId,
 }
 
 /// What to do after a byte.
@@ -91,7 +93,7 @@ pub struct Desk {
 impl Desk {
     /// A desk that has heard nobody; `spring` says which stiffness is in reach.
     pub const fn new(spring: Spring, about: About) -> Self {
-        Self { session: Session::new(about.silence_limit_ticks), spring, about, stored: about.model, ordered: None }
+        Self { session: Session::new(about.silence_limit_ticks), spring, about, stored: about.stored, ordered: None }
     }
 
     /// Takes a byte from the wire.

@@ -19,7 +19,6 @@ use firmware::mps2::vectors::{HIGH, LOW, Line};
 use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
 use firmware::script::Script;
 use firmware::settings::FLASHED;
-use firmware::start;
 use firmware::store::Store;
 use firmware::{hang_guard, stack_guard, tasks};
 use link::{Controller, Desk};
@@ -62,10 +61,7 @@ fn main() -> ! {
         semihosting::exit(EXIT_NO_SPRING);
     }
     let mut store = Store::new(Flash::init());
-    let started = start::control(settings, &store, last_fault);
-    let (control, desk) = match started
-        .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start, controller)?))).transpose())
-    {
+    let (control, desk) = match host::open(settings, &store, last_fault) {
         Ok(Some(both)) => both,
         Ok(None) => semihosting::exit(1),
         Err(error) => {
@@ -101,7 +97,7 @@ fn main() -> ! {
         }
         Mode::Link => {
             INTERLOCK_CLOSED.store(true, Ordering::Relaxed);
-            if let (Some(Ok(talk)), Ok(control)) = (desk.map(talk), obey(board, control)) {
+            if let (Ok(talk), Ok(control)) = (talk(desk), obey(board, control)) {
                 low.spawn(talk);
                 high.spawn(control);
             }

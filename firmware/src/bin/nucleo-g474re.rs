@@ -15,7 +15,6 @@ use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
 use firmware::settings::FLASHED;
-use firmware::start;
 use firmware::store::Store;
 use firmware::tasks;
 use firmware::{hang_guard, last_words, log, stack_guard};
@@ -58,10 +57,7 @@ fn main() -> ! {
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
     let mut store = Store::new(flash);
-    let started = start::control(&FLASHED, &store, last_fault);
-    match started
-        .and_then(|started| started.map(|(control, start)| Ok((control, host::desk(&start, CONTROLLER)?))).transpose())
-    {
+    match host::open(&FLASHED, &store, last_fault) {
         // Built once.
         Ok(None) => {}
         Ok(Some((control, desk))) => {
@@ -70,7 +66,7 @@ fn main() -> ! {
                 high.spawn(control);
             }
             // Without a line nobody can arm.
-            if let Some(talk) = line.zip(desk).and_then(|(line, desk)| talk(line, desk).ok()) {
+            if let Some(talk) = line.and_then(|line| talk(line, desk).ok()) {
                 low.spawn(talk);
             }
         }

@@ -235,7 +235,8 @@ impl Chip {
         let supervision = supervisor::Settings { host_timeout_s, ..supervisor::Settings::DEFAULT };
         let store = Store::new(shared.lock().unwrap().flash.clone());
         let stored = store.newest().map(|(id, payload)| (id, WireModel::read(payload).unwrap()));
-        let (model, found) = stored.unzip();
+        let (id, found) = stored.unzip();
+        let model = id.unwrap_or_default();
         let mut control = Control::new(&Settings::PAPER, &supervision, None).unwrap();
         if let Some(found) = found {
             control.take_on(&Settings::PAPER, &found).unwrap();
@@ -246,7 +247,8 @@ impl Chip {
             rate_hz: 1000,
             silence_limit_ticks: setup.silence_ms,
             last_fault: Fault::NONE,
-            model: model.unwrap_or_default(),
+            model,
+            stored: model,
         };
         let view =
             View { sample: Telemetry::default(), state: supervisor::State::Disarmed, refusal: None, overruns: 0 };

@@ -12,6 +12,8 @@ use model::supervisor::{Command, Fault as Cause};
 const ARMED: View = view(supervisor::State::Armed, State::Armed);
 const DISARMED: View = view(supervisor::State::Disarmed, State::Disarmed);
 const FAULTED: View = view(supervisor::State::Faulted(Cause::Monitor), State::Faulted);
+/// Is stored, and does not run.
+const REFUSED: ModelId = ModelId { number: 3, format: 1, length: 9, checksum: 7 };
 const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
 
 const fn view(state: supervisor::State, shown: State) -> View {
@@ -29,7 +31,7 @@ fn reply(bytes: &[u8]) -> Reply {
 /// What is answered if the tick turns `before` into `after`, and whether it was asked to do anything.
 fn talk(request: Request, before: &View, after: &View) -> (Option<Order>, Reply) {
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
-    let mut desk = Desk::new(spring, About { silence_limit_ticks: 500, ..About::default() });
+    let mut desk = Desk::new(spring, About { silence_limit_ticks: 500, stored: REFUSED, ..About::default() });
     let hello = Frame::new(Sequence(0), &Request::Hello);
     let frame = Frame::new(Sequence(1), &request);
     let (mut order, mut answer) = (None, None);
@@ -112,7 +114,7 @@ fn a_model_is_taken_while_disarmed_only() {
         assert_eq!(answer(ARMED), Reply::Refused(Reason::Armed), "{request:?}");
         assert_eq!(answer(FAULTED), Reply::Refused(Reason::Faulted(monitor)), "{request:?}");
     }
-    let models = Models::default();
+    let models = Models { active: ModelId::default(), stored: REFUSED };
     assert_eq!(talk(Request::Model, &ARMED, &ARMED).1, Reply::Model(models));
 }
 
