@@ -89,7 +89,7 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     ensure!(flash.address == 0x0800_0000, "the image begins at {:#x}", flash.address);
     let size = size::measure(variant, &[], Board::Nucleo)?;
     size.check()?;
-    println!("size: {size}; no way into a panic from the control tick ({} functions), no heap", audit::run(&bytes)?);
+    println!("size: {size}; no way into a panic from the control tick ({} functions), no float in it, no heap", audit::run(&bytes)?);
     let bin = elf.with_extension("boot.bin");
     fs::write(&bin, &flash.bytes).with_context(|| format!("cannot write {}", bin.display()))?;
 

@@ -18,7 +18,9 @@ pub(crate) fn run() -> Result<()> {
         let elf = image::build(Board::Mps2, opt)?;
         let name = opt.name();
         let functions = audit::run(&image::read(&elf)?)?;
-        eprintln!("opt-level {name}: no way into a panic from the control tick ({functions} functions), no heap");
+        eprintln!(
+            "opt-level {name}: no way into a panic from the control tick ({functions} functions), no float in it, no heap"
+        );
         for script in RUNS {
             bit_for_bit(&elf, script).with_context(|| format!("opt-level {name}, {script}"))?;
         }

@@ -18,6 +18,10 @@ pub(crate) struct Shape {
     pub(crate) calls: Vec<u32>,
     /// A call whose target is not in the code.
     pub(crate) calls_by_register: bool,
+    /// An instruction of the float unit.
+    pub(crate) floats: bool,
+    /// An instruction that is undefined for ever.
+    pub(crate) traps: bool,
     /// Bytes of stack: everything that is ever taken, as if all at once.
     pub(crate) frame: u32,
 }
@@ -78,6 +82,8 @@ impl Shape {
             _ if code & 0xf800 == 0xe000 => self.jump(function, at, sign(u32::from(code & 0x7ff), 11) * 2),
             // PUSH
             _ if code & 0xfe00 == 0xb400 => self.frame += 4 * (code & 0x1ff).count_ones(),
+            // UDF
+            _ if code & 0xff00 == 0xde00 => self.traps = true,
             // SUB SP
             _ if code & 0xff80 == 0xb080 => self.frame += 4 * u32::from(code & 0x7f),
             _ => {}
@@ -86,6 +92,10 @@ impl Shape {
 
     fn long(&mut self, function: &Function, at: u32, first: u16, second: u16) {
         let (a, b) = (u32::from(first), u32::from(second));
+        // Coprocessors 10 and 11.
+        self.floats |= a & 0xec00 == 0xec00 && b & 0x0e00 == 0x0a00;
+        // UDF.W
+        self.traps |= a & 0xfff0 == 0xf7f0 && b & 0xf000 == 0xa000;
         let immediate = (a >> 10 & 1) << 11 | (b >> 12 & 7) << 8 | b & 0xff;
         match (first, second) {
             // BL and B
@@ -152,6 +162,19 @@ mod tests {
         assert_eq!(shape(&[0xf000, 0xb880, 0xe7fe]).calls, [0x204]);
         assert!(shape(&[0x4798]).calls_by_register, "blx r3");
         assert_eq!(shape(&[0x4770]), Shape::default(), "bx lr");
+    }
+
+    #[test]
+    fn floats_and_traps_are_seen() {
+        // vmul.f32 s0, s0, s1; vldr d0, [r0]; vmov r0, s0; vcvt.f32.s32 s0, s0
+        for float in [[0xee20, 0x0a20], [0xed90, 0x0b00], [0xee10, 0x0a10], [0xeeb8, 0x0ac0]] {
+            assert!(shape(&float).floats, "{float:x?}");
+        }
+        // smull r0, r1, r2, r3; ldrd r0, r1, [r2]; lsl.w r0, r0, r1
+        for integer in [[0xfb82, 0x0103], [0xe9d2, 0x0100], [0xfa00, 0xf001]] {
+            assert_eq!(shape(&integer), Shape::default(), "{integer:x?}");
+        }
+        assert!(shape(&[0xdefe]).traps && shape(&[0xf7f0, 0xa000]).traps);
     }
 
     #[test]
