@@ -1,7 +1,7 @@
 //! What survives a reset: a record in memory that start-up leaves alone.
 //!
 //! After power-on this memory holds noise, so the record counts only with its check word. A reset without last words
-//! means that nobody could say anything any more: the watchdog, or the reset pin.
+//! means that nobody could say anything any more: the watchdog, the reset pin, or a dip of the supply.
 
 #![allow(unsafe_code)]
 
@@ -9,6 +9,8 @@ use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
 use model::supervisor::Fault;
+
+use crate::cause::Legacy;
 
 /// "vsj1"
 const MARK: u32 = 0x7673_6a31;
@@ -28,24 +30,11 @@ struct Record {
 
 struct Kept(UnsafeCell<MaybeUninit<Record>>);
 
-// SAFETY: written only with interrupts off or before they are on, by volatile accesses.
+// SAFETY: written with interrupts off only, and read before they are on, by volatile accesses.
 unsafe impl Sync for Kept {}
 
 #[unsafe(link_section = ".uninit.last_words")]
 static KEPT: Kept = Kept(UnsafeCell::new(MaybeUninit::uninit()));
-
-/// What the last run left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Legacy {
-    /// Nothing: the power was off.
-    None,
-    /// It was running until a reset that it did not cause.
-    Silent,
-    /// It was told to.
-    Told,
-    /// It stopped itself at this tick.
-    Stopped(Fault, u32),
-}
 
 /// Reads what was left and marks this run as running. Once, at boot.
 pub fn take() -> Legacy {
@@ -67,6 +56,18 @@ pub fn leave(fault: Fault, tick: u32) {
     write(u32::from(fault.code()), tick);
 }
 
+/// Leaves the fault that a start found, for whatever resets the chip before it is acknowledged.
+pub fn keep(found: Option<Fault>) {
+    if let Some(fault) = found {
+        leave(fault, 0);
+    }
+}
+
+/// The fault was acknowledged: this run is as any other.
+pub fn acknowledge() {
+    write(ALIVE, 0);
+}
+
 /// Leaves word that the reset which follows was ordered.
 pub fn leave_in_order() {
     write(TOLD, 0);
@@ -75,7 +76,7 @@ pub fn leave_in_order() {
 fn write(code: u32, tick: u32) {
     let record = Record { mark: MARK, code, tick, check: check(code, tick) };
     // SAFETY: see `Kept`.
-    unsafe { KEPT.0.get().cast::<Record>().write_volatile(record) }
+    cortex_m::interrupt::free(|_| unsafe { KEPT.0.get().cast::<Record>().write_volatile(record) });
 }
 
 fn check(code: u32, tick: u32) -> u32 {

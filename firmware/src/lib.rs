@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | `blocks` | the tick of each kind of spring under each controller, to be counted (feature `fast`) |
 //! | [`board`] | what a board must be able to do |
+//! | [`cause`] | why the chip was reset |
 //! | [`control`] | one control tick: supervisor, model, supervisor |
 //! | [`pace`] | when the next tick is due, and how many were missed |
 //! | [`post`] | between the host's task and the tick: an order made before a fault never acknowledges it |
@@ -33,6 +34,7 @@ extern crate std;
 #[cfg(feature = "fast")]
 pub mod blocks;
 pub mod board;
+pub mod cause;
 pub mod control;
 pub mod digest;
 pub mod pace;

@@ -112,6 +112,9 @@ impl Report {
         if let (Some(fault), false) = (fault, self.fault) {
             queue(Event::Fault(fault, number));
         }
+        if self.fault && fault.is_none() {
+            last_words::acknowledge();
+        }
         self.fault = fault.is_some();
         let limits = supervisor.limits(&tick.output);
         if limits != self.limits {

@@ -127,6 +127,6 @@ fn a_whole_frame() {
 
 #[test]
 fn fault_codes() {
-    let names = (0..=8).map(|code| Fault(code).name()).collect::<Vec<_>>().join(" ");
-    assert_eq!(names, "none panic hard-fault overrun interlock watchdog monitor config unknown");
+    let names = (0..=9).map(|code| Fault(code).name()).collect::<Vec<_>>().join(" ");
+    assert_eq!(names, "none panic hard-fault overrun interlock watchdog monitor config supply unknown");
 }

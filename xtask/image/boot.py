@@ -10,9 +10,8 @@ import sys
 
 from unicorn.arm_const import UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
 
-from board import FLASH, RAM, Board
+from board import FLASH, POWER_ON, RAM, Board
 
-POWER_ON = 1 << 27 | 1 << 26
 MISHAP_TICK = 300
 STORE = [FLASH + 0x7F000 + page * 0x800 for page in range(2)]  # The first word of each page, torn by a power cut.
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
@@ -41,6 +40,11 @@ def broken(code):
 def rotten(board):
     """A word of code or constants has two wrong bits."""
     board.two_wrong_bits()
+
+
+def dip(board):
+    """The supply dips, for too short a time to clear the memory."""
+    board.dipped = True
 
 
 def opened(board):
@@ -113,6 +117,7 @@ if __name__ == "__main__":
         "hard fault": play(HOST, broken(UNDEFINED), 400_000),
         "two wrong bits": play(HOST, rotten, 400_000),
         "torn": play([], None, 200_000, STORE),
+        "dip": play(HOST, dip, 400_000),
         "interlock": play(HOST, opened, 450_000),
         "no voltage": play(HOST, shorted, 450_000),
         "other amplifier": play(HOST, mistaken, 450_000) if FULL_SCALE < 1000 else None,

@@ -89,7 +89,10 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     ensure!(flash.address == 0x0800_0000, "the image begins at {:#x}", flash.address);
     let size = size::measure(variant, &[], Board::Nucleo)?;
     size.check()?;
-    println!("size: {size}; no way into a panic from the control tick ({} functions), no float in it, no heap", audit::run(&bytes)?);
+    println!(
+        "size: {size}; no way into a panic from the control tick ({} functions), no float in it, no heap",
+        audit::run(&bytes)?
+    );
     let bin = elf.with_extension("boot.bin");
     fs::write(&bin, &flash.bytes).with_context(|| format!("cannot write {}", bin.display()))?;
 
@@ -133,6 +136,7 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         println!("{name}: {}", faulted(&events(name)?, &bytes, within_us, fault).context(name)?);
     }
     println!("torn store: {}", torn(&events("torn")?, &bytes).context("torn")?);
+    println!("dip of the supply: {}", dipped(&events("dip")?, &bytes).context("dip")?);
     println!("hang with interrupts off: {}", deaf(&events("deaf")?, &bytes).context("deaf")?);
     println!("{CANNOT_SHOW}");
     Ok(())
@@ -208,6 +212,14 @@ fn faulted(events: &Events, image: &[u8], within_us: f64, fault: &str) -> Result
 fn torn(events: &Events, image: &[u8]) -> Result<String> {
     let boot = reborn_safe(events, image, "reset=power-on last_fault=0")?;
     Ok(format!("words with two wrong bits are forgiven there alone; `{boot}`"))
+}
+
+/// The reset takes the voltage; what the memory still holds says that it was none of switching on.
+fn dipped(events: &Events, image: &[u8]) -> Result<String> {
+    let (_, after) = mishap(events)?;
+    let (_, reborn) = after.split("reset")?;
+    let boot = reborn_safe(&reborn, image, "reset=brown-out last_fault=8")?;
+    Ok(format!("no voltage until it is acknowledged; `{boot}`"))
 }
 
 /// Only the watchdog ends it.

@@ -29,7 +29,8 @@ pub mod watchdog;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::board::Board;
-use crate::last_words::{self, Legacy};
+use crate::cause::Legacy;
+use crate::last_words;
 use model::supervisor::Fault;
 
 pub use dac::kill;
@@ -71,11 +72,13 @@ impl Board for Mps2 {
 
 /// Why the chip was reset, and the fault that caused it. The emulator has no register for it, only the last words tell.
 pub fn reset_cause() -> (&'static str, Option<Fault>) {
-    match last_words::take() {
+    let (name, fault) = match last_words::take() {
         Legacy::None => ("power-on", None),
         Legacy::Told => ("software", None),
         Legacy::Silent => ("watchdog", Some(Fault::Watchdog)),
         Legacy::Stopped(Fault::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
         Legacy::Stopped(fault, _) => ("software", Some(fault)),
-    }
+    };
+    last_words::keep(fault);
+    (name, fault)
 }

@@ -3,26 +3,26 @@
 use embassy_stm32::pac::RCC;
 use model::supervisor::Fault;
 
-use crate::last_words::{self, Legacy};
+use crate::cause::{Reset, cause};
+use crate::last_words;
 
 /// The cause's name, and the fault behind it. Clears the flags: once, at boot.
 pub fn reset_cause() -> (&'static str, Option<Fault>) {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
-    let fault = match last_words::take() {
-        Legacy::Stopped(fault, _) => Some(fault),
-        Legacy::None | Legacy::Silent | Legacy::Told => None,
-    };
     // A brown-out sets the pin's flag as well, and so does every other reset: the most telling one first.
-    if flags.borrstf() {
-        ("power-on", None)
+    let reset = if flags.borrstf() {
+        Reset::Supply
     } else if flags.iwdgrstf() {
-        ("watchdog", Some(fault.unwrap_or(Fault::Watchdog)))
+        Reset::Watchdog
     } else if flags.sftrstf() {
-        ("software", fault)
+        Reset::Software
     } else if flags.pinrstf() {
-        ("pin", None)
+        Reset::Pin
     } else {
-        ("other", fault)
-    }
+        Reset::Other
+    };
+    let (name, fault) = cause(reset, last_words::take());
+    last_words::keep(fault);
+    (name, fault)
 }

@@ -18,11 +18,21 @@ pub enum Fault {
     Monitor = 6,
     /// The settings were refused.
     Config = 7,
+    /// The supply dipped and reset the chip.
+    Supply = 8,
 }
 
 impl Fault {
-    pub(super) const ALL: [Self; 7] =
-        [Self::Panic, Self::HardFault, Self::Overrun, Self::Interlock, Self::Watchdog, Self::Monitor, Self::Config];
+    pub(super) const ALL: [Self; 8] = [
+        Self::Panic,
+        Self::HardFault,
+        Self::Overrun,
+        Self::Interlock,
+        Self::Watchdog,
+        Self::Monitor,
+        Self::Config,
+        Self::Supply,
+    ];
 
     /// Stable number, 1 to 255; zero stands for no fault.
     pub const fn code(self) -> u8 {
@@ -39,6 +49,7 @@ impl Fault {
             Self::Watchdog => "watchdog",
             Self::Monitor => "monitor",
             Self::Config => "config",
+            Self::Supply => "supply",
         }
     }
 
@@ -57,7 +68,7 @@ mod tests {
         for fault in Fault::ALL {
             assert_eq!(Fault::from_code(fault.code()), Some(fault));
         }
-        assert_eq!((Fault::from_code(0), Fault::from_code(8)), (None, None));
-        assert_eq!(Fault::ALL.map(Fault::code), [1, 2, 3, 4, 5, 6, 7], "these numbers are a promise");
+        assert_eq!((Fault::from_code(0), Fault::from_code(9)), (None, None));
+        assert_eq!(Fault::ALL.map(Fault::code), [1, 2, 3, 4, 5, 6, 7, 8], "these numbers are a promise");
     }
 }
