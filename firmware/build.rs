@@ -11,12 +11,11 @@ fn main() {
     let flash = match (has("CARGO_FEATURE_NUCLEO_G474RE"), has("CARGO_FEATURE_MPS2_AN386")) {
         (false, false) => return,
         (true, true) => panic!("one board at a time: nucleo-g474re or mps2-an386"),
-        // Both banks in one piece. Dual-bank is how the chip is delivered (option bit DBANK = 1).
+        // The first of two banks, as the chip is delivered (option bit DBANK = 1); in the second are the store's pages.
         (true, false) => "0x08000000",
         (false, true) => "0x00000000",
     };
-    // The last two pages of 512 KB are the store's.
-    fs::write(out.join("flash.x"), format!("MEMORY {{ FLASH : ORIGIN = {flash}, LENGTH = 508K }}\n")).unwrap();
+    fs::write(out.join("flash.x"), format!("MEMORY {{ FLASH : ORIGIN = {flash}, LENGTH = 256K }}\n")).unwrap();
     // link.x includes the work tree's memory.x by its bare name.
     let memory = package.join("../memory.x");
     fs::copy(&memory, out.join("memory.x")).unwrap_or_else(|e| panic!("cannot copy {}: {e}", memory.display()));

@@ -1,5 +1,5 @@
-//! The last two pages of the chip's flash, for the store. They lie in its second bank: the program goes on in the first
-//! while one of them is erased (22 ms) or written.
+//! The last two pages of the chip's flash, for the store. They lie in its second bank: the program goes on in the first,
+//! which is all that the linker gives it, while one of them is erased (22 ms) or written.
 //!
 //! A word that a power cut tore may have more wrong bits than the flash's code corrects. Reading it raises an interrupt
 //! that nothing masks; what it reads then is noise, and the store's checksum says so. Anywhere else such a word is code or
@@ -20,7 +20,7 @@ use crate::store::{PAGE, Pages, Side, WORD, Worn};
 
 /// Where the flash begins.
 const BASE: u32 = 0x0800_0000;
-/// Of the first of the two pages, from there; the linker's FLASH ends here.
+/// Of the first of the two pages, from there.
 const OFFSET: u32 = (512 << 10) - 2 * PAGE as u32;
 
 /// The pages are being looked through. Nothing else goes on below the tasks meanwhile, and no voltage may leave: before the
