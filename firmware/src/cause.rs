@@ -14,8 +14,8 @@ pub enum Legacy {
     Silent,
     /// It was told to.
     Told,
-    /// It stopped itself at this tick, or nobody has acknowledged yet that an earlier one did.
-    Stopped(Fault, u32),
+    /// A fault of this tick, or of an earlier run, that nobody had acknowledged.
+    Faulted(Fault, u32),
 }
 
 /// What the chip says.
@@ -36,7 +36,7 @@ pub enum Reset {
 /// The cause's name, and the fault behind it.
 pub fn cause(reset: Reset, legacy: Legacy) -> (&'static str, Option<Fault>) {
     let left = match legacy {
-        Legacy::Stopped(fault, _) => Some(fault),
+        Legacy::Faulted(fault, _) => Some(fault),
         Legacy::None | Legacy::Silent | Legacy::Told => None,
     };
     match (reset, legacy) {
@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn a_fault_outlives_every_reset_and_a_dip_of_the_supply_is_one() {
-        let panic = Legacy::Stopped(Fault::Panic, 7);
+        let panic = Legacy::Faulted(Fault::Panic, 7);
         for (reset, legacy, name, fault) in [
             (Reset::Supply, Legacy::None, "power-on", None),
             (Reset::Supply, Legacy::Silent, "brown-out", Some(Fault::Supply)),

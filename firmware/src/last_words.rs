@@ -45,7 +45,7 @@ pub fn take() -> Legacy {
         return Legacy::None;
     }
     match u8::try_from(record.code).ok().and_then(Fault::from_code) {
-        Some(fault) => Legacy::Stopped(fault, record.tick),
+        Some(fault) => Legacy::Faulted(fault, record.tick),
         None if record.code == TOLD => Legacy::Told,
         None => Legacy::Silent,
     }

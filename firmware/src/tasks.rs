@@ -69,10 +69,6 @@ pub async fn control<B: Board>(
             board.feed_watchdog();
         } else {
             absent = absent.saturating_add(1);
-            if absent == ROLL_CALL_TICKS + 1 {
-                // The reset that follows will not be able to say why.
-                last_words::leave(Fault::Watchdog, ticks);
-            }
         }
     }
     hang_guard::rest();
@@ -109,11 +105,13 @@ impl Report {
             State::Faulted(fault) => Some(fault),
             State::Disarmed | State::Armed => None,
         };
-        if let (Some(fault), false) = (fault, self.fault) {
-            queue(Event::Fault(fault, number));
-        }
-        if self.fault && fault.is_none() {
-            last_words::acknowledge();
+        match (fault, self.fault) {
+            (Some(fault), false) => {
+                queue(Event::Fault(fault, number));
+                last_words::leave(fault, number);
+            }
+            (None, true) => last_words::acknowledge(),
+            _ => {}
         }
         self.fault = fault.is_some();
         let limits = supervisor.limits(&tick.output);

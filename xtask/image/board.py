@@ -16,7 +16,7 @@ from peripherals import SysTick, Timer, Uart
 
 HZ = 170_000_000
 FLASH, RAM, RAM_SIZE = 0x0800_0000, 0x2000_0000, 128 * 1024
-POWER_ON = 1 << 27 | 1 << 26  # Flags of RCC_CSR.
+POWER_ON, BUTTON = 1 << 27 | 1 << 26, 1 << 26  # Flags of RCC_CSR.
 IDLE = 0x100  # Priority of a core without an active exception: below every other.
 HARD_FAULT = 3
 FRAME = (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR)
@@ -80,7 +80,8 @@ class Board:
         self.candidate = None
         self.watchdog = None
         self.outside, self.output, self.read_to = None, None, 0
-        self.wants_reset = self.sleeping = self.dipped = False
+        self.wants_reset = self.sleeping = False
+        self.cut = None
         self.fault = None
         self.note("reset", cause)
         self._look_outside()
@@ -119,8 +120,8 @@ class Board:
                 return 1 << 28 | 1 << 26
             if self.watchdog is not None and self.now >= self.watchdog:
                 return 1 << 29 | 1 << 26
-            if self.dipped:
-                return POWER_ON
+            if self.cut and self.now >= self.cut[0]:
+                return self.cut[1]
             if self.trapped:
                 self.trapped, self.sprung = False, True
                 self.traps[self.pc](self)

@@ -10,7 +10,7 @@ import sys
 
 from unicorn.arm_const import UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
 
-from board import FLASH, POWER_ON, RAM, Board
+from board import BUTTON, FLASH, HZ, POWER_ON, RAM, Board
 
 MISHAP_TICK = 300
 STORE = [FLASH + 0x7F000 + page * 0x800 for page in range(2)]  # The first word of each page, torn by a power cut.
@@ -44,7 +44,13 @@ def rotten(board):
 
 def dip(board):
     """The supply dips, for too short a time to clear the memory."""
-    board.dipped = True
+    board.cut = board.now, POWER_ON
+
+
+def pressed(board):
+    """Somebody answers a fault with the reset button."""
+    opened(board)
+    board.cut = board.now + 20 * HZ // 1000, BUTTON
 
 
 def opened(board):
@@ -118,6 +124,7 @@ if __name__ == "__main__":
         "two wrong bits": play(HOST, rotten, 400_000),
         "torn": play([], None, 200_000, STORE),
         "dip": play(HOST, dip, 400_000),
+        "button": play(HOST, pressed, 400_000),
         "interlock": play(HOST, opened, 450_000),
         "no voltage": play(HOST, shorted, 450_000),
         "other amplifier": play(HOST, mistaken, 450_000) if FULL_SCALE < 1000 else None,

@@ -136,7 +136,9 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         println!("{name}: {}", faulted(&events(name)?, &bytes, within_us, fault).context(name)?);
     }
     println!("torn store: {}", torn(&events("torn")?, &bytes).context("torn")?);
-    println!("dip of the supply: {}", dipped(&events("dip")?, &bytes).context("dip")?);
+    for (name, cause) in [("dip", "reset=brown-out last_fault=8"), ("button", "reset=pin last_fault=4")] {
+        println!("{name}: {}", cut(&events(name)?, &bytes, cause).context(name)?);
+    }
     println!("hang with interrupts off: {}", deaf(&events("deaf")?, &bytes).context("deaf")?);
     println!("{CANNOT_SHOW}");
     Ok(())
@@ -214,12 +216,11 @@ fn torn(events: &Events, image: &[u8]) -> Result<String> {
     Ok(format!("words with two wrong bits are forgiven there alone; `{boot}`"))
 }
 
-/// The reset takes the voltage; what the memory still holds says that it was none of switching on.
-fn dipped(events: &Events, image: &[u8]) -> Result<String> {
+/// A reset from outside takes no fault away: a dip of the supply is one, and one that was there is still to be acknowledged.
+fn cut(events: &Events, image: &[u8], cause: &str) -> Result<String> {
     let (_, after) = mishap(events)?;
     let (_, reborn) = after.split("reset")?;
-    let boot = reborn_safe(&reborn, image, "reset=brown-out last_fault=8")?;
-    Ok(format!("no voltage until it is acknowledged; `{boot}`"))
+    Ok(format!("no voltage until it is acknowledged; `{}`", reborn_safe(&reborn, image, cause)?))
 }
 
 /// Only the watchdog ends it.

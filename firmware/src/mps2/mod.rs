@@ -76,8 +76,8 @@ pub fn reset_cause() -> (&'static str, Option<Fault>) {
         Legacy::None => ("power-on", None),
         Legacy::Told => ("software", None),
         Legacy::Silent => ("watchdog", Some(Fault::Watchdog)),
-        Legacy::Stopped(Fault::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
-        Legacy::Stopped(fault, _) => ("software", Some(fault)),
+        Legacy::Faulted(Fault::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
+        Legacy::Faulted(fault, _) => ("software", Some(fault)),
     };
     last_words::keep(fault);
     (name, fault)
