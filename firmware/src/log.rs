@@ -1,7 +1,8 @@
 //! Every log line, in one place: `vsj log` reads them by these very formats. Times in us since boot.
 //!
 //! The control task does not log, because a logger takes its time. It puts [`Event`]s into a queue and goes on; housekeeping
-//! logs them. On the real board a logger never waits for a reader: what nobody reads in time is overwritten. Panics and hard faults log directly, after the voltage is gone.
+//! logs them. On the real board a logger never waits for a reader: what nobody reads in time is overwritten. Panics and hard
+//! faults log directly, after the voltage is gone.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

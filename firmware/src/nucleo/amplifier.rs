@@ -45,7 +45,7 @@ impl Amplifier {
     ) -> Self {
         let enable = Output::new(enable, Level::Low, Speed::Low);
         let mut dac = DacChannel::new_blocking(dac, output);
-        // Behind the chip's buffer the first and the last 0.2 V would not come out: zero would be up to 6 % of the full scale.
+        // Behind the chip's buffer the first and the last 0.2 V would not come out: zero could be 6 % of the full scale.
         dac.set_mode(Mode::NormalExternalUnbuffered);
         dac.set(Value::Bit12Right(0));
         dac.enable();

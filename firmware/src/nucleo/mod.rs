@@ -9,8 +9,8 @@
 //! | PA5 | LED, on while voltages may leave |
 //! | PA2, PA3 | LPUART1, the host's line, 115 200 bit/s: the debugger's USB port |
 //!
-//! The DAC's buffer ends 0.2 V before either supply, so it is off, and nothing but its own resistance drives PA4. An amplifier
-//! whose input takes current needs a follower at PA4: 1.5 MOhm cost 1 % of the voltage, 60 MOhm one code.
+//! The DAC's buffer ends 0.2 V before either supply, so it is off, and nothing but its own resistance drives PA4. An
+//! amplifier whose input takes current needs a follower at PA4: 1.5 MOhm cost 1 % of the voltage, 60 MOhm one code.
 //!
 //! | module | what it is |
 //! | --- | --- |
