@@ -45,6 +45,7 @@ pub mod leftover;
 pub mod model;
 pub mod noise;
 pub mod observed;
+mod periodogram;
 mod quality;
 mod reading_findings;
 pub mod relaxation;

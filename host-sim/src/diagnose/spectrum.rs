@@ -2,10 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
-
 use super::data::Data;
+use super::periodogram;
 use super::sums::dot;
 
 /// A line in the spectrum: `cosine cos(2 pi f t) + sine sin(2 pi f t)`, t from the first reading.
@@ -29,15 +27,12 @@ const ROWS: usize = 16;
 /// Neighbours of a line to each side, in widths of a line.
 const NEIGHBOURS: usize = 16;
 
-/// Power in bins, and how many of them a line is wide. Finer than the record's own resolution, so that a line between two
-/// bins is not missed.
+/// Power in bins, and how many of them a line is wide.
 fn powers(residual: &[f64], data: &Data) -> (Vec<f64>, usize) {
-    let rows = residual.len();
-    let length = (2 * rows).next_power_of_two();
-    let mut buffer: Vec<Complex<f64>> = on_a_grid(residual, data);
-    buffer.resize(length, Complex::default());
-    FftPlanner::new().plan_fft_forward(length).process(&mut buffer);
-    (buffer[..length / 2].iter().map(Complex::norm_sqr).collect(), length / rows)
+    let mut power = periodogram::powers(&on_a_grid(residual, data));
+    power.pop();
+    let width = 2 * power.len() / residual.len();
+    (power, width)
 }
 
 /// A line beside its neighbours.
@@ -95,13 +90,13 @@ pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
 }
 
 /// Readings by index where rows are regular, else each at the grid's nearest moment.
-fn on_a_grid(residual: &[f64], data: &Data) -> Vec<Complex<f64>> {
+fn on_a_grid(residual: &[f64], data: &Data) -> Vec<f64> {
     let start = data.time_s.first().copied().unwrap_or(0.0);
-    let mut grid = vec![Complex::default(); residual.len()];
+    let mut grid = vec![0.0; residual.len()];
     for (value, time) in residual.iter().zip(&data.time_s) {
         let at = ((time - start) / data.sample_s).round() as usize;
         if let Some(cell) = grid.get_mut(at) {
-            cell.re = *value;
+            *cell = *value;
         }
     }
     grid

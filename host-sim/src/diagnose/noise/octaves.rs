@@ -6,8 +6,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use crate::diagnose::periodogram::powers;
 
 /// Width of a band beside its frequency.
 const RELATIVE: f64 = 0.02;
@@ -22,18 +21,15 @@ pub(super) struct Octaves {
 impl Octaves {
     /// Of some values, and independent noise of this variance beside them; their mean counts as the lowest frequency.
     pub(super) fn of(values: &[f64], variance: f64) -> Self {
-        // Twice as long, so that the end does not meet the start.
-        let length = (2 * values.len()).next_power_of_two();
-        let mut buffer: Vec<Complex<f64>> = values.iter().map(|&value| Complex::new(value, 0.0)).collect();
-        buffer.resize(length, Complex::default());
-        FftPlanner::new().plan_fft_forward(length).process(&mut buffer);
+        let powers = powers(values);
+        let length = 2 * (powers.len() - 1);
         let line = TAU / length as f64;
         let mut bands: Vec<(f64, f64)> = Vec::new();
         let mut end = 0.0;
         // Sums of power, and of power times frequency.
-        for (index, value) in buffer[..=length / 2].iter().enumerate() {
+        for (index, of_values) in powers.into_iter().enumerate() {
             let sides = if index == 0 || 2 * index == length { 1.0 } else { 2.0 };
-            let power = sides * (value.norm_sqr() / values.len() as f64 + variance) / length as f64;
+            let power = sides * (of_values / values.len() as f64 + variance) / length as f64;
             let frequency = line * (index as f64).max(0.5);
             match bands.last_mut() {
                 Some(band) if frequency < end => *band = (band.0 + power * frequency, band.1 + power),
