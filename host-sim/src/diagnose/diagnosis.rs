@@ -5,7 +5,7 @@ use super::cure;
 use super::data::Data;
 use super::finding::{explained, finding};
 use super::fit::{Engine, Fit};
-use super::informative::{Silent, silent};
+use super::informative::{Silent, no_spring, silent};
 use super::leftover::{self, Leftover};
 use super::model::Model;
 use super::noise::{FINEST_V, scale_of_squares};
@@ -48,7 +48,7 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// True if readings that stopped at a bound did so because the spring goes beyond it, where a lattice lets them seem to.
     pub(super) fn believes_its_bounds(&self) -> bool {
-        let Some(step) = self.observed.step else { return true };
+        let step = self.observed.step.unwrap_or(FINEST_V);
         let beyond = |kind: Kind, sign: f64| {
             let rows = self.observed.kinds.iter().zip(&self.extended.residual).filter(|(of, _)| **of == kind);
             let beyond: Vec<f64> = rows.map(|(_, left)| -sign * left).collect();
@@ -80,6 +80,9 @@ pub(super) fn diagnose(
     let [before, after] = [&baseline, &best.fit].map(|fit| scale_of_squares(&observed.errors(&fit.residual)));
     if after > WORSE * before {
         best = search.root();
+    }
+    if let Some(silent) = no_spring(search.judge(), &baseline, &best) {
+        return unsearched(data, observed, engine, baseline, &silent);
     }
     let mut alternatives = rivals(&search, &best);
     let mut weights = Vec::new();

@@ -1,5 +1,7 @@
 //! Whether a record can tell anything of the spring, and what to do if not.
 
+use model::Plant;
+
 use super::data::Data;
 use super::effects::index_of;
 use super::fit::{Engine, Fit};
@@ -7,14 +9,18 @@ use super::interval::covariance;
 use super::model::{Block, Model};
 use super::noise::Noise;
 use super::report::Verdict;
+use super::search::Scored;
+use super::standstill;
 use super::sums::dot;
 
 /// A stair moves the simulation at least so far, in V: readings that stay where they are then are no spring's.
 const FAR_V: f64 = 5.0;
 /// Correlation with the simulation from which on readings are the same on another scale.
 const ALIKE: f64 = 0.98;
-/// Correlation below which readings have nothing to do with the voltage.
+/// Correlation below which readings may have nothing to do with the voltage.
 const STRANGE: f64 = 0.2;
+/// Gain and time constant that are likelier than the simulation's by so many nats are no chance.
+const CLEAR: f64 = 20.0;
 
 /// Why no cause is looked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,26 +76,37 @@ pub(super) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
     }
     let block = |cause| Block { effect: index_of(cause).expect("an effect"), form: 0 };
     let (gain, time_constant) = (block("gain-error"), block("time-constant"));
-    let probe =
-        Model::default().with(gain, vec![1.0]).with(time_constant, vec![engine.simulator.base.relaxation.tau_s.ln()]);
-    let best = engine.fit(probe.clone(), &Noise::first_look());
+    let probe = |tau_s: f64| Model::default().with(gain, vec![1.0]).with(time_constant, vec![tau_s.ln()]);
+    // A simulation may be so far off that no way leads from there.
+    let start = probe(engine.simulator.base.relaxation.tau_s);
+    let [here, paper] =
+        [&start, &probe(Plant::PAPER.time_constant_s)].map(|model| engine.fit(model.clone(), &Noise::first_look()));
+    let best = if paper.log_likelihood > here.log_likelihood { paper } else { here };
     let bounds = &gain.coordinates(data)[0];
-    let found = best.model.blocks.iter().find(|(block, _)| *block == gain).map_or(1.0, |(_, point)| point[0]);
-    if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found) {
-        if beside.correlation.abs() > ALIKE {
-            return Some(Silent::Sensor(beside.scaled()));
-        }
-        if beside.correlation.abs() < STRANGE {
-            return Some(Silent::Sensor(beside.still()));
-        }
+    let found = best.model.point(gain.effect).map_or(1.0, |point| point[0]);
+    if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found) && beside.correlation.abs() > ALIKE {
+        return Some(Silent::Sensor(beside.scaled()));
     }
-    // The noise as it is at best, the information as it is where the search starts.
-    let residual = engine.residual(&probe);
-    let start = Fit { model: probe, residual, noise: best.noise, ..best };
     // Half of the gain, or a factor of e in the time constant, is no knowledge.
-    let known = covariance(engine, &start)
-        .is_some_and(|covariance| covariance[(0, 0)].sqrt() < 0.5 && covariance[(1, 1)].sqrt() < 1.0);
-    (!known).then_some(Silent::Excitation)
+    let known = |fit: &Fit, engine: &mut Engine| {
+        covariance(engine, fit).is_some_and(|of| of[(0, 0)].sqrt() < 0.5 && of[(1, 1)].sqrt() < 1.0)
+    };
+    // The noise as it is at best, the information as it is where the search starts; of a start far off there is none.
+    let residual = engine.residual(&start);
+    let start = Fit { model: start, residual, noise: best.noise.clone(), ..best.clone() };
+    let found = best.log_likelihood > baseline.log_likelihood + CLEAR;
+    if !known(&start, engine) && !(found && known(&best, engine)) {
+        return Some(Silent::Excitation);
+    }
+    // Quick to tell, and a search for causes in noise alone is long.
+    let still = beside.correlation.abs() < STRANGE && standstill::as_likely(engine, &best.model, best.log_likelihood);
+    still.then(|| Silent::Sensor(beside.still()))
+}
+
+/// Of a spring that was found, if one that stands still is as likely.
+pub(super) fn no_spring(engine: &mut Engine, baseline: &Fit, found: &Scored) -> Option<Silent> {
+    let still = !found.fit.model.blocks.is_empty() && standstill::as_likely(engine, &found.fit.model, found.score);
+    still.then(|| Silent::Sensor(Beside::of(engine.data, baseline).still()))
 }
 
 /// Readings beside the simulation: the range of both, and how one goes with the other.

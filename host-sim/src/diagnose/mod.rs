@@ -15,7 +15,7 @@
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
 //! | [`leftover`], [`swallowed`], [`spikes`], [`spectrum`] | what no effect explains |
-//! | `informative`, `alternatives` | whether a record can tell anything; what it leaves open |
+//! | `informative`, `standstill`, `alternatives` | whether a record can tell anything, and of a spring; what it leaves open |
 //! | `finding`, `reading_findings`, `interval`, `quality` | a cause and what it is worth; parameters with intervals; errors |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
 
@@ -55,6 +55,7 @@ pub mod signal;
 pub mod spectrum;
 pub mod spikes;
 pub mod standing;
+mod standstill;
 mod start;
 mod sums;
 pub mod swallowed;

@@ -62,13 +62,13 @@ impl Observed {
         let continuous = ties <= counts.len() / 50 + 2;
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
             let (value, count) = *extreme?;
-            // A spring at rest reads zero again and again.
             let piled = count >= FEWEST_TIES && (continuous || count >= PILE * next.map_or(1, |next| next.1));
-            (piled && count < data.rows()).then_some(value)
+            // A spring at rest reads zero again and again.
+            (piled && count < data.rows() && value != 0.0).then_some(value)
         };
         let moves = data.reading.first() != data.reading.last() || counts.len() > 2;
         let upper = bound(counts.last(), counts.iter().rev().nth(1)).filter(|_| moves);
-        let lower = bound(counts.first(), counts.get(1)).filter(|&value| moves && value != 0.0);
+        let lower = bound(counts.first(), counts.get(1)).filter(|_| moves);
         let kinds = data.reading.iter().map(|&reading| {
             if upper.is_some_and(|bound| reading >= bound) {
                 Kind::AtLeast

@@ -1,11 +1,12 @@
-//! Spikes that keep time with the command.
+//! Spikes that are no outliers: they keep time with the command, or keep company.
 //!
-//! Outliers come at any time. A delay that varies, or commands that are taken late, leave spikes of a row or two just after
-//! changes of the voltage; noise of two scales holds them for outliers. By chance, of `n` far readings about `n p` lie just
-//! after a change, `p` being the part of all rows that do:
+//! Outliers come at any time, each for itself. A delay that varies, or commands that are taken late, leave spikes of a row or
+//! two just after changes of the voltage; a reading that is held for some rows leaves runs of spikes to one side. Noise of two
+//! scales holds both for outliers. By chance, of `n` far readings about `n p` lie just after a change, `p` being the part of
+//! all rows that do, and of neighbours that are both far as many are on one side as on both:
 //!
 //! ```text
-//! z = (count - n p) / sqrt(n p (1 - p))
+//! z = (count - n p) / sqrt(n p (1 - p)),      z = (alike - unlike) / sqrt(alike + unlike)
 //! ```
 
 use super::data::Data;
@@ -22,8 +23,10 @@ const CHANGE: f64 = 0.01;
 const AFTER: f64 = 4.0;
 /// Part of the far readings that must lie just after a change.
 const MOST: f64 = 0.5;
+/// Or must be beside one before them on the same side.
+const IN_RUNS: f64 = 0.2;
 
-/// What far readings tell, if they are just after changes of the voltage too often to be outliers.
+/// What far readings tell, if they are just after changes of the voltage, or in runs, too often to be outliers.
 pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
     fit.noise.wide?;
     let data = engine.data;
@@ -31,22 +34,39 @@ pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
     let white = fit.noise.innovations(&errors);
     let far = far_off(&fit.noise, &white);
     let after = after_changes(data, fit.model.chain(engine.simulator.base, data).delay_s);
-    let count = far.iter().zip(&after).filter(|(far, after)| **far && **after).count() as f64;
-    let of_rows = |rows: &[bool]| rows.iter().filter(|row| **row).count() as f64;
-    let (all, part) = (of_rows(&far), of_rows(&after) / after.len() as f64);
-    let surprise = (count - all * part) / (all * part * (1.0 - part)).sqrt();
-    if !(count > MOST * all && surprise > RARE) {
-        return None;
-    }
+    let count = in_time(&far, &after);
+    let place = match count {
+        Some(count) => format!("in {count} readings far off just after changes of the voltage"),
+        None => format!("in {} readings far off that come in runs to one side", in_runs(&far, &white)?),
+    };
     // Beside what the noise's memory does not foretell: that may have learnt to follow from the spike on.
     let of_far: f64 = white.iter().zip(&far).filter(|(_, far)| **far).map(|(white, _)| white * white).sum();
     Some(Leftover {
-        place: format!("in {count} readings far off just after changes of the voltage"),
+        place,
         share: of_far / dot(&white, &white),
         rms: (of_far / white.len() as f64).sqrt(),
         significant: true,
         doubtful: true,
     })
+}
+
+/// How many far rows are just after a change of the voltage, if that is no chance.
+fn in_time(far: &[bool], after: &[bool]) -> Option<usize> {
+    let of_rows = |rows: &[bool]| rows.iter().filter(|row| **row).count();
+    let count = far.iter().zip(after).filter(|(far, after)| **far && **after).count();
+    let (all, part) = (of_rows(far) as f64, of_rows(after) as f64 / after.len() as f64);
+    let surprise = (count as f64 - all * part) / (all * part * (1.0 - part)).sqrt();
+    (count as f64 > MOST * all && surprise > RARE).then_some(count)
+}
+
+/// How many far rows there are, if so many are beside another on the same side that it is no chance.
+fn in_runs(far: &[bool], white: &[f64]) -> Option<usize> {
+    let count = far.iter().filter(|far| **far).count();
+    let beside = (1..far.len()).filter(|&row| far[row] && far[row - 1]);
+    let (alike, unlike): (Vec<usize>, Vec<usize>) = beside.partition(|&row| white[row] * white[row - 1] > 0.0);
+    let (alike, unlike) = (alike.len() as f64, unlike.len() as f64);
+    let surprise = (alike - unlike) / (alike + unlike).sqrt();
+    (alike > IN_RUNS * count as f64 && surprise > RARE).then_some(count)
 }
 
 /// Rows whose readings are far off, by their innovations.
@@ -62,9 +82,9 @@ fn after_changes(data: &Data, delay_s: f64) -> Vec<bool> {
         if (data.voltage_v[row] - data.voltage_v[row - 1]).abs() <= CHANGE * data.full_scale_v {
             continue;
         }
+        // From the command on: a delay that the simulation has may be none of the spring's.
         let leaves = data.time_s[row] + delay_s;
-        let rows = first_from(leaves - data.sample_s).max(row)..first_from(leaves + AFTER * data.sample_s);
-        after[rows].fill(true);
+        after[row..first_from(leaves + AFTER * data.sample_s)].fill(true);
     }
     after
 }

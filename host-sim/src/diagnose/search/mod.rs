@@ -73,6 +73,11 @@ impl<'j, J: Judge> Search<'j, J> {
         Self { judge, seen: Seen::default(), extended: HashMap::new(), patient: true }
     }
 
+    /// Who is asked.
+    pub fn judge(&mut self) -> &mut J {
+        self.judge
+    }
+
     /// The best structure; `progress` hears of each structure that becomes the best.
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
         loop {
