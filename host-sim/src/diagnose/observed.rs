@@ -4,8 +4,10 @@
 //! readings that pile up exactly at the extreme stopped there. Both are seen in the readings themselves, before any model.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use super::data::Data;
+use super::growth;
 use super::noise::FINEST_V;
 
 /// One row's reading.
@@ -32,6 +34,8 @@ pub struct Observed {
     pub lower: Option<f64>,
     /// True if the step is coarse beside what readings scatter from row to row.
     pub coarse: bool,
+    /// One over each row's scale of noise, where that grows with the reading; their geometric mean is 1.
+    pub weights: Option<Arc<[f64]>>,
 }
 
 /// Fewest readings at an extreme that are a bound, on a continuous scale.
@@ -69,17 +73,23 @@ impl Observed {
         let moves = data.reading.first() != data.reading.last() || counts.len() > 2;
         let upper = bound(counts.last(), counts.iter().rev().nth(1)).filter(|_| moves);
         let lower = bound(counts.first(), counts.get(1)).filter(|_| moves);
-        let kinds = data.reading.iter().map(|&reading| {
-            if upper.is_some_and(|bound| reading >= bound) {
-                Kind::AtLeast
-            } else if lower.is_some_and(|bound| reading <= bound) {
-                Kind::AtMost
-            } else {
-                Kind::Exact
-            }
-        });
+        let kinds: Vec<Kind> = data
+            .reading
+            .iter()
+            .map(|&reading| {
+                if upper.is_some_and(|bound| reading >= bound) {
+                    Kind::AtLeast
+                } else if lower.is_some_and(|bound| reading <= bound) {
+                    Kind::AtMost
+                } else {
+                    Kind::Exact
+                }
+            })
+            .collect();
         let coarse = step.is_some_and(|step| step >= COARSE * scatter(&data.reading).max(FINEST_V));
-        Self { kinds: kinds.collect(), step, upper, lower, coarse }
+        // Steps of a lattice are even, whatever the noise.
+        let weights = if coarse { None } else { growth::weights(data, |row| kinds[row] == Kind::Exact) };
+        Self { kinds, step, upper, lower, coarse, weights }
     }
 
     /// The same where no bound is believed: a spring that settles at its highest voltage also reads the same for long.

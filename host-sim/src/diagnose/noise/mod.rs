@@ -1,14 +1,16 @@
 //! What the noise is, given what a model leaves: its memory, its scale, its tail.
 //!
 //! ```text
-//! memory(r) = e,      e ~ Student t of scale sigma and nu degrees of freedom (normal for nu = inf)
+//! memory(weight r) = e,      e ~ Student t of scale sigma and nu degrees of freedom (normal for nu = inf)
 //!                     or a mixture: a few readings with a much wider normal
 //! ```
 //!
 //! Without the autoregression, coloured noise passes for structure; without the heavy tail, a few readings do. Orders
-//! are chosen by Schwarz's criterion. Rounded and stopped readings have the probability of their cell.
+//! are chosen by Schwarz's criterion. Rounded and stopped readings have the probability of their cell. Weights are those of
+//! noise that grows with the reading (`growth`); for any other they are 1.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 pub mod memory;
 mod octaves;
@@ -41,6 +43,8 @@ pub struct Noise {
     pub cell: f64,
     /// Scale of the residual itself, in V.
     pub marginal: f64,
+    /// One over each row's scale, their geometric mean 1.
+    weights: Option<Arc<[f64]>>,
     /// What of a row's log-density its residual does not change.
     constant: f64,
 }
@@ -65,8 +69,16 @@ impl Noise {
     /// As [`Noise::first_look`], with the scale of a residual.
     pub fn robust(residual: &[f64]) -> Self {
         let sigma = scale(residual);
-        let noise =
-            Self { sigma, nu: 5.0, memory: Memory::default(), wide: None, cell: 0.0, marginal: sigma, constant: 0.0 };
+        let noise = Self {
+            sigma,
+            nu: 5.0,
+            memory: Memory::default(),
+            wide: None,
+            cell: 0.0,
+            marginal: sigma,
+            weights: None,
+            constant: 0.0,
+        };
         noise.with_tail(5.0, sigma)
     }
 
@@ -94,8 +106,11 @@ impl Noise {
         if negligible(residual) {
             return noise.with_tail(f64::INFINITY, FINEST_V);
         }
-        noise.memory = Memory::fitted(residual, noise.sigma);
-        let innovations = noise.memory.innovations(residual);
+        noise.weights.clone_from(&observed.weights);
+        let even = noise.weighted(residual);
+        let robust = if noise.weights.is_some() { scale(&exact(&even, observed)) } else { noise.sigma };
+        noise.memory = Memory::fitted(&even, robust);
+        let innovations = noise.memory.innovations(&even);
         noise.fit_tail(&exact(&innovations, observed));
         if noise.wide.is_none() {
             let white = noise.whitened(residual);
@@ -131,12 +146,20 @@ impl Noise {
 
     /// What the noise's memory does not foretell.
     pub fn whitened(&self, change: &[f64]) -> Vec<f64> {
-        self.memory.whitened(change)
+        self.memory.whitened(&self.weighted(change))
     }
 
     /// The same of a residual: its outliers foretell nothing.
     pub fn innovations(&self, residual: &[f64]) -> Vec<f64> {
-        if self.wide.is_some() { self.memory.innovations(residual) } else { self.whitened(residual) }
+        if self.wide.is_some() { self.memory.innovations(&self.weighted(residual)) } else { self.whitened(residual) }
+    }
+
+    /// As if the noise were even.
+    fn weighted<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
+        match &self.weights {
+            None => Cow::Borrowed(values),
+            Some(weights) => values.iter().zip(&**weights).map(|(value, weight)| value * weight).collect(),
+        }
     }
 
     /// The part of a row in a fit: `residual` as it is, `innovation` whitened.
@@ -273,7 +296,7 @@ mod tests {
     use super::*;
 
     fn as_read(rows: usize) -> Observed {
-        Observed { kinds: vec![Kind::Exact; rows], step: None, upper: None, lower: None, coarse: false }
+        Observed { kinds: vec![Kind::Exact; rows], step: None, upper: None, lower: None, coarse: false, weights: None }
     }
 
     #[test]
