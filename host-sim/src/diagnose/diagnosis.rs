@@ -48,7 +48,7 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// True if readings that stopped at a bound did so because the spring goes beyond it, where a lattice lets them seem to.
     pub(super) fn believes_its_bounds(&self) -> bool {
-        let step = self.observed.step.unwrap_or(FINEST_V);
+        let step = self.observed.lattice.map_or(FINEST_V, |lattice| lattice.step);
         let beyond = |kind: Kind, sign: f64| {
             let rows = self.observed.kinds.iter().zip(&self.extended.residual).filter(|(of, _)| **of == kind);
             let beyond: Vec<f64> = rows.map(|(_, left)| -sign * left).collect();

@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | [`base`] | the simulation that is judged |
 //! | [`chain`], [`bank`], [`law`], `knots`, [`leakage`] | command to stiffness: what a plant file says and effects change; runs and writes itself |
-//! | [`data`], [`observed`], `growth` | the record made ready; what its readings say before any model |
+//! | [`data`], [`observed`], [`lattice`], `growth` | the record made ready; what its readings say before any model |
 //! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
 //! | `start` | how far the spring has come where a record begins in mid-course |
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
@@ -40,6 +40,7 @@ pub mod held_out;
 mod informative;
 mod interval;
 mod knots;
+pub mod lattice;
 pub mod law;
 pub mod leakage;
 pub mod leftover;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::data::Data;
 use super::growth;
+use super::lattice::Lattice;
 use super::noise::FINEST_V;
 
 /// One row's reading.
@@ -26,8 +27,8 @@ pub enum Kind {
 pub struct Observed {
     /// Of each row.
     pub kinds: Vec<Kind>,
-    /// The step of the lattice that all readings lie on, in V, however fine.
-    pub step: Option<f64>,
+    /// The lattice that all readings lie on, however fine.
+    pub lattice: Option<Lattice>,
     /// The bounds at which readings stopped, in V.
     pub upper: Option<f64>,
     /// As [`Observed::upper`], below.
@@ -42,6 +43,8 @@ pub struct Observed {
 const FEWEST_TIES: usize = 3;
 /// A step coarser than this many of the noise's scales is a cell, a finer one is noise.
 pub const COARSE: f64 = 2.0;
+/// A reading so many of the noise's scales from a bound is not on its way there.
+const FAR: f64 = 30.0;
 /// On a lattice, readings at a bound are this many times as many as on the next step.
 const PILE: usize = 6;
 
@@ -58,17 +61,18 @@ impl Observed {
             }
         }
         let inner: Vec<f64> = counts.iter().map(|&(value, _)| value).collect();
-        let step = match inner.len() {
+        let lattice = match inner.len() {
             0..=5 => None,
-            many => lattice(&inner[1..many - 1]),
+            many => Lattice::of(&inner[1..many - 1]),
         };
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
+        let far = FAR * scatter(&data.reading).max(FINEST_V);
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
             let (value, count) = *extreme?;
             let piled = count >= FEWEST_TIES && (continuous || count >= PILE * next.map_or(1, |next| next.1));
             // A spring at rest reads zero again and again.
-            (piled && count < data.rows() && value != 0.0).then_some(value)
+            (piled && count < data.rows() && value != 0.0 && stays(&data.reading, value, far)).then_some(value)
         };
         let moves = data.reading.first() != data.reading.last() || counts.len() > 2;
         let upper = bound(counts.last(), counts.iter().rev().nth(1)).filter(|_| moves);
@@ -86,10 +90,10 @@ impl Observed {
                 }
             })
             .collect();
-        let coarse = step.is_some_and(|step| step >= COARSE * scatter(&data.reading).max(FINEST_V));
+        let coarse = lattice.is_some_and(|lattice| lattice.step >= COARSE * scatter(&data.reading).max(FINEST_V));
         // Steps of a lattice are even, whatever the noise.
         let weights = if coarse { None } else { growth::weights(data, |row| kinds[row] == Kind::Exact) };
-        Self { kinds, step, upper, lower, coarse, weights }
+        Self { kinds, lattice, upper, lower, coarse, weights }
     }
 
     /// The same where no bound is believed: a spring that settles at its highest voltage also reads the same for long.
@@ -116,6 +120,15 @@ impl Observed {
     }
 }
 
+/// True if readings come to a value and stay: of those that read it, half have another beside them, or one not far from it.
+/// Codes of readings that failed stand alone.
+fn stays(reading: &[f64], value: f64, far: f64) -> bool {
+    let near = |row: Option<&f64>| row.is_some_and(|other| (other - value).abs() <= far);
+    let rows = || (0..reading.len()).filter(|&row| reading[row] == value);
+    let staying = rows().filter(|&row| near(reading.get(row + 1)) || near(reading.get(row.wrapping_sub(1)))).count();
+    2 * staying >= rows().count()
+}
+
 /// Scale of independent noise on readings, from their second differences: a slow signal has none.
 fn scatter(reading: &[f64]) -> f64 {
     let mut bends: Vec<f64> =
@@ -125,37 +138,4 @@ fn scatter(reading: &[f64]) -> f64 {
     }
     let middle = bends.len() / 2;
     *bends.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
-}
-
-/// The largest step of which all differences between values are multiples.
-fn lattice(values: &[f64]) -> Option<f64> {
-    let span = values.last()? - values.first()?;
-    let tolerance = 1e-7 * span.max(1e-9);
-    let mut step = span;
-    for pair in values.windows(2) {
-        // Euclid's algorithm.
-        let (mut a, mut b) = (step, pair[1] - pair[0]);
-        while b > tolerance {
-            (a, b) = (b, a - b * (a / b + 1e-4).floor());
-            b = b.max(0.0);
-        }
-        step = a;
-        if step < 20.0 * tolerance {
-            return None;
-        }
-    }
-    (step < span).then_some(step)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_lattice_is_found_through_its_gaps() {
-        let values: Vec<f64> = [0, 2, 5, 6, 11, 12, 20].iter().map(|&k| 3.7 + 2.5 * f64::from(k)).collect();
-        assert!((lattice(&values).unwrap() - 2.5).abs() < 1e-9);
-        let values: Vec<f64> = (1..200).map(|k| f64::from(k).sqrt()).collect();
-        assert_eq!(lattice(&values), None);
-    }
 }

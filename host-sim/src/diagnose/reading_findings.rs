@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::data::Data;
 use super::fit::Fit;
+use super::lattice::Lattice;
 use super::noise::{FINEST_V, scale_of_squares};
 use super::observed::Observed;
 use super::quality::Z;
@@ -22,7 +23,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
     let single = |name: &str, value: f64, low: f64, high: f64, unit| {
         BTreeMap::from([(name.to_owned(), Parameter { value, low, high, unit })])
     };
-    if let Some(step) = observed.step
+    if let Some(Lattice { step, low, high }) = observed.lattice
         && step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V)
     {
         let grid = data.reading[0];
@@ -35,7 +36,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
         findings.push(Finding {
             cause: "quantisation",
             probability: 1.0,
-            parameters: single("step", step, step * (1.0 - 1e-6), step * (1.0 + 1e-6), "V"),
+            parameters: single("step", step, low, high, "V"),
             rmse_before: raw,
             rmse_after: scale_of_squares(&after).min(raw),
             evidence: format!(

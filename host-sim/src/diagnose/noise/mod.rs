@@ -19,6 +19,7 @@ mod tail;
 
 pub use memory::Memory;
 
+use super::lattice::Lattice;
 use super::observed::{COARSE, Kind, Observed};
 use super::sums::dot;
 use reading::{in_cell, stopped};
@@ -93,7 +94,7 @@ impl Noise {
     pub fn fitted(residual: &[f64], observed: &Observed) -> Self {
         let residual = &*observed.errors(residual);
         let mut noise = Self::robust(&exact(residual, observed));
-        if let Some(step) = observed.step
+        if let Some(Lattice { step, .. }) = observed.lattice
             && (observed.coarse || step >= COARSE * rest_of(scale_of_squares(residual), step).max(FINEST_V))
         {
             noise.cell = step / 2.0;
@@ -296,7 +297,14 @@ mod tests {
     use super::*;
 
     fn as_read(rows: usize) -> Observed {
-        Observed { kinds: vec![Kind::Exact; rows], step: None, upper: None, lower: None, coarse: false, weights: None }
+        Observed {
+            kinds: vec![Kind::Exact; rows],
+            lattice: None,
+            upper: None,
+            lower: None,
+            coarse: false,
+            weights: None,
+        }
     }
 
     #[test]
@@ -337,7 +345,10 @@ mod tests {
                 ((truth + noise) / step).round() * step - truth
             })
             .collect();
-        let noise = Noise::fitted(&off, &Observed { step: Some(step), coarse: true, ..as_read(3000) });
+        let noise = Noise::fitted(
+            &off,
+            &Observed { lattice: Some(Lattice { step, low: step, high: step }), coarse: true, ..as_read(3000) },
+        );
         assert!(noise.cell == 2.5 && (noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
     }
 
