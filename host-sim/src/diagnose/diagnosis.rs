@@ -42,7 +42,9 @@ pub struct Diagnosis {
     /// The best sets of causes beside each other, the best first.
     pub standings: Vec<Standing>,
     /// What its readings say of themselves.
-    observed: Observed,
+    pub(super) observed: Observed,
+    /// What the causes are worth: held-out log-likelihood less their price, in nats.
+    pub(super) score: f64,
 }
 
 impl Diagnosis {
@@ -67,7 +69,7 @@ pub(super) fn diagnose(
     given: Option<Lead>,
     progress: impl FnMut(&Scored),
 ) -> Diagnosis {
-    let baseline = engine.at(Model::default());
+    let mut baseline = engine.at(Model::default());
     if let Some(silent) = silent(engine, &baseline) {
         return unsearched(data, observed, engine, baseline, &silent);
     }
@@ -91,9 +93,13 @@ pub(super) fn diagnose(
         weights.push((effect, search.best_without(effect), left_out));
     }
     let contenders = standing::contenders(&search, &best);
-    let held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
+    let mut held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
     let known = [(&baseline, &*held_out[0]), (&best.fit, &*held_out[1])];
     let standings = standing::standings(engine, contenders, known);
+    // The simulation as it was knows nothing of what is cut off.
+    for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
+        *left -= observed.cut_v;
+    }
     let spikes = spikes::test(engine, &best.fit);
     let in_time = spikes.is_some();
     let left = swallowed::test(&data, &observed.errors(&best.fit.residual), &best.fit.noise.memory)
@@ -155,6 +161,7 @@ pub(super) fn diagnose(
         held_out,
         standings,
         observed: observed.clone(),
+        score: best.score,
     }
 }
 
@@ -178,6 +185,7 @@ fn unsearched(data: Data, observed: &Observed, engine: &Engine, baseline: Fit, s
     Diagnosis {
         report,
         data,
+        score: baseline.log_likelihood,
         extended: baseline.clone(),
         baseline,
         plant: engine.simulator.base.file().clone(),

@@ -68,7 +68,8 @@ impl<'a> Engine<'a> {
     /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
     pub fn residual(&mut self, model: &Model) -> Vec<f64> {
         self.simulator.run(model, &mut self.predicted);
-        let left = |(reading, predicted): (&f64, &f64)| reading - predicted;
+        let cut_v = self.observed.cut_v;
+        let left = |(reading, predicted): (&f64, &f64)| reading + cut_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
         if self.data.begun {
             self.simulator.run_from(self.data.full_scale_v, model, &mut self.predicted);

@@ -77,6 +77,9 @@ use search::{Scored, Search};
 /// Fewest readings that anything can be said of.
 const FEWEST_ROWS: usize = 8;
 
+/// Readings that were cut off instead of rounded have to be likelier by so many nats: most converters round.
+const CLEARLY: f64 = 5.0;
+
 /// A longer record is searched on a part of its rows first, of about so many.
 const LONG: usize = 5_000;
 const ROWS_TO_SEARCH: usize = 2_500;
@@ -125,13 +128,20 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         progress(&causes.join(", "));
     };
     let observed = Observed::new(&data);
-    let found = judged(record, options, &data, observed, &mut progress);
+    let rounded = judged(record, options, &data, &observed, &mut progress);
+    // No reading tells whether it was rounded or cut off; a spring tells.
+    let found = match observed.cut() {
+        None => rounded,
+        Some(cut) => {
+            let cut = judged(record, options, &data, &cut, &mut progress);
+            if cut.score > rounded.score + CLEARLY { cut } else { rounded }
+        }
+    };
     // A plateau on a lattice looks like a bound until a model is seen that does not go beyond it.
     if found.believes_its_bounds() {
         return Ok(found);
     }
-    let observed = Observed::new(&data).without_bounds();
-    Ok(judged(record, options, &data, observed, &mut progress))
+    Ok(judged(record, options, &data, &found.observed.without_bounds(), &mut progress))
 }
 
 /// Searches, a long record in part first, and says what it found.
@@ -139,21 +149,19 @@ fn judged(
     record: &Record,
     options: &Options,
     data: &Data,
-    observed: Observed,
+    observed: &Observed,
     progress: &mut impl FnMut(&Scored),
 ) -> Diagnosis {
     let every = if data.rows() > LONG { data.rows().div_ceil(ROWS_TO_SEARCH) } else { 1 };
     let given = (every > 1).then(|| {
         let thinned = Data::thinned(record, options.input, every);
-        let bounded = !observed.all_exact();
-        let observed = Observed::new(&thinned);
-        let observed = if bounded { observed } else { observed.without_bounds() };
+        let observed = Observed::new(&thinned).like(observed);
         let mut engine = Engine::new(&thinned, &observed, Simulator::new(&thinned, &options.base));
         let mut search = Search::new(&mut engine);
         search.run(&mut *progress);
         search.lead(LEADERS)
     });
-    let mut engine = Engine::new(data, &observed, Simulator::new(data, &options.base));
+    let mut engine = Engine::new(data, observed, Simulator::new(data, &options.base));
     let held = options.input == Input::Hold;
-    diagnosis::diagnose(data.clone(), &observed, &mut engine, held, given, progress)
+    diagnosis::diagnose(data.clone(), observed, &mut engine, held, given, progress)
 }

@@ -33,8 +33,10 @@ pub struct Observed {
     pub upper: Option<f64>,
     /// As [`Observed::upper`], below.
     pub lower: Option<f64>,
-    /// True if the step is coarse beside what readings scatter from row to row.
-    pub coarse: bool,
+    /// Scale of what they scatter from row to row, in V.
+    pub scatter_v: f64,
+    /// What readings were cut by on average, in V: half a step if their converter cuts off instead of rounding.
+    pub cut_v: f64,
     /// One over each row's scale of noise, where that grows with the reading; their geometric mean is 1.
     pub weights: Option<Arc<[f64]>>,
 }
@@ -43,6 +45,8 @@ pub struct Observed {
 const FEWEST_TIES: usize = 3;
 /// A step coarser than this many of the noise's scales is a cell, a finer one is noise.
 pub const COARSE: f64 = 2.0;
+/// Half of a step that is this part of the noise's scale is seen in its mean.
+const SEEN: f64 = 0.5;
 /// A reading so many of the noise's scales from a bound is not on its way there.
 const FAR: f64 = 30.0;
 /// On a lattice, readings at a bound are this many times as many as on the next step.
@@ -67,7 +71,8 @@ impl Observed {
         };
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
-        let far = FAR * scatter(&data.reading).max(FINEST_V);
+        let scatter_v = scatter(&data.reading).max(FINEST_V);
+        let far = FAR * scatter_v;
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
             let (value, count) = *extreme?;
             let piled = count >= FEWEST_TIES && (continuous || count >= PILE * next.map_or(1, |next| next.1));
@@ -90,15 +95,34 @@ impl Observed {
                 }
             })
             .collect();
-        let coarse = lattice.is_some_and(|lattice| lattice.step >= COARSE * scatter(&data.reading).max(FINEST_V));
+        let mut observed = Self { kinds, lattice, upper, lower, scatter_v, cut_v: 0.0, weights: None };
         // Steps of a lattice are even, whatever the noise.
-        let weights = if coarse { None } else { growth::weights(data, |row| kinds[row] == Kind::Exact) };
-        Self { kinds, lattice, upper, lower, coarse, weights }
+        if observed.step_beyond(COARSE).is_none() {
+            observed.weights = growth::weights(data, |row| observed.kinds[row] == Kind::Exact);
+        }
+        observed
     }
 
     /// The same where no bound is believed: a spring that settles at its highest voltage also reads the same for long.
     pub fn without_bounds(&self) -> Self {
         Self { kinds: vec![Kind::Exact; self.kinds.len()], upper: None, lower: None, ..self.clone() }
+    }
+
+    /// Of a part of the rows, with what was concluded from all of them.
+    pub fn like(self, all: &Self) -> Self {
+        let bounded = if all.all_exact() { self.without_bounds() } else { self };
+        Self { cut_v: all.cut_v, ..bounded }
+    }
+
+    /// The step, in V, if it is at least so many times as large as what readings scatter.
+    pub fn step_beyond(&self, times: f64) -> Option<f64> {
+        self.lattice.map(|lattice| lattice.step).filter(|step| *step >= times * self.scatter_v)
+    }
+
+    /// The same where the converter cuts off what is less than a step; `None` where that is little.
+    pub fn cut(&self) -> Option<Self> {
+        let step = self.step_beyond(SEEN)?;
+        Some(Self { cut_v: step / 2.0, ..self.clone() })
     }
 
     /// What rows are off by at least: one that stopped at a bound is not off while the prediction is beyond it.

@@ -24,7 +24,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
         BTreeMap::from([(name.to_owned(), Parameter { value, low, high, unit })])
     };
     if let Some(Lattice { step, low, high }) = observed.lattice
-        && step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V)
+        && (step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V) || observed.cut_v > 0.0)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data
@@ -37,11 +37,12 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
             cause: "quantisation",
             probability: 1.0,
             parameters: single("step", step, low, high, "V"),
-            rmse_before: raw,
+            rmse_before: scale_of_squares(&fit.residual.iter().map(|left| left - observed.cut_v).collect::<Vec<_>>()),
             rmse_after: scale_of_squares(&after).min(raw),
             evidence: format!(
-                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left",
-                step / raw
+                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left{}",
+                step / raw,
+                if observed.cut_v == 0.0 { "" } else { "; what is less than a step was cut off" }
             ),
         });
     }

@@ -95,7 +95,8 @@ impl Noise {
         let residual = &*observed.errors(residual);
         let mut noise = Self::robust(&exact(residual, observed));
         if let Some(Lattice { step, .. }) = observed.lattice
-            && (observed.coarse || step >= COARSE * rest_of(scale_of_squares(residual), step).max(FINEST_V))
+            && (observed.step_beyond(COARSE).is_some()
+                || step >= COARSE * rest_of(scale_of_squares(residual), step).max(FINEST_V))
         {
             noise.cell = step / 2.0;
             noise.nu = f64::INFINITY;
@@ -302,7 +303,8 @@ mod tests {
             lattice: None,
             upper: None,
             lower: None,
-            coarse: false,
+            scatter_v: 1.0,
+            cut_v: 0.0,
             weights: None,
         }
     }
@@ -345,10 +347,8 @@ mod tests {
                 ((truth + noise) / step).round() * step - truth
             })
             .collect();
-        let noise = Noise::fitted(
-            &off,
-            &Observed { lattice: Some(Lattice { step, low: step, high: step }), coarse: true, ..as_read(3000) },
-        );
+        let noise =
+            Noise::fitted(&off, &Observed { lattice: Some(Lattice { step, low: step, high: step }), ..as_read(3000) });
         assert!(noise.cell == 2.5 && (noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
     }
 
