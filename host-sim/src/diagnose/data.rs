@@ -36,9 +36,10 @@ const THINNED_PIECES: usize = 8_000;
 const THINNED_BLUR: f64 = 1e-3;
 
 /// Fewest readings at rest that tell whether the spring is at rest too.
-const FEWEST_AT_REST: usize = 8;
-/// A decay so many standard deviations high is one, also where noise has a memory.
-const CLEAR: f64 = 20.0;
+const FEWEST_AT_REST: usize = 4;
+/// A decay so many standard deviations high is one. Where noise with a memory passes for it, little is lost: the start that is
+/// then fitted is as small.
+const CLEAR: f64 = 8.0;
 
 /// The record, as every fit sees it.
 #[derive(Clone, Debug)]
