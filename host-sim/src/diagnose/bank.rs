@@ -5,6 +5,8 @@
 //! play: z' = clamp(z, u - r, u + r)        p = direct u + sum weight z
 //! ```
 //!
+//! A spring that never had a voltage starts with all `z` at 0; one that comes from a large voltage with each at its `r`, where
+//! its sensor has been set to zero.
 //! From rest upwards it follows its loading curve `phi(u) = direct u + sum weight max(u - r, 0)`. Behind a bank whose
 //! curve rises, another bank is a bank again, and the curves are put into each other (Kuhnen, *European Journal of
 //! Control* 9, 2003).
@@ -19,6 +21,8 @@ pub struct Bank {
     /// Weight of the input itself.
     pub direct: f64,
     plays: Vec<Play>,
+    /// What counts as 0 V.
+    zero: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +36,27 @@ impl Bank {
     /// Of plays with their thresholds, in V, and weights; those without weight are left out.
     pub fn new(direct: f64, plays: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let plays = plays.into_iter().filter(|(_, weight)| *weight != 0.0);
-        Self { direct, plays: plays.map(|(threshold, weight)| Play { threshold, weight, value: 0.0 }).collect() }
+        Self {
+            direct,
+            plays: plays.map(|(threshold, weight)| Play { threshold, weight, value: 0.0 }).collect(),
+            zero: 0.0,
+        }
+    }
+
+    /// The same after a large voltage: each play starts where that leaves it at 0 V, and what it then holds counts as none.
+    pub fn cycled(mut self) -> Self {
+        for play in &mut self.plays {
+            play.value = play.threshold;
+            self.zero += play.weight * play.threshold;
+        }
+        self
+    }
+
+    /// The same before any voltage.
+    pub fn at_rest(mut self) -> Self {
+        self.zero = 0.0;
+        self.plays.iter_mut().for_each(|play| play.value = 0.0);
+        self
     }
 
     /// Of a plant file.
@@ -95,7 +119,7 @@ impl Bank {
 
     /// The output when the input comes to `voltage`.
     pub fn at(&mut self, voltage: f64) -> f64 {
-        let mut sum = self.direct * voltage;
+        let mut sum = self.direct * voltage - self.zero;
         for play in &mut self.plays {
             play.value = play.value.clamp(voltage - play.threshold, voltage + play.threshold);
             sum += play.weight * play.value;
@@ -162,6 +186,20 @@ mod tests {
     fn a_whole_play_is_twice_its_threshold_wide() {
         let width = Bank::new(0.0, [(20.0, 1.0)]).width(500.0);
         assert!((width - 40.0).abs() < 0.5, "{width}");
+    }
+
+    /// The second time up is the same for both: the first has then been cycled too.
+    #[test]
+    fn a_cycled_bank_begins_where_a_large_voltage_leaves_it() {
+        let mut fresh = Bank::new(0.6, [(20.0, 0.1), (60.0, 0.3)]);
+        let mut cycled = fresh.clone().cycled();
+        assert_eq!(cycled.clone().at_rest(), fresh);
+        assert_eq!(cycled.clone().at(0.0), 0.0);
+        fresh.at(500.0);
+        let held = fresh.at(0.0);
+        for voltage in [30.0, 170.0, 90.0] {
+            assert!((fresh.at(voltage) - held - cycled.at(voltage)).abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -54,6 +54,8 @@ fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f6
     for (block, _) in &model.unmodelled(base, data).blocks {
         written = written.without(block.effect);
     }
-    written.chain(base, data).respond(&mut fitted, 0.0, &mut Vec::new());
+    let mut chain = written.chain(base, data);
+    chain.memory = chain.memory.at_rest();
+    chain.respond(&mut fitted, 0.0, &mut Vec::new());
     Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (fitted - fixed).abs()).fold(0.0, f64::max))
 }

@@ -8,6 +8,9 @@
 //! | part | one | r, weight |
 //! | bank | five, at r / 5 to r | r, weights |
 //! | part with gain, bank with gain | the same, with the gain of the loop's mean line | and the gain |
+//! | cycled part, cycled bank | the same, of a spring that comes from a large voltage | the same |
+//!
+//! The last begin on the branch that comes down: where the record begins, not what the spring is.
 
 use crate::diagnose::bank::Bank;
 use crate::diagnose::chain::Chain;
@@ -18,7 +21,9 @@ pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
 /// Number of plays and own gain, by form.
-const FORMS: [(usize, bool); 5] = [(1, false), (1, false), (5, false), (1, true), (5, true)];
+const FORMS: [(usize, bool); 7] = [(1, false), (1, false), (5, false), (1, true), (5, true), (1, true), (5, true)];
+/// From here on they begin on the branch that comes down.
+const CYCLED: usize = 5;
 /// Thresholds of a bank, as parts of r.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
@@ -33,7 +38,8 @@ fn bank(form: usize, point: &[f64]) -> Bank {
     };
     let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
     let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();
-    Bank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)))
+    let bank = Bank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
+    if form < CYCLED { bank } else { bank.cycled() }
 }
 
 impl Effect for Hysteresis {
