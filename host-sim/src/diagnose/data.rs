@@ -7,6 +7,8 @@ use model::Plant;
 use crate::record::Record;
 use crate::schedule::{Between, Schedule};
 
+use super::noise::FINEST_V;
+use super::observed::scatter;
 use super::signal::Signal;
 
 /// What the voltage did between the rows.
@@ -37,6 +39,8 @@ const THINNED_BLUR: f64 = 1e-3;
 
 /// Fewest readings at rest that tell whether the spring is at rest too.
 const FEWEST_AT_REST: usize = 4;
+/// In so short a part of its time constant the spring hardly falls.
+const SHORT: f64 = 0.3;
 /// A decay so many standard deviations high is one. Where noise with a memory passes for it, little is lost: the start that is
 /// then fitted is as small.
 const CLEAR: f64 = 8.0;
@@ -117,22 +121,23 @@ impl Data {
     }
 }
 
-/// True if the readings at rest, before the first voltage, fall from another stiffness to their rest as the spring does.
+/// True if the readings at rest, before the first voltage, fall from another stiffness to their rest as the spring does; where
+/// they are too short to fall, if they are not at rest.
 fn still_falling(time_s: &[f64], voltage_v: &[f64], reading: &[f64]) -> bool {
     let rest = voltage_v.iter().take_while(|voltage| **voltage == 0.0).count();
-    if rest < FEWEST_AT_REST {
+    if rest == 0 {
         return false;
     }
-    // Least squares on a constant and the spring's decay.
-    let decay: Vec<f64> =
-        time_s[..rest].iter().map(|time| (-(time - time_s[0]) / Plant::PAPER.time_constant_s).exp()).collect();
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / rest as f64;
+    let tau_s = Plant::PAPER.time_constant_s;
+    let decay: Vec<f64> = time_s[..rest].iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
+    let short = rest < FEWEST_AT_REST || time_s[rest - 1] - time_s[0] < SHORT * tau_s;
+    // Least squares on the spring's decay, and on a constant if that can be told from it.
+    let mean = |values: &[f64]| if short { 0.0 } else { values.iter().sum::<f64>() / rest as f64 };
     let (mean_decay, mean_reading) = (mean(&decay), mean(&reading[..rest]));
     let pairs = || decay.iter().zip(reading).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
     let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
     let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
-    let left: f64 = pairs().map(|(decay, reading)| (reading - height * decay).powi(2)).sum();
-    height.abs() > CLEAR * (left / rest as f64 / power).sqrt()
+    height.abs() > CLEAR * scatter(reading).max(FINEST_V) / power.sqrt()
 }
 
 /// Which fold each row belongs to: whole stairs of a short record that has some, else stretches in turn.

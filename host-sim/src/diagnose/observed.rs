@@ -154,7 +154,7 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
 }
 
 /// Scale of independent noise on readings, from their second differences: a slow signal has none.
-fn scatter(reading: &[f64]) -> f64 {
+pub(super) fn scatter(reading: &[f64]) -> f64 {
     let mut bends: Vec<f64> =
         reading.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs() / 6f64.sqrt()).collect();
     if bends.is_empty() {
