@@ -95,7 +95,8 @@ pub(super) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
     let residual = engine.residual(&start);
     let start = Fit { model: start, residual, noise: best.noise.clone(), ..best.clone() };
     let found = best.log_likelihood > baseline.log_likelihood + CLEAR;
-    if !known(&start, engine) && !(found && known(&best, engine)) {
+    let tells = known(&start, engine) || found && known(&best, engine);
+    if !tells {
         return Some(Silent::Excitation);
     }
     // Quick to tell, and a search for causes in noise alone is long.
