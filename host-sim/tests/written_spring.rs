@@ -63,7 +63,9 @@ fn what_is_written_is_what_was_fitted() {
                 let starts = it.starts(form, &scene);
                 let Some(point) = starts.get(starts.len() / 2) else { continue };
                 let model = Model::default().with(Block { effect, form }, point.clone());
-                let fitted = run(&base, &model);
+                // A file says what the spring is, not where a record begins: of the forms of hysteresis, the last two.
+                let from_rest = if it.cause() == "hysteresis" && form >= 5 { form - 2 } else { form };
+                let fitted = run(&base, &Model::default().with(Block { effect, form: from_rest }, point.clone()));
                 let text = model.extend(&base, &data).to_toml().expect("a text");
                 let file = plant_file::parse("written", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
                 let written = run(&Base::new(file).expect("a base"), &model.unmodelled(&base, &data));
