@@ -7,8 +7,8 @@ use model::Plant;
 use crate::record::Record;
 use crate::schedule::{Between, Schedule};
 
-use super::noise::FINEST_V;
-use super::observed::scatter;
+use super::noise::scale;
+use super::observed::bends;
 use super::signal::Signal;
 
 /// What the voltage did between the rows.
@@ -137,7 +137,7 @@ fn still_falling(time_s: &[f64], voltage_v: &[f64], reading: &[f64]) -> bool {
     let pairs = || decay.iter().zip(reading).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
     let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
     let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
-    height.abs() > CLEAR * scatter(reading).max(FINEST_V) / power.sqrt()
+    height.abs() > CLEAR * scale(&bends(reading).collect::<Vec<_>>()) / power.sqrt()
 }
 
 /// Which fold each row belongs to: whole stairs of a short record that has some, else stretches in turn.

@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use super::data::Data;
 use super::noise::scale;
+use super::observed::bends;
 
 /// Groups of like level.
 const GROUPS: usize = 10;
@@ -31,7 +32,7 @@ const RATIO: f64 = 1.3;
 pub(super) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc<[f64]>> {
     let reading = &data.reading;
     let level: Vec<f64> = (0..data.rows()).map(|row| level(reading, row)).collect();
-    let bend = |row: usize| (reading[row - 1] - 2.0 * reading[row] + reading[row + 1]) / 6f64.sqrt();
+    let bends: Vec<f64> = bends(reading).collect();
     let mut rows: Vec<usize> =
         (1..data.rows().saturating_sub(1)).filter(|row| (row - 1..=row + 1).all(&counts)).collect();
     if rows.len() < GROUPS * FEWEST {
@@ -40,7 +41,7 @@ pub(super) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
     rows.sort_by(|a, b| level[*a].total_cmp(&level[*b]));
     let of_group = |rows: &[usize]| {
         let middle = rows.iter().map(|row| level[*row]).sum::<f64>() / rows.len() as f64;
-        let scale = scale(&rows.iter().map(|row| bend(*row)).collect::<Vec<_>>());
+        let scale = scale(&rows.iter().map(|row| bends[row - 1]).collect::<Vec<_>>());
         // Level, scale, and what the scale is worth.
         (middle, scale, rows.len() as f64 / (ERROR * scale).powi(2))
     };

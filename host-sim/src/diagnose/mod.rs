@@ -130,7 +130,7 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let observed = Observed::new(&data);
     let rounded = judged(record, options, &data, &observed, &mut progress);
     // No reading tells whether it was rounded or cut off; a spring tells.
-    let found = match observed.cut() {
+    let found = match observed.cut().filter(|cut| suits(options, &data, cut, &rounded)) {
         None => rounded,
         Some(cut) => {
             let cut = judged(record, options, &data, &cut, &mut progress);
@@ -142,6 +142,12 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         return Ok(found);
     }
     Ok(judged(record, options, &data, &found.observed.without_bounds(), &mut progress))
+}
+
+/// True if readings taken as `observed` suit the causes that were found without it at least as well.
+fn suits(options: &Options, data: &Data, observed: &Observed, found: &Diagnosis) -> bool {
+    let mut engine = Engine::new(data, observed, Simulator::new(data, &options.base));
+    engine.fit_twice(found.extended.model.clone()).log_likelihood > found.extended.log_likelihood
 }
 
 /// Searches, a long record in part first, and says what it found.

@@ -153,13 +153,17 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
     2 * staying >= rows().count()
 }
 
-/// Scale of independent noise on readings, from their second differences: a slow signal has none.
-pub(super) fn scatter(reading: &[f64]) -> f64 {
-    let mut bends: Vec<f64> =
-        reading.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs() / 6f64.sqrt()).collect();
+/// Scale of independent noise on readings; none where most are the same.
+fn scatter(reading: &[f64]) -> f64 {
+    let mut bends: Vec<f64> = bends(reading).map(f64::abs).collect();
     if bends.is_empty() {
         return f64::INFINITY;
     }
     let middle = bends.len() / 2;
     *bends.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
+}
+
+/// Second differences, as large as independent noise: a slow signal has none.
+pub(super) fn bends(reading: &[f64]) -> impl Iterator<Item = f64> {
+    reading.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]) / 6f64.sqrt())
 }
