@@ -77,11 +77,14 @@ pub(super) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
     let block = |cause| Block { effect: index_of(cause).expect("an effect"), form: 0 };
     let (gain, time_constant) = (block("gain-error"), block("time-constant"));
     let probe = |tau_s: f64| Model::default().with(gain, vec![1.0]).with(time_constant, vec![tau_s.ln()]);
-    // A simulation may be so far off that no way leads from there.
     let start = probe(engine.simulator.base.relaxation.tau_s);
-    let [here, paper] =
-        [&start, &probe(Plant::PAPER.time_constant_s)].map(|model| engine.fit(model.clone(), &Noise::first_look()));
-    let best = if paper.log_likelihood > here.log_likelihood { paper } else { here };
+    let mut best = engine.fit(start.clone(), &Noise::first_look());
+    // A simulation may be so far off that no way leads from there.
+    let paper = probe(Plant::PAPER.time_constant_s);
+    if paper != start {
+        let other = engine.fit(paper, &Noise::first_look());
+        best = if other.log_likelihood > best.log_likelihood { other } else { best };
+    }
     let bounds = &gain.coordinates(data)[0];
     let found = best.model.point(gain.effect).map_or(1.0, |point| point[0]);
     if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found) && beside.correlation.abs() > ALIKE {
@@ -94,8 +97,8 @@ pub(super) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
     // The noise as it is at best, the information as it is where the search starts; of a start far off there is none.
     let residual = engine.residual(&start);
     let start = Fit { model: start, residual, noise: best.noise.clone(), ..best.clone() };
-    let found = best.log_likelihood > baseline.log_likelihood + CLEAR;
-    let tells = known(&start, engine) || found && known(&best, engine);
+    let is_clear = best.log_likelihood > baseline.log_likelihood + CLEAR;
+    let tells = known(&start, engine) || is_clear && known(&best, engine);
     if !tells {
         return Some(Silent::Excitation);
     }
