@@ -101,7 +101,7 @@ pub(super) fn diagnose(
         *left -= observed.cut_v;
     }
     let spikes = spikes::test(engine, &best.fit);
-    let in_time = spikes.is_some();
+    let alone = spikes.is_none();
     let left = swallowed::test(&data, &observed.errors(&best.fit.residual), &best.fit.noise.memory)
         .or(spikes)
         .or_else(|| leftover::test(engine, &best.fit).filter(|left| left.significant))
@@ -110,7 +110,7 @@ pub(super) fn diagnose(
     let quality_after = quality(engine, &best.fit, &held_out[1], true);
     let mut findings: Vec<Finding> =
         weights.iter().map(|(effect, without, left_out)| finding(engine, &best, *effect, without, left_out)).collect();
-    findings.extend(reading_findings(&data, observed, &best.fit, in_time));
+    findings.extend(reading_findings(&data, observed, &best.fit, alone));
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
 
     if never_reverses(&data) {

@@ -14,8 +14,9 @@ use super::spikes::far_off;
 /// A step of the readings this many of the noise's scales wide is worth naming.
 const COARSE_STEP: f64 = 0.5;
 
-/// What the readings themselves show; those far off `in_time` with the command are no outliers.
-pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_time: bool) -> Vec<Finding> {
+/// What the readings themselves show; those far off are outliers only if each is `alone`, neither in runs nor in time with
+/// the command.
+pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alone: bool) -> Vec<Finding> {
     let mut findings = Vec::new();
     let raw = scale_of_squares(&fit.residual);
     let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
@@ -61,7 +62,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, in_t
             ),
         });
     }
-    if let Some((_, wide)) = fit.noise.wide.filter(|_| !in_time) {
+    if let Some((_, wide)) = fit.noise.wide.filter(|_| alone) {
         let errors = observed.errors(&fit.residual);
         let far = far_off(&fit.noise, &fit.noise.innovations(&errors));
         let kept: Vec<f64> = errors.iter().zip(&far).filter(|(_, far)| !**far).map(|(error, _)| *error).collect();
