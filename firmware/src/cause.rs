@@ -33,13 +33,18 @@ pub enum Reset {
     Other,
 }
 
-/// The cause's name, and the fault behind it.
-pub fn cause(reset: Reset, legacy: Legacy) -> (&'static str, Option<Fault>) {
+/// The cause's name, and the fault behind it. A chip that does not say was reset by what leaves such a legacy.
+pub fn cause(reset: Option<Reset>, legacy: Legacy) -> (&'static str, Option<Fault>) {
     let left = match legacy {
         Legacy::Faulted(fault, _) => Some(fault),
         Legacy::None | Legacy::Silent | Legacy::Told => None,
     };
-    match (reset, legacy) {
+    let usual = match legacy {
+        Legacy::None => Reset::Supply,
+        Legacy::Silent | Legacy::Faulted(Fault::Watchdog, _) => Reset::Watchdog,
+        Legacy::Told | Legacy::Faulted(..) => Reset::Software,
+    };
+    match (reset.unwrap_or(usual), legacy) {
         (Reset::Supply, Legacy::None | Legacy::Told) => ("power-on", None),
         (Reset::Supply, _) => ("brown-out", left.or(Some(Fault::Supply))),
         (Reset::Watchdog, _) => ("watchdog", left.or(Some(Fault::Watchdog))),
@@ -68,7 +73,20 @@ mod tests {
             (Reset::Pin, panic, "pin", Some(Fault::Panic)),
             (Reset::Other, panic, "other", Some(Fault::Panic)),
         ] {
-            assert_eq!(cause(reset, legacy), (name, fault), "{reset:?} {legacy:?}");
+            assert_eq!(cause(Some(reset), legacy), (name, fault), "{reset:?} {legacy:?}");
+        }
+    }
+
+    #[test]
+    fn where_the_chip_does_not_say_the_legacy_does() {
+        for (legacy, name, fault) in [
+            (Legacy::None, "power-on", None),
+            (Legacy::Told, "software", None),
+            (Legacy::Silent, "watchdog", Some(Fault::Watchdog)),
+            (Legacy::Faulted(Fault::Watchdog, 7), "watchdog", Some(Fault::Watchdog)),
+            (Legacy::Faulted(Fault::Panic, 7), "software", Some(Fault::Panic)),
+        ] {
+            assert_eq!(cause(None, legacy), (name, fault), "{legacy:?}");
         }
     }
 }

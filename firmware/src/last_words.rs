@@ -10,7 +10,7 @@ use core::mem::MaybeUninit;
 
 use model::supervisor::Fault;
 
-use crate::cause::Legacy;
+use crate::cause::{Legacy, Reset, cause};
 
 /// "vsj1"
 const MARK: u32 = 0x7673_6a31;
@@ -36,8 +36,18 @@ unsafe impl Sync for Kept {}
 #[unsafe(link_section = ".uninit.last_words")]
 static KEPT: Kept = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Reads what was left and marks this run as running. Once, at boot.
-pub fn take() -> Legacy {
+/// The cause of a reset and the fault behind it, which stays for whatever resets the chip before it is acknowledged. Once, at
+/// boot; `said` is what the chip says of it, if anything.
+pub fn reset_cause(said: Option<Reset>) -> (&'static str, Option<Fault>) {
+    let (name, fault) = cause(said, take());
+    if let Some(fault) = fault {
+        leave(fault, 0);
+    }
+    (name, fault)
+}
+
+/// Reads what was left and marks this run as running.
+fn take() -> Legacy {
     // SAFETY: every bit pattern is a Record; see `Kept`.
     let record = unsafe { KEPT.0.get().cast::<Record>().read_volatile() };
     write(ALIVE, 0);
@@ -54,13 +64,6 @@ pub fn take() -> Legacy {
 /// Leaves `fault` for the next run.
 pub fn leave(fault: Fault, tick: u32) {
     write(u32::from(fault.code()), tick);
-}
-
-/// Leaves the fault that a start found, for whatever resets the chip before it is acknowledged.
-pub fn keep(found: Option<Fault>) {
-    if let Some(fault) = found {
-        leave(fault, 0);
-    }
 }
 
 /// The fault was acknowledged: this run is as any other.

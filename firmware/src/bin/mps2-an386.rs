@@ -16,11 +16,11 @@ use firmware::mps2::instructions::Counter;
 use firmware::mps2::registers::CLOCK_HZ;
 use firmware::mps2::uart::Uart;
 use firmware::mps2::vectors::{HIGH, LOW, Line};
-use firmware::mps2::{INTERLOCK_CLOSED, Mps2, reset_cause, semihosting};
+use firmware::mps2::{INTERLOCK_CLOSED, Mps2, semihosting};
 use firmware::script::Script;
 use firmware::settings::FLASHED;
 use firmware::store::Store;
-use firmware::{hang_guard, stack_guard, tasks};
+use firmware::{hang_guard, last_words, stack_guard, tasks};
 use link::{Controller, Desk};
 
 use core::sync::atomic::Ordering;
@@ -41,7 +41,7 @@ enum Mode {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut board = Mps2::init();
-    let (reset, last_fault) = reset_cause();
+    let (reset, last_fault) = last_words::reset_cause(None);
 
     let mut buffer = [0; 64];
     let name = semihosting::command_line(&mut buffer);

@@ -13,7 +13,7 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
-use firmware::nucleo::{Nucleo, clocks, kill, reset_cause};
+use firmware::nucleo::{Nucleo, clocks, kill, reset};
 use firmware::settings::FLASHED;
 use firmware::store::Store;
 use firmware::tasks;
@@ -44,7 +44,7 @@ unsafe fn FMAC() {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     kill();
-    let (reset, last_fault) = reset_cause();
+    let (reset, last_fault) = last_words::reset_cause(Some(reset()));
     let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
     log::boot(reset, last_fault.map_or(0, Fault::code), CONTROLLER);
     if let Some(mut core) = Peripherals::take() {

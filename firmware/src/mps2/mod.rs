@@ -29,9 +29,6 @@ pub mod watchdog;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::board::Board;
-use crate::cause::Legacy;
-use crate::last_words;
-use model::supervisor::Fault;
 
 pub use dac::kill;
 
@@ -68,17 +65,4 @@ impl Board for Mps2 {
     fn feed_watchdog(&mut self) {
         watchdog::feed();
     }
-}
-
-/// Why the chip was reset, and the fault that caused it. The emulator has no register for it, only the last words tell.
-pub fn reset_cause() -> (&'static str, Option<Fault>) {
-    let (name, fault) = match last_words::take() {
-        Legacy::None => ("power-on", None),
-        Legacy::Told => ("software", None),
-        Legacy::Silent => ("watchdog", Some(Fault::Watchdog)),
-        Legacy::Faulted(Fault::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
-        Legacy::Faulted(fault, _) => ("software", Some(fault)),
-    };
-    last_words::keep(fault);
-    (name, fault)
 }

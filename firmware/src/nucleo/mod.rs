@@ -34,7 +34,7 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use crate::board::Board;
 
 pub use amplifier::kill;
-pub use reset::reset_cause;
+pub use reset::reset;
 
 /// Without food for this long the chip is reset, in us.
 const WATCHDOG_US: u32 = 100_000;

@@ -1,17 +1,15 @@
-//! Why the chip was reset, from its own flags and from the last words.
+//! Why the chip was reset, by its own flags.
 
 use embassy_stm32::pac::RCC;
-use model::supervisor::Fault;
 
-use crate::cause::{Reset, cause};
-use crate::last_words;
+use crate::cause::Reset;
 
-/// The cause's name, and the fault behind it. Clears the flags: once, at boot.
-pub fn reset_cause() -> (&'static str, Option<Fault>) {
+/// What the flags say. Clears them: once, at boot.
+pub fn reset() -> Reset {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
     // A brown-out sets the pin's flag as well, and so does every other reset: the most telling one first.
-    let reset = if flags.borrstf() {
+    if flags.borrstf() {
         Reset::Supply
     } else if flags.iwdgrstf() {
         Reset::Watchdog
@@ -21,8 +19,5 @@ pub fn reset_cause() -> (&'static str, Option<Fault>) {
         Reset::Pin
     } else {
         Reset::Other
-    };
-    let (name, fault) = cause(reset, last_words::take());
-    last_words::keep(fault);
-    (name, fault)
+    }
 }

@@ -11,6 +11,7 @@
 use std::sync::Arc;
 
 use super::data::Data;
+use super::median::running;
 use super::noise::scale;
 use super::observed::bends;
 
@@ -18,8 +19,6 @@ use super::observed::bends;
 const GROUPS: usize = 10;
 /// Fewest rows of a group that tell a scale.
 const FEWEST: usize = 20;
-/// Neighbours to each side that make a row's level.
-const AROUND: usize = 2;
 /// Relative error of a scale from one row's second difference; neighbours are not independent.
 const ERROR: f64 = 1.5;
 /// Growth is beyond doubt if so many standard deviations large,
@@ -31,13 +30,13 @@ const RATIO: f64 = 1.3;
 /// not tell.
 pub(super) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc<[f64]>> {
     let reading = &data.reading;
-    let level: Vec<f64> = (0..data.rows()).map(|row| level(reading, row)).collect();
     let bends: Vec<f64> = bends(reading).collect();
     let mut rows: Vec<usize> =
         (1..data.rows().saturating_sub(1)).filter(|row| (row - 1..=row + 1).all(&counts)).collect();
     if rows.len() < GROUPS * FEWEST {
         return None;
     }
+    let level = running(&reading.iter().map(|reading| reading.abs()).collect::<Vec<_>>());
     rows.sort_by(|a, b| level[*a].total_cmp(&level[*b]));
     let of_group = |rows: &[usize]| {
         let middle = rows.iter().map(|row| level[*row]).sum::<f64>() / rows.len() as f64;
@@ -61,13 +60,6 @@ pub(super) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
     let scales: Vec<f64> = level.into_iter().map(of_level).collect();
     let mean = (scales.iter().map(|scale| scale.ln()).sum::<f64>() / scales.len() as f64).exp();
     Some(scales.into_iter().map(|scale| mean / scale).collect())
-}
-
-fn level(reading: &[f64], row: usize) -> f64 {
-    let mut around: Vec<f64> =
-        reading[row.saturating_sub(AROUND)..(row + AROUND + 1).min(reading.len())].iter().map(|r| r.abs()).collect();
-    let middle = around.len() / 2;
-    *around.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -44,6 +44,7 @@ pub mod lattice;
 pub mod law;
 pub mod leakage;
 pub mod leftover;
+mod median;
 pub mod model;
 pub mod noise;
 pub mod observed;

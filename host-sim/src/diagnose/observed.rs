@@ -9,6 +9,7 @@ use std::sync::Arc;
 use super::data::Data;
 use super::growth;
 use super::lattice::Lattice;
+use super::median::deviation;
 use super::noise::FINEST_V;
 
 /// One row's reading.
@@ -155,12 +156,7 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
 
 /// Scale of independent noise on readings; none where most are the same.
 fn scatter(reading: &[f64]) -> f64 {
-    let mut bends: Vec<f64> = bends(reading).map(f64::abs).collect();
-    if bends.is_empty() {
-        return f64::INFINITY;
-    }
-    let middle = bends.len() / 2;
-    *bends.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
+    deviation(bends(reading)).unwrap_or(f64::INFINITY)
 }
 
 /// Second differences, as large as independent noise: a slow signal has none.

@@ -9,6 +9,7 @@
 
 use super::effects::index_of;
 use super::fit::Engine;
+use super::median::median;
 use super::model::Model;
 use super::noise::{Noise, scale};
 
@@ -30,9 +31,8 @@ pub(super) fn as_likely(engine: &mut Engine, model: &Model, score: f64) -> bool 
         .zip(without_added.iter().zip(&left))
         .map(|(reading, (without, with))| reading - (without - with))
         .collect();
-    let mut sorted = reading.clone();
-    let (_, constant, _) = sorted.select_nth_unstable_by(reading.len() / 2, f64::total_cmp);
-    let around: Vec<f64> = reading.iter().map(|reading| reading - *constant).collect();
+    let constant = median(&mut reading.clone()).expect("readings");
+    let around: Vec<f64> = reading.iter().map(|reading| reading - constant).collect();
     let noise = Noise::fitted(&around, engine.observed);
     let likelihood = noise.log_likelihood(&around, engine.observed) - noise.cost(around.len());
     likelihood >= score && scale(&engine.observed.errors(&left)) > MOVES * scale(&engine.observed.errors(&around))

@@ -11,6 +11,7 @@
 
 use super::octaves::Octaves;
 use super::scale as robust_scale;
+use crate::diagnose::median::running;
 use crate::diagnose::sums::dot;
 
 /// A filter that turns noise with a memory into independent innovations.
@@ -39,8 +40,6 @@ const SPAN: f64 = 4.0;
 const BLOCK: usize = 1024;
 /// Beyond these, in robust scales, a residual does not teach the memory.
 const CLIP: f64 = 4.0;
-/// Neighbours to each side of a row.
-const AROUND: usize = 2;
 /// What a fractional difference must be likelier by than an autoregression alone, in nats: structure that is not yet
 /// explained looks like it too.
 const PRICE_OF_POWER: f64 = 8.0;
@@ -129,12 +128,7 @@ impl Memory {
 /// Values of which those wild beside their neighbours are their neighbours' median: an outlier has no memory, and many of
 /// them hide that of the noise (the cleaner of Martin and Thomson, *Proceedings of the IEEE* 70, 1982, in its simplest form).
 fn without_wild(values: &[f64]) -> Vec<f64> {
-    let median = |row: usize| {
-        let first = row.saturating_sub(AROUND).min(values.len() - 2 * AROUND - 1);
-        let mut around: [f64; 2 * AROUND + 1] = std::array::from_fn(|k| values[first + k]);
-        *around.select_nth_unstable_by(AROUND, f64::total_cmp).1
-    };
-    let medians: Vec<f64> = (0..values.len()).map(median).collect();
+    let medians = running(values);
     let off: Vec<f64> = values.iter().zip(&medians).map(|(value, median)| value - median).collect();
     let wild = CLIP * robust_scale(&off);
     let tame = |((value, median), off): ((&f64, f64), &f64)| if off.abs() > wild { median } else { *value };

@@ -20,6 +20,7 @@ mod tail;
 pub use memory::Memory;
 
 use super::lattice::Lattice;
+use super::median::deviation;
 use super::observed::{COARSE, Kind, Observed};
 use super::sums::dot;
 use reading::{in_cell, stopped};
@@ -261,13 +262,7 @@ fn exact<'i>(innovations: &'i [f64], observed: &Observed) -> Cow<'i, [f64]> {
 /// Robust scale around zero: the median size, as a normal's standard deviation, [`FINEST_V`] at least. Noise is never exactly
 /// zero; rows that are (a spring at rest, read without noise) say nothing of it.
 pub fn scale(residual: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).filter(|size| *size > 0.0).collect();
-    if sizes.is_empty() {
-        return FINEST_V;
-    }
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / 0.6745).max(FINEST_V)
+    deviation(residual.iter().copied().filter(|r| *r != 0.0)).map_or(FINEST_V, |scale| scale.max(FINEST_V))
 }
 
 /// True if what is left is the arithmetic's.
