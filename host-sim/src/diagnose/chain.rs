@@ -105,21 +105,22 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// From the electrodes to the stiffness, from `ahead_v` of where the lags would be at rest; `levels_v` is room to work in.
-    pub fn respond(&self, signal: &mut Signal, ahead_v: f64, levels_v: &mut Vec<f64>) {
-        if self.relaxation.varies() {
-            signal.middles(levels_v);
-        }
+    /// From the electrodes to where the stiffness would settle.
+    pub fn settle(&self, signal: &mut Signal) {
         let mut memory = self.memory.clone();
         if memory.table().is_some() {
-            signal.before = memory.at(signal.before);
-            signal.pass(|piece| {
-                let from = memory.at(piece.from);
-                (from, if piece.to == piece.from { from } else { memory.at(piece.to) })
-            });
+            signal.map(|voltage| memory.at(voltage));
         }
         if !self.law.is_none() {
             signal.map(|voltage| self.law.at(voltage));
+        }
+    }
+
+    /// From there to the stiffness, from `ahead_v` of where the lags would be at rest; `applied` is what is on the electrodes,
+    /// `levels_v` room to work in.
+    pub fn relax(&self, signal: &mut Signal, ahead_v: f64, applied: &Signal, levels_v: &mut Vec<f64>) {
+        if self.relaxation.varies() {
+            applied.middles(levels_v);
         }
         let mut lost = Lost::default();
         self.losses.iter().for_each(|loss| loss.take(signal, &mut lost));

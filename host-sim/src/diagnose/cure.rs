@@ -49,13 +49,15 @@ fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f6
     let fixed = open_loop::simulate(&file.extended(), RATE_HZ, &data.time_s, &voltage_v).ok()?;
 
     let schedule = Schedule::from_record(&Record { name: String::new(), rows }, Between::Hold);
-    let mut fitted = Signal::new(&schedule, &data.time_s, 0.0);
+    let voltage = Signal::new(&schedule, &data.time_s, 0.0);
     let mut written = model.clone();
     for (block, _) in &model.unmodelled(base, data).blocks {
         written = written.without(block.effect);
     }
     let mut chain = written.chain(base, data);
     chain.memory = chain.memory.at_rest();
-    chain.respond(&mut fitted, 0.0, &mut Vec::new());
+    let mut fitted = voltage.clone();
+    chain.settle(&mut fitted);
+    chain.relax(&mut fitted, 0.0, &voltage, &mut Vec::new());
     Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (fitted - fixed).abs()).fold(0.0, f64::max))
 }

@@ -29,6 +29,8 @@ pub enum Stage {
 pub enum Acts {
     /// By [`Effect::change`], up to the amplifier's output.
     OnAmplifier,
+    /// By [`Effect::change`], up to where the stiffness would settle.
+    OnSettled,
     /// By [`Effect::change`], behind it.
     OnChain,
     /// By [`Effect::respond`] alone.
@@ -110,7 +112,11 @@ pub trait Effect: Sync {
 
     /// What of a run it changes.
     fn acts(&self) -> Acts {
-        if self.stage() == Stage::Amplifier { Acts::OnAmplifier } else { Acts::OnChain }
+        match self.stage() {
+            Stage::Amplifier => Acts::OnAmplifier,
+            Stage::Static => Acts::OnSettled,
+            Stage::Relaxation | Stage::Reading => Acts::OnChain,
+        }
     }
 
     /// What it does, in words that follow "because".

@@ -110,11 +110,13 @@ pub struct Simulator<'a> {
     pub base: &'a Base,
     signal: Signal,
     levels_v: Vec<f64>,
-    /// What the last amplifier made of the command, and the last chain of that.
+    /// What the last amplifier made of the command, and the last memory and law of that.
     amplified: Kept<Signal>,
-    chained: Kept<Signal>,
-    /// Readings before any effect on them, of the last response.
-    response: Kept<Vec<f64>>,
+    settled: Kept<Signal>,
+    /// What the last relaxation made of that, from rest and from elsewhere.
+    chained: [Kept<Signal>; 2],
+    /// Readings before any effect on them, of the last response from either.
+    response: [Kept<Vec<f64>>; 2],
     /// Runs so far.
     pub runs: usize,
 }
@@ -174,8 +176,17 @@ impl Model {
 impl<'a> Simulator<'a> {
     /// For one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
-        let (amplified, chained, response) = (Kept::default(), Kept::default(), Kept::default());
-        Self { data, base, signal: Signal::default(), levels_v: Vec::new(), amplified, chained, response, runs: 0 }
+        Self {
+            data,
+            base,
+            signal: Signal::default(),
+            levels_v: Vec::new(),
+            amplified: Kept::default(),
+            settled: Kept::default(),
+            chained: Default::default(),
+            response: Default::default(),
+            runs: 0,
+        }
     }
 
     /// What a model predicts for each row, in V.
@@ -187,13 +198,14 @@ impl<'a> Simulator<'a> {
     pub fn run_from(&mut self, ahead_v: f64, model: &Model, readings: &mut Vec<f64>) {
         self.runs += 1;
         let data = self.data;
-        if !self.response.is_of(ahead_v, model, Acts::OnResponse) {
-            let mut made = std::mem::take(&mut self.response.made);
+        let from = usize::from(ahead_v != 0.0);
+        if !self.response[from].is_of(ahead_v, model, Acts::OnResponse) {
+            let mut made = std::mem::take(&mut self.response[from].made);
             made.clear();
             made.extend(self.responded(ahead_v, model).at_rows());
-            self.response.made = made;
+            self.response[from].made = made;
         }
-        readings.clone_from(&self.response.made);
+        readings.clone_from(&self.response[from].made);
         for (block, point) in &model.blocks {
             block.effect().read(block.form, point, data, readings);
         }
@@ -202,17 +214,22 @@ impl<'a> Simulator<'a> {
     /// The stiffness that a model's chain and response make of the command.
     fn responded(&mut self, ahead_v: f64, model: &Model) -> &Signal {
         let data = self.data;
-        let known = self.chained.is_of(ahead_v, model, Acts::OnChain);
-        let signal = &mut self.chained.made;
+        let chained = &mut self.chained[usize::from(ahead_v != 0.0)];
+        let known = chained.is_of(ahead_v, model, Acts::OnChain);
+        let signal = &mut chained.made;
         if !known {
             let chain = model.chain(self.base, data);
             // Whatever the spring was ahead by.
-            if !self.amplified.is_of(0.0, model, Acts::OnAmplifier) {
-                self.amplified.made.clone_from(&data.command);
-                chain.amplify(&mut self.amplified.made);
+            if !self.settled.is_of(0.0, model, Acts::OnSettled) {
+                if !self.amplified.is_of(0.0, model, Acts::OnAmplifier) {
+                    self.amplified.made.clone_from(&data.command);
+                    chain.amplify(&mut self.amplified.made);
+                }
+                self.settled.made.clone_from(&self.amplified.made);
+                chain.settle(&mut self.settled.made);
             }
-            signal.clone_from(&self.amplified.made);
-            chain.respond(signal, ahead_v, &mut self.levels_v);
+            signal.clone_from(&self.settled.made);
+            chain.relax(signal, ahead_v, &self.amplified.made, &mut self.levels_v);
         }
         if model.blocks.iter().all(|(block, _)| block.effect().acts() != Acts::OnResponse) {
             return signal;

@@ -1,14 +1,10 @@
 //! A signal along the spring's chain: straight pieces with jumps between them, each row of the record at a piece's start.
 //!
 //! Every block maps one signal to another. For pieces that are straight, a lag is solved exactly; what a lag makes of
-//! them is taken as straight again, so pieces are kept short beside the time constants (`LONGEST_PIECE_S`).
+//! them is taken as straight again, so pieces are kept short where it bends (`command`).
 
-use crate::schedule::{Schedule, Stretch};
+mod command;
 
-/// Longer pieces are divided: a curve of time constant 1 s departs from its chord by 1/800 of its change at most.
-const LONGEST_PIECE_S: f64 = 0.1;
-/// Unless that would make more pieces than this for each row; coarse records keep coarse pieces.
-const MOST_PIECES: usize = 20_000;
 /// What is shorter, in s, is numerical dust.
 const DUST_S: f64 = 1e-12;
 
@@ -21,12 +17,6 @@ pub struct Piece {
     pub from: f64,
     /// Value towards its end.
     pub to: f64,
-}
-
-impl From<&Stretch> for Piece {
-    fn from(stretch: &Stretch) -> Self {
-        Self { duration_s: stretch.duration_s, from: stretch.from_v, to: stretch.to_v() }
-    }
 }
 
 /// Adjoining pieces.
@@ -52,51 +42,6 @@ impl Clone for Signal {
 }
 
 impl Signal {
-    /// The schedule's voltage, divided at `times_s`, in V.
-    pub fn new(schedule: &Schedule, times_s: &[f64], before: f64) -> Self {
-        Self::coarse(schedule, times_s, before, MOST_PIECES, 0.0)
-    }
-
-    /// The same in about so many pieces where more would be finer, and where a chord is off by `blur_v` at most.
-    pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize, blur_v: f64) -> Self {
-        let duration = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
-        let longest = LONGEST_PIECE_S.max(duration / pieces as f64);
-        let mut signal = Self { before, ..Self::default() };
-        let mut reader = schedule.reader();
-        let mut stretches = Vec::new();
-        for pair in times_s.windows(2) {
-            signal.start_row();
-            let parts = ((pair[1] - pair[0]) / longest * (1.0 - 1e-9)).ceil().max(1.0);
-            // The last ends with the row, to the bit: a voltage may jump there.
-            let start = |part: usize| match part as f64 / parts {
-                1.0 => pair[1],
-                of => pair[0] + (pair[1] - pair[0]) * of,
-            };
-            for part in 0..parts as usize {
-                reader.at(start(part));
-                stretches.clear();
-                stretches.extend(reader.clone().stretches(start(part), start(part + 1)));
-                signal.push(&stretches, blur_v);
-            }
-        }
-        if let Some(&last) = times_s.last() {
-            signal.start_row();
-            let value = reader.at(last);
-            signal.pieces.push(Piece { duration_s: 0.0, from: value, to: value });
-        }
-        signal
-    }
-
-    /// What follows without a jump as one piece if that is off by `blur_v` at most, else one by one.
-    fn push(&mut self, stretches: &[Stretch], blur_v: f64) {
-        for stretches in stretches.chunk_by(|a, b| (b.from_v - a.to_v()).abs() <= 2.0 * blur_v) {
-            match chord(stretches, blur_v) {
-                Some(chord) => self.pieces.push(chord),
-                None => self.pieces.extend(stretches.iter().map(Piece::from)),
-            }
-        }
-    }
-
     /// The value just after each row's moment.
     pub fn at_rows(&self) -> impl Iterator<Item = f64> {
         self.rows.iter().map(|&piece| self.pieces[piece as usize].from)
@@ -108,14 +53,20 @@ impl Signal {
         middles.extend(self.pieces.iter().map(|piece| (piece.from + piece.to) / 2.0));
     }
 
-    /// Each value on its own, without memory.
+    /// Each value in turn, by a law that makes the same of one that stays.
     pub fn map(&mut self, mut law: impl FnMut(f64) -> f64) {
+        // Most pieces are flat and go on from the last, and laws are dear.
+        let (mut last, mut made) = (self.before, law(self.before));
+        let mut law = |value: f64| {
+            if value != last {
+                (last, made) = (value, law(value));
+            }
+            made
+        };
         self.before = law(self.before);
         for piece in &mut self.pieces {
-            // Most pieces are flat, and laws are dear.
-            let flat = piece.from == piece.to;
             piece.from = law(piece.from);
-            piece.to = if flat { piece.from } else { law(piece.to) };
+            piece.to = law(piece.to);
         }
     }
 
@@ -202,21 +153,6 @@ impl Signal {
     }
 }
 
-/// One piece instead of several, if it is off by `blur_v` at most.
-fn chord(stretches: &[Stretch], blur_v: f64) -> Option<Piece> {
-    let (first, last) = (stretches.first()?, stretches.last()?);
-    let duration_s: f64 = stretches.iter().map(|stretch| stretch.duration_s).sum();
-    let chord = Piece { duration_s, from: first.from_v, to: last.to_v() };
-    let slope = (chord.to - chord.from) / duration_s;
-    let mut at = chord.from;
-    let straight = stretches.iter().all(|stretch| {
-        let start = (stretch.from_v - at).abs();
-        at += slope * stretch.duration_s;
-        start.max((stretch.to_v() - at).abs()) <= blur_v
-    });
-    straight.then_some(chord)
-}
-
 /// A first-order low-pass of unit gain, `tau dx/dt = u - x`, exact for straight pieces.
 #[derive(Clone, Copy, Debug)]
 pub struct Lag {
@@ -226,19 +162,21 @@ pub struct Lag {
     duration_s: f64,
     /// exp(-duration / tau)
     kept: f64,
-    /// 1 - tau / duration (1 - kept): what is followed of a ramp.
+    /// 1 - tau / duration (1 - kept): what is followed of a ramp, which is the weight of its end.
     ramp: f64,
+    /// Weight of its start.
+    held: f64,
 }
 
 impl Lag {
     /// At rest at `value`.
     pub fn at(tau_s: f64, value: f64) -> Self {
-        Self { tau_s, value, duration_s: 0.0, kept: 1.0, ramp: 0.0 }
+        Self { tau_s, value, duration_s: 0.0, kept: 1.0, ramp: 0.0, held: 0.0 }
     }
 
     /// From here on with another time constant.
     pub fn with_tau(self, tau_s: f64) -> Self {
-        Self { tau_s, duration_s: 0.0, kept: 1.0, ramp: 0.0, ..self }
+        Self { value: self.value, ..Self::at(tau_s, 0.0) }
     }
 
     /// Start and end of the lag over a piece of its input.
@@ -250,9 +188,11 @@ impl Lag {
             self.duration_s = duration_s;
             self.kept = (-x).exp();
             self.ramp = if x > 1e-4 { 1.0 - (1.0 - self.kept) / x } else { x / 2.0 };
+            self.held = 1.0 - self.kept - self.ramp;
         }
         if duration_s > 0.0 {
-            self.value = from + (start - from) * self.kept + (to - from) * self.ramp;
+            // Only the first product waits for the piece before.
+            self.value = self.kept * start + (self.held * from + self.ramp * to);
         }
         (start, self.value)
     }
@@ -262,7 +202,7 @@ impl Lag {
 mod tests {
     use super::*;
     use crate::record::Record;
-    use crate::schedule::Between;
+    use crate::schedule::{Between, Schedule};
 
     fn step() -> Signal {
         let text = "time_s,voltage_v\n0,0\n1,100\n2,100\n3,100\n4,0\n";
@@ -277,23 +217,6 @@ mod tests {
     #[test]
     fn a_row_sees_the_voltage_just_after_its_jump() {
         assert_eq!(rows(&step()), [0.0, 100.0, 100.0, 100.0, 0.0]);
-    }
-
-    /// 1 V every 10 ms, then a jump back, in steps of 0.5 s.
-    #[test]
-    fn a_first_look_takes_small_steps_for_a_ramp_and_no_jump() {
-        let row = |row: usize| format!("{},{}\n", 0.01 * row as f64, if row < 130 { row } else { 0 });
-        let text = format!("time_s,voltage_v\n{}", (0..200).map(row).collect::<String>());
-        let schedule = Schedule::from_record(&Record::parse("r", &text, "stiffness").unwrap(), Between::Hold);
-        let pieces = |blur_v| Signal::coarse(&schedule, &[0.0, 0.5, 1.0, 1.5], 0.0, 3, blur_v).pieces;
-        let ramp = Piece { duration_s: 0.5, from: 0.0, to: 49.0 };
-        let [fine, coarse] = [0.0, 1.1].map(pieces);
-        assert!((ramp.duration_s - coarse[0].duration_s).abs() < 1e-9 && coarse[0].to == ramp.to, "{:?}", coarse[0]);
-        assert_eq!(coarse[1].from, 50.0);
-        let ends: Vec<(f64, f64)> = coarse[2..].iter().map(|piece| (piece.from, piece.to)).collect();
-        assert_eq!(ends, [(100.0, 129.0), (0.0, 0.0), (0.0, 0.0)]);
-        // Without blur what stays the same is one piece still.
-        assert_eq!(fine.len(), 130 + 2);
     }
 
     #[test]
