@@ -45,6 +45,8 @@ pub struct Diagnosis {
     pub(super) observed: Observed,
     /// What the causes are worth: held-out log-likelihood less their price, in nats.
     pub(super) score: f64,
+    /// For a search under another reading of the same rows.
+    pub(super) lead: Option<Lead>,
 }
 
 impl Diagnosis {
@@ -93,6 +95,7 @@ pub(super) fn diagnose(
         weights.push((effect, search.best_without(effect), left_out));
     }
     let contenders = standing::contenders(&search, &best);
+    let lead = Some(search.lead());
     let mut held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
     let known = [(&baseline, &*held_out[0]), (&best.fit, &*held_out[1])];
     let standings = standing::standings(engine, contenders, known);
@@ -162,6 +165,7 @@ pub(super) fn diagnose(
         standings,
         observed: observed.clone(),
         score: best.score,
+        lead,
     }
 }
 
@@ -192,5 +196,6 @@ fn unsearched(data: Data, observed: &Observed, engine: &Engine, baseline: Fit, s
         held_out: [unseen.clone(), unseen],
         standings: Vec::new(),
         observed: observed.clone(),
+        lead: None,
     }
 }

@@ -73,7 +73,7 @@ use data::Data;
 use fit::Engine;
 use model::Simulator;
 use observed::Observed;
-use search::{Scored, Search};
+use search::{Lead, Scored, Search};
 
 /// Fewest readings that anything can be said of.
 const FEWEST_ROWS: usize = 8;
@@ -84,8 +84,6 @@ const CLEARLY: f64 = 5.0;
 /// A longer record is searched on a part of its rows first, of about so many.
 const LONG: usize = 5_000;
 const ROWS_TO_SEARCH: usize = 2_500;
-/// Sets of causes from there that are judged on all rows.
-const LEADERS: usize = 3;
 
 /// How to take a record.
 #[derive(Clone, Debug)]
@@ -129,12 +127,12 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         progress(&causes.join(", "));
     };
     let observed = Observed::new(&data);
-    let rounded = judged(record, options, &data, &observed, &mut progress);
+    let rounded = judged(record, options, &data, &observed, None, &mut progress);
     // No reading tells whether it was rounded or cut off; a spring tells.
     let found = match observed.cut().filter(|cut| suits(options, &data, cut, &rounded)) {
         None => rounded,
         Some(cut) => {
-            let cut = judged(record, options, &data, &cut, &mut progress);
+            let cut = judged(record, options, &data, &cut, rounded.lead.clone(), &mut progress);
             if cut.score > rounded.score + CLEARLY { cut } else { rounded }
         }
     };
@@ -142,7 +140,8 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     if found.believes_its_bounds() {
         return Ok(found);
     }
-    Ok(judged(record, options, &data, &found.observed.without_bounds(), &mut progress))
+    let unbound = found.observed.without_bounds();
+    Ok(judged(record, options, &data, &unbound, found.lead, &mut progress))
 }
 
 /// True if readings taken as `observed` suit the causes that were found without it at least as well.
@@ -151,23 +150,25 @@ fn suits(options: &Options, data: &Data, observed: &Observed, found: &Diagnosis)
     engine.fit_twice(found.extended.model.clone()).log_likelihood > found.extended.log_likelihood
 }
 
-/// Searches, a long record in part first, and says what it found.
+/// Searches, from what is `given` or else a long record in part first, and says what it found.
 fn judged(
     record: &Record,
     options: &Options,
     data: &Data,
     observed: &Observed,
+    given: Option<Lead>,
     progress: &mut impl FnMut(&Scored),
 ) -> Diagnosis {
     let every = if data.rows() > LONG { data.rows().div_ceil(ROWS_TO_SEARCH) } else { 1 };
-    let given = (every > 1).then(|| {
+    let searched = || {
         let thinned = Data::thinned(record, options.input, every);
         let observed = Observed::new(&thinned).like(observed);
         let mut engine = Engine::new(&thinned, &observed, Simulator::new(&thinned, &options.base));
         let mut search = Search::new(&mut engine);
         search.run(&mut *progress);
-        search.lead(LEADERS)
-    });
+        search.lead()
+    };
+    let given = given.or_else(|| (every > 1).then(searched));
     let mut engine = Engine::new(data, observed, Simulator::new(data, &options.base));
     let held = options.input == Input::Hold;
     diagnosis::diagnose(data.clone(), observed, &mut engine, held, given, progress)

@@ -21,17 +21,42 @@ impl<J: Judge> Search<'_, J> {
         if let Some(children) = self.extended.get(&key) {
             return children.clone();
         }
-        let mut children = self.judged(node, |_| true);
+        let first_fits = self.first_fits(node);
+        let mut children = self.judged(node, first_fits);
         children.sort_by(|a, b| b.score.total_cmp(&a.score));
         self.extended.insert(key, children.clone());
         children
     }
 
-    /// The best of the extensions by wanted effects, judged.
-    pub(super) fn judged(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Scored> {
+    /// The best of the extensions by one effect, judged.
+    pub(super) fn changed(&mut self, node: &Scored, effect: usize) -> Vec<Scored> {
+        let first_fits = self.fitted(node, |other| other == effect);
+        self.judged(node, first_fits)
+    }
+
+    /// First fits of all extensions. Another pass, which charges other prices, finds the same.
+    fn first_fits(&mut self, node: &Scored) -> Vec<Fit> {
+        let model = &node.fit.model;
+        match self.first_fits.get(&model.structure()) {
+            Some((of, fits)) if of == model => fits.clone(),
+            _ => {
+                let fits = self.fitted(node, |_| true);
+                if self.keeps {
+                    self.first_fits.insert(model.structure(), (model.clone(), fits.clone()));
+                }
+                fits
+            }
+        }
+    }
+
+    fn fitted(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Fit> {
         let model = &node.fit.model;
         let new = |effect| wanted(effect) && !model.has(effect) && !contained(effect, model);
-        let first_fits = self.judge.extended(&node.fit, self.patient, &new);
+        self.judge.extended(&node.fit, self.patient, &new)
+    }
+
+    /// The best of first fits, judged.
+    fn judged(&mut self, node: &Scored, first_fits: Vec<Fit>) -> Vec<Scored> {
         let first_score =
             |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, fit) - fit.model.points().len() as f64;
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();

@@ -41,6 +41,8 @@ pub struct Scored {
     pub score: f64,
 }
 
+/// Sets of causes that one search hands on to another.
+const LEADERS: usize = 3;
 /// Structures that are carried on.
 const BEAM: usize = 3;
 /// Most blocks in a model.
@@ -54,11 +56,15 @@ pub struct Search<'j, J> {
     seen: Seen,
     /// Extensions of each structure, best first.
     extended: HashMap<Vec<Block>, Vec<Scored>>,
+    /// First fits of the extensions of a model, whatever they cost.
+    first_fits: HashMap<Vec<Block>, (Model, Vec<Fit>)>,
+    /// Those are kept for another pass.
+    keeps: bool,
     /// Also what the noise's memory may hide is tried; once is enough.
     patient: bool,
 }
 
-/// What a search on a part of the rows hands on.
+/// What a search hands on: one on a part of the rows, or one that took the readings otherwise.
 #[derive(Clone, Debug)]
 pub struct Lead {
     /// Its best models.
@@ -70,7 +76,8 @@ pub struct Lead {
 impl<'j, J: Judge> Search<'j, J> {
     /// Asks `judge`.
     pub fn new(judge: &'j mut J) -> Self {
-        Self { judge, seen: Seen::default(), extended: HashMap::new(), patient: true }
+        let (extended, first_fits) = (HashMap::new(), HashMap::new());
+        Self { judge, seen: Seen::default(), extended, first_fits, keeps: true, patient: true }
     }
 
     /// Who is asked.
@@ -94,6 +101,8 @@ impl<'j, J: Judge> Search<'j, J> {
     /// The best structure when others, found on a part of the rows, are given: those are judged, and extended once more.
     pub fn from(&mut self, Lead { models, caution }: Lead, mut progress: impl FnMut(&Scored)) -> Scored {
         self.patient = false;
+        // Of all rows of a long record they are many numbers.
+        self.keeps = false;
         self.seen.caution = caution;
         self.root();
         for model in models {
@@ -138,8 +147,8 @@ impl<'j, J: Judge> Search<'j, J> {
     }
 
     /// The best models, for a search on more rows.
-    pub fn lead(&self, count: usize) -> Lead {
-        let models = self.ranked().into_iter().take(count).map(|scored| scored.fit.model.clone()).collect();
+    pub fn lead(&self) -> Lead {
+        let models = self.ranked().into_iter().take(LEADERS).map(|scored| scored.fit.model.clone()).collect();
         Lead { models, caution: self.seen.caution }
     }
 
@@ -251,7 +260,7 @@ impl<'j, J: Judge> Search<'j, J> {
                 continue;
             }
             let without = self.left_out(&scored, effect);
-            for other in self.judged(&without, |other| other == effect) {
+            for other in self.changed(&without, effect) {
                 if other.score > scored.score {
                     scored = other;
                 }

@@ -129,6 +129,17 @@ fn caution_makes_every_block_dearer() {
     assert_eq!(found(&mut judge), ["gain-error"]);
 }
 
+/// What it costs is charged anew, what it is worth stays.
+#[test]
+fn another_pass_fits_nothing_anew() {
+    let mut judge = told(&[(&["gain-error"], 500.0), (&["gain-error", "hum"], 550.0)]);
+    assert_eq!(found(&mut judge), ["gain-error", "hum"]);
+    let once = std::mem::take(&mut judge.fits);
+    judge.caution = 1.5;
+    assert_eq!(found(&mut judge), ["gain-error", "hum"]);
+    assert_eq!(judge.fits, once);
+}
+
 #[test]
 fn a_further_block_costs_what_the_form_of_the_others_may_leave() {
     let mut judge = told(&[(&["hysteresis"], 500.0), (&["hysteresis", "drift"], 520.0)]);
