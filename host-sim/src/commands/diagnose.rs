@@ -38,7 +38,8 @@ pub(crate) struct Arguments {
     /// The record
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
-    /// The simulation to be judged: `paper`, or a plant file
+    /// The simulation to be judged: `paper`, or a plant file. What of that is not in the spring (memory, law, leakage, amplifier,
+    /// further time constants) is named in a sentence, `take_out` in JSON, and left out of the extended spring
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// What the voltage did between the rows

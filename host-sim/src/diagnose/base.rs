@@ -38,6 +38,27 @@ impl Base {
         Ok(Self { file, relaxation })
     }
 
+    /// The same without each of the parts that a file need not have, of those that it has.
+    pub fn without_each(&self) -> impl Iterator<Item = (&'static str, Self)> {
+        type Take = fn(&mut PlantFile) -> bool;
+        let parts: [(&str, Take); 6] = [
+            ("memory", |file| file.memory.take().is_some()),
+            ("law", |file| file.law.take().is_some()),
+            ("leakage", |file| file.leakage.take().is_some()),
+            ("amplifier", |file| file.amplifier.take().is_some()),
+            ("relaxation.tau_high_s", |file| file.relaxation.tau_high_s.take().is_some()),
+            ("relaxation.weights", |file| {
+                file.relaxation.tau_s.truncate(1);
+                !std::mem::take(&mut file.relaxation.weights).is_empty()
+            }),
+        ];
+        parts.into_iter().filter_map(|(part, take)| {
+            let mut file = self.file.clone();
+            let there = take(&mut file);
+            there.then(|| (part, Self { relaxation: Relaxation::of(&file.relaxation), file }))
+        })
+    }
+
     /// The file, to be extended.
     pub fn file(&self) -> &PlantFile {
         &self.file

@@ -15,6 +15,7 @@
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
 //! | [`leftover`], [`swallowed`], [`spikes`], [`spectrum`] | what no effect explains |
+//! | `lacking` | what a plant file says and the spring has not |
 //! | `informative`, `standstill`, `alternatives` | whether a record can tell anything, and of a spring; what it leaves open |
 //! | `finding`, `reading_findings`, `interval`, `quality` | a cause and what it is worth; parameters with intervals; errors |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
@@ -40,6 +41,7 @@ pub mod held_out;
 mod informative;
 mod interval;
 mod knots;
+mod lacking;
 pub mod lattice;
 pub mod law;
 pub mod leakage;
@@ -126,22 +128,28 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
-    let observed = Observed::new(&data);
-    let rounded = judged(record, options, &data, &observed, None, &mut progress);
+    let found = read(record, options, &data, &mut progress);
+    Ok(lacking::taken_out(record, options, &data, found, &mut progress))
+}
+
+/// What a record says, its readings taken as they suit a spring best.
+fn read(record: &Record, options: &Options, data: &Data, progress: &mut impl FnMut(&Scored)) -> Diagnosis {
+    let observed = Observed::new(data);
+    let rounded = judged(record, options, data, &observed, None, progress);
     // No reading tells whether it was rounded or cut off; a spring tells.
-    let found = match observed.cut().filter(|cut| suits(options, &data, cut, &rounded)) {
+    let found = match observed.cut().filter(|cut| suits(options, data, cut, &rounded)) {
         None => rounded,
         Some(cut) => {
-            let cut = judged(record, options, &data, &cut, rounded.lead.clone(), &mut progress);
+            let cut = judged(record, options, data, &cut, rounded.lead.clone(), progress);
             if cut.score > rounded.score + CLEARLY { cut } else { rounded }
         }
     };
     // A plateau on a lattice looks like a bound until a model is seen that does not go beyond it.
     if found.believes_its_bounds() {
-        return Ok(found);
+        return found;
     }
     let unbound = found.observed.without_bounds();
-    Ok(judged(record, options, &data, &unbound, found.lead, &mut progress))
+    judged(record, options, data, &unbound, found.lead, progress)
 }
 
 /// True if readings taken as `observed` suit the causes that were found without it at least as well.

@@ -20,6 +20,9 @@ pub struct Report {
     pub baseline: Quality,
     /// What it gets wrong, the largest error first.
     pub findings: Vec<Finding>,
+    /// Parts of the plant file that are not in this spring: the extended simulation is without them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub take_out: Vec<&'static str>,
     /// Other sets of causes that the data cannot reject.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The experiment that would decide, or show more.

@@ -23,7 +23,7 @@ pub fn text(name: &str, report: &Report) -> String {
         }
     }
     let (before, after) = (&report.baseline, &report.extended.quality);
-    let extends = !report.findings.is_empty();
+    let extends = !report.findings.is_empty() || !report.take_out.is_empty();
     let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
     for (what, before, after) in [
         ("free run RMSE [V]", before.rmse, after.rmse),
@@ -57,13 +57,34 @@ pub fn in_fixed_point(extended: &Extended) -> Option<String> {
     })
 }
 
+/// Which parts of the plant file are not in this spring.
+fn lacking(report: &Report) -> Option<String> {
+    let parts = &report.take_out;
+    let (are, them) = if parts.len() == 1 { ("is", "it") } else { ("are", "them") };
+    let (before, after) = (&report.baseline, &report.extended.quality);
+    (!parts.is_empty()).then(|| {
+        format!(
+            "The plant file's {} {are} not in this spring: take {them} out. The error on stretches that no fit has seen falls \
+             from {:.3} to {:.3} V without {them}{}.",
+            parts.join(" and "),
+            before.held_out_rmse,
+            after.held_out_rmse,
+            if report.findings.is_empty() { "" } else { " and with the causes below" }
+        )
+    })
+}
+
 /// What is wrong; what the cure is worth; what to do next.
 pub fn sentences(name: &str, report: &Report) -> Vec<String> {
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
     let in_readings = effects.clone().all(|effect| effect.stage() == Stage::Reading);
     let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.meaning())).collect();
     let (one, rows) = (causes.len() == 1, report.rows);
-    let mut sentences = vec![match report.verdict {
+    let mut sentences: Vec<String> = lacking(report).into_iter().collect();
+    sentences.push(match report.verdict {
+        Verdict::Explained if causes.is_empty() => {
+            format!("Without that, the simulation agrees with {name}: nothing beyond noise in {rows} readings.")
+        }
         Verdict::Consistent if report.leftover.is_none() => {
             format!("The simulation agrees with {name}: nothing beyond noise in {rows} readings.")
         }
@@ -87,8 +108,8 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
             };
             format!("{what}: {}.", causes.join("; "))
         }
-    }];
-    if !report.findings.is_empty() {
+    });
+    if !report.findings.is_empty() && report.take_out.is_empty() {
         let it = if one { "it" } else { "them" };
         let (before, after) = (&report.baseline, &report.extended.quality);
         sentences.push(if report.extended.gain > FORETOLD {
@@ -163,6 +184,7 @@ mod tests {
             verdict,
             baseline: quality,
             findings: causes.iter().map(finding).collect(),
+            take_out: Vec::new(),
             alternatives: alternatives.to_vec(),
             next_experiment: None,
             extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },

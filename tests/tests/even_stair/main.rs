@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use tempfile::tempdir;
 
+mod plant;
 mod sensor;
 mod start;
 
@@ -47,13 +48,24 @@ fn read(seed: u64, reading: impl Fn(usize, f64, f64) -> f64) -> Vec<(f64, f64)> 
 
 /// What is said of readings.
 fn diagnosed(rows: &[(f64, f64)]) -> Value {
+    diagnosed_in(rows, None)
+}
+
+/// What is said of them beside a plant file.
+fn diagnosed_with(rows: &[(f64, f64)], plant: &str) -> Value {
+    diagnosed_in(rows, Some(plant))
+}
+
+fn diagnosed_in(rows: &[(f64, f64)], plant: Option<&str>) -> Value {
     let mut text = String::from("time_s,voltage_v,stiffness\n");
     for (row, (volts, stiffness)) in rows.iter().enumerate() {
         writeln!(text, "{:.1},{volts},{stiffness}", row as f64 * SAMPLE_S).unwrap();
     }
     let folder = tempdir().unwrap();
     std::fs::write(folder.path().join("record.csv"), text).unwrap();
-    json(folder.path(), &["diagnose", "record.csv", "--json"])
+    std::fs::write(folder.path().join("plant.toml"), plant.unwrap_or_default()).unwrap();
+    let plant = if plant.is_some() { "plant.toml" } else { "paper" };
+    json(folder.path(), &["diagnose", "record.csv", "--plant", plant, "--json"])
 }
 
 fn causes(report: &Value) -> Vec<&str> {

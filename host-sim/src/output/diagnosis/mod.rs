@@ -62,7 +62,7 @@ pub fn write(mut files: Files, diagnosis: &Diagnosis, origin: &Origin) -> Result
 
 /// True if the extended simulation differs from the one as it was.
 fn is_extended(diagnosis: &Diagnosis) -> bool {
-    !diagnosis.extended.model.blocks.is_empty()
+    !diagnosis.extended.model.blocks.is_empty() || !diagnosis.report.take_out.is_empty()
 }
 
 fn figures(diagnosis: &Diagnosis) -> Vec<Figure> {
