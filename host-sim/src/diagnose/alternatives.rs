@@ -10,7 +10,8 @@ const RIVAL: f64 = 3.0;
 /// Rivals that are listed.
 const MOST_RIVALS: usize = 3;
 
-/// Sets of causes that are nearly as good, without being the best with more.
+/// Sets of causes that are nearly as good, without being the best with more: with more causes, or with one that contains
+/// the best's and so fits as well whatever the truth is.
 pub(super) fn rivals<J: Judge>(search: &Search<J>, best: &Scored) -> Vec<Vec<&'static str>> {
     let own = effects(&best.fit.model);
     search
@@ -18,10 +19,14 @@ pub(super) fn rivals<J: Judge>(search: &Search<J>, best: &Scored) -> Vec<Vec<&'s
         .into_iter()
         .take_while(|other| other.score > best.score - RIVAL)
         .map(|other| effects(&other.fit.model))
-        .filter(|set| !own.iter().all(|effect| set.contains(effect)))
+        .filter(|set| !own.iter().all(|effect| set.iter().any(|other| contains(*other, *effect))))
         .take(MOST_RIVALS)
         .map(|set| set.into_iter().map(|effect| EFFECTS[effect].cause()).collect())
         .collect()
+}
+
+fn contains(effect: usize, other: usize) -> bool {
+    effect == other || EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause())
 }
 
 /// On a record that only rises (or falls), memory and a law without memory are one.

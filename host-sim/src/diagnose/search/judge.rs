@@ -28,6 +28,9 @@ pub trait Judge {
     /// The likeliest point near the model's own.
     fn fit(&mut self, model: Model) -> Fit;
 
+    /// A model at its own point.
+    fn at(&mut self, model: Model) -> Fit;
+
     /// The likeliest point near that of a first fit.
     fn fit_again(&mut self, first: Fit) -> Fit;
 
@@ -55,6 +58,10 @@ pub trait Judge {
 impl Judge for Engine<'_> {
     fn fit(&mut self, model: Model) -> Fit {
         self.fit_twice(model)
+    }
+
+    fn at(&mut self, model: Model) -> Fit {
+        Engine::at(self, model)
     }
 
     fn fit_again(&mut self, first: Fit) -> Fit {

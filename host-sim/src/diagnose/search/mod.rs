@@ -159,7 +159,7 @@ impl<'j, J: Judge> Search<'j, J> {
 
     /// The structure without one of its effects, the rest fitted again.
     pub fn left_out(&mut self, scored: &Scored, effect: usize) -> Scored {
-        self.seen.judge(self.judge, scored.fit.model.without(effect))
+        self.seen.judge_from(self.judge, scored.fit.model.without(effect))
     }
 
     /// The best structure that was judged.
@@ -241,7 +241,9 @@ impl<'j, J: Judge> Search<'j, J> {
             let before = best.score;
             for effect in effects(&best.fit.model) {
                 let without = self.left_out(&best, effect);
-                let other = self.children(&without).into_iter().next();
+                let children = self.children(&without).into_iter().next();
+                let other = self.exchanged(&best, effect).into_iter().chain(children);
+                let other = other.max_by(|a, b| a.score.total_cmp(&b.score));
                 if let Some(other) = other.filter(|other| other.score > best.score) {
                     best = self.pruned(other);
                 }
@@ -251,6 +253,19 @@ impl<'j, J: Judge> Search<'j, J> {
             }
         }
         best
+    }
+
+    /// The best with another effect in the place of one, where the rest stays as it suits them both: without either it may
+    /// suit neither.
+    fn exchanged(&mut self, scored: &Scored, effect: usize) -> Option<Scored> {
+        let rest = scored.fit.model.without(effect);
+        if rest.blocks.is_empty() {
+            return None;
+        }
+        let fit = self.judge.at(rest);
+        let node = Scored { fit, ..scored.clone() };
+        let others = self.judged(&node, |other| other != effect);
+        others.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
     /// Each block in the form that suits the others best.

@@ -59,6 +59,15 @@ impl Seen {
         self.scored(judge, fit)
     }
 
+    /// The same, from a point that may be better than the one that was judged: the other blocks were fitted since.
+    pub(super) fn judge_from(&mut self, judge: &mut impl Judge, model: Model) -> Scored {
+        if !self.scored.contains_key(&model.structure()) {
+            return self.judge(judge, model);
+        }
+        let here = judge.at(model);
+        self.judge_anew(judge, here)
+    }
+
     /// The same, from a first fit that may be better than the one that was judged.
     pub(super) fn judge_anew(&mut self, judge: &mut impl Judge, first: Fit) -> Scored {
         match self.scored.get(&first.model.structure()).cloned() {

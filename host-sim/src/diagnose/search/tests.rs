@@ -53,6 +53,10 @@ impl Judge for Told {
         Fit { model, residual: Vec::new(), noise, log_likelihood, plain: log_likelihood }
     }
 
+    fn at(&mut self, model: Model) -> Fit {
+        self.fit(model)
+    }
+
     fn fit_again(&mut self, first: Fit) -> Fit {
         first
     }
