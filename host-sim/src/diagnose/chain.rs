@@ -1,8 +1,10 @@
 //! The chain from the command to the stiffness, in the order of [`model::extended`]:
 //!
 //! ```text
-//! command -> limit -> slew -> output's lag -> delay -> memory -> law -> leakage -> relaxation -> stiffness
+//! command -> limit -> slew -> output's lag -> delay -> memory -> law -> leakage -> relaxation -> law behind -> stiffness
 //! ```
+//!
+//! No plant file holds a law behind the relaxation: it is written as one before it, which settles at the same stiffness.
 //!
 //! A plant file says what it is at first, effects change it; it runs, and writes itself into a plant file. So what is
 //! fitted is what is written: a second limit is the lower one, a second slew the slower, delays add up, memories and laws
@@ -31,6 +33,8 @@ pub struct Chain<'a> {
     pub memory: Bank,
     /// The static law.
     pub law: Law<'a>,
+    /// Another one, behind the relaxation.
+    pub law_behind: Law<'a>,
     /// Losses of charge; a plant file holds the first.
     pub losses: Vec<Loss>,
     /// What comes at once, and what later.
@@ -54,6 +58,7 @@ impl<'a> Chain<'a> {
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
             memory: Bank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
+            law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
             relaxation,
         }
@@ -72,7 +77,7 @@ impl<'a> Chain<'a> {
             file.memory = self.memory.table();
         }
         let (gain, relaxation, leakage) = self.passed();
-        file.law = self.law.table(gain, full_scale_v);
+        file.law = self.law.table(gain, &self.law_behind, full_scale_v);
         file.leakage = leakage;
         relaxation.extend(file);
     }
@@ -119,7 +124,7 @@ impl<'a> Chain<'a> {
     /// From there to the stiffness, from `ahead_v` of where the lags would be at rest; `applied` is what is on the electrodes,
     /// `levels_v` room to work in.
     pub fn relax(&self, signal: &mut Signal, ahead_v: f64, applied: &Signal, levels_v: &mut Vec<f64>) {
-        if self.relaxation.varies() {
+        if self.relaxation.varies() && self.relaxation.by_state.is_none() {
             applied.middles(levels_v);
         }
         let mut lost = Lost::default();
@@ -128,6 +133,9 @@ impl<'a> Chain<'a> {
         self.relaxation.pass(signal, levels_v);
         if !lost.is_none() {
             lost.off(signal);
+        }
+        if !self.law_behind.is_none() {
+            signal.map(|stiffness| self.law_behind.at(stiffness));
         }
     }
 }

@@ -5,6 +5,7 @@ use super::cure;
 use super::data::Data;
 use super::finding::{explained, finding};
 use super::fit::{Engine, Fit};
+use super::in_step;
 use super::informative::{Silent, no_spring, silent};
 use super::leftover::{self, Leftover};
 use super::model::Model;
@@ -106,6 +107,7 @@ pub(super) fn diagnose(
     let spikes = spikes::test(engine, &best.fit);
     let alone = spikes.is_none();
     let left = swallowed::test(&data, &observed.errors(&best.fit.residual), &best.fit.noise.memory)
+        .or_else(|| in_step::test(engine, &best.fit))
         .or(spikes)
         .or_else(|| leftover::test(engine, &best.fit).filter(|left| left.significant))
         .filter(|left| left.rms > FINEST_V);

@@ -39,16 +39,18 @@ impl<'a> Law<'a> {
         self.behind.iter().fold(first, |value, law| law(value))
     }
 
-    /// For a plant file, `gain` times it: through knots up to `full_scale_v` or as far as the file's own law goes.
-    pub fn table(&self, gain: f64, full_scale_v: f64) -> Option<plant_file::Law> {
-        if self.behind.is_empty() && gain == 1.0 {
+    /// For a plant file, `gain` times it and another law behind: through knots up to `full_scale_v` or as far as the file's own
+    /// law goes.
+    pub fn table(&self, gain: f64, behind: &Law, full_scale_v: f64) -> Option<plant_file::Law> {
+        if self.behind.is_empty() && gain == 1.0 && behind.is_none() {
             return self.table.cloned();
         }
         let mut voltage_v: Vec<f64> = (0..=STEPS).map(|step| full_scale_v * step as f64 / STEPS as f64).collect();
         voltage_v.extend(self.table.iter().flat_map(|table| &table.voltage_v));
         voltage_v.sort_by(f64::total_cmp);
         voltage_v.dedup_by(|b, a| *b - *a < 1e-3 * full_scale_v / STEPS as f64);
-        let curve: Vec<Point> = voltage_v.into_iter().map(|voltage| (voltage, gain * self.at(voltage))).collect();
+        let curve: Vec<Point> =
+            voltage_v.into_iter().map(|voltage| (voltage, behind.at(gain * self.at(voltage)))).collect();
         let (voltage_v, stiffness) = knots(&curve, MOST_POINTS, STRAIGHT * full_scale_v).into_iter().unzip();
         Some(plant_file::Law { voltage_v, stiffness })
     }

@@ -14,7 +14,7 @@
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
-//! | [`leftover`], [`swallowed`], [`spikes`], [`spectrum`] | what no effect explains |
+//! | [`leftover`], [`swallowed`], `in_step`, [`spikes`], [`spectrum`] | what no effect explains |
 //! | `lacking` | what a plant file says and the spring has not |
 //! | `informative`, `standstill`, `alternatives` | whether a record can tell anything, and of a spring; what it leaves open |
 //! | `finding`, `reading_findings`, `interval`, `quality` | a cause and what it is worth; parameters with intervals; errors |
@@ -38,6 +38,7 @@ mod finding;
 pub mod fit;
 mod growth;
 pub mod held_out;
+mod in_step;
 mod informative;
 mod interval;
 mod knots;

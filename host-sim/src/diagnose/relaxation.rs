@@ -4,7 +4,9 @@
 //! y = share q + (1 - share - sum part_i) lag(tau(q); q) + sum part_i lag(tau_i; q)
 //! ```
 //!
-//! `q` is the stiffness that would be reached in the end. The paper's plant has no further part and one `tau`.
+//! `q` is the stiffness that would be reached in the end. The paper's plant has no further part and one `tau`. What `tau`
+//! follows is the voltage across the spring, or the spring's own state, in volts as well: `lag + part (q - lag)`, with the
+//! first lag's output for a part of 0, the whole stiffness for one of `share`.
 
 use super::signal::{Lag, Piece, Signal};
 use crate::plant_file::{self, PlantFile};
@@ -21,6 +23,11 @@ pub struct Part {
 /// What the tick can hold beside the first lag.
 pub const FURTHER: usize = 3;
 
+/// Longest step where the lag sets its own time constant, as a part of the shortest.
+const STEP: f64 = 0.1;
+/// And most steps of a piece: after so many the lag is at rest.
+const MOST_STEPS: f64 = 200.0;
+
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation {
@@ -32,6 +39,8 @@ pub struct Relaxation {
     pub tau_high_s: f64,
     /// Between the two: geometric if true, else straight.
     pub geometric: bool,
+    /// The time constant follows the spring's own state, of which so large a part comes at once; if none, the voltage.
+    pub by_state: Option<f64>,
     /// Parts that further lags bring, one after the other.
     pub further: [Part; FURTHER],
 }
@@ -42,7 +51,7 @@ impl Relaxation {
 
     /// One share, one time constant.
     pub fn plain(share: f64, tau_s: f64) -> Self {
-        Self { share, tau_s, tau_high_s: tau_s, geometric: false, further: Default::default() }
+        Self { share, tau_s, tau_high_s: tau_s, geometric: false, by_state: None, further: Default::default() }
     }
 
     /// Time constant at a voltage, in s.
@@ -107,7 +116,8 @@ impl Relaxation {
                 (share * piece.from + main * start, share * piece.to + main * end)
             });
         }
-        let mut levels = levels_v.iter().copied().filter(|_| self.varies());
+        let by_state = self.by_state.filter(|_| self.varies());
+        let mut levels = levels_v.iter().copied().filter(|_| self.varies() && by_state.is_none());
         let mut level = f64::NAN;
         signal.pass(|piece: Piece| {
             if let Some(next) = levels.next()
@@ -116,7 +126,10 @@ impl Relaxation {
                 level = next;
                 lag = lag.with_tau(self.tau_at(level));
             }
-            let (start, end) = lag.pass(piece);
+            let (start, end) = match by_state {
+                Some(at_once) => self.led(at_once, &mut lag, piece),
+                None => lag.pass(piece),
+            };
             let (mut from, mut to) = (share * piece.from + main * start, share * piece.to + main * end);
             for (part, lag) in &mut further {
                 let (start, end) = lag.pass(piece);
@@ -125,5 +138,25 @@ impl Relaxation {
             }
             (from, to)
         });
+    }
+    /// Start and end of the first lag over a piece of its input, where the spring's state sets its time constant. Exact for the
+    /// time constant that it has in the middle of each step.
+    fn led(&self, at_once: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
+        let start = lag.value();
+        let fastest_s = self.tau_s.min(self.tau_high_s);
+        let steps = (piece.duration_s / (STEP * fastest_s)).ceil().clamp(1.0, MOST_STEPS);
+        let duration_s = piece.duration_s / steps;
+        let rise = (piece.to - piece.from) / steps;
+        let mut from = piece.from;
+        for _ in 0..steps as usize {
+            // Implicitly, so that it lies between the output and what that follows, however long the step.
+            let ahead = 0.5 * duration_s / (lag.tau_s() + 0.5 * duration_s);
+            let to_come = from + 0.5 * rise - lag.value();
+            let middle = lag.value() + (ahead + at_once * (1.0 - ahead)) * to_come;
+            *lag = lag.with_tau(self.tau_at(middle));
+            lag.pass(Piece { duration_s, from, to: from + rise });
+            from += rise;
+        }
+        (start, lag.value())
     }
 }

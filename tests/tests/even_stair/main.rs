@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use tempfile::tempdir;
 
+mod forms;
 mod plant;
 mod sensor;
 mod start;

@@ -20,16 +20,23 @@ use crate::diagnose::effect::{Coordinate, Effect, Quantity, Scene, Stage, table}
 pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
-/// Number of plays and own gain, by form.
-const FORMS: [(usize, bool); 7] = [(1, false), (1, false), (5, false), (1, true), (5, true), (1, true), (5, true)];
-/// From here on they begin on the branch that comes down.
-const CYCLED: usize = 5;
+
+/// Number of plays, own gain, and whether they begin on the branch that comes down, by form.
+const FORMS: [(usize, bool, bool); 7] = [
+    (1, false, false),
+    (1, false, false),
+    (5, false, false),
+    (1, true, false),
+    (5, true, false),
+    (1, true, true),
+    (5, true, true),
+];
 /// Thresholds of a bank, as parts of r.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
 /// The bank of a form at a point.
 fn bank(form: usize, point: &[f64]) -> Bank {
-    let (count, own_gain) = FORMS[form];
+    let (count, own_gain, cycled) = FORMS[form];
     let threshold = point[0].exp();
     let plays: Vec<(f64, f64)> = match (form, count) {
         (WHOLE, _) => vec![(threshold, 1.0)],
@@ -39,7 +46,7 @@ fn bank(form: usize, point: &[f64]) -> Bank {
     let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
     let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();
     let bank = Bank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
-    if form < CYCLED { bank } else { bank.cycled() }
+    if cycled { bank.cycled() } else { bank }
 }
 
 impl Effect for Hysteresis {
@@ -64,7 +71,7 @@ impl Effect for Hysteresis {
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
-        let (count, own_gain) = FORMS[form];
+        let (count, own_gain, _) = FORMS[form];
         let mut coordinates = vec![Coordinate::log(1e-4 * data.full_scale_v, 0.5 * data.full_scale_v)];
         if form != WHOLE {
             coordinates.resize(1 + count, Coordinate::new(0.0, 2.0));
@@ -76,7 +83,7 @@ impl Effect for Hysteresis {
     }
 
     fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
-        let (count, own_gain) = FORMS[form];
+        let (count, own_gain, _) = FORMS[form];
         let start = |part: f64, weight: f64| {
             let mut point = vec![(part * data.full_scale_v).ln()];
             if form != WHOLE {

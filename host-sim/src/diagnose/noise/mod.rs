@@ -158,7 +158,7 @@ impl Noise {
     }
 
     /// As if the noise were even.
-    fn weighted<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
+    pub fn weighted<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
         match &self.weights {
             None => Cow::Borrowed(values),
             Some(weights) => values.iter().zip(&**weights).map(|(value, weight)| value * weight).collect(),

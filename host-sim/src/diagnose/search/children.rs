@@ -28,9 +28,9 @@ impl<J: Judge> Search<'_, J> {
         children
     }
 
-    /// The best of the extensions by one effect, judged.
-    pub(super) fn changed(&mut self, node: &Scored, effect: usize) -> Vec<Scored> {
-        let first_fits = self.fitted(node, |other| other == effect);
+    /// The best of the extensions by wanted effects, judged.
+    pub(super) fn wanted(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Scored> {
+        let first_fits = self.fitted(node, wanted);
         self.judged(node, first_fits)
     }
 

@@ -264,7 +264,7 @@ impl<'j, J: Judge> Search<'j, J> {
         }
         let fit = self.judge.at(rest);
         let node = Scored { fit, ..scored.clone() };
-        let others = self.judged(&node, |other| other != effect);
+        let others = self.wanted(&node, |other| other != effect);
         others.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
@@ -275,7 +275,7 @@ impl<'j, J: Judge> Search<'j, J> {
                 continue;
             }
             let without = self.left_out(&scored, effect);
-            for other in self.changed(&without, effect) {
+            for other in self.wanted(&without, |other| other == effect) {
                 if other.score > scored.score {
                     scored = other;
                 }

@@ -174,6 +174,16 @@ impl Lag {
         Self { tau_s, value, duration_s: 0.0, kept: 1.0, ramp: 0.0, held: 0.0 }
     }
 
+    /// Where it is.
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// Its time constant, in s.
+    pub fn tau_s(&self) -> f64 {
+        self.tau_s
+    }
+
     /// From here on with another time constant.
     pub fn with_tau(self, tau_s: f64) -> Self {
         Self { value: self.value, ..Self::at(tau_s, 0.0) }
