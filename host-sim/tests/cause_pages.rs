@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use host_sim::diagnose::data::Data;
 use host_sim::diagnose::effect::Effect;
 use host_sim::diagnose::effects::EFFECTS;
-use host_sim::diagnose::model::{Model, Simulator};
+use host_sim::diagnose::model::Model;
+use host_sim::diagnose::simulator::Simulator;
 use host_sim::diagnose::{Input, Options, diagnose};
 use host_sim::record::{Record, Row};
 

@@ -9,7 +9,8 @@ use std::path::PathBuf;
 use anyhow::Context;
 use end_to_end::hidden::{Cause, Effect, Hidden, Noise, Schedule};
 use host_sim::diagnose::data::Data;
-use host_sim::diagnose::model::{Model, Simulator};
+use host_sim::diagnose::model::Model;
+use host_sim::diagnose::simulator::Simulator;
 use host_sim::diagnose::{Input, Options};
 use host_sim::output::diagnosis::panels::panels;
 

@@ -14,7 +14,8 @@ use super::bank::Bank;
 use super::law::Law;
 use super::leakage::{Loss, Lost};
 use super::relaxation::Relaxation;
-use super::signal::{Lag, Signal};
+use super::signal::{Lag, Piece, Signal};
+use super::start::Start;
 use crate::plant_file::{Amplifier, Leakage, PlantFile};
 
 /// Everything between the command and the stiffness that a plant file can hold.
@@ -25,6 +26,8 @@ pub struct Chain<'a> {
     pub rising_v_per_s: f64,
     /// And fall, in V/s.
     pub falling_v_per_s: f64,
+    /// Where it begins, in V, if not at the command.
+    pub from_v: Option<f64>,
     /// Time constant of its output's resistance with the spring's capacitance, in s.
     pub output_tau_s: f64,
     /// How late it answers, in s.
@@ -43,6 +46,10 @@ pub struct Chain<'a> {
 
 /// A jump that falls on a row's moment counts as before it, however sums of times are rounded: parts of the delay.
 const ROUNDING: f64 = 1e-5;
+/// What had been sent before may have stepped at the ends of so many parts of the delay.
+const SENT: usize = 6;
+/// Higher than any voltage of a record.
+const HIGHEST_V: f64 = 1e6;
 
 impl<'a> Chain<'a> {
     /// Of a plant file, whose relaxation is given.
@@ -54,6 +61,7 @@ impl<'a> Chain<'a> {
             limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
+            from_v: None,
             output_tau_s: 0.0,
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
             memory: Bank::of(file.memory.as_ref()),
@@ -99,6 +107,7 @@ impl<'a> Chain<'a> {
             signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
         }
         if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {
+            signal.before = self.from_v.unwrap_or(signal.before);
             *signal = signal.slewed(self.rising_v_per_s, self.falling_v_per_s);
         }
         if self.output_tau_s > 0.0 {
@@ -121,21 +130,50 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// From there to the stiffness, from `ahead_v` of where the lags would be at rest; `applied` is what is on the electrodes,
-    /// `levels_v` room to work in.
-    pub fn relax(&self, signal: &mut Signal, ahead_v: f64, applied: &Signal, levels_v: &mut Vec<f64>) {
+    /// From there to the stiffness; `applied` is what is on the electrodes, `levels_v` becomes what [`Chain::follow`] needs to
+    /// know of it.
+    pub fn relax(&self, signal: &mut Signal, applied: &Signal, levels_v: &mut Vec<f64>) {
         if self.relaxation.varies() && self.relaxation.by_state.is_none() {
             applied.middles(levels_v);
         }
-        let mut lost = Lost::default();
-        self.losses.iter().for_each(|loss| loss.take(signal, &mut lost));
-        signal.before += ahead_v;
-        self.relaxation.pass(signal, levels_v);
-        if !lost.is_none() {
-            lost.off(signal);
-        }
+        self.follow(signal, &mut Start::at_rest(), levels_v);
         if !self.law_behind.is_none() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }
+    }
+
+    /// What is linear: from where memory and law would have it settle on.
+    fn follow(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
+        let mut lost = Lost::default();
+        self.losses.iter().for_each(|loss| loss.take(signal, start, &mut lost));
+        self.relaxation.pass(signal, start, levels_v);
+        if !lost.is_none() {
+            lost.off(signal);
+        }
+    }
+
+    /// What a start adds to the stiffness under the voltage of `signal` at the electrodes. Behind them, what had been sent
+    /// before arrives late, and plays may have been left as the highest voltage leaves them.
+    pub fn begin(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
+        let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.ask() } else { 0.0 });
+        let late = if self.delay_s > 0.0 { [0.0; SENT].map(|_| start.ask()) } else { [0.0; SENT] };
+        let kept = if self.memory.table().is_some() { start.ask() } else { 0.0 };
+        let (mut rest, mut above) = (self.memory.clone(), self.memory.clone());
+        rest.at(signal.before);
+        above.at(HIGHEST_V);
+        let mut apart = |voltage| match kept {
+            0.0 => 0.0,
+            _ => kept * (self.law.at(above.at(voltage)) - self.law.at(rest.at(voltage))),
+        };
+        let mut at_s = 0.0;
+        signal.before = 0.0;
+        signal.pass(|piece| {
+            let part = (at_s + piece.duration_s / 2.0) / self.delay_s * SENT as f64;
+            at_s += piece.duration_s;
+            let sent = late.get(part as usize).copied().unwrap_or(0.0);
+            let (from, to) = output.pass(Piece { from: 0.0, to: 0.0, ..piece });
+            (from + sent + apart(piece.from), to + sent + apart(piece.to))
+        });
+        self.follow(signal, start, levels_v);
     }
 }

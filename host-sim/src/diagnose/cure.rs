@@ -58,6 +58,6 @@ fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f6
     chain.memory = chain.memory.at_rest();
     let mut fitted = voltage.clone();
     chain.settle(&mut fitted);
-    chain.relax(&mut fitted, 0.0, &voltage, &mut Vec::new());
+    chain.relax(&mut fitted, &voltage, &mut Vec::new());
     Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (fitted - fixed).abs()).fold(0.0, f64::max))
 }

@@ -10,6 +10,7 @@
 use super::chain::Chain;
 use super::data::Data;
 use super::signal::Signal;
+use super::start::Start;
 
 /// Where in the chain an effect acts. Two effects of one stage are harder to tell apart than two of different stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -165,8 +166,8 @@ pub trait Effect: Sync {
         Some(table(self, form, point, data))
     }
 
-    /// Acts on the stiffness, in V.
-    fn respond(&self, _form: usize, _point: &[f64], _data: &Data, _signal: &mut Signal) {}
+    /// Acts on the stiffness, in V; its states ask where they start.
+    fn respond(&self, _form: usize, _point: &[f64], _signal: &mut Signal, _start: &mut Start) {}
 
     /// Acts on the readings at each row, in V.
     fn read(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}

@@ -7,9 +7,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::data::Data;
 use super::effect::Scene;
-use super::model::{Model, Simulator};
+use super::model::Model;
 use super::noise::{Noise, Term, scale};
-use super::observed::Observed;
+use super::observed::{Kind, Observed};
+use super::simulator::Simulator;
 use super::start;
 use super::sums::dot;
 
@@ -22,10 +23,23 @@ pub struct Fit {
     pub residual: Vec<f64>,
     /// The noise's law for this residual.
     pub noise: Noise,
-    /// Log-likelihood under that law, less the law's own cost.
+    /// Log-likelihood under that law, less [`Fit::cost`].
     pub log_likelihood: f64,
     /// Log-likelihood under independent noise: what a memory that is really structure cannot hide.
     pub plain: f64,
+    /// States whose start the readings had to tell.
+    pub states: usize,
+}
+
+impl Fit {
+    /// What the law of the noise and the start cost, in nats.
+    pub fn cost(&self) -> f64 {
+        cost(&self.noise, self.states, self.residual.len())
+    }
+}
+
+fn cost(noise: &Noise, states: usize, rows: usize) -> f64 {
+    noise.cost(rows) + start::cost(states, rows)
 }
 
 /// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
@@ -55,28 +69,31 @@ pub struct Engine<'a> {
     /// Readings less what the simulation without any block predicts, in V.
     pub simulation: Vec<f64>,
     predicted: Vec<f64>,
+    kernels: Vec<Vec<f64>>,
 }
 
 impl<'a> Engine<'a> {
     /// For one record.
     pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
-        let mut engine = Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new() };
+        let mut engine =
+            Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new(), kernels: Vec::new() };
         engine.simulation = engine.residual(&Model::default());
         engine
     }
 
     /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
     pub fn residual(&mut self, model: &Model) -> Vec<f64> {
-        self.simulator.run(model, &mut self.predicted);
+        if self.data.begun {
+            self.simulator.run_begun(model, &mut self.predicted, &mut self.kernels);
+        } else {
+            self.simulator.run(model, &mut self.predicted);
+        }
         let cut_v = self.observed.cut_v;
         let left = |(reading, predicted): (&f64, &f64)| reading + cut_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
         if self.data.begun {
-            self.simulator.run_from(self.data.full_scale_v, model, &mut self.predicted);
-            let moved = self.data.reading.iter().zip(&self.predicted).map(left);
-            let kernel: Vec<f64> = residual.iter().zip(moved).map(|(here, there)| here - there).collect();
-            let ahead = start::likeliest(&residual, &kernel);
-            residual.iter_mut().zip(&kernel).for_each(|(left, kernel)| *left -= ahead * kernel);
+            let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
+            start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact);
         }
         residual
     }
@@ -85,9 +102,10 @@ impl<'a> Engine<'a> {
     pub fn at(&mut self, model: Model) -> Fit {
         let residual = self.residual(&model);
         let noise = Noise::fitted(&residual, self.observed);
-        let log_likelihood = self.log(&noise, &residual) - noise.cost(residual.len());
+        let states = self.kernels.len();
+        let log_likelihood = self.log(&noise, &residual) - cost(&noise, states, residual.len());
         let plain = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
-        Fit { model, residual, noise, log_likelihood, plain }
+        Fit { model, residual, noise, log_likelihood, plain, states }
     }
 
     /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.
@@ -204,7 +222,7 @@ impl<'a> Engine<'a> {
             // Rows that stopped at a bound are taken one by one, the others whitened.
             let mut white = noise.whitened(&column);
             for (row, kind) in self.observed.kinds.iter().enumerate() {
-                if *kind != super::observed::Kind::Exact {
+                if *kind != Kind::Exact {
                     white[row] = column[row];
                 }
             }

@@ -29,7 +29,7 @@ impl Engine<'_> {
             let logs = fit.noise.logs(&there, self.observed).zip(&self.data.fold);
             log_likelihood += logs.filter(|(_, of)| usize::from(**of) == fold).map(|(log, _)| log).sum::<f64>();
         }
-        log_likelihood - fit.noise.cost(fit.residual.len())
+        log_likelihood - fit.cost()
     }
 
     /// Readings less prediction for each row, in V, by a fit that has not seen the row.
@@ -106,9 +106,10 @@ mod tests {
     use crate::diagnose::base::Base;
     use crate::diagnose::data::{Data, Input};
     use crate::diagnose::effects::index_of;
-    use crate::diagnose::model::{Block, Simulator};
+    use crate::diagnose::model::Block;
     use crate::diagnose::noise::normals;
     use crate::diagnose::observed::Observed;
+    use crate::diagnose::simulator::Simulator;
     use crate::record::{Record, Row};
 
     const ROWS: usize = 800;

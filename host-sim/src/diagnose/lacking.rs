@@ -12,10 +12,10 @@ use super::base::Base;
 use super::data::Data;
 use super::diagnosis::Diagnosis;
 use super::fit::Engine;
-use super::model::Simulator;
 use super::observed::Observed;
 use super::report::Verdict;
 use super::search::{Lead, Scored, Search};
+use super::simulator::Simulator;
 use super::{CLEARLY, Options, read};
 use crate::record::Record;
 

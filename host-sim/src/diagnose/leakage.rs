@@ -10,6 +10,7 @@
 
 use super::relaxation::Relaxation;
 use super::signal::{Lag, Signal};
+use super::start::Start;
 use crate::plant_file::Leakage;
 
 /// A loss of charge.
@@ -37,9 +38,9 @@ impl Loss {
     }
 
     /// Takes off the charge what passes the relaxation, and adds to `lost` what does not.
-    pub fn take(&self, signal: &mut Signal, lost: &mut Lost) {
+    pub fn take(&self, signal: &mut Signal, start: &mut Start, lost: &mut Lost) {
         let (passes, at_once) = (self.share * (1.0 - self.at_once), self.share * self.at_once);
-        let mut lag = Lag::at(self.tau_s, signal.before);
+        let mut lag = Lag::at(self.tau_s, signal.before + start.ask());
         lost.before += at_once * signal.before;
         signal.before *= 1.0 - passes;
         let mut number = 0;

@@ -9,8 +9,8 @@
 //! | [`base`] | the simulation that is judged |
 //! | [`chain`], [`bank`], [`law`], `knots`, [`leakage`] | command to stiffness: what a plant file says and effects change; runs and writes itself |
 //! | [`data`], [`observed`], [`lattice`], `growth` | the record made ready; what its readings say before any model |
-//! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`] | the chain from command to reading, effect by effect |
-//! | `start` | how far the spring has come where a record begins in mid-course |
+//! | [`signal`], [`relaxation`], [`effect`], [`effects`], [`model`], [`simulator`] | the chain from command to reading, effect by effect |
+//! | `start` | how far each state is off its rest where a record begins in mid-course |
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
@@ -58,6 +58,7 @@ pub mod relaxation;
 pub mod report;
 pub mod search;
 pub mod signal;
+pub mod simulator;
 pub mod spectrum;
 pub mod spikes;
 pub mod standing;
@@ -74,9 +75,9 @@ pub use report::{Report, Verdict};
 use base::Base;
 use data::Data;
 use fit::Engine;
-use model::Simulator;
 use observed::Observed;
 use search::{Lead, Scored, Search};
+use simulator::Simulator;
 
 /// Fewest readings that anything can be said of.
 const FEWEST_ROWS: usize = 8;

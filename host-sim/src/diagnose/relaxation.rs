@@ -9,6 +9,7 @@
 //! first lag's output for a part of 0, the whole stiffness for one of `share`.
 
 use super::signal::{Lag, Piece, Signal};
+use super::start::Start;
 use crate::plant_file::{self, PlantFile};
 
 /// A part that a lag of its own brings.
@@ -105,11 +106,12 @@ impl Relaxation {
 
     /// What becomes of the static stiffness; `levels_v` is the voltage across the spring in the middle of each piece,
     /// needed only if the time constant varies.
-    pub fn pass(&self, signal: &mut Signal, levels_v: &[f64]) {
+    pub fn pass(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
         let before = signal.before;
         let (share, main) = (self.share, self.main());
-        let mut lag = Lag::at(self.tau_s, before);
-        let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, Lag::at(it.tau_s, before))).collect();
+        let mut at_first = |tau_s| Lag::at(tau_s, before + start.ask());
+        let mut lag = at_first(self.tau_s);
+        let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, at_first(it.tau_s))).collect();
         if further.is_empty() && !self.varies() {
             return signal.pass(|piece| {
                 let (start, end) = lag.pass(piece);

@@ -94,9 +94,10 @@ mod tests {
     use super::*;
     use crate::diagnose::base::Base;
     use crate::diagnose::data::Input;
-    use crate::diagnose::model::{Model, Simulator};
+    use crate::diagnose::model::Model;
     use crate::diagnose::noise::normals;
     use crate::diagnose::observed::Observed;
+    use crate::diagnose::simulator::Simulator;
     use crate::record::{Record, Row};
 
     const ROWS: usize = 800;

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use host_sim::diagnose::data::Data;
-use host_sim::diagnose::model::Simulator;
+use host_sim::diagnose::simulator::Simulator;
 use host_sim::diagnose::{Options, examine};
 use host_sim::record::Record;
 use serde_json::Value;

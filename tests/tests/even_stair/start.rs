@@ -1,5 +1,7 @@
 //! Where a record begins.
 
+use std::collections::VecDeque;
+
 use super::{LEVELS_V, ROWS_PER_LEVEL, SAMPLE_S, causes, diagnosed, noise, read};
 
 /// At 0 V, but still on the way down from a voltage before; few readings tell of it.
@@ -42,4 +44,91 @@ fn hysteresis_is_found_on_the_branch_that_comes_down_too() {
     let width = report["findings"][0]["parameters"]["width_v"]["value"].as_f64().unwrap();
     assert!((width / 33.0 - 1.0).abs() < 0.1, "{width}");
     assert!(report["extended"]["rmse"].as_f64().unwrap() < 1.1, "{report}");
+}
+
+/// Rows before the record, of the longer one that it is cut out of: 0.3 s after a step from 150 to 370 V.
+const CUT: usize = 790;
+
+/// A stair of uneven steps, and what a spring answers row by row, cut.
+fn cut(seed: u64, spring: impl FnMut(f64) -> f64) -> Vec<(f64, f64)> {
+    const LEVELS_V: [f64; 10] = [0.0, 320.0, 500.0, 150.0, 430.0, 240.0, 370.0, 60.0, 460.0, 200.0];
+    let step = |index: usize| (LEVELS_V[index * 3 % 10], 40 + index * 37 % 61);
+    let levels = (0..60).flat_map(|index| std::iter::repeat_n(step(index).0, step(index).1)).take(2_800);
+    let volts: Vec<f64> = levels.collect();
+    let noise = noise(seed, volts.len());
+    let read = volts.iter().copied().map(spring).zip(&noise).map(|(y, noise)| y + noise);
+    volts.iter().copied().zip(read.collect::<Vec<_>>()).skip(CUT).collect()
+}
+
+/// What follows its input with a time constant, as it is when the input comes.
+fn lag(tau_s: f64) -> impl FnMut(f64) -> f64 {
+    let (kept, mut value) = ((-SAMPLE_S / tau_s).exp(), 0.0);
+    move |input| {
+        let now = value;
+        value = input + (value - input) * kept;
+        now
+    }
+}
+
+fn relaxed(mut lag: impl FnMut(f64) -> f64) -> impl FnMut(f64) -> f64 {
+    move |volts| volts / 11.0 + lag(volts) * 10.0 / 11.0
+}
+
+/// What was leaked, crept or swinging, sent or slewed before the first row is no cause of its own.
+#[test]
+fn a_cause_is_found_in_a_record_cut_out_of_a_longer_one() {
+    let leaking = || {
+        let (mut spring, mut leaked) = (relaxed(lag(5.5)), lag(25.0));
+        move |volts| spring(volts) - 0.2 * leaked(volts)
+    };
+    let creeping = || {
+        let (mut spring, mut slow) = (relaxed(lag(5.5)), lag(40.0));
+        move |volts| 0.85 * spring(volts) + 0.15 * slow(volts)
+    };
+    // What comes at once swings at 0.6 Hz, damped by 0.05: (x - e) and its rate turn by an angle a row.
+    let swinging = || {
+        let (mut spring, mut last, mut x, mut rate) = (relaxed(lag(5.5)), 0.0, 0.0, 0.0);
+        move |volts: f64| {
+            const OMEGA: f64 = std::f64::consts::TAU * 0.6;
+            x -= (volts - last) / 11.0;
+            last = volts;
+            let now = spring(volts) + x;
+            let damped = OMEGA * (1.0 - 0.05f64 * 0.05).sqrt();
+            let (decay, (sin, cos)) = ((-0.05 * OMEGA * SAMPLE_S).exp(), (damped * SAMPLE_S).sin_cos());
+            let along = (rate + 0.05 * OMEGA * x) / damped;
+            let lean = (OMEGA * OMEGA * x + 0.05 * OMEGA * rate) / damped;
+            (x, rate) = (decay * (x * cos + along * sin), decay * (rate * cos - lean * sin));
+            now
+        }
+    };
+    let late = || {
+        let (mut spring, mut sent) = (relaxed(lag(5.5)), VecDeque::from([0.0; 5]));
+        move |volts| {
+            sent.push_back(volts);
+            spring(sent.pop_front().expect("five"))
+        }
+    };
+    let slewing = || {
+        let (mut follows, mut at) = (lag(5.5), 0.0);
+        move |volts: f64| {
+            let next: f64 = volts.clamp(at - 15.0, at + 15.0);
+            let now = at / 11.0 + follows(0.5 * (at + next)) * 10.0 / 11.0;
+            at = next;
+            now
+        }
+    };
+    for seed in 1..=2 {
+        for (cause, parameter, value, rows) in [
+            ("charge-leakage", "tau_s", 25.0, cut(seed, leaking())),
+            ("second-relaxation", "tau_s", 40.0, cut(seed, creeping())),
+            ("resonance", "freq_hz", 0.6, cut(seed, swinging())),
+            ("delay", "delay_s", 0.5, cut(seed, late())),
+            ("amplifier-slew", "slew_v_per_s", 150.0, cut(seed, slewing())),
+        ] {
+            let report = diagnosed(&rows);
+            assert_eq!(causes(&report), [cause], "{seed}: {report}");
+            let found = report["findings"][0]["parameters"][parameter]["value"].as_f64().unwrap();
+            assert!((found / value - 1.0).abs() < 0.1, "{cause} {seed}: {found}");
+        }
+    }
 }

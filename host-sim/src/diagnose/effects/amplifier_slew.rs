@@ -5,6 +5,8 @@
 //! | both ways | `-slew <= du/dt <= slew` |
 //! | two rates | `-falling <= du/dt <= slew` |
 //! | output resistance | `tau du/dt = command - u`: a full stroke starts at `slew = full / tau` |
+//!
+//! Where a record begins in mid-course, the voltage that a bounded rate has reached by then is one coordinate more.
 
 use crate::diagnose::chain::Chain;
 use crate::diagnose::data::Data;
@@ -15,10 +17,14 @@ pub(super) struct AmplifierSlew;
 const BOTH_WAYS: usize = 0;
 const TWO_RATES: usize = 1;
 const RESISTANCE: usize = 2;
+/// Rates of a form.
+const RATES: [usize; 2] = [1, 2];
 /// Slower outputs would be taken for the spring, in s.
 const SLOWEST_OUTPUT_S: f64 = 1.0;
 /// Of two rates, how far apart they are looked for.
 const APART: f64 = 3.0;
+/// How far off the command an amplifier in mid-course is looked for, as a part of the stroke.
+const OFF: f64 = 0.2;
 
 fn stroke(data: &Data) -> f64 {
     data.full_scale_v.max(1e-6)
@@ -61,19 +67,24 @@ impl Effect for AmplifierSlew {
             return vec![Coordinate::log(shortest, longest)];
         }
         let (slowest, fastest) = range(data);
-        vec![Coordinate::log(slowest, fastest); if form == TWO_RATES { 2 } else { 1 }]
+        let mut coordinates = vec![Coordinate::log(slowest, fastest); RATES[form]];
+        coordinates.extend(data.begun.then_some(Coordinate::new(-stroke(data), stroke(data))));
+        coordinates
     }
 
     fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
         let (slowest, fastest) = range(data);
         let rates = (2.0 * slowest, 0.8 * fastest);
-        match form {
+        let starts: Vec<Vec<f64>> = match form {
             BOTH_WAYS => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
-            RESISTANCE => logarithms(taus(data), 10).map(|tau| vec![tau]).collect(),
+            RESISTANCE => return logarithms(taus(data), 10).map(|tau| vec![tau]).collect(),
             _ => logarithms(rates, 10)
                 .flat_map(|rate| [APART.ln(), -APART.ln()].map(|apart| vec![rate, rate + apart]))
                 .collect(),
-        }
+        };
+        // From the command itself no small change would show.
+        let from_v = data.begun.then_some(data.command.before - OFF * stroke(data));
+        starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
@@ -101,7 +112,8 @@ impl Effect for AmplifierSlew {
             chain.output_tau_s = value;
             return;
         }
-        let falling = point.get(1).map_or(value, |falling| falling.exp());
+        let falling = point[RATES[form] - 1].exp();
+        chain.from_v = point.get(RATES[form]).copied();
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);
         chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
     }

@@ -15,6 +15,7 @@ use std::f64::consts::TAU;
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage, logarithms};
 use crate::diagnose::signal::{Lag, Piece, Signal};
+use crate::diagnose::start::Start;
 
 pub(super) struct Resonance;
 
@@ -88,12 +89,12 @@ impl Effect for Resonance {
         10f64.ln()
     }
 
-    fn respond(&self, _: usize, point: &[f64], _: &Data, signal: &mut Signal) {
+    fn respond(&self, _: usize, point: &[f64], signal: &mut Signal, start: &mut Start) {
         let (omega, zeta) = (TAU * point[0].exp(), point[1].exp());
         let part = point.get(2).copied().unwrap_or(1.0);
         // Without a time of its own, nothing is slow.
-        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before));
-        let (mut x, mut v) = (if slow.is_some() { 0.0 } else { signal.before }, 0.0);
+        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.ask()));
+        let (mut x, mut v) = (if slow.is_some() { 0.0 } else { signal.before } + start.ask(), omega * start.ask());
         let mut last = f64::NAN;
         let mut step = [[1.0, 0.0], [0.0, 1.0]];
         signal.pass(|piece| {

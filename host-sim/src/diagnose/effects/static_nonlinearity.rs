@@ -93,7 +93,11 @@ impl Effect for StaticNonlinearity {
         }
     }
 
-    fn starts(&self, form: usize, _: &Scene) -> Vec<Vec<f64>> {
+    /// None in mid-course: where such a form starts is not straight in what it makes.
+    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && scene.data.begun {
+            return Vec::new();
+        }
         match FORMS[form].0 {
             Bend => vec![vec![0.1], vec![-0.1]],
             Exponential => vec![vec![0.3], vec![-0.3]],

@@ -44,7 +44,11 @@ impl Effect for VoltageDependentTimeConstant {
         coordinates
     }
 
-    fn starts(&self, form: usize, _: &Scene) -> Vec<Vec<f64>> {
+    /// None in mid-course: where such a form starts is not straight in what it makes.
+    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && scene.data.begun {
+            return Vec::new();
+        }
         let start = |(low, high): (f64, f64)| {
             let mut point = vec![low.ln(), high.ln()];
             point.extend(FORMS[form].1.then_some(Plant::PAPER.share));
