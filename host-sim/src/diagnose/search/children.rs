@@ -35,18 +35,17 @@ impl<J: Judge> Search<'_, J> {
     }
 
     /// First fits of all extensions. Another pass, which charges other prices, finds the same.
-    fn first_fits(&mut self, node: &Scored) -> Vec<Fit> {
+    pub(super) fn first_fits(&mut self, node: &Scored) -> Vec<Fit> {
         let model = &node.fit.model;
-        match self.first_fits.get(&model.structure()) {
-            Some((of, fits)) if of == model => fits.clone(),
-            _ => {
-                let fits = self.fitted(node, |_| true);
-                if self.keeps {
-                    self.first_fits.insert(model.structure(), (model.clone(), fits.clone()));
-                }
-                fits
-            }
+        let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();
+        if let Some((_, fits)) = kept.find(|(of, _)| of == model) {
+            return fits.clone();
         }
+        let fits = self.fitted(node, |_| true);
+        if self.keeps {
+            self.first_fits.entry(model.structure()).or_default().push((model.clone(), fits.clone()));
+        }
+        fits
     }
 
     fn fitted(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Fit> {
@@ -56,7 +55,7 @@ impl<J: Judge> Search<'_, J> {
     }
 
     /// The best of first fits, judged.
-    fn judged(&mut self, node: &Scored, first_fits: Vec<Fit>) -> Vec<Scored> {
+    pub(super) fn judged(&mut self, node: &Scored, first_fits: Vec<Fit>) -> Vec<Scored> {
         let first_score =
             |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, fit) - fit.model.points().len() as f64;
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();

@@ -57,7 +57,7 @@ pub struct Search<'j, J> {
     /// Extensions of each structure, best first.
     extended: HashMap<Vec<Block>, Vec<Scored>>,
     /// First fits of the extensions of a model, whatever they cost.
-    first_fits: HashMap<Vec<Block>, (Model, Vec<Fit>)>,
+    first_fits: HashMap<Vec<Block>, Vec<(Model, Vec<Fit>)>>,
     /// Those are kept for another pass.
     keeps: bool,
     /// Also what the noise's memory may hide is tried; once is enough.
@@ -264,8 +264,8 @@ impl<'j, J: Judge> Search<'j, J> {
         }
         let fit = self.judge.at(rest);
         let node = Scored { fit, ..scored.clone() };
-        let others = self.wanted(&node, |other| other != effect);
-        others.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
+        let first_fits = self.first_fits(&node);
+        self.judged(&node, first_fits).into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
     /// Each block in the form that suits the others best.

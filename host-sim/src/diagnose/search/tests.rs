@@ -21,7 +21,8 @@ struct Told {
     clean: f64,
     /// Only the patient are told of this effect.
     secret: Option<usize>,
-    fits: usize,
+    /// Fits less looks at a point, which cost none.
+    fits: isize,
 }
 
 fn effect(cause: &str) -> usize {
@@ -54,6 +55,7 @@ impl Judge for Told {
     }
 
     fn at(&mut self, model: Model) -> Fit {
+        self.fits -= 1;
         self.fit(model)
     }
 
