@@ -1,8 +1,11 @@
 //! The user's parameters of a fit with their 95 % intervals.
 //!
 //! ```text
-//! covariance = (J' W J)^-1        interval = value +- 1.96 sqrt(g' covariance g),    g: slope over the coordinates
+//! covariance = (J' W J + B)^-1        interval = value +- 1.96 sqrt(g' covariance g),    g: slope over the coordinates
 //! ```
+//!
+//! `B` is what the bounds tell of each coordinate: it is no farther than from one to the other. Where two effects do the
+//! same within them (a delay of a part of a row, the share of a step that comes at once), it is all that is known.
 //!
 //! What only a search has found has the range that the search leaves it.
 
@@ -27,7 +30,12 @@ pub(super) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>>
     let weights: f64 = terms.iter().map(|term| term.weight).sum();
     let heavy = fit.noise.cell == 0.0 && (fit.noise.nu.is_finite() || fit.noise.wide.is_some());
     let factor = if heavy { (squares / weights).min(1.0) } else { 1.0 };
-    (normal * factor).try_inverse().filter(|matrix| matrix.iter().all(|value| value.is_finite()))
+    let mut known = normal * factor;
+    let bounds = fit.model.coordinates(engine.data);
+    for (index, &place) in jacobian.places.iter().enumerate() {
+        known[(index, index)] += (Z / (bounds[place].highest - bounds[place].lowest)).powi(2);
+    }
+    known.try_inverse().filter(|matrix| matrix.iter().all(|value| value.is_finite()))
 }
 
 /// The user's parameters of an effect with their intervals, by the delta method.
@@ -75,22 +83,24 @@ pub(super) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> BTree
     found
 }
 
-/// Lowest and highest that a quantity can be: one coordinate after the other at its bounds.
+/// Lowest and highest that a quantity can be: one coordinate after the other at its bounds. An amplitude of two parts is
+/// smallest between them.
 fn reach(block: &Block, point: &[f64], data: &Data, index: usize) -> (f64, f64) {
     let mut reach = (f64::INFINITY, f64::NEG_INFINITY);
     for (place, bounds) in block.coordinates(data).iter().enumerate() {
-        for bound in [bounds.lowest, point[place], bounds.highest] {
+        let [low, here, high] = [bounds.lowest, point[place], bounds.highest].map(|at| {
             let mut moved = point.to_vec();
-            moved[place] = bound;
-            let value = block.effect().quantities(block.form, &moved, data)[index].value;
-            reach = (reach.0.min(value), reach.1.max(value));
+            moved[place] = at;
+            block.effect().quantities(block.form, &moved, data)[index].value
+        });
+        if low != here || high != here {
+            reach = (reach.0.min(low).min(high), reach.1.max(low).max(high));
         }
     }
     reach
 }
 
-/// Symmetric, but for what is only a size: that never crosses zero. Within the quantity's reach, unless the value is its end:
-/// an amplitude of two parts is smallest between their bounds.
+/// Symmetric, but for what is only a size: that never crosses zero. Within the quantity's reach, where the value is.
 fn interval(value: f64, error: f64, unit: &'static str, reach: (f64, f64)) -> Parameter {
     let error = if error.is_finite() { error } else { 10.0 * value.abs() };
     let (mut low, mut high) = (value - Z * error, value + Z * error);
@@ -98,10 +108,10 @@ fn interval(value: f64, error: f64, unit: &'static str, reach: (f64, f64)) -> Pa
         let factor = (Z * error / value).min(50.0).exp();
         (low, high) = (value / factor, value * factor);
     }
-    if reach.0 < value {
+    if reach.0 <= value {
         low = low.max(reach.0);
     }
-    if reach.1 > value {
+    if reach.1 >= value {
         high = high.min(reach.1);
     }
     Parameter { value, low, high, unit }

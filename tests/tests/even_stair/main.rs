@@ -10,9 +10,11 @@ use serde_json::Value;
 use tempfile::tempdir;
 
 mod forms;
+mod pairs;
 mod plant;
 mod sensor;
 mod start;
+mod sweep;
 
 const SAMPLE_S: f64 = 0.1;
 const LEVELS_V: [f64; 8] = [0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 300.0, 100.0];
@@ -31,6 +33,27 @@ fn with_share(share: f64, gain: f64, tau_s: f64) -> Vec<(f64, f64)> {
         let now = gain * (*lag + share * (volts - *lag));
         *lag = volts + (*lag - volts) * kept;
         Some((volts, now))
+    });
+    spring.collect()
+}
+
+/// Each row's command and stiffness, where the spring sees what `amplifier` makes of the command, millisecond by millisecond.
+fn seen_through(
+    volts: impl Iterator<Item = f64>,
+    share: f64,
+    mut amplifier: impl FnMut(f64) -> f64,
+) -> Vec<(f64, f64)> {
+    const STEPS: usize = 100;
+    let kept = (-SAMPLE_S / STEPS as f64 / 5.5).exp();
+    let mut lag = 0.0;
+    let spring = volts.map(|volts| {
+        let mut now = None;
+        for _ in 0..STEPS {
+            let seen = amplifier(volts);
+            now.get_or_insert(lag + share * (seen - lag));
+            lag = seen + (lag - seen) * kept;
+        }
+        (volts, now.unwrap())
     });
     spring.collect()
 }

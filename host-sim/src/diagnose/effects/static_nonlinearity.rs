@@ -108,7 +108,17 @@ impl Effect for StaticNonlinearity {
                     start.resize(coefficients, 0.0);
                     start
                 };
-                vec![start(0.05), start(-0.05)]
+                // An S is no bend: its ends stay, and its middle, and no step along a bend promises anything.
+                let s = |size: f64| {
+                    let mut start = vec![1.0 + size, -3.0 * size, 2.0 * size];
+                    start.resize(coefficients, 0.0);
+                    start
+                };
+                let mut starts = vec![start(0.05), start(-0.05)];
+                if coefficients > 2 {
+                    starts.extend([s(0.1), s(-0.1)]);
+                }
+                starts
             }
         }
     }

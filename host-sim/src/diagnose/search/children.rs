@@ -21,22 +21,22 @@ impl<J: Judge> Search<'_, J> {
         if let Some(children) = self.extended.get(&key) {
             return children.clone();
         }
-        let first_fits = self.first_fits(node);
-        let mut children = self.judged(node, first_fits);
+        let first_fits = self.first_fits(&node.fit);
+        let mut children = self.judged(&node.fit, first_fits);
         children.sort_by(|a, b| b.score.total_cmp(&a.score));
         self.extended.insert(key, children.clone());
         children
     }
 
     /// The best of the extensions by wanted effects, judged.
-    pub(super) fn wanted(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Scored> {
+    pub(super) fn wanted(&mut self, node: &Fit, wanted: impl Fn(usize) -> bool) -> Vec<Scored> {
         let first_fits = self.fitted(node, wanted);
         self.judged(node, first_fits)
     }
 
     /// First fits of all extensions. Another pass, which charges other prices, finds the same.
-    pub(super) fn first_fits(&mut self, node: &Scored) -> Vec<Fit> {
-        let model = &node.fit.model;
+    pub(super) fn first_fits(&mut self, node: &Fit) -> Vec<Fit> {
+        let model = &node.model;
         let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();
         if let Some((_, fits)) = kept.find(|(of, _)| of == model) {
             return fits.clone();
@@ -48,19 +48,19 @@ impl<J: Judge> Search<'_, J> {
         fits
     }
 
-    fn fitted(&mut self, node: &Scored, wanted: impl Fn(usize) -> bool) -> Vec<Fit> {
-        let model = &node.fit.model;
+    fn fitted(&mut self, node: &Fit, wanted: impl Fn(usize) -> bool) -> Vec<Fit> {
+        let model = &node.model;
         let new = |effect| wanted(effect) && !model.has(effect) && !contained(effect, model);
-        self.judge.extended(&node.fit, self.patient, &new)
+        self.judge.extended(node, self.patient, &new)
     }
 
     /// The best of first fits, judged.
-    pub(super) fn judged(&mut self, node: &Scored, first_fits: Vec<Fit>) -> Vec<Scored> {
+    pub(super) fn judged(&mut self, node: &Fit, first_fits: Vec<Fit>) -> Vec<Scored> {
         let first_score =
             |fit: &Fit| fit.log_likelihood - self.seen.price(self.judge, fit) - fit.model.points().len() as f64;
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
         if !self.patient {
-            let lost = first_score(&node.fit) - HOPELESS;
+            let lost = first_score(node) - HOPELESS;
             fits.retain(|(score, _)| *score > lost);
         }
         fits.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -74,9 +74,9 @@ impl<J: Judge> Search<'_, J> {
         });
         // What a memory of the noise hides while much is still wrong shows in the plain error.
         let rest = fits.split_off(JUDGED.min(fits.len()));
-        let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.fit.plain).collect();
+        let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.plain).collect();
         plain.sort_by(|a, b| b.1.plain.total_cmp(&a.1.plain));
-        if self.patient && !node.fit.noise.memory.is_none() {
+        if self.patient && !node.noise.memory.is_none() {
             fits.extend(plain.into_iter().take(JUDGED_PLAIN));
         }
         fits.into_iter().map(|(_, fit)| self.seen.judge_anew(self.judge, fit)).collect()

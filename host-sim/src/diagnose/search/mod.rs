@@ -262,20 +262,21 @@ impl<'j, J: Judge> Search<'j, J> {
         if rest.blocks.is_empty() {
             return None;
         }
-        let fit = self.judge.at(rest);
-        let node = Scored { fit, ..scored.clone() };
+        let node = self.judge.at(rest);
         let first_fits = self.first_fits(&node);
         self.judged(&node, first_fits).into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
-    /// Each block in the form that suits the others best.
+    /// Each block in the form that suits the others best as they are, from the start that does: what was found first may be
+    /// where it stood in for them.
     fn reformed(&mut self, mut scored: Scored) -> Scored {
+        let alone = scored.fit.model.blocks.len() == 1;
         for effect in effects(&scored.fit.model) {
-            if EFFECTS[effect].forms() < 2 {
+            if alone && EFFECTS[effect].forms() < 2 {
                 continue;
             }
-            let without = self.left_out(&scored, effect);
-            for other in self.wanted(&without, |other| other == effect) {
+            let rest = self.judge.at(scored.fit.model.without(effect));
+            for other in self.wanted(&rest, |other| other == effect) {
                 if other.score > scored.score {
                     scored = other;
                 }

@@ -1,5 +1,6 @@
 //! What an effect that is not fitted yet promises: how much of the residual its change could explain.
 
+use crate::diagnose::effect::Coordinate;
 use crate::diagnose::fit::{Engine, Fit, Jacobian};
 use crate::diagnose::noise::Noise;
 use crate::diagnose::sums::dot;
@@ -21,11 +22,18 @@ impl Metric {
     pub(super) fn new(engine: &mut Engine, fit: &Fit, noise: Noise) -> Self {
         let terms = engine.terms(&noise, &fit.residual);
         let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
-        let residual = terms.iter().map(|term| term.weight.sqrt() * term.residual).collect();
-        let Jacobian { columns, .. } = engine.jacobian(&fit.model, &noise, &fit.residual);
+        let residual: Vec<f64> = terms.iter().map(|term| term.weight.sqrt() * term.residual).collect();
+        let Jacobian { columns, places } = engine.jacobian(&fit.model, &noise, &fit.residual);
+        let (points, bounds) = (fit.model.points(), fit.model.coordinates(engine.data));
         let mut own: Vec<Vec<f64>> = Vec::new();
-        for column in columns {
+        for (column, place) in columns.iter().zip(places) {
             let mut column: Vec<f64> = column.iter().zip(&roots).map(|(value, root)| value * root).collect();
+            // A point at its bound cannot follow where it wants out: what it wants there, another effect may be.
+            let wanted = dot(&column, &residual);
+            let Coordinate { lowest, highest, .. } = bounds[place];
+            if points[place] <= lowest && wanted < 0.0 || points[place] >= highest && wanted > 0.0 {
+                continue;
+            }
             let size = norm(&column);
             remove(&mut column, &own);
             let left = norm(&column);
