@@ -21,8 +21,9 @@ const RAMP_S: f64 = 0.1;
 /// Show what the simulation gets wrong on measured data, name the cause, measure the gain of the cure
 ///
 /// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (volts of equivalent static voltage, or - where
-/// nothing was read). Every change of the voltage belongs in it. Without voltage_v, applied_v is taken, as `vsj stair --out`
-/// writes it.
+/// nothing was read). Every change of the voltage belongs in it. A row's voltage is there from its time on, and its reading is
+/// taken just after: of a step to this voltage, it has the part that comes at once. Without voltage_v, applied_v is taken, as
+/// `vsj stair --out` writes it.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:

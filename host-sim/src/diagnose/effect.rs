@@ -145,8 +145,8 @@ pub trait Effect: Sync {
         &[]
     }
 
-    /// How many places a search for it looks at, as a natural logarithm: what a find by chance is discounted by.
-    fn places(&self, _data: &Data) -> f64 {
+    /// How many places a search for a form looks at, as a natural logarithm: what a find by chance is discounted by.
+    fn places(&self, _form: usize, _data: &Data) -> f64 {
         0.0
     }
 

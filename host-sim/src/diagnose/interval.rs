@@ -9,8 +9,6 @@
 //!
 //! What only a search has found has the range that the search leaves it.
 
-use std::collections::BTreeMap;
-
 use nalgebra::DMatrix;
 
 use super::data::Data;
@@ -39,13 +37,13 @@ pub(super) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>>
 }
 
 /// The user's parameters of an effect with their intervals, by the delta method.
-pub(super) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> BTreeMap<String, Parameter> {
+pub(super) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String, Parameter)> {
     let data = engine.data;
     let covariance = covariance(engine, fit);
     let bounds = fit.model.coordinates(data);
     let places: Vec<usize> = (0..bounds.len()).filter(|&place| bounds[place].fitted).collect();
     let mut start = 0;
-    let mut found = BTreeMap::new();
+    let mut found = Vec::new();
     for (block, point) in &fit.model.blocks {
         if block.effect == effect {
             let quantities = |point: &[f64]| block.effect().quantities(block.form, point, data);
@@ -68,12 +66,12 @@ pub(super) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> BTree
                     (slope.transpose() * matrix * &slope)[(0, 0)].max(0.0).sqrt()
                 });
                 let reach = reach(block, point, data, index);
-                found.insert(name, interval(value, error, unit, reach));
+                found.push((name, interval(value, error, unit, reach)));
             }
             let residual = engine.residual(&fit.model.without(effect));
             let scene = Scene { data, residual: &residual, sigma: fit.noise.sigma };
             for (name, low, high) in block.effect().searched_range(block.form, point, &scene) {
-                if let Some(parameter) = found.get_mut(&name) {
+                if let Some((_, parameter)) = found.iter_mut().find(|(other, _)| *other == name) {
                     (parameter.low, parameter.high) = (low.min(parameter.value), high.max(parameter.value));
                 }
             }

@@ -11,6 +11,7 @@ use super::fit::{Engine, Fit, Jacobian};
 use super::signal::{Lag, Piece};
 use super::spectrum;
 use super::sums::dot;
+use super::whereabouts::whereabouts;
 
 /// Structure that no block has taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +51,7 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     let mut groups = features(data);
     let count: usize = groups.iter().map(|group| group.columns.len()).sum();
     if data.rows() < ROWS_PER_FEATURE * count {
-        return alike(fit);
+        return alike(data, fit);
     }
     let terms = engine.terms(&fit.noise, &fit.residual);
     let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
@@ -94,14 +95,14 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
 }
 
 /// A short record is asked only whether errors are like the ones before them (von Neumann's ratio).
-fn alike(fit: &Fit) -> Option<Leftover> {
+fn alike(data: &Data, fit: &Fit) -> Option<Leftover> {
     let errors = &fit.noise.innovations(&fit.residual);
     let squares: f64 = errors.iter().map(|error| error * error).sum();
     let steps: f64 = errors.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     let share = 1.0 - 0.5 * steps / squares.max(1e-300);
     let rows = errors.len() as f64;
     Some(Leftover {
-        place: "that each error is like the one before it".into(),
+        place: "that each error is like the one before it".to_owned() + &whereabouts(data, errors),
         share,
         rms: share.max(0.0).sqrt() * (squares / rows).sqrt(),
         significant: share * rows.sqrt() > UNLIKELY,

@@ -14,7 +14,7 @@
 //! | [`noise`], [`fit`], [`held_out`] | what a reading's error is worth; the likeliest parameters; stretches no fit has seen |
 //! | [`search`], [`standing`] | which effects; how the best sets of them stand |
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
-//! | [`leftover`], [`swallowed`], `in_step`, [`spikes`], [`spectrum`] | what no effect explains |
+//! | [`leftover`], [`swallowed`], `in_step`, [`spikes`], [`spectrum`], `whereabouts` | what no effect explains, and where |
 //! | `lacking` | what a plant file says and the spring has not |
 //! | `informative`, `standstill`, `alternatives` | whether a record can tell anything, and of a spring; what it leaves open |
 //! | `finding`, `reading_findings`, `interval`, `quality` | a cause and what it is worth; parameters with intervals; errors |
@@ -67,6 +67,7 @@ mod start;
 mod sums;
 pub mod swallowed;
 pub mod text;
+mod whereabouts;
 
 pub use data::Input;
 pub use diagnosis::Diagnosis;
@@ -74,6 +75,7 @@ pub use report::{Report, Verdict};
 
 use base::Base;
 use data::Data;
+use effects::index_of;
 use fit::Engine;
 use observed::Observed;
 use search::{Lead, Scored, Search};
@@ -83,7 +85,7 @@ use simulator::Simulator;
 const FEWEST_ROWS: usize = 8;
 
 /// Readings that were cut off instead of rounded have to be likelier by so many nats: most converters round.
-const CLEARLY: f64 = 5.0;
+const CLEARLY: f64 = 3.0;
 
 /// A longer record is searched on a part of its rows first, of about so many.
 const LONG: usize = 5_000;
@@ -154,10 +156,16 @@ fn read(record: &Record, options: &Options, data: &Data, progress: &mut impl FnM
     judged(record, options, data, &unbound, found.lead, progress)
 }
 
-/// True if readings taken as `observed` suit the causes that were found without it at least as well.
-fn suits(options: &Options, data: &Data, observed: &Observed, found: &Diagnosis) -> bool {
-    let mut engine = Engine::new(data, observed, Simulator::new(data, &options.base));
-    engine.fit_twice(found.extended.model.clone()).log_likelihood > found.extended.log_likelihood
+/// True if readings that were cut off suit the causes that were found without it better, a shift of them apart: that may stand
+/// for what was cut off.
+fn suits(options: &Options, data: &Data, cut: &Observed, found: &Diagnosis) -> bool {
+    let shift = index_of("reading-offset").expect("an effect");
+    let model = found.extended.model.without(shift);
+    let likelihood = |observed| {
+        let mut engine = Engine::new(data, observed, Simulator::new(data, &options.base));
+        engine.fit_twice(model.clone()).log_likelihood
+    };
+    likelihood(cut) > likelihood(&found.observed)
 }
 
 /// Searches, from what is `given` or else a long record in part first, and says what it found.

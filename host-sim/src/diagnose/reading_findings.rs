@@ -1,7 +1,5 @@
 //! Causes that the readings themselves show: a lattice, a bound, outliers.
 
-use std::collections::BTreeMap;
-
 use super::data::Data;
 use super::fit::Fit;
 use super::lattice::Lattice;
@@ -22,7 +20,7 @@ pub(super) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
     let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
     let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
     let single = |name: &str, value: f64, low: f64, high: f64, unit| {
-        BTreeMap::from([(name.to_owned(), Parameter { value, low, high, unit })])
+        vec![(name.to_owned(), Parameter { value, low, high, unit })]
     };
     if let Some(Lattice { step, low, high }) = observed.lattice
         && (step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V) || observed.cut_v > 0.0)

@@ -1,8 +1,6 @@
 //! What a diagnosis says, in the form that scripts read.
 
-use std::collections::BTreeMap;
-
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Version of the form.
 pub const SCHEMA: u32 = 1;
@@ -89,14 +87,19 @@ pub struct Finding {
     pub cause: &'static str,
     /// How sure it is that this cause is there, beside the best explanation without it.
     pub probability: f64,
-    /// Its parameters.
-    pub parameters: BTreeMap<String, Parameter>,
+    /// Its parameters, in the order of its page.
+    #[serde(serialize_with = "by_name")]
+    pub parameters: Vec<(String, Parameter)>,
     /// Error of the best fit without it, in V.
     pub rmse_before: f64,
     /// Error with it, in V.
     pub rmse_after: f64,
     /// Why it is believed, in one sentence.
     pub evidence: String,
+}
+
+fn by_name<S: Serializer>(parameters: &[(String, Parameter)], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(parameters.iter().map(|(name, parameter)| (name, parameter)))
 }
 
 /// A parameter with its 95 % interval.

@@ -14,6 +14,7 @@ use super::fit::{Engine, Fit};
 use super::leftover::{Leftover, RARE};
 use super::noise::Noise;
 use super::sums::dot;
+use super::whereabouts::whereabouts;
 
 /// A reading this many of the noise's scales off is far off.
 const FAR: f64 = 4.0;
@@ -39,10 +40,11 @@ pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
         Some(count) => format!("in {count} readings far off just after changes of the voltage"),
         None => format!("in {} readings far off that come in runs to one side", in_runs(&far, &white)?),
     };
+    let far_ones: Vec<f64> = white.iter().zip(&far).map(|(white, far)| if *far { *white } else { 0.0 }).collect();
     // Beside what the noise's memory does not foretell: that may have learnt to follow from the spike on.
-    let of_far: f64 = white.iter().zip(&far).filter(|(_, far)| **far).map(|(white, _)| white * white).sum();
+    let of_far = dot(&far_ones, &far_ones);
     Some(Leftover {
-        place,
+        place: place + &whereabouts(data, &far_ones),
         share: of_far / dot(&white, &white),
         rms: (of_far / white.len() as f64).sqrt(),
         significant: true,

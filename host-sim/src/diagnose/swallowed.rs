@@ -18,6 +18,7 @@ use super::leftover::Leftover;
 use super::noise::memory::Memory;
 use super::noise::{scale, scale_of_squares};
 use super::spectrum;
+use super::whereabouts::whereabouts;
 
 /// Long parts of the record.
 const PARTS: usize = 8;
@@ -39,7 +40,7 @@ pub fn test(data: &Data, errors: &[f64], memory: &Memory) -> Option<Leftover> {
         return None;
     }
     let found = |place: &str, share: f64| Leftover {
-        place: place.into(),
+        place: place.to_owned() + &whereabouts(data, errors),
         share,
         rms: share.sqrt() * scale_of_squares(errors),
         significant: true,

@@ -131,12 +131,9 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         });
     }
     if !report.alternatives.is_empty() {
-        let rivals: Vec<String> = report
-            .alternatives
-            .iter()
-            .map(|set| if set.is_empty() { "nothing".into() } else { set.join(" with ") })
-            .collect();
-        sentences.push(format!("The data cannot reject instead: {}.", rivals.join("; ")));
+        let nothing = || "that nothing is wrong".to_owned();
+        let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
+        sentences.push(format!("The data cannot reject instead: {}.", rivals.collect::<Vec<_>>().join("; ")));
     }
     if let Some(leftover) = &report.leftover {
         let small = if report.verdict == Verdict::Unexplained { "" } else { "Too little to change this verdict: " };
@@ -162,8 +159,6 @@ fn row(text: &mut String, finding: &Finding) {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::super::report::{NoiseReport, Quality, ResidualReport, SCHEMA};
     use super::*;
 
@@ -173,7 +168,7 @@ mod tests {
         let finding = |&cause: &&'static str| Finding {
             cause,
             probability: 1.0,
-            parameters: BTreeMap::new(),
+            parameters: Vec::new(),
             rmse_before: 7.86,
             rmse_after: 7.86,
             evidence: String::new(),

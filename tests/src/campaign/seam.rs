@@ -35,7 +35,12 @@ pub fn foretell(hidden: &Hidden, rows: usize) -> Result<(Vec<f64>, Vec<&'static 
     Simulator::new(&data, &options.base).run(&learnt.extended.model, &mut foretold);
     // A bound that readings stopped at exactly is a finding, but no part of the model.
     let middle = learnt.data.reading.iter().sum::<f64>() / rows as f64;
-    for limit in learnt.report.findings.iter().filter_map(|finding| Some(finding.parameters.get("limit")?.value)) {
+    for limit in learnt
+        .report
+        .findings
+        .iter()
+        .filter_map(|finding| Some(finding.parameters.iter().find(|it| it.0 == "limit")?.1.value))
+    {
         foretold.iter_mut().for_each(|y| *y = if limit > middle { y.min(limit) } else { y.max(limit) });
     }
     Ok((foretold, learnt.report.findings.iter().map(|finding| finding.cause).collect()))

@@ -15,6 +15,7 @@ mod plant;
 mod sensor;
 mod start;
 mod sweep;
+mod zero;
 
 const SAMPLE_S: f64 = 0.1;
 const LEVELS_V: [f64; 8] = [0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 300.0, 100.0];

@@ -58,7 +58,7 @@ impl Effect for Delay {
         vec![Quantity::new("delay_s", "s", point[0] + point[1])]
     }
 
-    fn places(&self, data: &Data) -> f64 {
+    fn places(&self, _: usize, data: &Data) -> f64 {
         (longest(data) / data.command_s).clamp(1.0, 5.0).ln()
     }
 

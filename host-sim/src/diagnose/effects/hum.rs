@@ -50,7 +50,7 @@ impl Effect for Hum {
         vec![Quantity::new("amplitude", "V", point[1].hypot(point[2])), Quantity::new("freq_hz", "Hz", point[0])]
     }
 
-    fn places(&self, data: &Data) -> f64 {
+    fn places(&self, _: usize, data: &Data) -> f64 {
         // As many lines as half the rows; its three coordinates are charged already.
         ((data.rows() as f64 / 2.0).max(1.0).ln() - 4.5).max(0.0)
     }

@@ -1,19 +1,46 @@
-//! One stretch of readings is shifted by a constant.
+//! Readings are shifted by a constant.
+//!
+//! | form | |
+//! | --- | --- |
+//! | run | one stretch of them |
+//! | whole | all of them: the sensor's zero |
 
 use crate::diagnose::data::Data;
 use crate::diagnose::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::diagnose::median::{deviation, median};
+use crate::diagnose::observed::bends;
 
 pub(super) struct ReadingOffset;
+
+const RUN: usize = 0;
+const WHOLE: usize = 1;
 
 /// Shortest run that is one, in rows; a run that is longer than half of the record is the rest's offset.
 const SHORTEST: usize = 5;
 /// A single reading counts for no more than this many of the noise's scales.
 const CLIP: f64 = 6.0;
+/// First rows that tell the sensor's zero, and how many of their errors it is off if it is.
+const AT_REST: usize = 10;
+const SHOWN: f64 = 3.0;
 
-/// Rows from `point[0]` up to but not including `point[1]` by `point[2]`.
-fn rows(point: &[f64], rows: usize) -> std::ops::Range<usize> {
+/// Which rows are shifted, and by what: from `point[0]` up to but not including `point[1]` by `point[2]`; all by `point[0]`.
+fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, f64) {
+    if form == WHOLE {
+        return (0..rows, point[0]);
+    }
     let to = (point[1] as usize).min(rows);
-    (point[0] as usize).min(to)..to
+    ((point[0] as usize).min(to)..to, point[2])
+}
+
+/// False if the sensor's zero is right: a spring that never had a voltage reads it.
+fn shows_at_rest(data: &Data) -> bool {
+    let rest = data.voltage_v.iter().take(AT_REST).take_while(|voltage| **voltage == 0.0).count();
+    if data.begun || rest == 0 {
+        return true;
+    }
+    let zero = median(&mut data.reading[..rest].to_vec()).unwrap_or(0.0);
+    let error = deviation(bends(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
+    zero.abs() > SHOWN * error
 }
 
 /// The run whose shift explains most: by sums over runs of growing length. Unseen rows neither count nor cost.
@@ -91,36 +118,48 @@ impl Effect for ReadingOffset {
     }
 
     fn meaning(&self) -> &'static str {
-        "one stretch of readings is shifted"
+        "a stretch of readings, or all, is shifted"
     }
 
     fn experiment(&self) -> &'static str {
-        "the same schedule again: a shift of the sensor does not come back at the same time"
+        "the same schedule again, from a rest at 0 V: a shift of the sensor shows at rest, or not at the same time again"
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+    fn forms(&self) -> usize {
+        2
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let rows = data.rows() as f64;
         let most = 2.0 * data.full_scale_v.max(1.0);
-        vec![Coordinate::searched(0.0, rows), Coordinate::searched(0.0, rows), Coordinate::new(-most, most)]
+        let offset = Coordinate::new(-most, most);
+        match form {
+            RUN => vec![Coordinate::searched(0.0, rows), Coordinate::searched(0.0, rows), offset],
+            _ => vec![offset],
+        }
     }
 
-    fn starts(&self, _: usize, scene: &Scene) -> Vec<Vec<f64>> {
-        best_run(scene).into_iter().collect()
+    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
+        match form {
+            RUN => best_run(scene).into_iter().collect(),
+            _ if shows_at_rest(scene.data) => vec![vec![-scene.sigma], vec![scene.sigma]],
+            _ => Vec::new(),
+        }
     }
 
-    fn quantities(&self, _: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        let run = rows(point, data.rows());
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        let (run, offset) = shifted(form, point, data.rows());
         let last = data.rows() - 1;
         vec![
             Quantity::new("from_s", "s", data.time_s[run.start.min(last)]),
             Quantity::new("to_s", "s", data.time_s[run.end.saturating_sub(1).min(last)]),
-            Quantity::new("offset", "V", point[2]),
+            Quantity::new("offset", "V", offset),
         ]
     }
 
-    fn places(&self, data: &Data) -> f64 {
+    fn places(&self, form: usize, data: &Data) -> f64 {
         // Both edges; neighbouring runs are nearly the same.
-        1.25 * (data.rows() as f64).max(1.0).ln()
+        if form == RUN { 1.25 * (data.rows() as f64).max(1.0).ln() } else { 0.0 }
     }
 
     fn polish(&self, _: usize, point: &mut [f64], scene: &Scene) {
@@ -130,7 +169,10 @@ impl Effect for ReadingOffset {
     }
 
     /// An edge may lie where moving it costs less than 95 % certainty allows, and between two rows.
-    fn searched_range(&self, _: usize, point: &[f64], scene: &Scene) -> Vec<(String, f64, f64)> {
+    fn searched_range(&self, form: usize, point: &[f64], scene: &Scene) -> Vec<(String, f64, f64)> {
+        if form != RUN {
+            return Vec::new();
+        }
         let (time, rows) = (&scene.data.time_s, scene.data.rows());
         let (from, to, offset) = (point[0] as usize, (point[1] as usize).min(rows), point[2]);
         // Cost of counting a row of the run as outside, in nats; the opposite is a gain.
@@ -156,9 +198,10 @@ impl Effect for ReadingOffset {
         vec![("from_s".into(), at(lower), at(upper)), ("to_s".into(), at(earlier.saturating_sub(1)), at(later))]
     }
 
-    fn read(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
-        for reading in &mut readings[rows(point, data.rows())] {
-            *reading += point[2];
+    fn read(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+        let (run, offset) = shifted(form, point, data.rows());
+        for reading in &mut readings[run] {
+            *reading += offset;
         }
     }
 }

@@ -85,7 +85,7 @@ impl Effect for Resonance {
         vec![Quantity::new("freq_hz", "Hz", point[0].exp()), Quantity::new("zeta", "", point[1].exp())]
     }
 
-    fn places(&self, _: &Data) -> f64 {
+    fn places(&self, _: usize, _: &Data) -> f64 {
         10f64.ln()
     }
 

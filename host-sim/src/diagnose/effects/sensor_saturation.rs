@@ -54,7 +54,7 @@ impl Effect for SensorSaturation {
         vec![Quantity::new("limit", "V", point[0])]
     }
 
-    fn places(&self, _: &Data) -> f64 {
+    fn places(&self, _: usize, _: &Data) -> f64 {
         10f64.ln()
     }
 

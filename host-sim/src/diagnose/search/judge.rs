@@ -89,7 +89,10 @@ impl Judge for Engine<'_> {
     fn price(&self, block: &Block) -> f64 {
         let effect = block.effect();
         let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
-        PRICE + PRICE_OF_COORDINATE * fitted as f64 + effect.places(self.data) + (effect.forms() as f64).ln()
+        PRICE
+            + PRICE_OF_COORDINATE * fitted as f64
+            + effect.places(block.form, self.data)
+            + (effect.forms() as f64).ln()
     }
 
     fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {

@@ -1,0 +1,51 @@
+//! What is shifted all along: a sensor whose zero is off, a converter that cuts off.
+
+use super::{causes, diagnosed, read};
+
+/// `None` where the cause has another name.
+fn offset(report: &serde_json::Value) -> Option<f64> {
+    report["findings"].as_array()?.iter().find(|it| it["cause"] == "reading-offset")?["parameters"]["offset"]["value"]
+        .as_f64()
+}
+
+#[test]
+fn a_zero_that_is_off_is_one_number() {
+    for (seed, zero) in [(1, 15.0), (2, -15.0), (3, 4.0)] {
+        let report = diagnosed(&read(seed, |_, y, noise| y + noise + zero));
+        assert_eq!(causes(&report), ["reading-offset"], "{zero}: {report}");
+        assert!((offset(&report).unwrap() - zero).abs() < 0.2, "{zero}: {report}");
+        // What holds all along is foretold.
+        assert!(report["extended"]["held_out_rmse"].as_f64().unwrap() < 1.1, "{zero}: {report}");
+        let report = diagnosed(&read(seed, |_, y, noise| 1.1 * y + noise + zero));
+        assert!(offset(&report).is_some_and(|found| (found - zero).abs() < 0.5), "{zero}: {report}");
+        assert!(causes(&report).contains(&"gain-error") && causes(&report).len() == 2, "{zero}: {report}");
+    }
+}
+
+/// Half a step all along is what a converter cuts off, not the sensor's zero.
+#[test]
+fn what_is_cut_off_is_no_shift() {
+    for (seed, step) in [(1, 6.0), (2, 10.115), (3, 12.0), (4, 14.6), (5, 15.7), (6, 17.5)] {
+        let report = diagnosed(&read(seed, |_, y, noise| step * ((y + noise) / step).floor()));
+        assert_eq!(causes(&report), ["quantisation"], "{step}: {report}");
+    }
+    // One that rounds keeps the zero that is off.
+    let report = diagnosed(&read(7, |_, y, noise| 12.0 * ((y + noise + 20.0) / 12.0).round()));
+    assert!(offset(&report).is_some_and(|found| (found - 20.0).abs() < 1.0), "{report}");
+}
+
+/// What no cause explains is told by its time.
+#[test]
+fn a_sensor_that_sticks_for_a_while_is_told_by_its_time() {
+    let fresh = read(8, |_, y, noise| y + noise);
+    // Over two steps of the stair.
+    let stuck = 1100..1600;
+    let rows: Vec<_> = (0..fresh.len())
+        .map(|row| (fresh[row].0, if stuck.contains(&row) { fresh[stuck.start].1 } else { fresh[row].1 }))
+        .collect();
+    let report = diagnosed(&rows);
+    assert_eq!(report["verdict"], "unexplained", "{report}");
+    let told = report["leftover"].as_str().unwrap();
+    let times: Vec<f64> = told.split(" s").filter_map(|part| part.rsplit(' ').next()?.parse().ok()).collect();
+    assert!(times.iter().any(|time| (110.0..160.0).contains(time)), "{told}");
+}
