@@ -21,37 +21,27 @@ impl<J: Judge> Search<'_, J> {
         if let Some(children) = self.extended.get(&key) {
             return children.clone();
         }
-        let first_fits = self.first_fits(&node.fit);
+        let first_fits = self.first_fits(&node.fit, None);
         let mut children = self.judged(&node.fit, first_fits);
         children.sort_by(|a, b| b.score.total_cmp(&a.score));
         self.extended.insert(key, children.clone());
         children
     }
 
-    /// The best of the extensions by wanted effects, judged.
-    pub(super) fn wanted(&mut self, node: &Fit, wanted: impl Fn(usize) -> bool) -> Vec<Scored> {
-        let first_fits = self.fitted(node, wanted);
-        self.judged(node, first_fits)
-    }
-
-    /// First fits of all extensions. Another pass, which charges other prices, finds the same.
-    pub(super) fn first_fits(&mut self, node: &Fit) -> Vec<Fit> {
+    /// First fits of all extensions, or of those by one effect. Another pass, which charges other prices, finds the same.
+    pub(super) fn first_fits(&mut self, node: &Fit, wanted: Option<usize>) -> Vec<Fit> {
         let model = &node.model;
         let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();
-        if let Some((_, fits)) = kept.find(|(of, _)| of == model) {
+        if let Some((.., fits)) = kept.find(|(of, effect, _)| of == model && *effect == wanted) {
             return fits.clone();
         }
-        let fits = self.fitted(node, |_| true);
+        let new =
+            |effect| wanted.is_none_or(|wanted| wanted == effect) && !model.has(effect) && !contained(effect, model);
+        let fits = self.judge.extended(node, self.patient, &new);
         if self.keeps {
-            self.first_fits.entry(model.structure()).or_default().push((model.clone(), fits.clone()));
+            self.first_fits.entry(model.structure()).or_default().push((model.clone(), wanted, fits.clone()));
         }
         fits
-    }
-
-    fn fitted(&mut self, node: &Fit, wanted: impl Fn(usize) -> bool) -> Vec<Fit> {
-        let model = &node.model;
-        let new = |effect| wanted(effect) && !model.has(effect) && !contained(effect, model);
-        self.judge.extended(node, self.patient, &new)
     }
 
     /// The best of first fits, judged.

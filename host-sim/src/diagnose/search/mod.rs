@@ -57,7 +57,7 @@ pub struct Search<'j, J> {
     /// Extensions of each structure, best first.
     extended: HashMap<Vec<Block>, Vec<Scored>>,
     /// First fits of the extensions of a model, whatever they cost.
-    first_fits: HashMap<Vec<Block>, Vec<(Model, Vec<Fit>)>>,
+    first_fits: HashMap<Vec<Block>, Vec<(Model, Option<usize>, Vec<Fit>)>>,
     /// Those are kept for another pass.
     keeps: bool,
     /// Also what the noise's memory may hide is tried; once is enough.
@@ -263,7 +263,7 @@ impl<'j, J: Judge> Search<'j, J> {
             return None;
         }
         let node = self.judge.at(rest);
-        let first_fits = self.first_fits(&node);
+        let first_fits = self.first_fits(&node, None);
         self.judged(&node, first_fits).into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
@@ -276,7 +276,8 @@ impl<'j, J: Judge> Search<'j, J> {
                 continue;
             }
             let rest = self.judge.at(scored.fit.model.without(effect));
-            for other in self.wanted(&rest, |other| other == effect) {
+            let first_fits = self.first_fits(&rest, Some(effect));
+            for other in self.judged(&rest, first_fits) {
                 if other.score > scored.score {
                     scored = other;
                 }
