@@ -27,19 +27,15 @@ pub struct Fit {
     pub log_likelihood: f64,
     /// Log-likelihood under independent noise: what a memory that is really structure cannot hide.
     pub plain: f64,
-    /// States whose start the readings had to tell.
-    pub states: usize,
+    /// What a start in mid-course costs, in nats.
+    pub start_cost: f64,
 }
 
 impl Fit {
     /// What the law of the noise and the start cost, in nats.
     pub fn cost(&self) -> f64 {
-        cost(&self.noise, self.states, self.residual.len())
+        self.noise.cost(self.residual.len()) + self.start_cost
     }
-}
-
-fn cost(noise: &Noise, states: usize, rows: usize) -> f64 {
-    noise.cost(rows) + start::cost(states, rows)
 }
 
 /// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
@@ -70,13 +66,22 @@ pub struct Engine<'a> {
     pub simulation: Vec<f64>,
     predicted: Vec<f64>,
     kernels: Vec<Vec<f64>>,
+    /// Of the last residual.
+    start_cost: f64,
 }
 
 impl<'a> Engine<'a> {
     /// For one record.
     pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
-        let mut engine =
-            Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new(), kernels: Vec::new() };
+        let mut engine = Self {
+            data,
+            observed,
+            simulator,
+            simulation: Vec::new(),
+            predicted: Vec::new(),
+            kernels: Vec::new(),
+            start_cost: 0.0,
+        };
         engine.simulation = engine.residual(&Model::default());
         engine
     }
@@ -93,7 +98,7 @@ impl<'a> Engine<'a> {
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
         if self.data.begun {
             let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
-            start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact);
+            self.start_cost = start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact);
         }
         residual
     }
@@ -102,10 +107,10 @@ impl<'a> Engine<'a> {
     pub fn at(&mut self, model: Model) -> Fit {
         let residual = self.residual(&model);
         let noise = Noise::fitted(&residual, self.observed);
-        let states = self.kernels.len();
-        let log_likelihood = self.log(&noise, &residual) - cost(&noise, states, residual.len());
+        let start_cost = self.start_cost;
+        let log_likelihood = self.log(&noise, &residual) - noise.cost(residual.len()) - start_cost;
         let plain = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
-        Fit { model, residual, noise, log_likelihood, plain, states }
+        Fit { model, residual, noise, log_likelihood, plain, start_cost }
     }
 
     /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.

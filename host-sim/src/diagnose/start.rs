@@ -48,8 +48,14 @@ impl Start {
     }
 }
 
-/// Takes the likeliest start off a residual, by what `counts` of its rows; states are off by about `reach_v`.
-pub(super) fn take_off(residual: &mut [f64], kernels: &[Vec<f64>], reach_v: f64, counts: impl Fn(usize) -> bool) {
+/// Takes the likeliest start off a residual, by what `counts` of its rows; states are off by about `reach_v`. What that start
+/// costs, in nats: each state by Schwarz's criterion, and what the prior says against it.
+pub(super) fn take_off(
+    residual: &mut [f64],
+    kernels: &[Vec<f64>],
+    reach_v: f64,
+    counts: impl Fn(usize) -> bool,
+) -> f64 {
     let early = kernels.iter().map(|kernel| faded(kernel)).max().unwrap_or(0);
     let counted = |values: &[f64]| (0..early).filter(|&row| counts(row)).map(|row| values[row]).collect::<Vec<f64>>();
     let read = counted(residual);
@@ -68,24 +74,20 @@ pub(super) fn take_off(residual: &mut [f64], kernels: &[Vec<f64>], reach_v: f64,
             // The lower triangle is all that is read.
             told[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted, other));
         }
-        let Some(cholesky) = normal.cholesky() else { return };
+        let Some(cholesky) = normal.cholesky() else { return 0.0 };
         cholesky.solve_mut(&mut start);
         left.clone_from(&read);
         take(&start, &told, &mut left);
         far = FAR * scale(&left);
     }
     take(&start, kernels, residual);
+    0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * start.norm_squared() / reach_v.powi(2)
 }
 
 fn take(start: &DVector<f64>, kernels: &[Vec<f64>], from: &mut [f64]) {
     for (start, kernel) in start.iter().zip(kernels) {
         from.iter_mut().zip(kernel).for_each(|(left, kernel)| *left -= start * kernel);
     }
-}
-
-/// What so many states cost, in nats.
-pub(super) fn cost(states: usize, rows: usize) -> f64 {
-    0.5 * (rows.max(2) as f64).ln() * states as f64
 }
 
 /// The first row from which on a kernel hardly matters.

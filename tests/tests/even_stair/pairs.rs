@@ -16,7 +16,7 @@ fn found(seed: u64, share: f64, amplifier: impl FnMut(f64) -> f64) -> serde_json
 /// what a larger share does.
 #[test]
 fn a_share_is_found_beside_a_delay() {
-    for (seed, delay_ms) in [(1, 300), (2, 550), (3, 900)] {
+    for (seed, delay_ms) in [(1, 330), (2, 550), (3, 870)] {
         let mut on_the_way = VecDeque::from(vec![0.0; delay_ms]);
         let report = found(seed, 0.25, |volts| {
             on_the_way.push_back(volts);

@@ -27,7 +27,9 @@ fn told(gain: f64, seed: u64, part: &str, relaxation: &str) -> Value {
 #[test]
 fn it_is_taken_out_and_what_is_wrong_beside_it_is_named() {
     for (seed, (name, part, relaxation)) in PARTS.into_iter().enumerate() {
-        for (gain, wrong) in [(1.0, None), (1.1, Some("gain-error"))] {
+        // A law times a gain is another law.
+        let gains = if name == "law" { &[(1.0, None)][..] } else { &[(1.0, None), (1.1, Some("gain-error"))] };
+        for &(gain, wrong) in gains {
             let report = told(gain, seed as u64, part, relaxation);
             assert_eq!(report["take_out"], serde_json::json!([name]), "{report}");
             assert_eq!(report["verdict"], "explained", "{name}: {report}");

@@ -19,6 +19,8 @@ use crate::diagnose::start::Start;
 
 pub(super) struct Resonance;
 
+/// A polymer damps its swings by no less; what rings on for longer is the schedule's own rhythm.
+const LEAST_DAMPED: f64 = 5e-3;
 /// What overshoots a step by less than a sixth is a lag, and no swing to be seen.
 const MOST_DAMPED: f64 = 0.5;
 const WHOLE: usize = 0;
@@ -59,7 +61,7 @@ impl Effect for Resonance {
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (lowest, highest) = range(data);
         let mut coordinates =
-            vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(1e-3, MOST_DAMPED)];
+            vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(LEAST_DAMPED, MOST_DAMPED)];
         if form != WHOLE {
             coordinates.push(Coordinate::new(0.0, 1.5));
         }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{Judge, Scored, Search, effects};
+use super::{FirstFits, Judge, Scored, Search, effects};
 use crate::diagnose::effects::EFFECTS;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::model::Model;
@@ -32,14 +32,18 @@ impl<J: Judge> Search<'_, J> {
     pub(super) fn first_fits(&mut self, node: &Fit, wanted: Option<usize>) -> Vec<Fit> {
         let model = &node.model;
         let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();
-        if let Some((.., fits)) = kept.find(|(of, effect, _)| of == model && *effect == wanted) {
-            return fits.clone();
+        if let Some(kept) = kept.find(|kept| kept.of == *model && kept.by == wanted) {
+            return kept.fits.clone();
         }
         let new =
             |effect| wanted.is_none_or(|wanted| wanted == effect) && !model.has(effect) && !contained(effect, model);
         let fits = self.judge.extended(node, self.patient, &new);
         if self.keeps {
-            self.first_fits.entry(model.structure()).or_default().push((model.clone(), wanted, fits.clone()));
+            self.first_fits.entry(model.structure()).or_default().push(FirstFits {
+                of: model.clone(),
+                by: wanted,
+                fits: fits.clone(),
+            });
         }
         fits
     }

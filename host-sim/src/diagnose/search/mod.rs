@@ -57,11 +57,19 @@ pub struct Search<'j, J> {
     /// Extensions of each structure, best first.
     extended: HashMap<Vec<Block>, Vec<Scored>>,
     /// First fits of the extensions of a model, whatever they cost.
-    first_fits: HashMap<Vec<Block>, Vec<(Model, Option<usize>, Vec<Fit>)>>,
+    first_fits: HashMap<Vec<Block>, Vec<FirstFits>>,
     /// Those are kept for another pass.
     keeps: bool,
     /// Also what the noise's memory may hide is tried; once is enough.
     patient: bool,
+}
+
+/// First fits of a model's extensions.
+struct FirstFits {
+    of: Model,
+    /// By this effect, or by all.
+    by: Option<usize>,
+    fits: Vec<Fit>,
 }
 
 /// What a search hands on: one on a part of the rows, or one that took the readings otherwise.

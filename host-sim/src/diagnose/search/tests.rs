@@ -51,7 +51,7 @@ impl Judge for Told {
             of_part.map(|(part, worth)| worth + (has.len() - part.len()) as f64).fold(has.len() as f64, f64::max);
         let mut noise = Noise::first_look();
         noise.marginal = if self.quiet.is_none_or(|effect| has.contains(&effect)) { 1.0 } else { 10.0 };
-        Fit { model, residual: Vec::new(), noise, log_likelihood, plain: log_likelihood, states: 0 }
+        Fit { model, residual: Vec::new(), noise, log_likelihood, plain: log_likelihood, start_cost: 0.0 }
     }
 
     fn at(&mut self, model: Model) -> Fit {
