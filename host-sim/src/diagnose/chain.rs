@@ -130,7 +130,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// From there to the stiffness; `applied` is what is on the electrodes, `levels_v` becomes what [`Chain::follow`] needs to
+    /// From there to the stiffness; `applied` is what is on the electrodes, `levels_v` becomes what the relaxation needs to
     /// know of it.
     pub fn relax(&self, signal: &mut Signal, applied: &Signal, levels_v: &mut Vec<f64>) {
         if self.relaxation.varies() && self.relaxation.by_state.is_none() {
