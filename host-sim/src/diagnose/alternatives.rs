@@ -1,7 +1,7 @@
 //! Other explanations that a record leaves open, and the experiment that would decide.
 
 use super::data::Data;
-use super::effects::{EFFECTS, index_of};
+use super::effects::{EFFECTS, contains, index_of};
 use super::report::{Finding, Verdict};
 use super::search::{Judge, Scored, Search, effects};
 
@@ -19,14 +19,10 @@ pub(super) fn rivals<J: Judge>(search: &Search<J>, best: &Scored) -> Vec<Vec<&'s
         .into_iter()
         .take_while(|other| other.score > best.score - RIVAL)
         .map(|other| effects(&other.fit.model))
-        .filter(|set| !own.iter().all(|effect| set.iter().any(|other| contains(*other, *effect))))
+        .filter(|set| !own.iter().all(|effect| set.iter().any(|other| other == effect || contains(*other, *effect))))
         .take(MOST_RIVALS)
         .map(|set| set.into_iter().map(|effect| EFFECTS[effect].cause()).collect())
         .collect()
-}
-
-fn contains(effect: usize, other: usize) -> bool {
-    effect == other || EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause())
 }
 
 /// On a record that only rises (or falls), memory and a law without memory are one.

@@ -84,7 +84,8 @@ use simulator::Simulator;
 /// Fewest readings that anything can be said of.
 const FEWEST_ROWS: usize = 8;
 
-/// Readings that were cut off instead of rounded have to be likelier by so many nats: most converters round.
+/// What is not as it usually is has to be likelier by so many nats: readings that were cut off instead of rounded, a part of
+/// the plant file that the spring has not.
 const CLEARLY: f64 = 3.0;
 
 /// A longer record is searched on a part of its rows first, of about so many.

@@ -98,8 +98,7 @@ impl Model {
             rest = others;
         }
     }
-}
-impl Model {
+
     /// The base's chain, changed by the model's blocks.
     pub fn chain<'a>(&'a self, base: &'a Base, data: &'a Data) -> Chain<'a> {
         let mut chain = base.chain();

@@ -141,6 +141,7 @@ impl Relaxation {
             (from, to)
         });
     }
+
     /// Start and end of the first lag over a piece of its input, where the spring's state sets its time constant. Exact for the
     /// time constant that it has in the middle of each step.
     fn led(&self, at_once: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {

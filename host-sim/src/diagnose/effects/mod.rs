@@ -47,3 +47,8 @@ pub static EFFECTS: &[&dyn Effect] = &[
 pub fn index_of(cause: &str) -> Option<usize> {
     EFFECTS.iter().position(|effect| effect.cause() == cause)
 }
+
+/// True if a cause contains another, as its special case.
+pub fn contains(effect: usize, other: usize) -> bool {
+    EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause())
+}

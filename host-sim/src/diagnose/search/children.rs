@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::{FirstFits, Judge, Scored, Search, effects};
-use crate::diagnose::effects::EFFECTS;
+use crate::diagnose::effects::contains;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::model::Model;
 
@@ -79,7 +79,5 @@ impl<J: Judge> Search<'_, J> {
 
 /// True if an effect is a special case of one that is there: it could only trade with it.
 fn contained(effect: usize, model: &Model) -> bool {
-    let wider = EFFECTS[effect].special_case_of();
-    let narrower = |other: usize| EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause());
-    effects(model).into_iter().any(|other| wider.contains(&EFFECTS[other].cause()) || narrower(other))
+    effects(model).into_iter().any(|other| contains(other, effect) || contains(effect, other))
 }

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::Scored;
 use super::judge::Judge;
 use crate::diagnose::effect::Stage;
-use crate::diagnose::effects::EFFECTS;
+use crate::diagnose::effects::contains;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::model::{Block, Model};
 
@@ -109,10 +109,7 @@ impl Seen {
 
     /// The best of all structures that do without an effect, and without a cause that contains it.
     pub(super) fn best_without(&self, effect: usize) -> Option<Scored> {
-        let wider = EFFECTS[effect].special_case_of();
-        let has = |model: &Model| {
-            effects(model).into_iter().any(|other| other == effect || wider.contains(&EFFECTS[other].cause()))
-        };
+        let has = |model: &Model| effects(model).into_iter().any(|other| other == effect || contains(other, effect));
         let without = self.scored.values().filter(|scored| !has(&scored.fit.model));
         without.max_by(|a, b| a.score.total_cmp(&b.score)).cloned()
     }
