@@ -2,11 +2,12 @@
 
 use super::data::Data;
 use super::effects::{EFFECTS, contains, index_of};
+use super::informative::Silent;
 use super::report::{Finding, Verdict};
 use super::search::{Judge, Scored, Search, effects};
 
 /// Odds under which a rival set counts as possible, in nats.
-const RIVAL: f64 = 3.0;
+pub(super) const RIVAL: f64 = 3.0;
 /// Rivals that are listed.
 const MOST_RIVALS: usize = 3;
 
@@ -69,6 +70,7 @@ pub(super) fn next_experiment(
         Verdict::Unexplained => Some(
             "run the same schedule again: what comes back is the spring's, what does not is the readings'".to_owned(),
         ),
-        _ => None,
+        Verdict::Insufficient => Some(Silent::Excitation.next_experiment().to_owned()),
+        Verdict::Consistent | Verdict::Explained => None,
     }
 }

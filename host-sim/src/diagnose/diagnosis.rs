@@ -8,6 +8,7 @@ use super::fit::{Engine, Fit};
 use super::in_step;
 use super::informative::{Silent, no_spring, silent};
 use super::leftover::{self, Leftover};
+use super::margins::Margins;
 use super::model::Model;
 use super::noise::{FINEST_V, scale_of_squares};
 use super::observed::{Kind, Observed};
@@ -96,7 +97,7 @@ pub(super) fn diagnose(
         weights.push((effect, search.best_without(effect), left_out));
     }
     let contenders = standing::contenders(&search, &best);
-    let lead = Some(search.lead());
+    let lead = search.lead();
     let mut held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
     let known = [(&baseline, &*held_out[0]), (&best.fit, &*held_out[1])];
     let standings = standing::standings(engine, contenders, known);
@@ -122,10 +123,12 @@ pub(super) fn diagnose(
         alternatives.extend(twin(&findings));
     }
     let cure = cure::of(engine, &best.fit.model, held);
+    let would_show = findings.is_empty().then(|| Margins::of(engine, &best.fit, lead.caution));
     let material = left.as_ref().is_some_and(|left| left.share > MATERIAL);
     let verdict = match () {
         () if material => Verdict::Unexplained,
         () if !alternatives.is_empty() => Verdict::Ambiguous,
+        () if would_show.is_some_and(|margins| !margins.tell()) => Verdict::Insufficient,
         () if findings.is_empty() => Verdict::Consistent,
         () => Verdict::Explained,
     };
@@ -152,6 +155,7 @@ pub(super) fn diagnose(
         },
         findings,
         take_out: Vec::new(),
+        would_show,
         alternatives,
         next_experiment,
         leftover,
@@ -168,7 +172,7 @@ pub(super) fn diagnose(
         standings,
         observed: observed.clone(),
         score: best.score,
-        lead,
+        lead: Some(lead),
     }
 }
 
@@ -183,6 +187,7 @@ fn unsearched(data: Data, observed: &Observed, engine: &Engine, baseline: Fit, s
         baseline: quality,
         findings: Vec::new(),
         take_out: Vec::new(),
+        would_show: None,
         alternatives: Vec::new(),
         next_experiment: Some(silent.next_experiment().into()),
         extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },

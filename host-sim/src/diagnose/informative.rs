@@ -74,17 +74,15 @@ pub(super) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
         let far = beside.simulated[1] - beside.simulated[0] > FAR_V;
         return Some(if far { Silent::Sensor(beside.still()) } else { Silent::Excitation });
     }
-    let block = |cause| Block { effect: index_of(cause).expect("an effect"), form: 0 };
-    let (gain, time_constant) = (block("gain-error"), block("time-constant"));
-    let probe = |tau_s: f64| Model::default().with(gain, vec![1.0]).with(time_constant, vec![tau_s.ln()]);
-    let start = probe(engine.simulator.base.relaxation.tau_s);
+    let start = of_both(engine.simulator.base.relaxation.tau_s);
     let mut best = engine.fit(start.clone(), &Noise::first_look());
     // A simulation may be so far off that no way leads from there.
-    let paper = probe(Plant::PAPER.time_constant_s);
+    let paper = of_both(Plant::PAPER.time_constant_s);
     if paper != start {
         let other = engine.fit(paper, &Noise::first_look());
         best = if other.log_likelihood > best.log_likelihood { other } else { best };
     }
+    let [gain, _] = gain_and_time_constant();
     let bounds = &gain.coordinates(data)[0];
     let found = best.model.point(gain.effect).map_or(1.0, |point| point[0]);
     if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found) && beside.correlation.abs() > ALIKE {
@@ -105,6 +103,17 @@ pub(super) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
     // Quick to tell, and a search for causes in noise alone is long.
     let still = beside.correlation.abs() < STRANGE && standstill::as_likely(engine, &best.model, best.log_likelihood);
     still.then(|| Silent::Sensor(beside.still()))
+}
+
+/// The two numbers that every record of use tells.
+pub(super) fn gain_and_time_constant() -> [Block; 2] {
+    ["gain-error", "time-constant"].map(|cause| Block { effect: index_of(cause).expect("an effect"), form: 0 })
+}
+
+/// A model of both: the gain as it is simulated, and a time constant.
+pub(super) fn of_both(tau_s: f64) -> Model {
+    let [gain, time_constant] = gain_and_time_constant();
+    Model::default().with(gain, vec![1.0]).with(time_constant, vec![tau_s.ln()])
 }
 
 /// Of a spring that was found, if one that stands still is as likely.

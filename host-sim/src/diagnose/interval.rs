@@ -18,8 +18,8 @@ use super::model::Block;
 use super::quality::Z;
 use super::report::Parameter;
 
-/// Inverse of the information on the fitted coordinates.
-pub(super) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>> {
+/// What the readings tell of the fitted coordinates.
+pub(super) fn information(engine: &mut Engine, fit: &Fit) -> DMatrix<f64> {
     let jacobian = engine.jacobian(&fit.model, &fit.noise, &fit.residual);
     let terms = engine.terms(&fit.noise, &fit.residual);
     let (normal, _) = normal_equations(&jacobian, &terms);
@@ -27,10 +27,15 @@ pub(super) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>>
     let squares: f64 = terms.iter().map(|term| (term.weight * term.residual).powi(2)).sum();
     let weights: f64 = terms.iter().map(|term| term.weight).sum();
     let heavy = fit.noise.cell == 0.0 && (fit.noise.nu.is_finite() || fit.noise.wide.is_some());
-    let factor = if heavy { (squares / weights).min(1.0) } else { 1.0 };
-    let mut known = normal * factor;
+    if heavy { normal * (squares / weights).min(1.0) } else { normal }
+}
+
+/// Inverse of the information on the fitted coordinates, with what their bounds tell.
+pub(super) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>> {
+    let mut known = information(engine, fit);
     let bounds = fit.model.coordinates(engine.data);
-    for (index, &place) in jacobian.places.iter().enumerate() {
+    let places = (0..bounds.len()).filter(|&place| bounds[place].fitted);
+    for (index, place) in places.enumerate() {
         known[(index, index)] += (Z / (bounds[place].highest - bounds[place].lowest)).powi(2);
     }
     known.try_inverse().filter(|matrix| matrix.iter().all(|value| value.is_finite()))

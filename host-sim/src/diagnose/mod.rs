@@ -16,7 +16,7 @@
 //! | [`cure`] | the extended spring as a plant file, and in the tick |
 //! | [`leftover`], [`swallowed`], `in_step`, [`spikes`], [`spectrum`], `whereabouts` | what no effect explains, and where |
 //! | `lacking` | what a plant file says and the spring has not |
-//! | `informative`, `standstill`, `alternatives` | whether a record can tell anything, and of a spring; what it leaves open |
+//! | `informative`, `standstill`, `margins`, `alternatives` | whether a record can tell anything, and of a spring; what it would have shown, and leaves open |
 //! | `finding`, `reading_findings`, `interval`, `quality` | a cause and what it is worth; parameters with intervals; errors |
 //! | [`diagnosis`], [`report`], [`text`] | what is said |
 
@@ -47,6 +47,7 @@ pub mod lattice;
 pub mod law;
 pub mod leakage;
 pub mod leftover;
+mod margins;
 mod median;
 pub mod model;
 pub mod noise;

@@ -2,6 +2,8 @@
 
 use serde::{Serialize, Serializer};
 
+use super::margins::Margins;
+
 /// Version of the form.
 pub const SCHEMA: u32 = 1;
 
@@ -21,6 +23,9 @@ pub struct Report {
     /// Parts of the plant file that are not in this spring: the extended simulation is without them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub take_out: Vec<&'static str>,
+    /// Errors that would have shown, where nothing is found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub would_show: Option<Margins>,
     /// Other sets of causes that the data cannot reject.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The experiment that would decide, or show more.

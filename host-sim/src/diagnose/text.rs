@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::cure::SMALL_ERROR_V;
 use super::effect::Stage;
 use super::effects::{EFFECTS, index_of};
+use super::margins::Margins;
 use super::report::{Extended, Finding, Report, Verdict};
 
 /// A gain below this is none.
@@ -74,24 +75,42 @@ fn lacking(report: &Report) -> Option<String> {
     })
 }
 
+/// How far off something is, as a part of it, to two digits.
+fn off_by(part: f64) -> String {
+    let percent = 100.0 * part;
+    match part {
+        ..0.1 => format!("{percent:.*} %", (1.0 - percent.log10().floor()).clamp(1.0, 6.0) as usize),
+        0.1..1.0 => format!("{percent:.0} %"),
+        1.0..100.0 => format!("a factor of {:.0}", 1.0 + part),
+        _ => "any factor".into(),
+    }
+}
+
 /// What is wrong; what the cure is worth; what to do next.
 pub fn sentences(name: &str, report: &Report) -> Vec<String> {
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
     let in_readings = effects.clone().all(|effect| effect.stage() == Stage::Reading);
     let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.meaning())).collect();
+    let margins = report.would_show.map(|Margins { gain, time_constant }| {
+        format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
+    });
     let (one, rows) = (causes.len() == 1, report.rows);
     let mut sentences: Vec<String> = lacking(report).into_iter().collect();
     sentences.push(match report.verdict {
         Verdict::Explained if causes.is_empty() => {
             format!("Without that, the simulation agrees with {name}: nothing beyond noise in {rows} readings.")
         }
-        Verdict::Consistent if report.leftover.is_none() => {
-            format!("The simulation agrees with {name}: nothing beyond noise in {rows} readings.")
+        Verdict::Consistent => {
+            let what = if report.leftover.is_none() { "beyond noise" } else { "worth a cause" };
+            format!(
+                "The simulation agrees with {name}: nothing {what} in {rows} readings{}.",
+                margins.map_or_else(String::new, |off| format!(", where {off} would have shown"))
+            )
         }
-        Verdict::Consistent => format!("The simulation agrees with {name}: nothing worth a cause in {rows} readings."),
-        Verdict::Insufficient => {
-            format!("{name} cannot tell what is wrong: its {rows} readings hold too little excitation.")
-        }
+        Verdict::Insufficient => format!(
+            "{name} cannot tell what is wrong: its {rows} readings hold too little excitation{}.",
+            margins.map_or_else(String::new, |off| format!("; {off} need not show"))
+        ),
         Verdict::Unexplained if causes.is_empty() => {
             format!("The simulation is wrong on {name}, and no known cause explains it.")
         }
@@ -180,6 +199,7 @@ mod tests {
             baseline: quality,
             findings: causes.iter().map(finding).collect(),
             take_out: Vec::new(),
+            would_show: None,
             alternatives: alternatives.to_vec(),
             next_experiment: None,
             extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
@@ -188,6 +208,20 @@ mod tests {
             residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
         };
         sentences("r.csv", &report)[..2].join(" ")
+    }
+
+    #[test]
+    fn a_margin_has_two_digits() {
+        for (part, said) in [
+            (0.000_43, "0.043 %"),
+            (0.0058, "0.58 %"),
+            (0.071, "7.1 %"),
+            (0.4, "40 %"),
+            (44.42, "a factor of 45"),
+            (f64::INFINITY, "any factor"),
+        ] {
+            assert_eq!(off_by(part), said);
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use serde_json::Value;
 use tempfile::tempdir;
 
 mod forms;
+mod margins;
 mod pairs;
 mod plant;
 mod sensor;
