@@ -85,10 +85,17 @@ impl Data {
             Input::Linear => Schedule::from_record(record, Between::Linear),
             Input::Stair => Schedule::stair(),
         };
-        let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?))).step_by(every);
+        let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?)));
         let time_s: Vec<f64> = rows().map(|(row, _)| row.time_s).collect();
         let voltage_v: Vec<f64> = rows().map(|(row, _)| row.voltage_v).collect();
         let reading: Vec<f64> = rows().map(|(_, reading)| reading).collect();
+        let first_v = voltage_v.first().copied().unwrap_or(0.0);
+        // Told by all rows: a part of them is of the same record.
+        let begun = first_v != 0.0 || still_falling(&time_s, &voltage_v, &reading);
+        let [time_s, voltage_v, reading] = [time_s, voltage_v, reading].map(|all| match every {
+            1 => all,
+            _ => all.into_iter().step_by(every).collect(),
+        });
         let full_scale_v = voltage_v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let mut gaps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         gaps.sort_by(f64::total_cmp);
@@ -97,10 +104,9 @@ impl Data {
         let even =
             gaps.last().zip(gaps.first()).is_some_and(|(longest, shortest)| longest - shortest < 0.01 * sample_s);
         // A record that begins under voltage had it before, or begins at the moment of the step.
-        let (first_v, first) = (voltage_v.first().copied().unwrap_or(0.0), reading.first().copied().unwrap_or(0.0));
+        let first = reading.first().copied().unwrap_or(0.0);
         let stepped = first / first_v < 2.0 * Plant::PAPER.share;
         let before = if stepped { 0.0 } else { first_v };
-        let begun = first_v != 0.0 || still_falling(&time_s, &voltage_v, &reading);
         let command = match every {
             1 => Signal::new(&schedule, &time_s, before),
             _ => Signal::coarse(&schedule, &time_s, before, THINNED_PIECES, THINNED_BLUR * full_scale_v),
@@ -162,6 +168,8 @@ fn folds(voltage_v: &[f64]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::noise::normals;
+    use crate::record::Row;
 
     #[test]
     fn few_rows_are_held_out_stair_by_stair_if_they_are_stairs() {
@@ -173,6 +181,24 @@ mod tests {
             let fold = folds(&record);
             assert!(fold.chunk_by(|a, b| a == b).all(|stretch| stretch.len() == SHORTEST_STRETCH), "{fold:?}");
             assert_eq!(fold.iter().max(), Some(&(FOLDS as u8 - 1)));
+        }
+    }
+
+    /// A decay that a part of the rows cannot tell is in the record all the same, and asks for the same coordinates.
+    #[test]
+    fn a_part_of_the_rows_begins_as_all_of_them_do() {
+        let noise = normals(4000);
+        let row = |row: usize, start_v: f64| {
+            let time_s = 0.01 * row as f64;
+            let measured = Some(start_v * (-time_s / 5.5).exp() + noise[row]);
+            Row { line: 0, time_s, voltage_v: if row < 3000 { 0.0 } else { 300.0 }, measured }
+        };
+        let record = |start_v| Record { name: String::new(), rows: (0..4000).map(|at| row(at, start_v)).collect() };
+        for (start_v, begun) in [(0.0, false), (1.5, true)] {
+            let record = record(start_v);
+            for every in [1, 2, 8, 40] {
+                assert_eq!(Data::thinned(&record, Input::Hold, every).begun, begun, "{start_v} V, every {every}");
+            }
         }
     }
 
