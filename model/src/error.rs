@@ -54,7 +54,8 @@ impl fmt::Display for OutOfRange {
         let Self { field, value, lowest, highest, unit } = self;
         write!(f, "{field} = ")?;
         // Not with hundreds of digits.
-        if value.is_finite() && value.abs() >= 1e15 { write!(f, "{value:e}") } else { write!(f, "{value}") }?;
+        let many = value.is_finite() && *value != 0.0 && !(1e-9..1e15).contains(&value.abs());
+        if many { write!(f, "{value:e}") } else { write!(f, "{value}") }?;
         write!(f, " is not allowed: expected {lowest}")?;
         if lowest != highest {
             write!(f, " to {highest}")?;

@@ -66,28 +66,24 @@ pub struct Engine<'a> {
     pub simulation: Vec<f64>,
     predicted: Vec<f64>,
     kernels: Vec<Vec<f64>>,
-    /// Of the last residual.
-    start_cost: f64,
 }
 
 impl<'a> Engine<'a> {
     /// For one record.
     pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
-        let mut engine = Self {
-            data,
-            observed,
-            simulator,
-            simulation: Vec::new(),
-            predicted: Vec::new(),
-            kernels: Vec::new(),
-            start_cost: 0.0,
-        };
+        let mut engine =
+            Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new(), kernels: Vec::new() };
         engine.simulation = engine.residual(&Model::default());
         engine
     }
 
     /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
     pub fn residual(&mut self, model: &Model) -> Vec<f64> {
+        self.residual_and_start(model).0
+    }
+
+    /// The same, with what that start costs, in nats.
+    fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
         if self.data.begun {
             self.simulator.run_begun(model, &mut self.predicted, &mut self.kernels);
         } else {
@@ -96,21 +92,22 @@ impl<'a> Engine<'a> {
         let cut_v = self.observed.cut_v;
         let left = |(reading, predicted): (&f64, &f64)| reading + cut_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
-        if self.data.begun {
-            let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
-            self.start_cost = start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact);
-        }
-        residual
+        let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
+        let start_cost = match self.data.begun {
+            true => start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact),
+            false => 0.0,
+        };
+        (residual, start_cost)
     }
 
     /// A model at the point that it has, with the noise that suits it.
     pub fn at(&mut self, model: Model) -> Fit {
-        let residual = self.residual(&model);
+        let (residual, start_cost) = self.residual_and_start(&model);
         let noise = Noise::fitted(&residual, self.observed);
-        let start_cost = self.start_cost;
-        let log_likelihood = self.log(&noise, &residual) - noise.cost(residual.len()) - start_cost;
+        let log_likelihood = self.log(&noise, &residual);
         let plain = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
-        Fit { model, residual, noise, log_likelihood, plain, start_cost }
+        let fit = Fit { model, residual, noise, log_likelihood, plain, start_cost };
+        Fit { log_likelihood: log_likelihood - fit.cost(), ..fit }
     }
 
     /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.

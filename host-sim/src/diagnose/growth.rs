@@ -29,13 +29,13 @@ const RATIO: f64 = 1.3;
 /// One over each row's scale, their geometric mean 1; `None` if the noise does not grow. Rows for which `counts` is false do
 /// not tell.
 pub(super) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc<[f64]>> {
-    let reading = &data.reading;
-    let bends: Vec<f64> = bends(reading).collect();
     let mut rows: Vec<usize> =
         (1..data.rows().saturating_sub(1)).filter(|row| (row - 1..=row + 1).all(&counts)).collect();
     if rows.len() < GROUPS * FEWEST {
         return None;
     }
+    let reading = &data.reading;
+    let bends: Vec<f64> = bends(reading).collect();
     let level = running(&reading.iter().map(|reading| reading.abs()).collect::<Vec<_>>());
     rows.sort_by(|a, b| level[*a].total_cmp(&level[*b]));
     let of_group = |rows: &[usize]| {

@@ -1,6 +1,7 @@
 //! Where a record begins in mid-course: how far each state of the chain is off its rest by then.
 //!
-//! Behind memory and law all is linear, so the prediction is straight in the states at the first row,
+//! Behind memory and law all is linear (but for two forms, a time constant by the spring's state and a law behind the
+//! relaxation, which are not tried here), so the prediction is straight in the states at the first row,
 //! `prediction(x) = prediction(0) + sum x_i kernel_i`, and the kernels die away. So `x` is no coordinate of a fit; every
 //! model gets the one that suits it best, by Huber's robust least squares with a normal prior as wide as the record's
 //! voltages (of kernels alike, only the sum is known). It counts as given, also for stretches that are held out; what the

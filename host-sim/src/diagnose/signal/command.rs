@@ -15,6 +15,7 @@ const GROWTH: f64 = 0.05;
 const STILL: f64 = 1e-4;
 /// Unless that would make more pieces than this for each row; coarse records keep coarse pieces.
 const MOST_PIECES: usize = 20_000;
+
 impl From<&Stretch> for Piece {
     fn from(stretch: &Stretch) -> Self {
         Self { duration_s: stretch.duration_s, from: stretch.from_v, to: stretch.to_v() }
