@@ -57,6 +57,7 @@ pub(super) fn next_experiment(
     verdict: Verdict,
     findings: &[Finding],
     alternatives: &[Vec<&'static str>],
+    wanders: bool,
 ) -> Option<String> {
     match verdict {
         Verdict::Ambiguous => {
@@ -67,10 +68,11 @@ pub(super) fn next_experiment(
             let experiment = EFFECTS[index_of(cause)?].experiment();
             Some(format!("run {experiment}"))
         }
-        Verdict::Unexplained => Some(
+        Verdict::Consistent if !wanders => None,
+        Verdict::Unexplained | Verdict::Consistent => Some(
             "run the same schedule again: what comes back is the spring's, what does not is the readings'".to_owned(),
         ),
         Verdict::Insufficient => Some(Silent::Excitation.next_experiment().to_owned()),
-        Verdict::Consistent | Verdict::Explained => None,
+        Verdict::Explained => None,
     }
 }

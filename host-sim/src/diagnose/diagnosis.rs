@@ -132,7 +132,7 @@ pub(super) fn diagnose(
         () if findings.is_empty() => Verdict::Consistent,
         () => Verdict::Explained,
     };
-    let next_experiment = next_experiment(verdict, &findings, &alternatives);
+    let next_experiment = next_experiment(verdict, &findings, &alternatives, best.fit.wanders());
     let leftover = left.map(|left| {
         let Leftover { place, share, rms, .. } = left;
         format!("{:.1} % of what is left ({rms:.3} V RMS) is no noise: it shows {place}", 100.0 * share)

@@ -31,7 +31,15 @@ pub struct Fit {
     pub start_cost: f64,
 }
 
+/// Errors this many times as large as what of them is new at each reading wander.
+const WANDERS: f64 = 4.0;
+
 impl Fit {
+    /// True if nearly all that is left would be foretold by the noise's memory: what is slow may hide in it.
+    pub fn wanders(&self) -> bool {
+        self.noise.marginal > WANDERS * self.noise.sigma
+    }
+
     /// What the law of the noise and the start cost, in nats.
     pub fn cost(&self) -> f64 {
         self.noise.cost(self.residual.len()) + self.start_cost

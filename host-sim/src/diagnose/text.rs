@@ -6,7 +6,7 @@ use super::cure::SMALL_ERROR_V;
 use super::effect::Stage;
 use super::effects::{EFFECTS, index_of};
 use super::margins::Margins;
-use super::report::{Extended, Finding, Report, Verdict};
+use super::report::{Extended, Finding, Quality, Report, Verdict};
 
 /// A gain below this is none.
 const FORETOLD: f64 = 0.005;
@@ -154,6 +154,13 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
         sentences.push(format!("The data cannot reject instead: {}.", rivals.collect::<Vec<_>>().join("; ")));
     }
+    if report.verdict == Verdict::Consistent && report.next_experiment.is_some() {
+        let Quality { rmse, one_step_rmse, .. } = report.extended.quality;
+        sentences.push(format!(
+            "That noise wanders, by {rmse:.3} V where {one_step_rmse:.3} V is new at each reading: what is slow in the spring \
+             would pass for it."
+        ));
+    }
     if let Some(leftover) = &report.leftover {
         let small = if report.verdict == Verdict::Unexplained { "" } else { "Too little to change this verdict: " };
         sentences.push(format!("{small}{leftover}."));
@@ -178,7 +185,7 @@ fn row(text: &mut String, finding: &Finding) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::{NoiseReport, Quality, ResidualReport, SCHEMA};
+    use super::super::report::{NoiseReport, ResidualReport, SCHEMA};
     use super::*;
 
     /// The first two sentences about causes that leave the error as it is.

@@ -1,6 +1,6 @@
 //! What is said to show shows, and not much less does.
 
-use super::{ROWS_PER_LEVEL, diagnosed, noise, stiffness};
+use super::{ROWS_PER_LEVEL, SAMPLE_S, diagnosed, noise, read, stiffness};
 
 const RECORDS: u64 = 5;
 
@@ -42,4 +42,18 @@ fn a_record_that_would_not_show_a_gain_off_by_half_cannot_tell() {
     let report = diagnosed(&rows(90));
     assert_eq!(report["verdict"], "insufficient", "{report}");
     assert!(!report["next_experiment"].is_null(), "{report}");
+}
+
+/// A gain that swings slowly looks like noise with a long memory: it is named as such at least, with what would tell.
+#[test]
+fn what_may_hide_in_noise_that_wanders_is_said() {
+    let swinging = |part: f64| {
+        let swing = move |row: usize| 1.0 + part * (row as f64 * SAMPLE_S / 80.0 * std::f64::consts::TAU).sin();
+        diagnosed(&read(9, |row, y, noise| swing(row) * y + noise))
+    };
+    let calm = swinging(0.0);
+    assert!(calm["verdict"] == "consistent" && calm["next_experiment"].is_null(), "{calm}");
+    let report = swinging(0.06);
+    assert!(report["extended"]["rmse"].as_f64().unwrap() > 5.0, "{report}");
+    assert!(report["verdict"] != "explained" && !report["next_experiment"].is_null(), "{report}");
 }

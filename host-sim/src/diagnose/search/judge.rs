@@ -18,8 +18,6 @@ const PRICE_OF_COORDINATE: f64 = 1.8;
 const MISFIT: f64 = 0.005;
 /// And no more than this part of the noise: a larger misfit would be seen as a memory of its own.
 const MISFIT_SEEN: f64 = 0.3;
-/// What is left may be so many times what its memory does not foretell before that is doubted.
-const FORETOLD: f64 = 4.0;
 /// An effect that promises less in all its forms, in nats, is not fitted.
 const PROMISE: f64 = 2.5;
 /// And to those who are not patient must promise this part of its price.
@@ -105,7 +103,7 @@ impl Judge for Engine<'_> {
     fn doubts(&mut self, fit: &Fit) -> bool {
         // Before any effect is found, a memory may be the effect's own; and one that is to foretell nearly all that is left.
         let remembers = !fit.noise.memory.is_none();
-        let unfound = remembers && (fit.model.blocks.is_empty() || fit.noise.marginal > FORETOLD * fit.noise.sigma);
+        let unfound = remembers && (fit.model.blocks.is_empty() || fit.wanders());
         let errors = self.observed.errors(&fit.residual);
         let swallowed = || swallowed::test(self.data, &errors, &fit.noise.memory).is_some();
         unfound || swallowed() || leftover::test(self, fit).is_none_or(|left| left.doubtful)
