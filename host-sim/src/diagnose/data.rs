@@ -41,9 +41,12 @@ const THINNED_BLUR: f64 = 1e-3;
 const FEWEST_AT_REST: usize = 4;
 /// In so short a part of its time constant the spring hardly falls.
 const SHORT: f64 = 0.3;
-/// A decay so many standard deviations high is one. Where noise with a memory passes for it, little is lost: the start that is
-/// then fitted is as small.
-const CLEAR: f64 = 8.0;
+/// A decay so many standard deviations high is one,
+const CLEAR: f64 = 5.0;
+/// with one of these times the paper's time constant.
+const TAUS: [f64; 3] = [0.5, 1.0, 2.0];
+/// Correlation of neighbours beyond which noise is not believed to remember.
+const LONGEST: f64 = 0.98;
 
 /// The record, as every fit sees it.
 #[derive(Clone, Debug)]
@@ -127,23 +130,38 @@ impl Data {
     }
 }
 
-/// True if the readings at rest, before the first voltage, fall from another stiffness to their rest as the spring does; where
+/// True if the readings at rest, before the first voltage, fall from another stiffness to their rest as a spring does; where
 /// they are too short to fall, if they are not at rest.
 fn still_falling(time_s: &[f64], voltage_v: &[f64], reading: &[f64]) -> bool {
     let rest = voltage_v.iter().take_while(|voltage| **voltage == 0.0).count();
     if rest == 0 {
         return false;
     }
+    let (time_s, at_rest) = (&time_s[..rest], &reading[..rest]);
     let tau_s = Plant::PAPER.time_constant_s;
-    let decay: Vec<f64> = time_s[..rest].iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
     let short = rest < FEWEST_AT_REST || time_s[rest - 1] - time_s[0] < SHORT * tau_s;
-    // Least squares on the spring's decay, and on a constant if that can be told from it.
-    let mean = |values: &[f64]| if short { 0.0 } else { values.iter().sum::<f64>() / rest as f64 };
-    let (mean_decay, mean_reading) = (mean(&decay), mean(&reading[..rest]));
-    let pairs = || decay.iter().zip(reading).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
-    let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
-    let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
-    height.abs() > CLEAR * scale(&bends(reading).collect::<Vec<_>>()) / power.sqrt()
+    let new_v = scale(&bends(reading).collect::<Vec<_>>());
+    let falls = |tau_s: f64| {
+        let decay: Vec<f64> = time_s.iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
+        // Least squares on the decay, and on a constant if that can be told from it.
+        let mean = |values: &[f64]| if short { 0.0 } else { values.iter().sum::<f64>() / rest as f64 };
+        let (mean_decay, mean_reading) = (mean(&decay), mean(at_rest));
+        let pairs = || decay.iter().zip(at_rest).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
+        let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
+        let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
+        let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
+        height.abs() * power.sqrt() > CLEAR * if short { new_v } else { new_v.max(of_a_sum(&left)) }
+    };
+    TAUS.iter().any(|times| falls(times * tau_s))
+}
+
+/// What noise comes to in a sum, for each root of its rows: its deviation, the larger the longer it remembers (as a first-order
+/// autoregression does).
+fn of_a_sum(noise: &[f64]) -> f64 {
+    let power: f64 = noise.iter().map(|value| value * value).sum();
+    let memory = noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / power.max(f64::MIN_POSITIVE);
+    let memory = memory.clamp(0.0, LONGEST);
+    (power / noise.len() as f64 * (1.0 + memory) / (1.0 - memory)).sqrt()
 }
 
 /// Which fold each row belongs to: whole stairs of a short record that has some, else stretches in turn.
@@ -199,6 +217,35 @@ mod tests {
             for every in [1, 2, 8, 40] {
                 assert_eq!(Data::thinned(&record, Input::Hold, every).begun, begun, "{start_v} V, every {every}");
             }
+        }
+    }
+
+    /// What wanders by itself is no decay, and a spring that falls faster or slower than the paper's is one.
+    #[test]
+    fn noise_that_remembers_does_not_fall() {
+        let record = |row: &dyn Fn(f64, f64) -> f64, seed: usize| {
+            let noise = normals(3000 + seed).split_off(seed);
+            let remembered = noise.iter().scan(0.0, |last, noise| {
+                *last = 0.9 * *last + noise;
+                Some(*last)
+            });
+            let rows = remembered.zip(&noise).enumerate().map(|(index, (slow, quick))| {
+                let time_s = 0.1 * index as f64;
+                let voltage_v = if index < 60 { 0.0 } else { 300.0 };
+                Row {
+                    line: 0,
+                    time_s,
+                    voltage_v,
+                    measured: Some(row(time_s, if seed % 2 == 0 { slow } else { *quick })),
+                }
+            });
+            Data::new(&Record { name: String::new(), rows: rows.collect() }, Input::Hold).begun
+        };
+        let wanders = (0..100).filter(|seed| record(&|_, noise| noise, *seed)).count();
+        assert!(wanders < 3, "{wanders} of 100");
+        for tau_s in [2.0, 3.5, 8.0, 15.0] {
+            let falls = (0..100).filter(|seed| record(&|time, noise| 60.0 * (-time / tau_s).exp() + noise, *seed));
+            assert!(falls.count() > 90, "{tau_s} s");
         }
     }
 
