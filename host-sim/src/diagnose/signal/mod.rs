@@ -6,7 +6,7 @@
 mod command;
 
 /// What is shorter, in s, is numerical dust.
-const DUST_S: f64 = 1e-12;
+const DUST_S: f64 = 1e-9;
 
 /// One straight piece.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -81,8 +81,18 @@ impl Signal {
     pub fn delayed(&self, delay_s: f64) -> Self {
         let mut later = self.emptied();
         let constant = Piece { duration_s: delay_s, from: self.before, to: self.before };
-        let mut source = std::iter::once(constant).chain(self.pieces.iter().copied()).filter(|p| p.duration_s > DUST_S);
-        let mut rest = source.next().unwrap_or(constant);
+        let all = std::iter::once(constant).chain(self.pieces.iter().copied()).filter(|p| p.duration_s > DUST_S);
+        let mut source = all.peekable();
+        // What stays is one piece, whatever rows it had: not cut where those come to lie.
+        let mut next = || {
+            let mut piece = source.next()?;
+            let stays = |to: &Piece| [piece.from, to.from, to.to] == [piece.to; 3];
+            while let Some(more) = source.next_if(stays) {
+                piece.duration_s += more.duration_s;
+            }
+            Some(piece)
+        };
+        let mut rest = next().unwrap_or(constant);
         let mut rows = self.rows.iter().peekable();
         for (index, piece) in self.pieces.iter().enumerate() {
             if rows.next_if(|&&row| row as usize == index).is_some() {
@@ -91,10 +101,8 @@ impl Signal {
             let mut left = piece.duration_s;
             loop {
                 if rest.duration_s <= DUST_S {
-                    match source.next() {
-                        Some(next) => rest = next,
-                        None => rest = Piece { duration_s: f64::INFINITY, from: rest.to, to: rest.to },
-                    }
+                    let end = Piece { duration_s: f64::INFINITY, from: rest.to, to: rest.to };
+                    rest = next().unwrap_or(end);
                 }
                 let taken = left.min(rest.duration_s);
                 let slope = if rest.from == rest.to { 0.0 } else { (rest.to - rest.from) / rest.duration_s };
