@@ -153,6 +153,11 @@ pub trait Effect: Sync {
     /// Moves the searched coordinates to where `residual`, which is without the effect, wants them.
     fn polish(&self, _form: usize, _point: &mut [f64], _scene: &Scene) {}
 
+    /// Of a point between two bounds at which the prediction jumps, one that many `steps` beyond, or before them if negative.
+    fn beyond(&self, _form: usize, _point: &[f64], _steps: f64, _data: &Data) -> Option<Vec<f64>> {
+        None
+    }
+
     /// Lowest and highest of the user's parameters that a search alone has found; others are left to the fit.
     fn searched_range(&self, _form: usize, _point: &[f64], _scene: &Scene) -> Vec<(String, f64, f64)> {
         Vec::new()

@@ -62,6 +62,9 @@ const ENOUGH: f64 = 0.02;
 /// A step that promises less is not tried.
 const HOPELESS: f64 = 0.1 * ENOUGH;
 
+/// Most such bounds that a fit goes beyond, one after the other.
+const MOST_STEPS: usize = 30;
+
 /// Fits models to one record.
 pub struct Engine<'a> {
     /// The record.
@@ -122,7 +125,32 @@ impl<'a> Engine<'a> {
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
         let model = self.polished(model, |_| true);
         let model = self.descend(model, law);
-        self.at(model)
+        let here = self.at(model);
+        self.gone_on(here, law)
+    }
+
+    /// From between bounds at which the prediction jumps, to either side while that is likelier.
+    fn gone_on(&mut self, mut here: Fit, law: &Noise) -> Fit {
+        for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
+            let mut steps = side;
+            for _ in 0..MOST_STEPS {
+                let (block, point) = &here.model.blocks[index];
+                let Some(point) = block.effect().beyond(block.form, point, steps, self.data) else { break };
+                let mut model = here.model.clone();
+                model.blocks[index].1 = point;
+                let model = self.descend(model, law);
+                let there = self.at(model);
+                if there.log_likelihood > here.log_likelihood {
+                    here = there;
+                    steps *= 2.0;
+                } else if steps != side {
+                    steps = side;
+                } else {
+                    break;
+                }
+            }
+        }
+        here
     }
 
     /// Moves what only a search can move, block by block, to where the rest of the model wants it in the rows that are seen.

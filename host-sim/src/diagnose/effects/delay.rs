@@ -54,6 +54,12 @@ impl Effect for Delay {
         starts
     }
 
+    /// A promise is a poor judge of rows, and a fit moves within one.
+    fn beyond(&self, _: usize, point: &[f64], rows: f64, data: &Data) -> Option<Vec<f64>> {
+        let to_s = point[0] + (0.5 + rows) * data.command_s;
+        (data.even && (0.0..longest(data)).contains(&to_s)).then(|| split(data, to_s))
+    }
+
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("delay_s", "s", point[0] + point[1])]
     }
@@ -68,5 +74,45 @@ impl Effect for Delay {
 
     fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.delay_s += point[0] + point[1];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::base::Base;
+    use crate::diagnose::data::Input;
+    use crate::diagnose::effects::index_of;
+    use crate::diagnose::fit::Engine;
+    use crate::diagnose::model::{Block, Model};
+    use crate::diagnose::noise::normals;
+    use crate::diagnose::observed::Observed;
+    use crate::diagnose::simulator::Simulator;
+    use crate::record::{Record, Row};
+
+    /// Whole rows and a part of one, from starts on either side.
+    #[test]
+    fn a_fit_goes_from_row_to_row() {
+        let volts = |row: usize| [0.0, 300.0, 100.0, 500.0, 200.0][row / 90 % 5];
+        let row = |row| Row { line: 0, time_s: 0.1 * row as f64, voltage_v: volts(row), measured: Some(0.0) };
+        let record = Record { name: String::new(), rows: (0..900).map(row).collect() };
+        let mut data = Data::new(&record, Input::Hold);
+        let of = |data: &Data, delay_s| {
+            let block = Block { effect: index_of("delay").unwrap(), form: 0 };
+            Model::default().with(block, split(data, delay_s))
+        };
+        let base = Base::paper();
+        for delay_s in [0.5, 0.83] {
+            let mut readings = Vec::new();
+            Simulator::new(&data, &base).run(&of(&data, delay_s), &mut readings);
+            data.reading = readings.iter().zip(normals(900)).map(|(reading, noise)| reading + noise).collect();
+            let observed = Observed::new(&data);
+            let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &base));
+            for start_s in [-0.2, -0.1, 0.25].map(|off_s| delay_s + off_s) {
+                let fit = engine.fit_twice(of(&data, start_s));
+                let found_s: f64 = fit.model.points().iter().sum();
+                assert!((found_s - delay_s).abs() < 0.02, "{found_s} for {delay_s} from {start_s}");
+            }
+        }
     }
 }
