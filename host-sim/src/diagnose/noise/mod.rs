@@ -168,9 +168,10 @@ impl Noise {
     /// The part of a row in a fit: `residual` as it is, `innovation` whitened.
     pub fn term(&self, kind: Kind, residual: f64, innovation: f64) -> Term {
         match kind {
-            Kind::AtLeast => stopped(residual, self.marginal),
+            // What is rounded comes to a bound from half a step before it.
+            Kind::AtLeast => stopped(residual - self.cell, self.marginal),
             Kind::AtMost => {
-                let term = stopped(-residual, self.marginal);
+                let term = stopped(-residual - self.cell, self.marginal);
                 Term { residual: -term.residual, ..term }
             }
             Kind::Exact if self.cell > 0.0 => in_cell(residual, self.sigma, self.cell),
