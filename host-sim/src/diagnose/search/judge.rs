@@ -124,11 +124,12 @@ struct Extension {
 /// Blocks that might be added, each from its most promising starts.
 fn extensions(engine: &mut Engine, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Extension> {
     let mut metrics = Vec::new();
-    let remembers = !fit.noise.memory.is_none();
-    if patient || !remembers {
+    let (remembers, rounded) = (!fit.noise.memory.is_none(), fit.noise.cell > 0.0);
+    // What rounding leaves keeps time with the voltage, and would promise everything.
+    if !rounded && (patient || !remembers) {
         metrics.push(Metric::new(engine, fit, Noise::robust(&fit.residual)));
     }
-    if remembers {
+    if remembers || rounded {
         metrics.push(Metric::new(engine, fit, fit.noise.clone()));
     }
     let sigma = scale(&fit.residual);

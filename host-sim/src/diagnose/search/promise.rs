@@ -58,8 +58,9 @@ impl Metric {
         let step = (along / size).clamp(0.0, FARTHEST);
         let total = dot(&self.residual, &self.residual);
         let part = ((2.0 * along - step * size) * step / total.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
-        // The noise's scale would shrink along.
-        -0.5 * self.residual.len() as f64 * (1.0 - part).ln()
+        // The noise's scale would shrink along; not that of rounded rows, most of which tell nothing.
+        let telling = if self.noise.cell > 0.0 { total } else { self.residual.len() as f64 };
+        -0.5 * telling * (1.0 - part).ln()
     }
 }
 
