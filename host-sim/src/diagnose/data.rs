@@ -236,7 +236,7 @@ mod tests {
                     line: 0,
                     time_s,
                     voltage_v,
-                    measured: Some(row(time_s, if seed % 2 == 0 { slow } else { *quick })),
+                    measured: Some(row(time_s, if seed.is_multiple_of(2) { slow } else { *quick })),
                 }
             });
             Data::new(&Record { name: String::new(), rows: rows.collect() }, Input::Hold).begun
