@@ -123,8 +123,8 @@ pub(super) fn diagnose(
         alternatives.extend(twin(&findings));
     }
     let cure = cure::of(engine, &best.fit.model, held);
-    let would_show = findings.is_empty().then(|| Margins::of(engine, &best.fit, lead.caution));
     let material = left.as_ref().is_some_and(|left| left.share > MATERIAL);
+    let would_show = (findings.is_empty() && !material).then(|| Margins::of(engine, &best.fit, lead.caution));
     let verdict = match () {
         () if material => Verdict::Unexplained,
         () if !alternatives.is_empty() => Verdict::Ambiguous,

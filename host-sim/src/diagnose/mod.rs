@@ -72,6 +72,7 @@ mod whereabouts;
 
 pub use data::Input;
 pub use diagnosis::Diagnosis;
+pub use margins::Margins;
 pub use report::{Report, Verdict};
 
 use base::Base;

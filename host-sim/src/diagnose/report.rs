@@ -23,7 +23,7 @@ pub struct Report {
     /// Parts of the plant file that are not in this spring: the extended simulation is without them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub take_out: Vec<&'static str>,
-    /// Errors that would have shown, where nothing is found.
+    /// Errors that would have shown, where nothing is wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub would_show: Option<Margins>,
     /// Other sets of causes that the data cannot reject.
