@@ -348,6 +348,17 @@ mod tests {
         assert!(noise.cell == 2.5 && (noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
     }
 
+    /// A spring at 98 V reads 100 V in steps of 5 V, whether or not it stops there.
+    #[test]
+    fn what_is_rounded_comes_to_a_bound_from_half_a_step_before_it() {
+        let noise = Noise { cell: 2.5, sigma: 0.2, marginal: 0.2, ..Noise::robust(&normals(100)) };
+        for (kind, side) in [(Kind::AtLeast, 1.0), (Kind::AtMost, -1.0)] {
+            let log = |residual: f64| noise.term(kind, side * residual, side * residual).log;
+            assert!(log(2.0) > 0.9f64.ln(), "{kind:?}: {}", log(2.0));
+            assert!(log(3.0) < 0.1f64.ln(), "{kind:?}: {}", log(3.0));
+        }
+    }
+
     /// The weight is minus the slope of the log-density over the innovation.
     #[test]
     fn a_weight_is_the_slope_of_its_density() {
