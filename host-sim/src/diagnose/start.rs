@@ -64,9 +64,9 @@ pub(super) fn take_off(
     let mut start = DVector::zeros(kernels.len());
     let mut left = read.clone();
     let mut weighted = left.clone();
-    let mut far = f64::INFINITY;
-    for _ in 0..ROUNDS {
-        let prior = (scale(&left) / reach_v).powi(2);
+    let (mut usual, mut far) = (scale(&left), f64::INFINITY);
+    for round in 1..=ROUNDS {
+        let prior = (usual / reach_v).powi(2);
         let mut normal = DMatrix::from_diagonal_element(kernels.len(), kernels.len(), prior);
         for (i, kernel) in told.iter().enumerate() {
             let weights = left.iter().map(|left| (far / left.abs()).min(1.0));
@@ -77,9 +77,12 @@ pub(super) fn take_off(
         }
         let Some(cholesky) = normal.cholesky() else { return 0.0 };
         cholesky.solve_mut(&mut start);
-        left.clone_from(&read);
-        take(&start, &told, &mut left);
-        far = FAR * scale(&left);
+        if round < ROUNDS {
+            left.clone_from(&read);
+            take(&start, &told, &mut left);
+            usual = scale(&left);
+            far = FAR * usual;
+        }
     }
     take(&start, kernels, residual);
     0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * start.norm_squared() / reach_v.powi(2)
