@@ -122,6 +122,15 @@ impl Noise {
                 noise.fit_tail(&exact(&white, observed));
             }
         }
+        if !noise.memory.is_none() {
+            // Squares chose it, of errors that were clipped; where tails are heavy, the likelihood may not want it.
+            let mut alone = Self { memory: Memory::default(), ..noise.clone() };
+            alone.fit_tail(&exact(&even, observed));
+            let worth = |noise: &Self| noise.log_likelihood(residual, observed) - noise.cost(residual.len());
+            if worth(&alone) > worth(&noise) {
+                noise = alone;
+            }
+        }
         noise.marginal = scale_of_squares(&exact(residual, observed)).max(noise.sigma);
         noise
     }
@@ -305,16 +314,26 @@ mod tests {
         }
     }
 
+    /// A normal over the root of a chi-square over its four degrees of freedom: Student's t.
+    fn heavy(rows: usize) -> Vec<f64> {
+        let student = |five: &[f64]| five[0] / (five[1..].iter().map(|x| x * x).sum::<f64>() / 4.0).sqrt();
+        normals(5 * rows).chunks(5).map(student).collect()
+    }
+
+    /// A memory that squares see by chance would make room for whatever does without it.
+    #[test]
+    fn independent_noise_of_a_heavy_tail_remembers_nothing() {
+        let remembers = |rows: &&[f64]| !Noise::fitted(rows, &as_read(rows.len())).memory.is_none();
+        let count = heavy(60_000).chunks(600).filter(remembers).count();
+        assert!(count < 2, "{count} of 100");
+    }
+
     #[test]
     fn a_tail_is_recovered() {
         let normal = normals(4000);
         let noise = Noise::fitted(&normal, &as_read(4000));
         assert!(noise.nu.is_infinite() && (noise.sigma - 1.0).abs() < 0.05, "{noise:?}");
-        // A normal over the root of a chi-square over its degrees of freedom.
-        let parts = normals(5 * 4000);
-        let student = |five: &[f64]| five[0] / (five[1..].iter().map(|x| x * x).sum::<f64>() / 4.0).sqrt();
-        let heavy: Vec<f64> = parts.chunks(5).map(student).collect();
-        let noise = Noise::fitted(&heavy, &as_read(4000));
+        let noise = Noise::fitted(&heavy(4000), &as_read(4000));
         assert!((3.0..=6.0).contains(&noise.nu) && (noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
     }
 
