@@ -122,8 +122,8 @@ impl Noise {
                 noise.fit_tail(&exact(&white, observed));
             }
         }
-        if !noise.memory.is_none() {
-            // Squares chose it, of errors that were clipped; where tails are heavy, the likelihood may not want it.
+        if !noise.memory.is_none() && noise.nu.is_finite() {
+            // Squares chose it, of errors that were clipped; where the tail is heavy, the likelihood may not want it.
             let mut alone = Self { memory: Memory::default(), ..noise.clone() };
             alone.fit_tail(&exact(&even, observed));
             let worth = |noise: &Self| noise.log_likelihood(residual, observed) - noise.cost(residual.len());
