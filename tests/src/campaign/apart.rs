@@ -7,12 +7,13 @@
 //! It is a lower bound: e has the few shapes (time constants, frequencies, stretches) that are drawn, and there may be more
 //! than one other cause at work. It holds while effects are small: a delay and a slew of less than a row are one and the
 //! same on equal steps, whatever the noise; not so when they last longer. Quantisation, outliers and saturation move no
-//! small expected reading, and imitate nothing.
+//! small expected reading, and imitate nothing. But outliers may be a heavy tail of the noise, which is no effect.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::detectable::NONCENTRALITY;
+use super::detectable::{NONCENTRALITY, smallest};
+use super::mixture::Mixture;
 use crate::hidden::{Cause, Effect, Hidden};
 
 /// In standard deviations of the noise: 5 % to be wrong, either way.
@@ -29,6 +30,11 @@ const SHAPES: u64 = 2;
 /// If the record doesn't hide exactly one effect.
 pub fn factor(hidden: &Hidden, size: f64) -> f64 {
     let [effect] = hidden.effects.as_slice() else { panic!("one effect at a time") };
+    if effect.cause == Cause::Outliers {
+        let (rows, far) = (hidden.readings.read.len() as f64, effect.plain[1] / hidden.noise.sigma_v);
+        let told = smallest(|size| Mixture::new(effect.plain[0], size * far).told_from_a_tail(rows));
+        return told.map_or(f64::INFINITY, |told| (told / size).max(1.0));
+    }
     if moves_nothing(effect.cause) {
         return 1.0;
     }
@@ -96,5 +102,6 @@ mod tests {
         };
         assert!((of(Cause::Hum) - 1.0).abs() < 0.05, "{}", of(Cause::Hum));
         assert!(of(Cause::GainError) > 1.5, "{}", of(Cause::GainError));
+        assert!(of(Cause::Outliers) > 1.5, "{}", of(Cause::Outliers));
     }
 }

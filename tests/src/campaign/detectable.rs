@@ -7,13 +7,12 @@
 //! Where an effect is no shift of the expected readings, an equivalent stands in:
 //! - Quantisation: a test of the residual's variance, which rounding raises by step^2/12. Finding the lattice itself needs
 //!   no size at all, but a lattice finer than this hides in the noise.
-//! - Outliers: the likelihood ratio of the true mixture, with the scatter of its logarithm taken as normal.
+//! - Outliers: the likelihood ratio of the true [`mixture`](super::mixture).
 //! - Saturation: the shift by which the bound clips the expected readings; that clipped readings repeat to the bit is left
 //!   out.
 //! - Delay and slew: against the least of them (see [`Effect::least`](crate::hidden::Effect::least)), not against none.
 
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
-
+use super::mixture::Mixture;
 use crate::hidden::{Cause, Hidden};
 
 /// By number of unknowns, from 1. From the noncentral chi-square distribution.
@@ -38,7 +37,7 @@ pub fn size(hidden: &Hidden) -> Option<f64> {
         }
         Cause::Outliers => {
             let far = effect.plain[1] / sigma;
-            smallest(|size| mixture_excess(effect.plain[0], size * far, rows))
+            smallest(|size| Mixture::new(effect.plain[0], size * far).detected(rows))
         }
         cause => {
             let least = hidden.at(effect.least());
@@ -53,7 +52,7 @@ pub fn size(hidden: &Hidden) -> Option<f64> {
 }
 
 /// The least size, to a percent, from where on `excess` is positive; none if it isn't at 1.
-fn smallest(excess: impl Fn(f64) -> f64) -> Option<f64> {
+pub(super) fn smallest(excess: impl Fn(f64) -> f64) -> Option<f64> {
     if excess(1.0) < 0.0 {
         return None;
     }
@@ -63,32 +62,6 @@ fn smallest(excess: impl Fn(f64) -> f64) -> Option<f64> {
         if excess(middle) < 0.0 { low = middle } else { high = middle }
     }
     Some(high)
-}
-
-/// How far the log likelihood ratio of a mixture lies above what a 5 % test with 95 % power needs; readings in units of
-/// the noise, outliers half to one and a half times `far` off, either side.
-fn mixture_excess(fraction: f64, far: f64, rows: f64) -> f64 {
-    const STEP: f64 = 0.02;
-    let normal = |x: f64| (-0.5 * x * x).exp() / TAU.sqrt();
-    let below = |x: f64| 0.5 * libm::erfc(-x * FRAC_1_SQRT_2);
-    // Up to 1.5 far off, and noise on top. The mixture is symmetric: one half, twice.
-    let cells = ((1.5 * far + 8.0) / STEP) as u32;
-    let (mut null, mut mixed) = ([0.0; 2], [0.0; 2]);
-    for cell in 0..cells {
-        let x = STEP * (f64::from(cell) + 0.5);
-        let one_side = |x: f64| below(x - 0.5 * far) - below(x - 1.5 * far);
-        let outlying = (one_side(x) + one_side(-x)) / (2.0 * far);
-        let usual = normal(x);
-        let mixture = (1.0 - fraction) * usual + fraction * outlying;
-        // Where both vanish there is nothing to weigh.
-        let ratio = (mixture.max(1e-300) / usual.max(1e-300)).ln();
-        for (sums, density) in [(&mut null, usual), (&mut mixed, mixture)] {
-            sums[0] += 2.0 * STEP * density * ratio;
-            sums[1] += 2.0 * STEP * density * ratio * ratio;
-        }
-    }
-    let spread = |[mean, square]: [f64; 2]| (square - mean * mean).max(0.0).sqrt();
-    rows.sqrt() * (mixed[0] - null[0]) - NORMAL_95 * (spread(null) + spread(mixed))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! | [`part`] | which records a part of the campaign is made of |
 //! | [`score`], [`summary`] | what became of one record, and of many |
 //! | [`bound`] | how near a parameter can come at best |
-//! | [`detectable`], [`apart`], [`ladder`] | the smallest effect that can be seen, told from others, and that is named |
+//! | [`detectable`], [`apart`], [`mixture`], [`ladder`] | the smallest effect that can be seen, told from others, and that is named |
 //! | [`aim`] | what is asked for, and whether it came out |
 //! | [`tables`] | all of it as Markdown |
 //! | [`rivals`] | what other tools make of the same records |
@@ -17,6 +17,7 @@ pub mod apart;
 pub mod bound;
 pub mod detectable;
 pub mod ladder;
+pub mod mixture;
 pub mod part;
 pub mod rivals;
 pub mod score;
