@@ -167,11 +167,11 @@ impl<'a> Chain<'a> {
         };
         let mut at_s = 0.0;
         signal.before = 0.0;
-        if output.value() == 0.0 && kept == 0.0 && late == [0.0; SENT] {
-            signal.pass(|_| (0.0, 0.0));
-            return self.follow(signal, start, levels_v);
-        }
+        let at_rest = output.value() == 0.0 && kept == 0.0 && late == [0.0; SENT];
         signal.pass(|piece| {
+            if at_rest {
+                return (0.0, 0.0);
+            }
             let part = (at_s + piece.duration_s / 2.0) / self.delay_s * SENT as f64;
             at_s += piece.duration_s;
             let sent = late.get(part as usize).copied().unwrap_or(0.0);
