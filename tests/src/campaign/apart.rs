@@ -12,12 +12,12 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::detectable::{NONCENTRALITY, smallest};
+use super::detectable::{NONCENTRALITY, NORMAL_95, smallest};
 use super::mixture::Mixture;
 use crate::hidden::{Cause, Effect, Hidden};
 
 /// In standard deviations of the noise: 5 % to be wrong, either way.
-const TELLING: f64 = 2.0 * 1.6449;
+const TELLING: f64 = 2.0 * NORMAL_95;
 /// Small enough for directions to be straight.
 const SMALL: f64 = 0.01;
 /// Shapes drawn of each other cause.
@@ -31,8 +31,8 @@ const SHAPES: u64 = 2;
 pub fn factor(hidden: &Hidden, size: f64) -> f64 {
     let [effect] = hidden.effects.as_slice() else { panic!("one effect at a time") };
     if effect.cause == Cause::Outliers {
-        let (rows, far) = (hidden.readings.read.len() as f64, effect.plain[1] / hidden.noise.sigma_v);
-        let told = smallest(|size| Mixture::new(effect.plain[0], size * far).told_from_a_tail(rows));
+        let (rows, sigma) = (hidden.readings.read.len() as f64, hidden.noise.sigma_v);
+        let told = smallest(|size| Mixture::of(effect, size, sigma).told_from_a_tail(rows));
         return told.map_or(f64::INFINITY, |told| (told / size).max(1.0));
     }
     if moves_nothing(effect.cause) {

@@ -19,7 +19,7 @@ use crate::hidden::{Cause, Hidden};
 pub const NONCENTRALITY: [f64; 3] = [12.9947, 15.4432, 17.1699];
 
 /// One-sided 95 % point of the normal distribution.
-const NORMAL_95: f64 = 1.6449;
+pub(super) const NORMAL_95: f64 = 1.6449;
 
 /// The detectable size of the record's one effect. None if even the plain effect is too small.
 ///
@@ -35,10 +35,7 @@ pub fn size(hidden: &Hidden) -> Option<f64> {
             let step = sigma * (12.0 * 2.0 * scatter / (1.0 - scatter)).sqrt();
             Some(step / effect.plain[0]).filter(|&size| size <= 1.0)
         }
-        Cause::Outliers => {
-            let far = effect.plain[1] / sigma;
-            smallest(|size| Mixture::new(effect.plain[0], size * far).detected(rows))
-        }
+        Cause::Outliers => smallest(|size| Mixture::of(effect, size, sigma).detected(rows)),
         cause => {
             let least = hidden.at(effect.least());
             let needed = NONCENTRALITY[cause.facts().unknowns - 1];

@@ -5,8 +5,9 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
-/// One-sided 95 % point of the normal distribution.
-const NORMAL_95: f64 = 1.6449;
+use super::detectable::NORMAL_95;
+use crate::hidden::Effect;
+
 /// Width of a cell, in standard deviations of the noise.
 const STEP: f64 = 0.02;
 /// Degrees of freedom of the heavy tails that may be taken for it.
@@ -18,8 +19,13 @@ pub struct Mixture {
 }
 
 impl Mixture {
+    /// What outliers of a size make of normal noise of a deviation, in V.
+    pub fn of(outliers: &Effect, size: f64, sigma_v: f64) -> Self {
+        Self::new(outliers.plain[0], size * outliers.plain[1] / sigma_v)
+    }
+
     /// Normal noise of deviation 1, in which a part of the readings is half to one and a half times `far` off, either side.
-    pub fn new(fraction: f64, far: f64) -> Self {
+    fn new(fraction: f64, far: f64) -> Self {
         let below = |x: f64| 0.5 * libm::erfc(-x * FRAC_1_SQRT_2);
         let one_side = |x: f64| below(x - 0.5 * far) - below(x - 1.5 * far);
         let density = |x: f64| {
