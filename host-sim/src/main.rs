@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
-use host_sim::BadInput;
+use simulation::bad_input::BadInput;
 
 /// Simulates the variable-stiffness spring and its controller, with the code that runs in the amplifier's MCU.
 ///

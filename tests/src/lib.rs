@@ -1,8 +1,4 @@
-//! Helpers of the end-to-end tests, the campaign that hides effects in records and asks for their names, and the loop that
-//! a controller closes around a spring with a hidden effect.
+//! Helpers of the end-to-end tests: the program under test, and a firmware image that only logs.
 
-pub mod campaign;
-pub mod closed_loop;
 pub mod defmt;
-pub mod hidden;
 pub mod vsj;

@@ -1,15 +1,15 @@
 //! The share of `cargo campaign` that every change has to pass: fewer records, other seeds, the campaign's aims where a few
 //! records can tell, and bounds that a handful of records can miss by chance where they can't.
 
-use end_to_end::campaign::part::{self, Job};
-use end_to_end::campaign::score::Outcome;
-use end_to_end::campaign::seam::diagnose;
-use end_to_end::campaign::summary::Summary;
-use end_to_end::campaign::tables;
-use end_to_end::campaign::{apart, detectable, ladder};
-use end_to_end::hidden::Cause;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
+use validation::campaign::part::{self, Job};
+use validation::campaign::score::Outcome;
+use validation::campaign::seam::diagnose;
+use validation::campaign::summary::Summary;
+use validation::campaign::tables;
+use validation::campaign::{apart, detectable, ladder};
+use validation::hidden::Cause;
 
 /// Where the seeds start. The campaign starts at 1.
 const FIRST: u64 = 20_261_121;
@@ -90,8 +90,8 @@ fn an_effect_is_named_soon_after_it_can_be_told_apart() {
 #[test]
 fn the_campaign_believes_one_who_knows() {
     use serde_json::{Value, json};
-    let oracle = |hidden: &end_to_end::hidden::Hidden| {
-        let finding = |truth: &end_to_end::hidden::truth::Truth| {
+    let oracle = |hidden: &validation::hidden::Hidden| {
+        let finding = |truth: &validation::hidden::truth::Truth| {
             let around = |(name, value): &(String, f64)| {
                 let off = 0.001 * value.abs();
                 (name.clone(), json!({"value": value + off, "low": value - off, "high": value + 2.0 * off, "unit": ""}))

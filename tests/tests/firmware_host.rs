@@ -6,8 +6,8 @@
 use firmware::rehearsal::rehearse;
 use firmware::script::{STAIR_TICKS, Script};
 use firmware::settings::SETTINGS;
-use host_sim::experiment::Experiment;
-use host_sim::schedule::Schedule;
+use simulation::experiment::Experiment;
+use simulation::schedule::Schedule;
 
 #[test]
 fn every_code_and_estimate_of_the_stair_is_the_simulators() {

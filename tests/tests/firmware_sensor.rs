@@ -2,8 +2,6 @@
 //!
 //! `cargo xtask story --feedback` holds the emulated image against the same code.
 
-use end_to_end::closed_loop::stair;
-use end_to_end::hidden::{Cause, Effect, Live, Noise};
 use firmware::control::{Control, Orders, Senses, Untimed};
 use firmware::settings::{SETTINGS, SUPERVISION};
 use model::feedback::Fault;
@@ -11,6 +9,8 @@ use model::supervisor::Command;
 use model::{Feedback, Sensor, Settings, Volts};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use validation::closed_loop::stair;
+use validation::hidden::{Cause, Effect, Live, Noise};
 
 /// Armed at once with 300 V; so long.
 const TICKS: usize = 40_000;

@@ -19,8 +19,8 @@ mod table;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use end_to_end::hidden::Cause;
 use rayon::prelude::*;
+use validation::hidden::Cause;
 
 use crate::setup;
 use crate::variant::Controller;

@@ -4,14 +4,15 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::beam::cantilever::{Beam, Load};
-use host_sim::beam::layered::ELEMENTS;
-use host_sim::beam::readings;
-use host_sim::beam::report::{Question, Report};
-use host_sim::beam::slip::tips;
-use host_sim::beam::stack::{self, ORDER, Stack, TABLE2};
-use host_sim::csv_table::read;
+use host_sim::output::figure;
 use host_sim::output::files::Files;
+use paper::beam::cantilever::{Beam, Load};
+use paper::beam::layered::ELEMENTS;
+use paper::beam::readings;
+use paper::beam::report::{Question, Report};
+use paper::beam::slip::tips;
+use paper::beam::stack::{self, ORDER, Stack, TABLE2};
+use simulation::csv_table::read;
 
 use super::{named, print, wrote};
 
@@ -87,8 +88,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("beam.txt", |out| out.write_all(text.as_bytes()))?;
-        for (name, svg) in report.figures(&question.readings) {
-            files.add(name, |out| out.write_all(svg.as_bytes()))?;
+        for (name, figure) in report.figures(&question.readings) {
+            files.add(name, |out| out.write_all(figure::svg(&figure).as_bytes()))?;
         }
         written = wrote(&files.finish()?);
     }

@@ -2,10 +2,10 @@
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::comparison::compare;
 use host_sim::output::comparison;
-use host_sim::plant_file;
 use model::Amplifier;
+use simulation::comparison::compare;
+use simulation::plant_file;
 
 use super::{SETTINGS, named, print};
 

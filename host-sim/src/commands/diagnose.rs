@@ -5,14 +5,17 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::diagnose::{Input, Options, base::Base, examine, text};
+use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
-use host_sim::plant_file;
-use host_sim::record::{MEASURED, Record};
-use host_sim::schedule::Schedule;
+use identify::plant::base::Base;
+use identify::{Options, examine};
 use indicatif::ProgressBar;
+use simulation::plant_file;
+use simulation::record::{MEASURED, Record};
+use simulation::schedule::Schedule;
 
+use super::voltage::Input;
 use super::{print, wrote};
 
 /// Within this time, in s, a row of the stair may have the voltage before a step or that after it.
@@ -65,7 +68,7 @@ impl Arguments {
         Origin {
             record: record.name.clone(),
             column: self.column.clone(),
-            input: self.input,
+            input: self.input.into(),
             command: command.join(" "),
         }
     }
@@ -88,7 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if arguments.input == Input::Stair {
         record.check_commanded(&Schedule::stair(), "the report's stair (--input stair)", RAMP_S)?;
     }
-    let options = Options { input: arguments.input, base };
+    let options = Options { input: arguments.input.into(), base };
     // A folder that cannot be made is known before the search begins.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::dynamics::input::Input;
-use host_sim::dynamics::plant::PlantGains;
-use host_sim::dynamics::report::{Model, Question, Report};
-use host_sim::dynamics::zener::{Changes, Start, Zener};
+use host_sim::output::figure;
 use host_sim::output::files::Files;
-use host_sim::schedule::Between;
+use paper::dynamics::input::Input;
+use paper::dynamics::plant::PlantGains;
+use paper::dynamics::report::{Model, Question, Report};
+use paper::dynamics::zener::{Changes, Start, Zener};
 
+use super::voltage::Between;
 use super::{named, print, wrote};
 
 /// Run one of the report's dynamic models, and say what it is in terms of the others
@@ -83,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         },
         length_m: arguments.length,
         gains: PlantGains { proportional: arguments.kp, integral_per_s: arguments.ki },
-        input: Input::open(&arguments.input, arguments.between)?,
+        input: Input::open(&arguments.input, arguments.between.into())?,
         start: if arguments.settled { Start::Settled } else { Start::Unloaded },
         every_s: arguments.every,
     };
@@ -92,7 +93,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("response.csv", |out| out.write_all(report.csv().as_bytes()))?;
-        files.add("response.svg", |out| out.write_all(report.figure().as_bytes()))?;
+        files.add("response.svg", |out| out.write_all(figure::svg(&report.figure()).as_bytes()))?;
         written = wrote(&files.finish()?);
     }
     if arguments.json {

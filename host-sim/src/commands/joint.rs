@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::beam::cantilever::Beam;
-use host_sim::joint::report::{Report, Requirement};
-use host_sim::joint::{Joint, MOST_SPRINGS, OuterEnd};
 use host_sim::output::files::Files;
-use host_sim::plant_file;
-use host_sim::reference::Loop;
+use paper::beam::cantilever::Beam;
+use paper::joint::report::{Report, Requirement};
+use paper::joint::{Joint, MOST_SPRINGS, OuterEnd};
+use simulation::plant_file;
+use simulation::reference::Loop;
 
 use super::{named, print, wrote};
 

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
-use host_sim::bad_input;
-use host_sim::bad_input::number;
 use host_sim::link::{Client, Failure, Patience, Port, StatusReport};
 use link::{Desired, Fault, Reason, Request, State, Status, WireVolts};
 use serde::Serialize;
+use simulation::bad_input;
+use simulation::bad_input::number;
 
 /// Talk to the MCU over its serial link: status, set, arm, disarm, watch, record, model
 #[derive(Args, Debug)]

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::bad_input;
 use host_sim::log::{
     CSV_HEADER, Decoder, Encoding, Formats, Item, Line, Summary, TABLE_HEADER, csv_row, more_damage_csv_row,
     more_damage_table_row, summary_text, table_row,
 };
 use serde::Serialize;
+use simulation::bad_input;
 
 /// Decode the firmware's log into a table and a summary, from a file or as it comes
 #[derive(Args, Debug)]

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 use anyhow::Result;
-use host_sim::BadInput;
+use simulation::bad_input::BadInput;
 
 pub(crate) mod beam;
 pub(crate) mod compare;
@@ -16,6 +16,7 @@ pub(crate) mod log;
 pub(crate) mod reproduce;
 pub(crate) mod stair;
 pub(crate) mod tune;
+mod voltage;
 
 /// Prints to stdout; that nobody reads on, as in `vsj stair | head`, is no failure.
 fn print(text: &str) -> Result<()> {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
-use host_sim::reproduce::reproduce;
+use paper::reproduce::reproduce;
 
 use super::{print, wrote};
 

@@ -2,21 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
+use super::voltage::Between;
 use super::{SETTINGS, named, print, wrote};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
-use host_sim::BadInput;
-use host_sim::bad_input;
-use host_sim::bad_input::number;
-use host_sim::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
 use host_sim::output::files::{Files, write_csv};
 use host_sim::output::{plots, terminal};
-use host_sim::plant_file::{self, PlantFile};
-use host_sim::record::{MEASURED, Record};
-use host_sim::schedule::{Between, Schedule};
-use host_sim::stair::{Report, Rows};
 use indicatif::{ProgressBar, ProgressStyle};
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Plant, Settings};
+use paper::stair::{Report, Rows};
+use simulation::bad_input;
+use simulation::bad_input::BadInput;
+use simulation::bad_input::number;
+use simulation::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
+use simulation::plant_file::{self, PlantFile};
+use simulation::record::{MEASURED, Record};
+use simulation::schedule::Schedule;
 
 /// Run the stair experiment in closed loop on the fixed-point controller, beside the report's Table 3
 #[derive(Args, Debug)]
@@ -181,7 +182,7 @@ fn run_plant<P: Judged>(
         file => {
             let read = record.insert(Record::open(Path::new(file), arguments.column.as_deref().unwrap_or(MEASURED))?);
             read.check_range(arguments.min_v, arguments.limit_v)?;
-            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default()))
+            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default().into()))
         }
     };
     let experiment = Experiment { name, schedule, settings };

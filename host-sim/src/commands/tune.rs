@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::bad_input;
 use host_sim::output::files::Files;
 use host_sim::output::tuning;
-use host_sim::plant_file;
-use host_sim::tune::{Question, tune};
 use model::Amplifier;
+use simulation::bad_input;
+use simulation::plant_file;
+use simulation::tune::{Question, tune};
 
 use super::{SETTINGS, named, print, wrote};
 

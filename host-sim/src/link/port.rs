@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 
-use crate::bad_input;
+use simulation::bad_input;
 
 /// Longest wait for a byte.
 const POLL: Duration = Duration::from_millis(5);
@@ -26,7 +26,7 @@ impl Port {
     /// Opens a port by its name. `baud` counts for serial devices only.
     ///
     /// # Errors
-    /// [`crate::BadInput`] if it cannot be opened.
+    /// [`simulation::bad_input::BadInput`] if it cannot be opened.
     pub fn open(name: &str, baud: u32) -> Result<Self> {
         let opened = if let Some(path) = name.strip_prefix("unix:") {
             unix(path)

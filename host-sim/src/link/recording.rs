@@ -1,4 +1,4 @@
-//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness` that a [`crate::record::Record`] is read from.
+//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness` that a [`simulation::record::Record`] is read from.
 //!
 //! Each row leaves the program in one piece, the moment it is known: whenever the recording stops, by Ctrl-C, by a lost
 //! cable, by the end of the disk, the file ends with a complete row.
@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail};
 use link::{Status, Telemetry};
 use serde::Serialize;
 
-use crate::bad_input;
+use simulation::bad_input;
 
 /// A recording on its way.
 pub struct Recording {
@@ -46,7 +46,7 @@ impl Recording {
     /// Starts a file. One that exists is kept unless `replace`: a measurement cannot be made again.
     ///
     /// # Errors
-    /// [`crate::BadInput`] if it cannot be made.
+    /// [`simulation::bad_input::BadInput`] if it cannot be made.
     pub fn new(path: &Path, replace: bool, status: &Status, every_ticks: u16) -> Result<Self> {
         let file = match File::options().write(true).create_new(!replace).create(replace).truncate(replace).open(path) {
             Ok(file) => file,
@@ -132,8 +132,8 @@ impl Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{MEASURED, Record};
     use link::WireVolts;
+    use simulation::record::{MEASURED, Record};
 
     fn status(measured: bool) -> Status {
         let sample = Telemetry { measured: measured.then_some(WireVolts(0)), ..Telemetry::default() };
@@ -194,7 +194,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (path, _) = start(folder.path(), true);
         let error = Recording::new(&path, false, &status(true), 10).err().unwrap();
-        assert!(error.is::<crate::BadInput>() && error.to_string().contains("--force"), "{error}");
+        assert!(error.is::<simulation::bad_input::BadInput>() && error.to_string().contains("--force"), "{error}");
         Recording::new(&path, true, &status(true), 10).unwrap();
     }
 

@@ -1,9 +1,9 @@
 //! Bytes in, lines out.
 
-use super::formats::{Encoding, Formats};
-use super::frames::{Frames, Packed};
-use super::line::Line;
-use super::shape::Stop;
+use crate::log::formats::{Encoding, Formats};
+use crate::log::frames::{Frames, Packed};
+use crate::log::line::Line;
+use crate::log::shape::Stop;
 
 /// Bytes that unpacking may leave behind a frame, all zero: the last seven are packed together.
 const MOST_PADDING: usize = 6;

@@ -8,9 +8,9 @@ use defmt_decoder::{DecodeError, Table};
 use object::{Object, ObjectSection, ObjectSymbol};
 use serde::{Deserialize, Serialize};
 
-use super::line::Line;
-use super::shape::{Formatted, Shape, Stop, Walk};
-use crate::bad_input;
+use crate::log::line::Line;
+use crate::log::shape::{Formatted, Shape, Stop, Walk};
+use simulation::bad_input;
 
 /// How the frames are packed, as the image says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -41,7 +41,7 @@ impl Formats {
     /// Reads them from the bytes of an ELF file.
     ///
     /// # Errors
-    /// [`crate::BadInput`] if it is not one, or not of a firmware that logs with defmt 0.3 to 1.x.
+    /// [`simulation::bad_input::BadInput`] if it is not one, or not of a firmware that logs with defmt 0.3 to 1.x.
     pub fn parse(elf: &[u8]) -> Result<Self> {
         let table = match Table::parse(elf) {
             Ok(Some(table)) => table,

@@ -5,7 +5,7 @@ use std::fmt;
 use defmt_decoder::Frame;
 use serde::{Serialize, Serializer};
 
-use super::event::Event;
+use crate::log::event::Event;
 
 /// How grave a line is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -3,9 +3,9 @@
 use model::Limits;
 use serde::Serialize;
 
-use super::Item;
-use super::event::{Boot, Done, Event};
-use super::line::{Level, Line};
+use crate::log::Item;
+use crate::log::event::{Boot, Done, Event};
+use crate::log::line::{Level, Line};
 
 /// All the lines of a log, added up. The firmware counts from its start, so each start is added to those before.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

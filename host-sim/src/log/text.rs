@@ -5,7 +5,7 @@ use std::fmt::{Display, Write};
 
 use model::Limits;
 
-use super::{Event, Item, Line, Summary};
+use crate::log::{Event, Item, Line, Summary};
 
 /// First line of the table.
 pub const TABLE_HEADER: &str = "    time [s]  level  message";

@@ -1,8 +1,8 @@
 //! A comparison of controllers as text.
 
-use super::step_response;
-use super::terminal::{line, tidy};
-use crate::comparison::{AtLimit, Comparison};
+use crate::output::step_response;
+use crate::output::terminal::{line, tidy};
+use simulation::comparison::{AtLimit, Comparison};
 
 /// One table an amplifier.
 pub fn text(comparison: &Comparison) -> String {

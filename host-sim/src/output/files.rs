@@ -7,8 +7,8 @@ use anyhow::{Context, Result};
 use model::Spring;
 use tempfile::NamedTempFile;
 
-use crate::bad_input;
-use crate::experiment::{Experiment, Run, Sample};
+use simulation::bad_input;
+use simulation::experiment::{Experiment, Run, Sample};
 
 /// Files that are written beside their place and moved there only when all are complete.
 pub struct Files {
@@ -20,7 +20,7 @@ impl Files {
     /// Files for `folder`, which is made if it does not exist.
     ///
     /// # Errors
-    /// [`crate::BadInput`] if it cannot be made.
+    /// [`simulation::bad_input::BadInput`] if it cannot be made.
     pub fn new(folder: &Path) -> Result<Self> {
         if let Err(error) = std::fs::create_dir_all(folder) {
             bad_input!("{}: cannot be made: {error}; expected a folder to write to", folder.display());
@@ -47,7 +47,7 @@ impl Files {
     /// Moves every file to its place and tells their paths.
     ///
     /// # Errors
-    /// If one of them cannot be; then none is moved. [`crate::BadInput`] if something else than a file is in its place.
+    /// If one of them cannot be; then none is moved. [`simulation::bad_input::BadInput`] if something else than a file is in its place.
     pub fn finish(self) -> Result<Vec<PathBuf>> {
         // What could go wrong in a folder that was just written to is known before the first file is moved.
         for (_, path) in &self.written {

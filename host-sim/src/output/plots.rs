@@ -2,10 +2,10 @@
 
 use kuva::prelude::*;
 
-use crate::experiment::{Experiment, Run, Sample};
-use crate::stair::Report;
+use paper::stair::Report;
+use simulation::experiment::{Experiment, Run, Sample};
 
-use super::draw::{self, Axes, line, thinned};
+use crate::output::draw::{self, Axes, line, thinned};
 
 const TARGET: &str = "#888888";
 const WITH: &str = "#0072b2";

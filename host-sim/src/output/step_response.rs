@@ -1,8 +1,8 @@
 //! The answer to one step as columns of a table: times, overshoot, peak, and the bound on t97.
 
-use super::terminal::optional;
-use crate::experiment::StartsFrom;
-use crate::response::Response;
+use crate::output::terminal::optional;
+use simulation::experiment::StartsFrom;
+use simulation::response::Response;
 
 /// Names of the columns.
 pub(super) const NAMES: &str = "    t50     t90     t97 | overshoot     peak | shortest possible t97";

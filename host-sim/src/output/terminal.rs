@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use super::step_response;
-use crate::experiment::StartsFrom;
-use crate::response::Response;
-use crate::stair::{LimitedTicks, Report, Row};
+use crate::output::step_response;
+use paper::stair::{LimitedTicks, Report, Row};
+use simulation::experiment::StartsFrom;
+use simulation::response::Response;
 
 /// The rows beside what was printed and measured, what does not agree and why, and the steps.
 pub fn text(report: &Report) -> String {

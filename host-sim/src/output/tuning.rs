@@ -2,11 +2,12 @@
 
 use anyhow::Result;
 
-use super::figure::Figure;
-use super::files::Files;
-use super::terminal::{line, optional};
-use crate::tune::trade::Parameter;
-use crate::tune::{Margins, Trade, Tuning, Worst};
+use crate::output::figure;
+use crate::output::files::Files;
+use crate::output::terminal::{line, optional};
+use paper::figure::Figure;
+use simulation::tune::trade::Parameter;
+use simulation::tune::{Margins, Trade, Tuning, Worst};
 
 /// Settings, what they are worth, and the trade in a few rows.
 pub fn text(tuning: &Tuning, plant: &str) -> String {
@@ -116,7 +117,7 @@ pub fn write(files: &mut Files, tuning: &Tuning) -> Result<()> {
                 figure = figure.curve(&format!("PI, {}", parameter.name()), gains, true);
             }
         }
-        let svg = figure.svg();
+        let svg = figure::svg(&figure);
         files.add(name, |out| out.write_all(svg.as_bytes()))?;
     }
     Ok(())

@@ -7,9 +7,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use host_sim::record::{MEASURED, Record};
 use link::{Frame, Reply, State, Status};
 use serialport::{SerialPort, TTYPort};
+use simulation::record::{MEASURED, Record};
 
 use crate::mcu::{Mcu, Setup};
 use crate::vsj::{bad, good, json, start, stdout, vsj};

@@ -4,10 +4,10 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use end_to_end::hidden::Cause;
-use end_to_end::hidden::record::Recipe;
 use end_to_end::vsj::{json, run, text};
 use serde_json::Value;
+use validation::hidden::Cause;
+use validation::hidden::record::Recipe;
 
 use super::{FILES, folder, names, papers, refused};
 

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use end_to_end::hidden::noise::Noise;
 use end_to_end::vsj::json;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use tempfile::tempdir;
+use validation::hidden::noise::Noise;
 
 mod forms;
 mod margins;

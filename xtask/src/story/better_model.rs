@@ -6,12 +6,12 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use end_to_end::hidden::{Block, Cause};
-use host_sim::plant_file;
 use link::{ModelId, WireModel};
 use model::Plant;
 use serde::Serialize;
 use serde_json::Value;
+use simulation::plant_file;
+use validation::hidden::{Block, Cause};
 
 use super::lock_step::{Moment, NEVER, TICK_S};
 use super::stage::{EVERY, Errors, Stage, name};

@@ -10,10 +10,10 @@ use std::path::Path;
 use std::thread;
 
 use anyhow::{Context, Result, anyhow};
-use end_to_end::hidden::live::Live;
 use firmware::settings::SETTINGS;
 use model::Volts;
 use model::units::Signal;
+use validation::hidden::live::Live;
 
 use crate::emulator::{self, Run};
 use crate::shell;

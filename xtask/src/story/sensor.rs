@@ -5,9 +5,9 @@ use std::fmt::Write;
 use std::ops::Range;
 
 use anyhow::{Result, ensure};
-use end_to_end::hidden::Cause;
 use firmware::RATE_HZ;
 use serde::Serialize;
+use validation::hidden::Cause;
 
 use super::lock_step::{Moment, NEVER};
 use super::stage::{Errors, Stage, Way, name};

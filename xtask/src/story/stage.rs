@@ -5,8 +5,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use end_to_end::hidden::live::Live;
-use end_to_end::hidden::{Cause, Effect, Noise, Schedule};
 use firmware::RATE_HZ;
 use firmware::rehearsal::rehearse;
 use firmware::script::{Script, UP_DOWN_TICKS, up_down_v};
@@ -14,6 +12,8 @@ use link::WireModel;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
+use validation::hidden::live::Live;
+use validation::hidden::{Cause, Effect, Noise, Schedule};
 
 use super::lock_step::{self, Moment};
 use crate::emulate::Comparison;

@@ -3,8 +3,8 @@
 use anyhow::{Context, Result};
 use clap::Args;
 use host_sim::link::Failure;
-use host_sim::{BadInput, bad_input, plant_file};
 use link::{Reason, WireModel};
+use simulation::{BadInput, bad_input, plant_file};
 
 use super::Talk;
 

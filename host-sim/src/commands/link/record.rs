@@ -5,15 +5,16 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::bad_input;
 use host_sim::link::Recording;
-use host_sim::record::{MEASURED, Record};
-use host_sim::schedule::{Between, Schedule};
 use indicatif::{ProgressBar, ProgressStyle};
 use link::{Desired, Request, State};
 use serde_json::json;
+use simulation::bad_input;
+use simulation::record::{MEASURED, Record};
+use simulation::schedule::Schedule;
 
 use super::{Talk, seconds, stop_on_interrupt, stopped};
+use crate::commands::voltage::Between;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -58,7 +59,7 @@ impl Arguments {
             None => None,
             Some("stair") => Some(Schedule::stair()),
             Some("step") => Some(Schedule::ideal_stair()),
-            Some(file) => Some(Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between)),
+            Some(file) => Some(Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between.into())),
         })
     }
 }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
-use super::files::Files;
-use crate::diagnose::{Diagnosis, Input};
+use crate::output::files::Files;
+use identify::{Diagnosis, Input};
 
 mod page;
 pub mod panels;
@@ -13,6 +13,7 @@ pub mod plots;
 mod residuals;
 mod style;
 mod tables;
+pub mod text;
 
 /// Where a diagnosis comes from: the page's footer.
 #[derive(Clone, Debug)]

@@ -2,11 +2,12 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::style;
-use super::tables;
-use super::{Figure, Origin, is_extended};
-use crate::diagnose::report::Verdict;
-use crate::diagnose::{Diagnosis, Input, text};
+use crate::output::diagnosis::style;
+use crate::output::diagnosis::tables;
+use crate::output::diagnosis::text;
+use crate::output::diagnosis::{Figure, Origin, is_extended};
+use identify::answer::Verdict;
+use identify::{Diagnosis, Input};
 
 /// The whole page. What comes from files is escaped.
 pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -> String {

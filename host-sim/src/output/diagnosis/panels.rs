@@ -2,10 +2,10 @@
 
 use kuva::prelude::*;
 
-use super::plots::command;
-use super::style::{AFTER, BEFORE, COMMAND, READING};
-use crate::diagnose::data::Data;
+use crate::output::diagnosis::plots::command;
+use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned_to};
+use identify::record::data::Data;
 
 /// Stretches of time that a line is drawn by: the panels are small.
 const STRETCHES: usize = 200;

@@ -2,12 +2,12 @@
 
 use kuva::prelude::*;
 
-use super::is_extended;
-use super::style::{AFTER, BEFORE, COMMAND, READING};
-use crate::diagnose::Diagnosis;
-use crate::diagnose::data::Data;
-use crate::diagnose::report::Report;
+use crate::output::diagnosis::is_extended;
+use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned};
+use identify::answer::Report;
+use identify::record::data::Data;
+use identify::verdict::diagnosis::Diagnosis;
 
 /// A record with no more rows than this is drawn as points: a line would tell what is between them.
 const POINTS: usize = 120;

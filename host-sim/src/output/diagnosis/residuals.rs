@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use crate::diagnose::Diagnosis;
+use identify::verdict::diagnosis::Diagnosis;
 
 /// Writes the table; voltages, readings and residuals in V.
 ///

@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use super::is_extended;
-use crate::diagnose::Diagnosis;
-use crate::diagnose::noise::scale_of_squares;
-use crate::diagnose::report::{Finding, Parameter};
-use crate::diagnose::standing::Standing;
+use crate::output::diagnosis::is_extended;
+use identify::answer::{Finding, Parameter};
+use identify::noise::scale_of_squares;
+use identify::verdict::diagnosis::Diagnosis;
+use identify::verdict::ranking::Standing;
 
 /// Each cause with its parameters.
 pub(super) fn findings(findings: &[Finding]) -> Markup {

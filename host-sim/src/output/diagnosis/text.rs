@@ -1,0 +1,257 @@
+//! A diagnosis as text: three sentences a person can act on, then the table.
+
+use std::fmt::Write;
+
+use identify::answer::{Extended, Finding, Quality, Report, Verdict};
+use identify::effects::effect::Stage;
+use identify::effects::{EFFECTS, index_of};
+use identify::verdict::export::SMALL_ERROR_V;
+use identify::verdict::margins::Margins;
+
+/// A gain below this is none.
+const FORETOLD: f64 = 0.005;
+
+/// What goes to the terminal.
+pub fn text(name: &str, report: &Report) -> String {
+    let mut text = String::new();
+    for sentence in sentences(name, report) {
+        let _ = writeln!(text, "{sentence}");
+    }
+    if !report.findings.is_empty() {
+        let _ = writeln!(text, "\n{:34} {:>11}   parameters with 95 % intervals", "cause", "probability");
+        for finding in &report.findings {
+            row(&mut text, finding);
+        }
+    }
+    let (before, after) = (&report.baseline, &report.extended.quality);
+    let extends = !report.findings.is_empty() || !report.take_out.is_empty();
+    let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
+    for (what, before, after) in [
+        ("free run RMSE [V]", before.rmse, after.rmse),
+        ("held-out RMSE [V]", before.held_out_rmse, after.held_out_rmse),
+        ("one-step RMSE [V]", before.one_step_rmse, after.one_step_rmse),
+        ("fit [%]", before.fit_percent, after.fit_percent),
+    ] {
+        let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".into() };
+        let after = if extends { format!(" {:>12}", number(after)) } else { String::new() };
+        let _ = writeln!(text, "{what:22} {:>12}{after}", number(before));
+    }
+    if extends && let Some(sentence) = in_fixed_point(&report.extended) {
+        let _ = writeln!(text, "{sentence}");
+    }
+    text
+}
+
+/// Whether the tick runs the extended spring.
+pub fn in_fixed_point(extended: &Extended) -> Option<String> {
+    if let Some(why) = &extended.tick_refuses {
+        return Some(format!("The fixed-point tick does NOT run the extended spring: {why}."));
+    }
+    let error_v = extended.fixed_point_error_v?;
+    Some(if error_v <= SMALL_ERROR_V {
+        format!("The fixed-point tick runs the extended spring within {error_v:.3} V of the fit.")
+    } else {
+        format!(
+            "The extended spring as written is NOT the fitted one: in the fixed-point tick it departs by up to \
+             {error_v:.3} V, more than {SMALL_ERROR_V} V."
+        )
+    })
+}
+
+/// Which parts of the plant file are not in this spring.
+fn lacking(report: &Report) -> Option<String> {
+    let parts = &report.take_out;
+    let (are, them) = if parts.len() == 1 { ("is", "it") } else { ("are", "them") };
+    let (before, after) = (&report.baseline, &report.extended.quality);
+    (!parts.is_empty()).then(|| {
+        format!(
+            "The plant file's {} {are} not in this spring: take {them} out. The error on stretches that no fit has seen falls \
+             from {:.3} to {:.3} V without {them}{}.",
+            parts.join(" and "),
+            before.held_out_rmse,
+            after.held_out_rmse,
+            if report.findings.is_empty() { "" } else { " and with the causes below" }
+        )
+    })
+}
+
+/// How far off something is, as a part of it, to two digits.
+fn off_by(part: f64) -> String {
+    let percent = 100.0 * part;
+    match part {
+        ..0.1 => format!("{percent:.*} %", (1.0 - percent.log10().floor()).clamp(1.0, 6.0) as usize),
+        0.1..1.0 => format!("{percent:.0} %"),
+        1.0..100.0 => format!("a factor of {:.0}", 1.0 + part),
+        _ => "any factor".into(),
+    }
+}
+
+/// What is wrong; what the cure is worth; what to do next.
+pub fn sentences(name: &str, report: &Report) -> Vec<String> {
+    let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
+    let in_readings = effects.clone().all(|effect| effect.stage() == Stage::Reading);
+    let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.meaning())).collect();
+    let margins = report.would_show.map(|Margins { gain, time_constant }| {
+        format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
+    });
+    let (one, rows) = (causes.len() == 1, report.rows);
+    let mut sentences: Vec<String> = lacking(report).into_iter().collect();
+    sentences.push(match report.verdict {
+        Verdict::Explained if causes.is_empty() => {
+            format!("Without that, the simulation agrees with {name}: nothing beyond noise in {rows} readings.")
+        }
+        Verdict::Consistent => {
+            let what = if report.leftover.is_none() { "beyond noise" } else { "worth a cause" };
+            format!(
+                "The simulation agrees with {name}: nothing {what} in {rows} readings{}.",
+                margins.map_or_else(String::new, |off| format!(", where {off} would have shown"))
+            )
+        }
+        Verdict::Insufficient => format!(
+            "{name} cannot tell what is wrong: its {rows} readings hold too little excitation{}.",
+            margins.map_or_else(String::new, |off| format!("; {off} need not show"))
+        ),
+        Verdict::Unexplained if causes.is_empty() => {
+            format!("The simulation is wrong on {name}, and no known cause explains it.")
+        }
+        Verdict::Unexplained => {
+            let explain = if one { "explains" } else { "explain" };
+            format!("The simulation is wrong on {name}; {} {explain} only a part.", causes.join(", "))
+        }
+        Verdict::Ambiguous | Verdict::Explained => {
+            let what = match (in_readings, report.alternatives.iter().any(Vec::is_empty)) {
+                (false, false) => format!("The simulation is wrong on {name}"),
+                (false, true) => format!("The simulation may be wrong on {name}"),
+                (true, false) => format!("The readings of {name} are at fault"),
+                (true, true) => format!("The readings of {name} may be at fault"),
+            };
+            format!("{what}: {}.", causes.join("; "))
+        }
+    });
+    if !report.findings.is_empty() && report.take_out.is_empty() {
+        let it = if one { "it" } else { "them" };
+        let (before, after) = (&report.baseline, &report.extended.quality);
+        sentences.push(if report.extended.gain > FORETOLD {
+            format!(
+                "With {it} in the model, the error on stretches that no fit has seen falls from {:.3} to {:.3} V, by {:.1} %.",
+                before.held_out_rmse,
+                after.held_out_rmse,
+                100.0 * report.extended.gain
+            )
+        } else if after.rmse > (1.0 - FORETOLD) * before.rmse {
+            let whose = if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is the readings' own" };
+            format!("With {it} in the model, the error stays at {:.3} V{whose}.", after.rmse)
+        } else {
+            format!(
+                "With {it} in the model, the error falls from {:.3} to {:.3} V, but not on stretches that no fit has seen: no \
+                 other part of the record foretells it.",
+                before.rmse, after.rmse
+            )
+        });
+    }
+    if !report.alternatives.is_empty() {
+        let nothing = || "that nothing is wrong".to_owned();
+        let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
+        sentences.push(format!("The data cannot reject instead: {}.", rivals.collect::<Vec<_>>().join("; ")));
+    }
+    if report.verdict == Verdict::Consistent && report.next_experiment.is_some() {
+        let Quality { rmse, one_step_rmse, .. } = report.extended.quality;
+        sentences.push(format!(
+            "That noise wanders, by {rmse:.3} V where {one_step_rmse:.3} V is new at each reading: what is slow in the spring \
+             would pass for it."
+        ));
+    }
+    if let Some(leftover) = &report.leftover {
+        let small = if report.verdict == Verdict::Unexplained { "" } else { "Too little to change this verdict: " };
+        sentences.push(format!("{small}{leftover}."));
+    }
+    if let Some(next) = &report.next_experiment {
+        sentences.push(format!("To decide, {next}."));
+    }
+    sentences
+}
+
+fn row(text: &mut String, finding: &Finding) {
+    let parameters: Vec<String> = finding
+        .parameters
+        .iter()
+        .map(|(name, it)| {
+            format!("{name} = {:.4} [{:.4}, {:.4}] {}", it.value, it.low, it.high, it.unit).trim().to_owned()
+        })
+        .collect();
+    let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
+    let _ = writeln!(text, "  {}", finding.evidence);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use identify::answer::{NoiseReport, ResidualReport, SCHEMA};
+
+    /// The first two sentences about causes that leave the error as it is.
+    fn said(verdict: Verdict, causes: &[&'static str], alternatives: &[Vec<&'static str>]) -> String {
+        let quality = Quality { rmse: 7.86, fit_percent: 90.0, held_out_rmse: 7.86, one_step_rmse: 7.86 };
+        let finding = |&cause: &&'static str| Finding {
+            cause,
+            probability: 1.0,
+            parameters: Vec::new(),
+            rmse_before: 7.86,
+            rmse_after: 7.86,
+            evidence: String::new(),
+        };
+        let report = Report {
+            schema: SCHEMA,
+            rows: 600,
+            verdict,
+            baseline: quality,
+            findings: causes.iter().map(finding).collect(),
+            take_out: Vec::new(),
+            would_show: None,
+            alternatives: alternatives.to_vec(),
+            next_experiment: None,
+            extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+            leftover: None,
+            noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
+            residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
+        };
+        sentences("r.csv", &report)[..2].join(" ")
+    }
+
+    #[test]
+    fn a_margin_has_two_digits() {
+        for (part, said) in [
+            (0.000_43, "0.043 %"),
+            (0.0058, "0.58 %"),
+            (0.071, "7.1 %"),
+            (0.4, "40 %"),
+            (44.42, "a factor of 45"),
+            (f64::INFINITY, "any factor"),
+        ] {
+            assert_eq!(off_by(part), said);
+        }
+    }
+
+    #[test]
+    fn who_is_at_fault_is_said_of_readings_and_of_the_simulation() {
+        use Verdict::{Ambiguous, Explained, Unexplained};
+        let nothing = [Vec::new()];
+        for (verdict, causes, alternatives, expected) in [
+            (Explained, &["outliers", "hum"][..], &[][..], "The readings of r.csv are at fault: outliers (single"),
+            (Ambiguous, &["reading-offset"], &nothing, "The readings of r.csv may be at fault: reading-offset ("),
+            (Explained, &["outliers", "drift"], &[], "The simulation is wrong on r.csv: outliers (single"),
+            (Ambiguous, &["drift"], &nothing, "The simulation may be wrong on r.csv: drift ("),
+            (Unexplained, &["hum"], &[], "The simulation is wrong on r.csv; hum ("),
+        ] {
+            let said = said(verdict, causes, alternatives);
+            assert!(said.starts_with(expected), "{said}");
+            let whose = "stays at 7.860 V: nearly all of it is the readings' own.";
+            assert_eq!(said.ends_with(whose), verdict != Unexplained, "{said}");
+        }
+        for (causes, part) in
+            [(&["drift"][..], ") explains only a part."), (&["drift", "hum"], ") explain only a part.")]
+        {
+            let said = said(Unexplained, causes, &[]);
+            assert!(said.contains(part), "{said}");
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! The real voltage follows the command slowly. Its lag grows with the step; a delay's does not.
+//!
+//! | form | law |
+//! | --- | --- |
+//! | both ways | `-slew <= du/dt <= slew` |
+//! | two rates | `-falling <= du/dt <= slew` |
+//! | output resistance | `tau du/dt = command - u`: a full stroke starts at `slew = full / tau` |
+//!
+//! Where a record begins in mid-course, the voltage that a bounded rate has reached by then is one coordinate more.
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, logarithms, table};
+use crate::plant::chain::Chain;
+use crate::record::data::Data;
+
+pub(super) struct AmplifierSlew;
+
+const BOTH_WAYS: usize = 0;
+const TWO_RATES: usize = 1;
+const RESISTANCE: usize = 2;
+/// Rates of a form.
+const RATES: [usize; 2] = [1, 2];
+/// Slower outputs would be taken for the spring, in s.
+const SLOWEST_OUTPUT_S: f64 = 1.0;
+/// Of two rates, how far apart they are looked for.
+const APART: f64 = 3.0;
+/// How far off the command an amplifier in mid-course is looked for, as a part of the stroke.
+const OFF: f64 = 0.2;
+
+fn stroke(data: &Data) -> f64 {
+    data.full_scale_v.max(1e-6)
+}
+
+/// Rates, in V/s, at which a full stroke takes the whole record or a tenth of a sample.
+fn range(data: &Data) -> (f64, f64) {
+    (stroke(data) / data.duration_s().max(1e-6), 10.0 * stroke(data) / data.sample_s)
+}
+
+/// Time constants of the output, in s: shorter ones are a delay to the rows.
+fn taus(data: &Data) -> (f64, f64) {
+    (data.sample_s, SLOWEST_OUTPUT_S.max(2.0 * data.sample_s))
+}
+
+impl Effect for AmplifierSlew {
+    fn cause(&self) -> &'static str {
+        "amplifier-slew"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Amplifier
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the amplifier's voltage changes at a bounded rate"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "single steps of very different heights: a slew lag grows with the step"
+    }
+
+    fn forms(&self) -> usize {
+        3
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        if form == RESISTANCE {
+            let (shortest, longest) = taus(data);
+            return vec![Coordinate::log(shortest, longest)];
+        }
+        let (slowest, fastest) = range(data);
+        let mut coordinates = vec![Coordinate::log(slowest, fastest); RATES[form]];
+        coordinates.extend(data.begun.then_some(Coordinate::new(-stroke(data), stroke(data))));
+        coordinates
+    }
+
+    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+        let (slowest, fastest) = range(data);
+        let rates = (2.0 * slowest, 0.8 * fastest);
+        let starts: Vec<Vec<f64>> = match form {
+            BOTH_WAYS => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
+            RESISTANCE => return logarithms(taus(data), 10).map(|tau| vec![tau]).collect(),
+            _ => logarithms(rates, 10)
+                .flat_map(|rate| [APART.ln(), -APART.ln()].map(|apart| vec![rate, rate + apart]))
+                .collect(),
+        };
+        // From the command itself no small change would show.
+        let from_v = data.begun.then_some(data.command.before - OFF * stroke(data));
+        starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
+    }
+
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        let value = point[0].exp();
+        match form {
+            RESISTANCE => vec![
+                Quantity::new("slew_v_per_s", "V/s", stroke(data) / value),
+                Quantity::new("output_tau_s", "s", value),
+            ],
+            TWO_RATES => vec![
+                Quantity::new("slew_v_per_s", "V/s", value),
+                Quantity::new("falling_v_per_s", "V/s", point[1].exp()),
+            ],
+            _ => vec![Quantity::new("slew_v_per_s", "V/s", value)],
+        }
+    }
+
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, _: &Chain) -> Option<toml::Value> {
+        (form != BOTH_WAYS).then(|| table(self, form, point, data))
+    }
+
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        let value = point[0].exp();
+        if form == RESISTANCE {
+            chain.output_tau_s = value;
+            return;
+        }
+        let falling = point[RATES[form] - 1].exp();
+        chain.from_v = point.get(RATES[form]).copied();
+        chain.rising_v_per_s = chain.rising_v_per_s.min(value);
+        chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
+    }
+}

@@ -1,0 +1,77 @@
+//! Stiffness falls back while the voltage stays: a part of it leaks away with a time constant of its own.
+//!
+//! ```text
+//! q = f - (1 - at_once) share lag(tau; f)        y = relaxation(q) - at_once share lag(tau; f)
+//! ```
+//!
+//! In one form all of the loss passes the relaxation, in the other a part of it shows at once.
+//!
+//! Leakage lowers the settled value by `share`; creep keeps it, and drift follows the clock.
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
+use crate::plant::chain::Chain;
+use crate::plant::leakage::Loss;
+use crate::record::data::Data;
+
+pub(super) struct ChargeLeakage;
+
+/// What leaks faster than the spring relaxes is never seen to fall back: it is a gain.
+const FASTEST_S: f64 = 3.5;
+
+const AT_ONCE: usize = 1;
+
+fn loss(point: &[f64]) -> Loss {
+    Loss { share: point[0], tau_s: point[1].exp(), at_once: point.get(2).copied().unwrap_or(0.0) }
+}
+
+impl Effect for ChargeLeakage {
+    fn cause(&self) -> &'static str {
+        "charge-leakage"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Relaxation
+    }
+
+    fn meaning(&self) -> &'static str {
+        "stiffness falls back while the voltage stays"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "one step, held for minutes: only leakage lets the stiffness fall while the voltage stays"
+    }
+
+    fn forms(&self) -> usize {
+        2
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        let longest = 10.0 * data.duration_s().max(FASTEST_S);
+        let mut coordinates = vec![Coordinate::new(0.0, 1.0), Coordinate::log(FASTEST_S, longest)];
+        coordinates.extend((form == AT_ONCE).then_some(Coordinate::new(0.0, 1.0)));
+        coordinates
+    }
+
+    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+        let longest = data.duration_s();
+        [4.0, 8.0, 16.0, 32.0, 64.0, 128.0]
+            .into_iter()
+            .filter(|&tau: &f64| tau < longest)
+            .map(|tau| [0.1, tau.ln()].into_iter().chain((form == AT_ONCE).then_some(0.5)).collect())
+            .collect()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
+    }
+
+    /// A plant file holds one, and one that passes the relaxation.
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
+        let passes = loss(point).at_once == 0.0 || loss(point).passed(&chain.relaxation).is_some();
+        (chain.losses.len() > 1 || !passes).then(|| table(self, form, point, data))
+    }
+
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.losses.push(loss(point));
+    }
+}

@@ -1,0 +1,63 @@
+//! A periodic disturbance rides on the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
+
+use crate::adequacy::spectrum;
+use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::record::data::Data;
+
+pub(super) struct Hum;
+
+/// Peaks of the spectrum that are tried.
+const PEAKS: usize = 3;
+/// Fewest periods in a record.
+const FEWEST: f64 = spectrum::FEWEST_PERIODS as f64;
+
+impl Effect for Hum {
+    fn cause(&self) -> &'static str {
+        "hum"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Reading
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::OnReadings
+    }
+
+    fn meaning(&self) -> &'static str {
+        "a periodic disturbance rides on the readings"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "readings at constant voltage, at another sample time: a line that is an alias moves"
+    }
+
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        let most = 2.0 * data.full_scale_v.max(1.0);
+        let frequency = Coordinate::new(0.9 * FEWEST / data.duration_s().max(1e-9), 0.5 / data.sample_s);
+        vec![frequency, Coordinate::new(-most, most), Coordinate::new(-most, most)]
+    }
+
+    fn starts(&self, _: usize, Scene { data, residual, .. }: &Scene) -> Vec<Vec<f64>> {
+        spectrum::peaks(residual, data, PEAKS)
+            .into_iter()
+            .filter(|peak| peak.frequency_hz > FEWEST / data.duration_s())
+            .map(|peak| vec![peak.frequency_hz, peak.cosine, peak.sine])
+            .collect()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("amplitude", "V", point[1].hypot(point[2])), Quantity::new("freq_hz", "Hz", point[0])]
+    }
+
+    fn places(&self, _: usize, data: &Data) -> f64 {
+        // As many lines as half the rows; its three coordinates are charged already.
+        ((data.rows() as f64 / 2.0).max(1.0).ln() - 4.5).max(0.0)
+    }
+
+    fn read(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+        for (reading, (sin, cos)) in readings.iter_mut().zip(spectrum::oscillation(point[0], data)) {
+            *reading += point[1] * cos + point[2] * sin;
+        }
+    }
+}

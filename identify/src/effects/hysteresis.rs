@@ -1,0 +1,113 @@
+//! Rate-independent memory: the branches up and down differ.
+//!
+//! A [`Bank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
+//!
+//! | form | plays | coordinates |
+//! | --- | --- | --- |
+//! | whole | one, weight 1 | r |
+//! | part | one | r, weight |
+//! | bank | five, at r / 5 to r | r, weights |
+//! | part with gain, bank with gain | the same, with the gain of the loop's mean line | and the gain |
+//! | cycled part, cycled bank | the same, of a spring that comes from a large voltage | the same |
+//!
+//! The last begin on the branch that comes down: where the record begins, not what the spring is.
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
+use crate::plant::bank::Bank;
+use crate::plant::chain::Chain;
+use crate::record::data::Data;
+
+pub(super) struct Hysteresis;
+
+const WHOLE: usize = 0;
+
+/// Number of plays, own gain, and whether they begin on the branch that comes down, by form.
+const FORMS: [(usize, bool, bool); 7] = [
+    (1, false, false),
+    (1, false, false),
+    (5, false, false),
+    (1, true, false),
+    (5, true, false),
+    (1, true, true),
+    (5, true, true),
+];
+/// Thresholds of a bank, as parts of r.
+const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
+
+/// The bank of a form at a point.
+fn bank(form: usize, point: &[f64]) -> Bank {
+    let (count, own_gain, cycled) = FORMS[form];
+    let threshold = point[0].exp();
+    let plays: Vec<(f64, f64)> = match (form, count) {
+        (WHOLE, _) => vec![(threshold, 1.0)],
+        (_, 1) => vec![(threshold, point[1])],
+        _ => PARTS.iter().zip(&point[1..]).map(|(part, &weight)| (threshold * part, weight)).collect(),
+    };
+    let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
+    let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();
+    let bank = Bank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
+    if cycled { bank.cycled() } else { bank }
+}
+
+impl Effect for Hysteresis {
+    fn cause(&self) -> &'static str {
+        "hysteresis"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Static
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the branches up and down differ, however slowly they are run"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "a slow stair up and down again: only under hysteresis the branches stay apart, however long each step is held"
+    }
+
+    fn forms(&self) -> usize {
+        FORMS.len()
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        let (count, own_gain, _) = FORMS[form];
+        let mut coordinates = vec![Coordinate::log(1e-4 * data.full_scale_v, 0.5 * data.full_scale_v)];
+        if form != WHOLE {
+            coordinates.resize(1 + count, Coordinate::new(0.0, 2.0));
+        }
+        if own_gain {
+            coordinates.push(Coordinate::new(0.2, 5.0));
+        }
+        coordinates
+    }
+
+    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+        let (count, own_gain, _) = FORMS[form];
+        let start = |part: f64, weight: f64| {
+            let mut point = vec![(part * data.full_scale_v).ln()];
+            if form != WHOLE {
+                point.resize(1 + count, weight / count as f64);
+            }
+            if own_gain {
+                point.push(1.0);
+            }
+            point
+        };
+        let parts: &[f64] = if count == 1 { &[0.004, 0.01, 0.02, 0.04, 0.08, 0.16, 0.3] } else { &[0.02, 0.07, 0.2] };
+        parts.iter().map(|&part| start(part, 0.4)).collect()
+    }
+
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("width_v", "V", bank(form, point).width(data.full_scale_v))]
+    }
+
+    /// A plant file holds so many plays.
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
+        (!chain.memory.fits()).then(|| table(self, form, point, data))
+    }
+
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.memory = bank(form, point).behind(&chain.memory);
+    }
+}

@@ -1,0 +1,45 @@
+//! The immediate part of a step is not 1/11.
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::plant::chain::Chain;
+use crate::record::data::Data;
+
+pub(super) struct InstantaneousShare;
+
+impl Effect for InstantaneousShare {
+    fn cause(&self) -> &'static str {
+        "instantaneous-share"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Relaxation
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the part of a step that comes at once is another"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "steps read within a hundredth of the time constant"
+    }
+
+    fn coordinates(&self, _: usize, _: &Data) -> Vec<Coordinate> {
+        vec![Coordinate::new(-0.2, 1.0)]
+    }
+
+    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+        vec![vec![0.04], vec![0.2]]
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("share", "", point[0])]
+    }
+
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
+    }
+
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.relaxation.share = point[0];
+    }
+}

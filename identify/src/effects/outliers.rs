@@ -1,0 +1,41 @@
+//! Single readings are far off. Not a part of the chain but of the noise: a mixture of two scales against one heavy tail
+//! ([`crate::noise`]).
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::record::data::Data;
+
+pub(super) struct Outliers;
+
+impl Effect for Outliers {
+    fn cause(&self) -> &'static str {
+        "outliers"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Reading
+    }
+
+    fn meaning(&self) -> &'static str {
+        "single readings are far off"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "readings at constant voltage: outliers come without any change"
+    }
+
+    fn forms(&self) -> usize {
+        0
+    }
+
+    fn coordinates(&self, _: usize, _: &Data) -> Vec<Coordinate> {
+        Vec::new()
+    }
+
+    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    fn quantities(&self, _: usize, _: &[f64], _: &Data) -> Vec<Quantity> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,40 @@
+//! Readings come in coarse steps. Found from the readings' exact lattice ([`crate::record::observed`]), not by a fit.
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::record::data::Data;
+
+pub(super) struct Quantisation;
+
+impl Effect for Quantisation {
+    fn cause(&self) -> &'static str {
+        "quantisation"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Reading
+    }
+
+    fn meaning(&self) -> &'static str {
+        "readings come in coarse steps"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "readings at constant voltage with the sensor on a finer range"
+    }
+
+    fn forms(&self) -> usize {
+        0
+    }
+
+    fn coordinates(&self, _: usize, _: &Data) -> Vec<Coordinate> {
+        Vec::new()
+    }
+
+    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    fn quantities(&self, _: usize, _: &[f64], _: &Data) -> Vec<Quantity> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,131 @@
+//! Underdamped oscillation after a change, with the natural frequency `w = 2 pi freq`:
+//!
+//! ```text
+//! x'' + 2 zeta w x' + w^2 x = w^2 e        y' = y + part (x - e)
+//! ```
+//!
+//! | form | what excites it | part |
+//! | --- | --- | --- |
+//! | whole | the response, `e = y` | 1 |
+//! | in part | the response | fitted |
+//! | quick | what changes quickly, `e = y - lag(T; y)` | fitted |
+
+use std::f64::consts::TAU;
+
+use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage, logarithms};
+use crate::plant::start::Start;
+use crate::record::data::Data;
+use crate::record::signal::{Lag, Piece, Signal};
+
+pub(super) struct Resonance;
+
+/// A polymer damps its swings by no less; what rings on for longer is the schedule's own rhythm.
+const LEAST_DAMPED: f64 = 5e-3;
+/// What overshoots a step by less than a sixth is a lag, and no swing to be seen.
+const MOST_DAMPED: f64 = 0.5;
+const WHOLE: usize = 0;
+const QUICK: usize = 2;
+/// From where on a quick change is looked for, in s.
+const QUICK_S: f64 = 0.5;
+
+/// Frequencies, in Hz, from a period of the whole record to what two samples show.
+fn range(data: &Data) -> (f64, f64) {
+    (1.0 / data.duration_s().max(1e-6), 0.5 / data.sample_s)
+}
+
+impl Effect for Resonance {
+    fn cause(&self) -> &'static str {
+        "resonance"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Relaxation
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::OnResponse
+    }
+
+    fn meaning(&self) -> &'static str {
+        "it swings after a change"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "single steps, read at ten times the frequency in question"
+    }
+
+    fn forms(&self) -> usize {
+        3
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        let (lowest, highest) = range(data);
+        let mut coordinates =
+            vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(LEAST_DAMPED, MOST_DAMPED)];
+        if form != WHOLE {
+            coordinates.push(Coordinate::new(0.0, 1.5));
+        }
+        if form == QUICK {
+            coordinates.push(Coordinate::log(0.2 * data.sample_s, data.duration_s()));
+        }
+        coordinates
+    }
+
+    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+        let (lowest, highest) = range(data);
+        let frequencies = logarithms((8.0 * lowest, 0.95 * highest), 24);
+        let (dampings, rest): (&[f64], &[f64]) = match form {
+            WHOLE => (&[0.05, 0.3], &[]),
+            QUICK => (&[0.1], &[1.0, QUICK_S.ln()]),
+            _ => (&[0.05, 0.3], &[0.2]),
+        };
+        let start = |freq: f64, zeta: &f64| [&[freq, zeta.ln()], rest].concat();
+        frequencies.flat_map(|freq| dampings.iter().map(move |zeta| start(freq, zeta))).collect()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("freq_hz", "Hz", point[0].exp()), Quantity::new("zeta", "", point[1].exp())]
+    }
+
+    fn places(&self, _: usize, _: &Data) -> f64 {
+        10f64.ln()
+    }
+
+    fn respond(&self, _: usize, point: &[f64], signal: &mut Signal, start: &mut Start) {
+        let (omega, zeta) = (TAU * point[0].exp(), point[1].exp());
+        let part = point.get(2).copied().unwrap_or(1.0);
+        // Without a time of its own, nothing is slow.
+        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.ask()));
+        let (mut x, mut v) = (if slow.is_some() { 0.0 } else { signal.before } + start.ask(), omega * start.ask());
+        let mut last = f64::NAN;
+        let mut step = [[1.0, 0.0], [0.0, 1.0]];
+        signal.pass(|piece| {
+            let (slow_from, slow_to) = slow.as_mut().map_or((0.0, 0.0), |slow| slow.pass(piece));
+            let Piece { duration_s, from, to } = piece;
+            let (from, to) = (from - slow_from, to - slow_to);
+            let start = x;
+            if duration_s > 0.0 {
+                if (duration_s - last).abs() > 1e-9 * duration_s || last.is_nan() {
+                    last = duration_s;
+                    step = transition(omega, zeta, duration_s);
+                }
+                // Around the straight line that the oscillator would follow in the end.
+                let slope = (to - from) / duration_s;
+                let lag = 2.0 * zeta / omega * slope;
+                let (dx, dv) = (x - (from - lag), v - slope);
+                x = to - lag + step[0][0] * dx + step[0][1] * dv;
+                v = slope + step[1][0] * dx + step[1][1] * dv;
+            }
+            (piece.from + part * (start - from), piece.to + part * (x - to))
+        });
+    }
+}
+
+/// What a free oscillation makes of displacement and speed in a time.
+fn transition(omega: f64, zeta: f64, time_s: f64) -> [[f64; 2]; 2] {
+    let damped = omega * (1.0 - zeta * zeta).sqrt();
+    let decay = (-zeta * omega * time_s).exp();
+    let (sin, cos) = (damped * time_s).sin_cos();
+    let s = sin / damped;
+    [[decay * (cos + zeta * omega * s), decay * s], [-decay * omega * omega * s, decay * (cos - zeta * omega * s)]]
+}

@@ -1,0 +1,80 @@
+//! Part of the response relaxes with another, slower time constant (creep); the settled value stays.
+//!
+//! | form | what relaxes |
+//! | --- | --- |
+//! | of the rest | `y = share_0 q + (1 - share_0 - creep) lag(tau; q) + creep lag(slow; q)` |
+//! | of everything | `y = (1 - creep) (share_0 q + (1 - share_0) lag(tau; q)) + creep lag(slow; q)` |
+//! | by decades | as of everything, in three equal parts: `slow / 10`, `slow`, `10 slow` (logarithmic creep) |
+//! | spread | of the rest, in two equal parts, to both sides: `slow` and `tau^2 / slow` (a broad relaxation) |
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::plant::chain::Chain;
+use crate::plant::relaxation::Part;
+use crate::record::data::Data;
+
+pub(super) struct SecondRelaxation;
+
+const OF_THE_REST: usize = 0;
+const OF_EVERYTHING: usize = 1;
+const BY_DECADES: usize = 2;
+/// It is the slower one.
+const FASTEST_S: f64 = 5.5;
+
+impl Effect for SecondRelaxation {
+    fn cause(&self) -> &'static str {
+        "second-relaxation"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Relaxation
+    }
+
+    fn meaning(&self) -> &'static str {
+        "part of the response creeps with a slower time constant"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "one step, held for minutes: creep goes on rising to the same settled value"
+    }
+
+    fn forms(&self) -> usize {
+        4
+    }
+
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        vec![Coordinate::new(0.0, 0.9), Coordinate::log(FASTEST_S, 10.0 * data.duration_s().max(FASTEST_S))]
+    }
+
+    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+        [9.0, 15.0, 25.0, 45.0, 80.0, 150.0, 300.0]
+            .into_iter()
+            .filter(|&tau: &f64| tau < 3.0 * data.duration_s())
+            .map(|tau| vec![0.1, tau.ln()])
+            .collect()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
+    }
+
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
+    }
+
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        let (creep, slow_s) = (point[0], point[1].exp());
+        let relaxation = &mut chain.relaxation;
+        let parts = |times: &[f64]| {
+            let part = |&tau_s: &f64| Part { part: creep / times.len() as f64, tau_s };
+            std::array::from_fn(|index| times.get(index).map(part).unwrap_or_default())
+        };
+        relaxation.further = match form {
+            OF_THE_REST | OF_EVERYTHING => parts(&[slow_s]),
+            BY_DECADES => parts(&[0.1 * slow_s, slow_s, 10.0 * slow_s]),
+            _ => parts(&[slow_s, relaxation.tau_s * relaxation.tau_s / slow_s]),
+        };
+        if form == OF_EVERYTHING || form == BY_DECADES {
+            relaxation.share *= 1.0 - creep;
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The sensitivity depends on the voltage, without memory: `f = f(u)`, with `x = |u| / full scale`.
+//!
+//! | curve | `f / u` |
+//! | --- | --- |
+//! | bend | `1 + a (x - 1)`: the ends stay |
+//! | exponential | `(1 - exp(-k x)) / (x (1 - exp(-k)))`: the ends stay |
+//! | exponential with gain | `g` times that |
+//! | quadratic, cubic, quintic | `g + a x`, `+ b x^2`, `+ c x^3 + d x^4`: the gain is its own |
+//!
+//! Each before the relaxation (Hammerstein's model) or, some, behind it (Wiener's): there `u` is what has relaxed so far.
+//! Settled, both are one curve; what comes at once, and how fast, tells them apart.
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::plant::chain::Chain;
+use crate::record::data::Data;
+
+pub(super) struct StaticNonlinearity;
+
+/// `f / u` as a curve over `x`.
+#[derive(Clone, Copy)]
+enum Curve {
+    Bend,
+    Exponential,
+    ExponentialWithGain,
+    /// Of so many coefficients.
+    Polynomial(usize),
+}
+use Curve::{Bend, Exponential, ExponentialWithGain, Polynomial};
+
+/// Curve of each form, and whether it is behind the relaxation.
+const FORMS: [(Curve, bool); 10] = [
+    (Bend, false),
+    (Exponential, false),
+    (ExponentialWithGain, false),
+    (Polynomial(2), false),
+    (Polynomial(3), false),
+    (Polynomial(5), false),
+    (Bend, true),
+    (ExponentialWithGain, true),
+    (Polynomial(3), true),
+    (Polynomial(5), true),
+];
+
+/// Points of the curve that are reported.
+const POINTS: u32 = 5;
+
+impl Curve {
+    /// `f / u` at `x`.
+    fn secant(self, point: &[f64], x: f64) -> f64 {
+        match self {
+            Bend => 1.0 + point[0] * (x - 1.0),
+            ExponentialWithGain => point[1] * Exponential.secant(point, x),
+            Exponential => {
+                let k = if point[0].abs() < 1e-6 { 1e-6 } else { point[0] };
+                if x < 1e-9 { k / -(-k).exp_m1() } else { (-k * x).exp_m1() / (x * (-k).exp_m1()) }
+            }
+            Polynomial(_) => point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient),
+        }
+    }
+}
+
+impl Effect for StaticNonlinearity {
+    fn cause(&self) -> &'static str {
+        "static-nonlinearity"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Static
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the sensitivity depends on the voltage"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "a slow stair over the whole range up and down again: without memory both branches are one curve"
+    }
+
+    fn forms(&self) -> usize {
+        FORMS.len()
+    }
+
+    fn coordinates(&self, form: usize, _: &Data) -> Vec<Coordinate> {
+        match FORMS[form].0 {
+            Bend => vec![Coordinate::new(-2.0, 2.0)],
+            Exponential => vec![Coordinate::new(-8.0, 8.0)],
+            ExponentialWithGain => vec![Coordinate::new(-8.0, 8.0), Coordinate::new(0.02, 50.0)],
+            Polynomial(coefficients) => {
+                let mut coordinates = vec![Coordinate::new(-20.0, 20.0)];
+                coordinates.resize(coefficients, Coordinate::new(-100.0, 100.0));
+                coordinates
+            }
+        }
+    }
+
+    /// None in mid-course: where such a form starts is not straight in what it makes.
+    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && scene.data.begun {
+            return Vec::new();
+        }
+        match FORMS[form].0 {
+            Bend => vec![vec![0.1], vec![-0.1]],
+            Exponential => vec![vec![0.3], vec![-0.3]],
+            ExponentialWithGain => vec![vec![0.3, 1.0], vec![-0.3, 1.0]],
+            Polynomial(coefficients) => {
+                let start = |bend: f64| {
+                    let mut start = vec![1.0 - bend, bend];
+                    start.resize(coefficients, 0.0);
+                    start
+                };
+                // An S is no bend: its ends stay, and its middle, and no step along a bend promises anything.
+                let s = |size: f64| {
+                    let mut start = vec![1.0 + size, -3.0 * size, 2.0 * size];
+                    start.resize(coefficients, 0.0);
+                    start
+                };
+                let mut starts = vec![start(0.05), start(-0.05)];
+                if coefficients > 2 {
+                    starts.extend([s(0.1), s(-0.1)]);
+                }
+                starts
+            }
+        }
+    }
+
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        // At voltages of two digits' steps, so that the name says where exactly.
+        let step = data.full_scale_v / f64::from(POINTS);
+        let decimals = (1.0 - step.log10().floor()).clamp(-300.0, 300.0) as i32;
+        let unit = 10f64.powi(-decimals);
+        let at = |part: u32| {
+            let voltage = (step / unit).round() * unit * f64::from(part);
+            let name = format!("at_{voltage:.*}_v", decimals.max(0) as usize);
+            Quantity::new(name, "V", voltage * FORMS[form].0.secant(point, voltage / data.full_scale_v))
+        };
+        (1..=POINTS).map(at).collect()
+    }
+
+    /// The tick's law is before the relaxation.
+    fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        FORMS[form].1.then(|| "fitted behind the relaxation, written before it".into())
+    }
+
+    fn change<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
+        let (curve, behind) = FORMS[form];
+        let law = if behind { &mut chain.law_behind } else { &mut chain.law };
+        law.push(move |voltage| voltage * curve.secant(point, voltage.abs() / data.full_scale_v));
+    }
+}

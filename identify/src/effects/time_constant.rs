@@ -1,0 +1,51 @@
+//! The relaxation time is not 5.5 s.
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::plant::chain::Chain;
+use crate::record::data::Data;
+
+pub(super) struct TimeConstant;
+
+impl Effect for TimeConstant {
+    fn cause(&self) -> &'static str {
+        "time-constant"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Relaxation
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the relaxation takes another time"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "a step that is read densely for ten time constants"
+    }
+
+    fn special_case_of(&self) -> &'static [&'static str] {
+        &["voltage-dependent-time-constant"]
+    }
+
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        vec![Coordinate::log(0.2 * data.sample_s, 10.0 * data.duration_s())]
+    }
+
+    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+        [1.0, 2.5, 4.0, 5.0, 6.0, 8.0, 14.0, 30.0].map(|tau: f64| vec![tau.ln()]).to_vec()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("tau_s", "s", point[0].exp())]
+    }
+
+    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        None
+    }
+
+    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        let factor = point[0].exp() / chain.relaxation.tau_s;
+        chain.relaxation.tau_s *= factor;
+        chain.relaxation.tau_high_s *= factor;
+    }
+}

@@ -1,0 +1,85 @@
+//! The relaxation time changes with the voltage: straight or geometric from `tau_low` at 0 V to `tau_high` at 500 V.
+//!
+//! | form | between its ends | follows |
+//! | --- | --- | --- |
+//! | 0, 1 | straight, geometric | the voltage across the spring |
+//! | 2, 3 | straight, geometric | the spring's own state: what has relaxed so far, and a part of what is still to come |
+
+use model::Plant;
+
+use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::plant::chain::Chain;
+use crate::record::data::Data;
+
+pub(super) struct VoltageDependentTimeConstant;
+
+/// Geometric, by the spring's own state.
+const FORMS: [(bool, bool); 4] = [(false, false), (true, false), (false, true), (true, true)];
+
+impl Effect for VoltageDependentTimeConstant {
+    fn cause(&self) -> &'static str {
+        "voltage-dependent-time-constant"
+    }
+
+    fn stage(&self) -> Stage {
+        Stage::Relaxation
+    }
+
+    fn meaning(&self) -> &'static str {
+        "the relaxation time changes with the voltage"
+    }
+
+    fn experiment(&self) -> &'static str {
+        "equal small steps at several voltages, each held for five time constants"
+    }
+
+    fn forms(&self) -> usize {
+        FORMS.len()
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        let coordinate = Coordinate::log(0.2 * data.sample_s, 10.0 * data.duration_s());
+        let mut coordinates = vec![coordinate, coordinate];
+        coordinates.extend(FORMS[form].1.then(|| Coordinate::new(0.0, 1.0)));
+        coordinates
+    }
+
+    /// None in mid-course: where such a form starts is not straight in what it makes.
+    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && scene.data.begun {
+            return Vec::new();
+        }
+        let start = |(low, high): (f64, f64)| {
+            let mut point = vec![low.ln(), high.ln()];
+            point.extend(FORMS[form].1.then_some(Plant::PAPER.share));
+            point
+        };
+        [(5.5, 6.5), (5.5, 4.5), (6.5, 4.5), (4.5, 6.5), (4.5, 5.5), (6.5, 5.5), (9.0, 3.0), (3.0, 9.0)]
+            .map(start)
+            .to_vec()
+    }
+
+    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        vec![Quantity::new("tau_low_s", "s", point[0].exp()), Quantity::new("tau_high_s", "s", point[1].exp())]
+    }
+
+    /// The tick's time constant is straight between both ends, and follows the voltage.
+    fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        match FORMS[form] {
+            (false, false) => None,
+            (true, false) => Some("fitted as geometric between its ends, written as straight".into()),
+            (false, true) => Some("fitted by the spring's own state, written by the voltage".into()),
+            (true, true) => Some(
+                "fitted as geometric between its ends and by the spring's own state, written as straight and by the voltage"
+                    .into(),
+            ),
+        }
+    }
+
+    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.relaxation.tau_s = point[0].exp();
+        chain.relaxation.tau_high_s = point[1].exp();
+        chain.relaxation.geometric = FORMS[form].0;
+        chain.relaxation.by_state = FORMS[form].1.then(|| point[2]);
+    }
+}

@@ -1,0 +1,312 @@
+//! Fits of a model's points to a record: Levenberg and Marquardt's method on the noise's log-likelihood.
+//!
+//! Each round takes the noise's weights for the present residual (iteratively reweighted least squares), steps, and keeps
+//! the step only if the likelihood grew. Coordinates stay within their bounds.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::effects::effect::Scene;
+use crate::effects::model::Model;
+use crate::fit::simulator::Simulator;
+use crate::noise::{Noise, Term, scale};
+use crate::plant::start;
+use crate::record::data::Data;
+use crate::record::observed::{Kind, Observed};
+use crate::stats::sums::dot;
+
+/// A model with its points fitted.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model at its best point.
+    pub model: Model,
+    /// Readings less prediction, in V.
+    pub residual: Vec<f64>,
+    /// The noise's law for this residual.
+    pub noise: Noise,
+    /// Log-likelihood under that law, less [`Fit::cost`].
+    pub log_likelihood: f64,
+    /// Log-likelihood under independent noise: what a memory that is really structure cannot hide.
+    pub plain: f64,
+    /// What a start in mid-course costs, in nats.
+    pub start_cost: f64,
+}
+
+/// Errors this many times as large as what of them is new at each reading wander.
+const WANDERS: f64 = 4.0;
+
+impl Fit {
+    /// True if nearly all that is left would be foretold by the noise's memory: what is slow may hide in it.
+    pub fn wanders(&self) -> bool {
+        self.noise.marginal > WANDERS * self.noise.sigma
+    }
+
+    /// What the law of the noise and the start cost, in nats.
+    pub fn cost(&self) -> f64 {
+        self.noise.cost(self.residual.len()) + self.start_cost
+    }
+}
+
+/// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
+#[derive(Clone, Debug)]
+pub struct Jacobian {
+    /// Places of the columns among all coordinates.
+    pub places: Vec<usize>,
+    /// The columns, in V per unit of the coordinate.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// Rounds of a fit.
+const ROUNDS: usize = 14;
+/// A round that gains less than this, in nats, is the last.
+const ENOUGH: f64 = 0.02;
+/// A step that promises less is not tried.
+const HOPELESS: f64 = 0.1 * ENOUGH;
+
+/// Most such bounds that a fit goes beyond, one after the other.
+const MOST_STEPS: usize = 30;
+
+/// Fits models to one record.
+pub struct Engine<'a> {
+    /// The record.
+    pub data: &'a Data,
+    /// What its readings say.
+    pub observed: &'a Observed,
+    /// Runs the models.
+    pub simulator: Simulator<'a>,
+    /// Readings less what the simulation without any block predicts, in V.
+    pub simulation: Vec<f64>,
+    predicted: Vec<f64>,
+    kernels: Vec<Vec<f64>>,
+}
+
+impl<'a> Engine<'a> {
+    /// For one record.
+    pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
+        let mut engine =
+            Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new(), kernels: Vec::new() };
+        engine.simulation = engine.residual(&Model::default());
+        engine
+    }
+
+    /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
+    pub fn residual(&mut self, model: &Model) -> Vec<f64> {
+        self.residual_and_start(model).0
+    }
+
+    /// The same, with what that start costs, in nats.
+    fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
+        if self.data.begun {
+            self.simulator.run_begun(model, &mut self.predicted, &mut self.kernels);
+        } else {
+            self.simulator.run(model, &mut self.predicted);
+        }
+        let cut_v = self.observed.cut_v;
+        let left = |(reading, predicted): (&f64, &f64)| reading + cut_v - predicted;
+        let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
+        let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
+        let start_cost = match self.data.begun {
+            true => start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact),
+            false => 0.0,
+        };
+        (residual, start_cost)
+    }
+
+    /// A model at the point that it has, with the noise that suits it.
+    pub fn at(&mut self, model: Model) -> Fit {
+        let (residual, start_cost) = self.residual_and_start(&model);
+        let noise = Noise::fitted(&residual, self.observed);
+        let log_likelihood = self.log(&noise, &residual);
+        let plain = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
+        let fit = Fit { model, residual, noise, log_likelihood, plain, start_cost };
+        Fit { log_likelihood: log_likelihood - fit.cost(), ..fit }
+    }
+
+    /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.
+    pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
+        let model = self.polished(model, |_| true);
+        let model = self.descend(model, law);
+        let here = self.at(model);
+        self.gone_on(here, law)
+    }
+
+    /// From between bounds at which the prediction jumps, to either side while that is likelier.
+    fn gone_on(&mut self, mut here: Fit, law: &Noise) -> Fit {
+        for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
+            let mut steps = side;
+            for _ in 0..MOST_STEPS {
+                let (block, point) = &here.model.blocks[index];
+                let Some(point) = block.effect().beyond(block.form, point, steps, self.data) else { break };
+                let mut model = here.model.clone();
+                model.blocks[index].1 = point;
+                let model = self.descend(model, law);
+                let there = self.at(model);
+                if there.log_likelihood > here.log_likelihood {
+                    here = there;
+                    steps *= 2.0;
+                } else if steps != side {
+                    steps = side;
+                } else {
+                    break;
+                }
+            }
+        }
+        here
+    }
+
+    /// Moves what only a search can move, block by block, to where the rest of the model wants it in the rows that are seen.
+    pub fn polished(&mut self, mut model: Model, seen: impl Fn(usize) -> bool) -> Model {
+        for index in 0..model.blocks.len() {
+            let block = model.blocks[index].0;
+            if !block.searched(self.data) {
+                continue;
+            }
+            let mut residual = self.residual(&model.without(block.effect));
+            let rows = 0..residual.len();
+            let errors: Vec<f64> = rows.clone().filter(|&row| seen(row)).map(|row| residual[row]).collect();
+            rows.filter(|&row| !seen(row)).for_each(|row| residual[row] = f64::NAN);
+            let scene = Scene { data: self.data, residual: &residual, sigma: scale(&errors) };
+            block.effect().polish(block.form, &mut model.blocks[index].1, &scene);
+        }
+        model
+    }
+
+    /// First for robust independent noise, then for the law that it leaves.
+    pub fn fit_twice(&mut self, model: Model) -> Fit {
+        let first = self.fit(model, &Noise::first_look());
+        self.fit_again(first)
+    }
+
+    /// For the law that a first fit leaves.
+    pub fn fit_again(&mut self, first: Fit) -> Fit {
+        let second = self.fit(first.model.clone(), &first.noise);
+        if second.log_likelihood >= first.log_likelihood { second } else { first }
+    }
+
+    fn log(&self, noise: &Noise, residual: &[f64]) -> f64 {
+        noise.log_likelihood(residual, self.observed)
+    }
+
+    fn descend(&mut self, mut model: Model, law: &Noise) -> Model {
+        let bounds = model.coordinates(self.data);
+        let mut points = model.points();
+        for (point, bound) in points.iter_mut().zip(&bounds) {
+            *point = point.clamp(bound.lowest, bound.highest);
+        }
+        model.set_points(&points);
+        let mut residual = self.residual(&model);
+        let (mut noise, mut value) = law.rescaled(&residual, self.observed);
+        let mut damping = 1e-3;
+        for _ in 0..ROUNDS {
+            let jacobian = self.jacobian(&model, &noise, &residual);
+            if jacobian.places.is_empty() {
+                break;
+            }
+            let (normal, gradient) = normal_equations(&jacobian, &self.terms(&noise, &residual));
+            let mut gained = 0.0;
+            for _ in 0..6 {
+                let Some(step) = damped_step(&normal, &gradient, damping) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let mut moved = points.clone();
+                for (&place, step) in jacobian.places.iter().zip(step.iter()) {
+                    moved[place] = (moved[place] + step).clamp(bounds[place].lowest, bounds[place].highest);
+                }
+                if promised(&normal, &gradient, &jacobian.places, &points, &moved) < HOPELESS {
+                    break;
+                }
+                let mut candidate = model.clone();
+                candidate.set_points(&moved);
+                let there = self.residual(&candidate);
+                let (noise_there, value_there) = law.rescaled(&there, self.observed);
+                if value_there > value {
+                    gained = value_there - value;
+                    (points, model, residual, noise, value) = (moved, candidate, there, noise_there, value_there);
+                    damping = (damping / 8.0).max(1e-9);
+                    break;
+                }
+                damping *= 6.0;
+            }
+            if gained < ENOUGH {
+                break;
+            }
+        }
+        model
+    }
+
+    /// Every row's part in the fit.
+    pub fn terms(&self, noise: &Noise, residual: &[f64]) -> Vec<Term> {
+        let white = noise.innovations(&self.observed.errors(residual));
+        (0..residual.len()).map(|row| noise.term(self.observed.kinds[row], residual[row], white[row])).collect()
+    }
+
+    /// Forward differences, from the bounds inwards.
+    pub fn jacobian(&mut self, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
+        let bounds = model.coordinates(self.data);
+        let points = model.points();
+        let places: Vec<usize> = (0..points.len()).filter(|&place| bounds[place].fitted).collect();
+        let mut nudged = model.clone();
+        let columns = places.iter().map(|&place| {
+            let bound = &bounds[place];
+            let mut step = 1e-5 * (bound.highest - bound.lowest).min(1.0 + points[place].abs());
+            if points[place] + step > bound.highest {
+                step = -step;
+            }
+            let mut moved = points.clone();
+            moved[place] += step;
+            nudged.set_points(&moved);
+            let there = self.residual(&nudged);
+            let column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
+            // Rows that stopped at a bound are taken one by one, the others whitened.
+            let mut white = noise.whitened(&column);
+            for (row, kind) in self.observed.kinds.iter().enumerate() {
+                if *kind != Kind::Exact {
+                    white[row] = column[row];
+                }
+            }
+            white
+        });
+        let columns = columns.collect();
+        Jacobian { places, columns }
+    }
+}
+
+/// `J' W J` and `J' W r`.
+pub fn normal_equations(jacobian: &Jacobian, terms: &[Term]) -> (DMatrix<f64>, DVector<f64>) {
+    let size = jacobian.columns.len();
+    let mut normal = DMatrix::zeros(size, size);
+    let mut gradient = DVector::zeros(size);
+    let mut weighted = vec![0.0; terms.len()];
+    let residual: Vec<f64> = terms.iter().map(|term| term.residual).collect();
+    for (i, column) in jacobian.columns.iter().enumerate() {
+        for ((weighted, value), term) in weighted.iter_mut().zip(column).zip(terms) {
+            *weighted = value * term.weight;
+        }
+        gradient[i] = dot(&weighted, &residual);
+        for (j, other) in jacobian.columns.iter().enumerate().skip(i) {
+            let product = dot(&weighted, other);
+            normal[(i, j)] = product;
+            normal[(j, i)] = product;
+        }
+    }
+    (normal, gradient)
+}
+
+/// What the parabola of the normal equations gains between two points, in nats.
+fn promised(normal: &DMatrix<f64>, gradient: &DVector<f64>, places: &[usize], from: &[f64], to: &[f64]) -> f64 {
+    let step = DVector::from_iterator(places.len(), places.iter().map(|&place| to[place] - from[place]));
+    gradient.dot(&step) - 0.5 * (normal * &step).dot(&step)
+}
+
+/// The solution of the damped normal equations, scaled to unit diagonal.
+pub fn damped_step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    let size = normal.nrows();
+    let scale = DVector::from_fn(size, |i, _| 1.0 / normal[(i, i)].max(1e-30).sqrt());
+    let mut scaled = DMatrix::from_fn(size, size, |i, j| normal[(i, j)] * scale[i] * scale[j]);
+    for i in 0..size {
+        scaled[(i, i)] = scaled[(i, i)].max(1e-12) + damping;
+    }
+    let right = gradient.component_mul(&scale);
+    let step = scaled.cholesky()?.solve(&right).component_mul(&scale);
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}

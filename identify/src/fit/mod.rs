@@ -1,0 +1,6 @@
+//! A model and a record in, the likeliest parameters, intervals and held-out predictions out.
+
+pub mod engine;
+pub mod held_out;
+pub mod interval;
+pub mod simulator;

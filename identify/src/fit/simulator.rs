@@ -1,0 +1,194 @@
+//! What a model predicts for a record. Runs that differ in later things alone share the earlier ones.
+
+use crate::effects::effect::Acts;
+use crate::effects::model::Model;
+use crate::plant::base::Base;
+use crate::plant::start::Start;
+use crate::record::data::Data;
+use crate::record::signal::Signal;
+
+/// Runs models on a record.
+#[derive(Clone, Debug)]
+pub struct Simulator<'a> {
+    /// The record.
+    pub data: &'a Data,
+    /// The simulation without any effect.
+    pub base: &'a Base,
+    signal: Signal,
+    levels_v: Vec<f64>,
+    /// What the last amplifier made of the command, the last memory and law of that, and the last relaxation of that.
+    amplified: Kept<Signal>,
+    settled: Kept<Signal>,
+    chained: Kept<Signal>,
+    /// Readings before any effect on them, of the last response.
+    response: Kept<Vec<f64>>,
+    /// What each state adds to them.
+    kernels: Kept<Vec<Vec<f64>>>,
+    /// Runs so far.
+    pub runs: usize,
+}
+
+/// What a part of a run made, and of what.
+#[derive(Clone, Debug, Default)]
+struct Kept<T> {
+    of: Option<Model>,
+    made: T,
+}
+
+impl<T> Kept<T> {
+    /// True if it was made by the same blocks as far as `last`; else it is said to be from now on.
+    fn is_of(&mut self, model: &Model, last: Acts) -> bool {
+        let blocks = || model.blocks.iter().filter(|(block, _)| block.effect().acts() <= last);
+        if self.of.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks())) {
+            return true;
+        }
+        self.of = Some(Model { blocks: blocks().cloned().collect() });
+        false
+    }
+}
+
+impl<'a> Simulator<'a> {
+    /// For one record.
+    pub fn new(data: &'a Data, base: &'a Base) -> Self {
+        Self {
+            data,
+            base,
+            signal: Signal::default(),
+            levels_v: Vec::new(),
+            amplified: Kept::default(),
+            settled: Kept::default(),
+            chained: Kept::default(),
+            response: Kept::default(),
+            kernels: Kept::default(),
+            runs: 0,
+        }
+    }
+
+    /// What a model predicts for each row, in V.
+    pub fn run(&mut self, model: &Model, readings: &mut Vec<f64>) {
+        self.runs += 1;
+        if !self.response.is_of(model, Acts::OnResponse) {
+            let mut made = std::mem::take(&mut self.response.made);
+            made.clear();
+            made.extend(self.responded(model).at_rows());
+            self.response.made = made;
+        }
+        readings.clone_from(&self.response.made);
+        self.read(model, readings);
+    }
+
+    fn read(&self, model: &Model, readings: &mut [f64]) {
+        for (block, point) in &model.blocks {
+            block.effect().read(block.form, point, self.data, readings);
+        }
+    }
+
+    /// The same, and what each state that is 1 V off its rest at the first row adds to it.
+    pub fn run_begun(&mut self, model: &Model, readings: &mut Vec<f64>, kernels: &mut Vec<Vec<f64>>) {
+        self.run(model, readings);
+        if !self.kernels.is_of(model, Acts::OnResponse) {
+            let chain = model.chain(self.base, self.data);
+            self.kernels.made.clear();
+            let (mut state, mut states) = (0, 1);
+            while state < states {
+                let mut start = Start::off(state);
+                self.signal.clone_from(&self.amplified.made);
+                chain.begin(&mut self.signal, &mut start, &self.levels_v);
+                for (block, point) in &model.blocks {
+                    block.effect().respond(block.form, point, &mut self.signal, &mut start);
+                }
+                (state, states) = (state + 1, start.states());
+                // What no row sees is no unknown.
+                if self.signal.at_rows().any(|value| value != 0.0) {
+                    self.kernels.made.push(self.signal.at_rows().collect());
+                }
+            }
+        }
+        kernels.clone_from(&self.kernels.made);
+        if model.blocks.iter().any(|(block, _)| block.effect().acts() == Acts::OnReadings) {
+            for kernel in kernels {
+                kernel.iter_mut().zip(&self.response.made).for_each(|(moved, stiffness)| *moved += stiffness);
+                self.read(model, kernel);
+                kernel.iter_mut().zip(&*readings).for_each(|(moved, reading)| *moved -= reading);
+            }
+        }
+    }
+
+    /// The stiffness that a model's chain and response make of the command.
+    fn responded(&mut self, model: &Model) -> &Signal {
+        let data = self.data;
+        let known = self.chained.is_of(model, Acts::OnChain);
+        let signal = &mut self.chained.made;
+        if !known {
+            let chain = model.chain(self.base, data);
+            if !self.settled.is_of(model, Acts::OnSettled) {
+                if !self.amplified.is_of(model, Acts::OnAmplifier) {
+                    self.amplified.made.clone_from(&data.command);
+                    chain.amplify(&mut self.amplified.made);
+                }
+                self.settled.made.clone_from(&self.amplified.made);
+                chain.settle(&mut self.settled.made);
+            }
+            signal.clone_from(&self.settled.made);
+            chain.relax(signal, &self.amplified.made, &mut self.levels_v);
+        }
+        if model.blocks.iter().all(|(block, _)| block.effect().acts() != Acts::OnResponse) {
+            return signal;
+        }
+        self.signal.clone_from(signal);
+        for (block, point) in &model.blocks {
+            block.effect().respond(block.form, point, &mut self.signal, &mut Start::at_rest());
+        }
+        &self.signal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::index_of;
+    use crate::effects::model::Block;
+    use crate::record::data::Input;
+    use simulation::record::Record;
+
+    /// Whatever ran before: a run is what it is for a new simulator.
+    #[test]
+    fn what_is_kept_changes_no_run() {
+        let rows = (0..60).map(|row| format!("{row},{},0\n", 100 * (row / 20 % 2)));
+        let text = format!("time_s,voltage_v,stiffness\n{}", rows.collect::<String>());
+        let (data, base) = (Data::new(&Record::parse("r", &text, "stiffness").unwrap(), Input::Hold), Base::paper());
+        let of = |blocks: &[(&str, &[f64])]| {
+            blocks.iter().fold(Model::default(), |model, (cause, point)| {
+                model.with(Block { effect: index_of(cause).unwrap(), form: 0 }, point.to_vec())
+            })
+        };
+        type Named<'a> = (&'a str, &'a [f64]);
+        let [gain, swing, hum, cut]: [Named; 4] = [
+            ("gain-error", &[1.2]),
+            ("resonance", &[-1.0, -1.0]),
+            ("hum", &[0.1, 3.0, 0.0]),
+            ("amplifier-limit", &[60.0]),
+        ];
+        let models = [
+            of(&[]),
+            of(&[hum]),
+            of(&[gain, hum]),
+            of(&[gain, swing, hum]),
+            of(&[cut, gain]),
+            of(&[cut]),
+            of(&[gain]),
+            of(&[swing]),
+        ];
+        let mut kept = Simulator::new(&data, &base);
+        let mut got = (Vec::new(), Vec::new());
+        let mut expected = got.clone();
+        for first in &models {
+            for model in &models {
+                kept.run(first, &mut got.0);
+                kept.run_begun(model, &mut got.0, &mut got.1);
+                Simulator::new(&data, &base).run_begun(model, &mut expected.0, &mut expected.1);
+                assert_eq!(got, expected, "{model:?} after {first:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The tail of the innovations: a normal's, Student's t, or a mixture of two normals, by likelihood.
+
+use crate::noise::{FINEST_V, Noise, scale, scale_of_squares};
+use crate::stats::sums::total;
+
+const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];
+/// What a mixture must be better by than one heavy tail, in nats, to be outliers.
+const OUTLIERS: f64 = 7.0;
+/// Where more readings than this part are off, they are no outliers.
+const MOST_OUTLIERS: f64 = 0.25;
+/// So few errors are taken one by one; of more, sizes are alike in cells, so many for each scale.
+const FEW: usize = 1_000;
+const CELLS: f64 = 100.0;
+/// Scale of outliers in the noise's scales, at least.
+const WIDE: f64 = 4.0;
+
+impl Noise {
+    fn is_normal(&self) -> bool {
+        self.nu.is_infinite() && self.wide.is_none()
+    }
+
+    /// Where a search for the scale of some innovations starts; where it ends if they are normal.
+    pub(super) fn first_scale(&self, innovations: &[f64]) -> f64 {
+        if self.is_normal() { scale_of_squares(innovations) } else { scale(innovations) }
+    }
+
+    /// The likeliest scale for some innovations, by reweighting; the tail's shape stays. Of each item `of` says its size, and
+    /// how many have it.
+    pub(super) fn fit_scale<T>(&mut self, start: f64, items: &[T], of: impl Fn(&T) -> (f64, f64), rounds: usize) {
+        *self = self.scaled_to(start);
+        if self.is_normal() {
+            return;
+        }
+        let count = total(items, |item| of(item).1).max(1.0);
+        for _ in 0..rounds {
+            let squares = total(items, |item| {
+                let (e, times) = of(item);
+                times * e * e * self.weight(e)
+            });
+            *self = self.scaled_to(self.sigma * (squares / count).sqrt());
+        }
+    }
+
+    /// The same shape, of another scale.
+    fn scaled_to(&self, sigma: f64) -> Self {
+        let scaled = self.with_tail(self.nu, sigma);
+        let wide = self.wide.map(|(fraction, wide)| (fraction, wide * scaled.sigma / self.sigma));
+        Self { wide, ..scaled }
+    }
+
+    /// The likeliest tail of some innovations, and its scale.
+    pub(super) fn fit_tail(&mut self, innovations: &[f64]) {
+        let start = scale(innovations);
+        let sizes = &*sizes(innovations, start);
+        let mut best = f64::NEG_INFINITY;
+        let mut consider = |noise: &mut Self, tried: Self, cost: f64| {
+            let log: f64 = sizes.iter().map(|&(e, times)| times * tried.exact_term(e).log).sum::<f64>() - cost;
+            if log > best {
+                best = log;
+                *noise = tried;
+            }
+        };
+        let normal = self.with_tail(f64::INFINITY, scale_of_squares(innovations));
+        consider(self, normal.clone(), 0.0);
+        for nu in TAILS {
+            let mut heavy = normal.with_tail(nu, start);
+            heavy.fit_scale(start, sizes, |&size| size, 8);
+            consider(self, heavy, 2.0);
+        }
+        if innovations.len() >= 30 && innovations.iter().any(|e| e.abs() > WIDE * start) {
+            let mixture = Self::mixture(sizes, start, &normal);
+            if mixture.wide.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS) {
+                consider(self, mixture, OUTLIERS);
+            }
+        }
+    }
+
+    /// Expectation-maximisation of two normals around zero.
+    fn mixture(sizes: &[(f64, f64)], start: f64, normal: &Self) -> Self {
+        let sums = |sum: (f64, f64), &(e, times): &(f64, f64)| (sum.0 + times, sum.1 + times * (e * e));
+        let (count, _) = sizes.iter().fold((0.0, 0.0), sums);
+        let (far, squares) = sizes.iter().filter(|(e, _)| e.abs() > WIDE * start).fold((0.0, 0.0), sums);
+        let (mut sigma, mut wide) = (start, (squares / f64::max(far, 1.0)).sqrt().max(WIDE * start));
+        let mut fraction = far / count;
+        for _ in 0..25 {
+            let (mut weight, mut narrow_sum, mut wide_sum) = (0.0, 0.0, 0.0);
+            for &(e, times) in sizes {
+                let normal = |scale: f64| (-0.5 * (e / scale).powi(2)).exp() / scale;
+                let (a, b) = ((1.0 - fraction) * normal(sigma), fraction * normal(wide));
+                let outlier = if a + b > 0.0 { b / (a + b) } else { 1.0 };
+                weight += times * outlier;
+                narrow_sum += times * (1.0 - outlier) * e * e;
+                wide_sum += times * outlier * e * e;
+            }
+            fraction = (weight / count).clamp(1e-6, 0.5);
+            sigma = (narrow_sum / (count - weight)).sqrt().max(FINEST_V);
+            wide = (wide_sum / weight.max(1e-9)).sqrt().max(WIDE * sigma);
+        }
+        Self { wide: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }
+    }
+}
+
+/// Errors, each so many times: where only their sizes matter, many of nearly the same size count as one.
+pub(super) fn sizes(errors: &[f64], scale: f64) -> Vec<(f64, f64)> {
+    if errors.len() <= FEW {
+        return errors.iter().map(|&e| (e, 1.0)).collect();
+    }
+    let mut cells = vec![(0.0, 0.0); (2.0 * WIDE * CELLS) as usize];
+    let mut sizes = Vec::new();
+    for &e in errors {
+        match cells.get_mut((e.abs() / scale * CELLS) as usize) {
+            Some((squares, times)) => (*squares, *times) = (*squares + e * e, *times + 1.0),
+            None => sizes.push((e, 1.0)),
+        }
+    }
+    sizes.extend(
+        cells.into_iter().filter(|cell| cell.1 > 0.0).map(|(squares, times)| ((squares / times).sqrt(), times)),
+    );
+    sizes
+}
+
+/// Logarithm of the t distribution's constant.
+pub(super) fn tail_constant(nu: f64) -> f64 {
+    libm::lgamma(0.5 * (nu + 1.0)) - libm::lgamma(0.5 * nu) - 0.5 * (nu * std::f64::consts::PI).ln()
+}

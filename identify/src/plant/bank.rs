@@ -1,0 +1,222 @@
+//! Rate-independent memory: a bank of play operators (the Prandtl-Ishlinskii model; Brokate and Sprekels, *Hysteresis and
+//! Phase Transitions*, 1996).
+//!
+//! ```text
+//! play: z' = clamp(z, u - r, u + r)        p = direct u + sum weight z
+//! ```
+//!
+//! A spring that never had a voltage starts with all `z` at 0; one that comes from a large voltage with each at its `r`, where
+//! its sensor has been set to zero.
+//! From rest upwards it follows its loading curve `phi(u) = direct u + sum weight max(u - r, 0)`. Behind a bank whose
+//! curve rises, another bank is a bank again, and the curves are put into each other (Kuhnen, *European Journal of
+//! Control* 9, 2003).
+
+use model::extended::memory::MOST_PLAYS;
+
+use simulation::plant_file::Memory;
+
+/// A bank of play operators; without plays and with `direct = 1`, no memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bank {
+    /// Weight of the input itself.
+    pub direct: f64,
+    plays: Vec<Play>,
+    /// What counts as 0 V.
+    zero: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Play {
+    threshold: f64,
+    weight: f64,
+    value: f64,
+}
+
+impl Bank {
+    /// Of plays with their thresholds, in V, and weights; those without weight are left out.
+    pub fn new(direct: f64, plays: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let plays = plays.into_iter().filter(|(_, weight)| *weight != 0.0);
+        Self {
+            direct,
+            plays: plays.map(|(threshold, weight)| Play { threshold, weight, value: 0.0 }).collect(),
+            zero: 0.0,
+        }
+    }
+
+    /// The same after a large voltage: each play starts where that leaves it at 0 V, and what it then holds counts as none.
+    pub fn cycled(mut self) -> Self {
+        for play in &mut self.plays {
+            play.value = play.threshold;
+            self.zero += play.weight * play.threshold;
+        }
+        self
+    }
+
+    /// The same before any voltage.
+    pub fn at_rest(mut self) -> Self {
+        self.zero = 0.0;
+        self.plays.iter_mut().for_each(|play| play.value = 0.0);
+        self
+    }
+
+    /// Of a plant file.
+    pub fn of(memory: Option<&Memory>) -> Self {
+        match memory {
+            None => Self::new(1.0, []),
+            Some(Memory { direct, thresholds_v, weights }) => {
+                Self::new(*direct, thresholds_v.iter().copied().zip(weights.iter().copied()))
+            }
+        }
+    }
+
+    /// For a plant file; none if there is no memory.
+    pub fn table(&self) -> Option<Memory> {
+        let (thresholds_v, weights) = self.plays.iter().map(|play| (play.threshold, play.weight)).unzip();
+        (*self != Self::new(1.0, [])).then_some(Memory { direct: self.direct, thresholds_v, weights })
+    }
+
+    /// True if a plant file holds that many plays.
+    pub fn fits(&self) -> bool {
+        self.plays.len() <= MOST_PLAYS
+    }
+
+    /// True if the loading curve falls nowhere.
+    pub fn rises(&self) -> bool {
+        self.lines().iter().all(|line| line.slope >= -1e-9)
+    }
+
+    /// This bank behind another, whose loading curve falls nowhere.
+    pub fn behind(&self, first: &Self) -> Self {
+        if *first == Self::new(1.0, []) {
+            return self.clone();
+        }
+        let (outer, inner) = (self.lines(), first.lines());
+        // Where the first bank reaches the thresholds of this one.
+        let reached = outer.iter().map(|line| {
+            let below = inner[inner.partition_point(|inner| inner.value <= line.start).max(1) - 1];
+            below.start + (line.start - below.value) / below.slope
+        });
+        let mut starts: Vec<f64> = inner.iter().map(|line| line.start).chain(reached.filter(|v| *v > 0.0)).collect();
+        starts.retain(|start| start.is_finite());
+        starts.sort_by(f64::total_cmp);
+        starts.dedup_by(|b, a| *b - *a < 1e-9);
+        let mut bank = Self::new(0.0, []);
+        let mut before = 0.0;
+        for (index, &threshold) in starts.iter().enumerate() {
+            // Within the line, so that rounding cannot choose the wrong one.
+            let within = starts.get(index + 1).map_or(threshold + 1.0, |next| (threshold + next) / 2.0);
+            let Line { start, value, slope } = line_at(&inner, within);
+            let slope = slope * line_at(&outer, value + slope * (within - start)).slope;
+            if index == 0 {
+                bank.direct = slope;
+            } else if slope != before {
+                bank.plays.push(Play { threshold, weight: slope - before, value: 0.0 });
+            }
+            before = slope;
+        }
+        bank
+    }
+
+    /// The output when the input comes to `voltage`.
+    pub fn at(&mut self, voltage: f64) -> f64 {
+        let mut sum = self.direct * voltage - self.zero;
+        for play in &mut self.plays {
+            play.value = play.value.clamp(voltage - play.threshold, voltage + play.threshold);
+            sum += play.weight * play.value;
+        }
+        sum
+    }
+
+    /// Largest distance along the voltage axis between the branches of a slow loop from 0 to `top` and back, in V.
+    pub fn width(mut self, top: f64) -> f64 {
+        const STEPS: usize = 400;
+        let voltage = |step: usize| top * step as f64 / STEPS as f64;
+        // Once around first, so that the loop closes.
+        for step in (0..=STEPS).chain((0..STEPS).rev()) {
+            self.at(voltage(step));
+        }
+        let up: Vec<f64> = (0..=STEPS).map(|step| self.at(voltage(step))).collect();
+        let mut down: Vec<f64> = (0..=STEPS).rev().map(|step| self.at(voltage(step))).collect();
+        down.reverse();
+        // Both rise with the voltage: the voltage of the branch up at the same stiffness, by interpolation.
+        let mut at = 0;
+        let mut widest = 0.0f64;
+        for (step, &value) in down.iter().enumerate() {
+            while at + 1 < STEPS && up[at + 1] < value {
+                at += 1;
+            }
+            let rise = up[at + 1] - up[at];
+            let part = if rise > 0.0 { ((value - up[at]) / rise).clamp(0.0, 1.0) } else { 1.0 };
+            widest = widest.max(voltage(at) + part * top / STEPS as f64 - voltage(step));
+        }
+        widest
+    }
+
+    /// The loading curve from 0 V up.
+    fn lines(&self) -> Vec<Line> {
+        let mut plays = self.plays.clone();
+        plays.sort_by(|a, b| a.threshold.total_cmp(&b.threshold));
+        let mut lines = vec![Line { start: 0.0, value: 0.0, slope: self.direct }];
+        for Play { threshold, weight, .. } in plays {
+            let Line { start, value, slope } = lines[lines.len() - 1];
+            lines.push(Line { start: threshold, value: value + slope * (threshold - start), slope: slope + weight });
+        }
+        lines
+    }
+}
+
+/// A line of a loading curve.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    start: f64,
+    value: f64,
+    slope: f64,
+}
+
+fn line_at(lines: &[Line], at: f64) -> Line {
+    lines[lines.partition_point(|line| line.start <= at).max(1) - 1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One play of weight 1 lags by its threshold on both branches.
+    #[test]
+    fn a_whole_play_is_twice_its_threshold_wide() {
+        let width = Bank::new(0.0, [(20.0, 1.0)]).width(500.0);
+        assert!((width - 40.0).abs() < 0.5, "{width}");
+    }
+
+    /// The second time up is the same for both: the first has then been cycled too.
+    #[test]
+    fn a_cycled_bank_begins_where_a_large_voltage_leaves_it() {
+        let mut fresh = Bank::new(0.6, [(20.0, 0.1), (60.0, 0.3)]);
+        let mut cycled = fresh.clone().cycled();
+        assert_eq!(cycled.clone().at_rest(), fresh);
+        assert_eq!(cycled.clone().at(0.0), 0.0);
+        fresh.at(500.0);
+        let held = fresh.at(0.0);
+        for voltage in [30.0, 170.0, 90.0] {
+            assert!((fresh.at(voltage) - held - cycled.at(voltage)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_bank_behind_a_bank_is_one_bank() {
+        let first = Bank::new(0.5, [(20.0, 0.3), (45.0, 0.4)]);
+        let none = Bank::new(1.0, []);
+        assert_eq!(first.behind(&none), first);
+        let whole = Bank::new(0.0, [(15.0, 0.5), (15.0, 0.5)]);
+        for second in [whole, Bank::new(0.0, [(30.0, 1.0)]), Bank::new(-0.3, [(10.0, 0.9), (30.0, 0.2), (90.0, 0.4)])] {
+            let mut both = second.behind(&first);
+            let (mut first, mut second) = (first.clone(), second.clone());
+            for step in 0..4000 {
+                let voltage = 300.0 * (0.01 * f64::from(step)).sin() + 200.0 * (0.0371 * f64::from(step)).sin();
+                let expected = second.at(first.at(voltage));
+                let got = both.at(voltage);
+                assert!((got - expected).abs() < 1e-9, "{got} {expected} at {voltage}");
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The simulation that is judged, as a plant file has it: the blocks that are there before any cause is looked for.
+
+use anyhow::Result;
+use model::Plant;
+
+use crate::plant::bank::Bank;
+use crate::plant::chain::Chain;
+use crate::plant::relaxation::Relaxation;
+use simulation::bad_input;
+use simulation::plant_file::PlantFile;
+
+/// A plant file's chain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Base {
+    file: PlantFile,
+    /// Its relaxation, which causes may change.
+    pub relaxation: Relaxation,
+}
+
+impl Base {
+    /// The paper's plant.
+    pub fn paper() -> Self {
+        let Plant { share, time_constant_s } = Plant::PAPER;
+        Self { file: Plant::PAPER.into(), relaxation: Relaxation::plain(share, time_constant_s) }
+    }
+
+    /// The chain of a plant file.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] for one with a memory that no other can stand behind.
+    pub fn new(file: PlantFile) -> Result<Self> {
+        if !Bank::of(file.memory.as_ref()).rises() {
+            bad_input!(
+                "--plant: memory that falls as the voltage rises; expected direct >= 0, also with the weights added to it"
+            );
+        }
+        let relaxation = Relaxation::of(&file.relaxation);
+        Ok(Self { file, relaxation })
+    }
+
+    /// The same without each of the parts that a file need not have, of those that it has.
+    pub fn without_each(&self) -> impl Iterator<Item = (&'static str, Self)> {
+        type Take = fn(&mut PlantFile) -> bool;
+        let parts: [(&str, Take); 6] = [
+            ("memory", |file| file.memory.take().is_some()),
+            ("law", |file| file.law.take().is_some()),
+            ("leakage", |file| file.leakage.take().is_some()),
+            ("amplifier", |file| file.amplifier.take().is_some()),
+            ("relaxation.tau_high_s", |file| file.relaxation.tau_high_s.take().is_some()),
+            ("relaxation.weights", |file| {
+                file.relaxation.tau_s.truncate(1);
+                !std::mem::take(&mut file.relaxation.weights).is_empty()
+            }),
+        ];
+        parts.into_iter().filter_map(|(part, take)| {
+            let mut file = self.file.clone();
+            let there = take(&mut file);
+            there.then(|| (part, Self { relaxation: Relaxation::of(&file.relaxation), file }))
+        })
+    }
+
+    /// The file, to be extended.
+    pub fn file(&self) -> &PlantFile {
+        &self.file
+    }
+
+    /// What runs.
+    pub fn chain(&self) -> Chain<'_> {
+        Chain::of(&self.file, self.relaxation)
+    }
+}

@@ -1,0 +1,123 @@
+//! A curve as a few straight lines, each about as far off as the others.
+//!
+//! For a bound on how far a chord may be off its curve, each goes as far as it can; the bound is the least for which the
+//! chords are few enough. (With free knots the error is least where it is the same between all of them: de Boor, *A Practical
+//! Guide to Splines*, 1978.) Then each knot is lifted by what its chords are off on average, which halves the error of a curve
+//! that bends one way.
+
+/// A point of a curve: place and value.
+pub(crate) type Point = (f64, f64);
+
+/// Halvings of the logarithm's range in which the bound is looked for.
+const HALVINGS: usize = 30;
+
+/// At most `most` knots, the curve's ends among them, and no more than are needed for chords that may be off by `enough`.
+/// The curve is at least two points, close together, in ascending places. Its first point stays.
+pub(crate) fn knots(curve: &[Point], most: usize, enough: f64) -> Vec<Point> {
+    if let Some(knots) = chords(curve, most, enough) {
+        return lifted(curve, &knots);
+    }
+    let mut best = vec![0, curve.len() - 1];
+    let (mut low, mut high) = (enough, curve.iter().fold(enough, |range, (_, value)| range.max(2.0 * value.abs())));
+    for _ in 0..HALVINGS {
+        let bound = (low * high).sqrt();
+        match chords(curve, most, bound) {
+            Some(knots) => (best, high) = (knots, bound),
+            None => low = bound,
+        }
+    }
+    lifted(curve, &best)
+}
+
+/// The curve's points that chords go through which are off by no more than `bound`, each as long as can be; none if they
+/// are too many.
+fn chords(curve: &[Point], most: usize, bound: f64) -> Option<Vec<usize>> {
+    let mut knots = vec![0];
+    while let Some(&from) = knots.last()
+        && from + 1 < curve.len()
+    {
+        if knots.len() == most {
+            return None;
+        }
+        knots.push(farthest(curve, from, bound));
+    }
+    Some(knots)
+}
+
+/// The last point whose chord passes all between by no more than `bound`.
+fn farthest(curve: &[Point], from: usize, bound: f64) -> usize {
+    let (x, y) = curve[from];
+    let mut slopes = (f64::NEG_INFINITY, f64::INFINITY);
+    let mut reached = from + 1;
+    for (index, &(there, value)) in curve.iter().enumerate().skip(from + 1) {
+        let slope = |value: f64| (value - y) / (there - x);
+        if (slopes.0..=slopes.1).contains(&slope(value)) {
+            reached = index;
+        }
+        slopes = (slopes.0.max(slope(value - bound)), slopes.1.min(slope(value + bound)));
+        if slopes.0 > slopes.1 {
+            break;
+        }
+    }
+    reached
+}
+
+/// Knots moved to where their chords are off as far to one side as to the other.
+fn lifted(curve: &[Point], knots: &[usize]) -> Vec<Point> {
+    let lift = |pair: &[usize]| {
+        let ((x, y), (end, at_end)) = (curve[pair[0]], curve[pair[1]]);
+        let off = curve[pair[0]..=pair[1]].iter().map(|(at, value)| value - y - (at_end - y) * (at - x) / (end - x));
+        let (least, most) = off.fold((0.0f64, 0.0f64), |(least, most), off| (least.min(off), most.max(off)));
+        (least + most) / 2.0
+    };
+    let lifts: Vec<f64> = knots.windows(2).map(lift).collect();
+    let of_knot = |knot: usize| match knot {
+        0 => 0.0,
+        _ => (lifts[knot - 1] + lifts.get(knot).unwrap_or(&lifts[knot - 1])) / 2.0,
+    };
+    knots.iter().enumerate().map(|(knot, &index)| (curve[index].0, curve[index].1 + of_knot(knot))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(law: impl Fn(f64) -> f64) -> Vec<Point> {
+        (0..=1000).map(|step| 0.5 * f64::from(step)).map(|x| (x, law(x))).collect()
+    }
+
+    /// Largest distance of the lines through some knots from a curve.
+    fn off(curve: &[Point], knots: &[Point]) -> f64 {
+        let line = |x: f64| {
+            let at = knots.partition_point(|knot| knot.0 <= x).clamp(1, knots.len() - 1);
+            let ((a, from), (b, to)) = (knots[at - 1], knots[at]);
+            from + (to - from) * (x - a) / (b - a)
+        };
+        curve.iter().map(|(x, y)| (y - line(*x)).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_parabola_gets_even_knots() {
+        let curve = curve(|x| x * x / 500.0);
+        let knots = knots(&curve, 9, 1e-6);
+        assert!(knots.len() == 9 && knots.iter().enumerate().all(|(k, knot)| (knot.0 - 62.5 * k as f64).abs() < 8.0));
+        // A chord of length h is off by h^2 / 8 f''; the first cannot be lifted at its start.
+        let bow = 62.5f64.powi(2) / 8.0 * 2.0 / 500.0;
+        assert!(off(&curve, &knots) < 0.85 * bow, "{} {bow}", off(&curve, &knots));
+    }
+
+    #[test]
+    fn knots_lie_where_the_curve_bends() {
+        let curve = curve(|x| 100.0 * (1.0 - (-x / 40.0).exp()));
+        let even: Vec<Point> = curve.iter().step_by(125).copied().collect();
+        let knots = knots(&curve, 9, 1e-6);
+        assert!(knots.len() <= 9 && off(&curve, &knots) < 0.15 * off(&curve, &even), "{knots:?}");
+    }
+
+    #[test]
+    fn a_kink_is_met_and_a_line_needs_no_knots() {
+        let kinked = curve(|x| x.min(200.0) + 0.5 * (x - 200.0).max(0.0));
+        assert_eq!(knots(&kinked, 9, 1e-6), [(0.0, 0.0), (200.0, 200.0), (500.0, 350.0)]);
+        assert_eq!(knots(&curve(|x| 2.0 * x), 9, 1e-6), [(0.0, 0.0), (500.0, 1000.0)]);
+    }
+}

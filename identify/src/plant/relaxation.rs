@@ -1,0 +1,165 @@
+//! The relaxation: what comes at once, and the lags that bring the rest.
+//!
+//! ```text
+//! y = share q + (1 - share - sum part_i) lag(tau(q); q) + sum part_i lag(tau_i; q)
+//! ```
+//!
+//! `q` is the stiffness that would be reached in the end. The paper's plant has no further part and one `tau`. What `tau`
+//! follows is the voltage across the spring, or the spring's own state, in volts as well: `lag + part (q - lag)`, with the
+//! first lag's output for a part of 0, the whole stiffness for one of `share`.
+
+use crate::plant::start::Start;
+use crate::record::signal::{Lag, Piece, Signal};
+use simulation::plant_file::{self, PlantFile};
+
+/// A part that a lag of its own brings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Part {
+    /// Of everything; 0 for none.
+    pub part: f64,
+    /// Its time constant, in s.
+    pub tau_s: f64,
+}
+
+/// What the tick can hold beside the first lag.
+pub const FURTHER: usize = 3;
+
+/// Longest step where the lag sets its own time constant, as a part of the shortest.
+const STEP: f64 = 0.1;
+/// And most steps of a piece: after so many the lag is at rest.
+const MOST_STEPS: f64 = 200.0;
+
+/// Parameters of the relaxation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relaxation {
+    /// Part that comes at once.
+    pub share: f64,
+    /// Time constant at 0 V, in s.
+    pub tau_s: f64,
+    /// Time constant at [`Relaxation::HIGH_V`], in s; equal to `tau_s` where the voltage does not matter.
+    pub tau_high_s: f64,
+    /// Between the two: geometric if true, else straight.
+    pub geometric: bool,
+    /// The time constant follows the spring's own state, of which so large a part comes at once; if none, the voltage.
+    pub by_state: Option<f64>,
+    /// Parts that further lags bring, one after the other.
+    pub further: [Part; FURTHER],
+}
+
+impl Relaxation {
+    /// The voltage that `tau_high_s` belongs to.
+    pub const HIGH_V: f64 = 500.0;
+
+    /// One share, one time constant.
+    pub fn plain(share: f64, tau_s: f64) -> Self {
+        Self { share, tau_s, tau_high_s: tau_s, geometric: false, by_state: None, further: Default::default() }
+    }
+
+    /// Time constant at a voltage, in s.
+    pub fn tau_at(&self, voltage_v: f64) -> f64 {
+        let part = voltage_v.abs() / Self::HIGH_V;
+        let tau = if self.geometric {
+            self.tau_s * (self.tau_high_s / self.tau_s).powf(part)
+        } else {
+            self.tau_s + (self.tau_high_s - self.tau_s) * part
+        };
+        tau.max(0.02 * self.tau_s)
+    }
+
+    /// The further parts that are there.
+    pub fn parts(&self) -> impl Iterator<Item = Part> {
+        self.further.into_iter().filter(|part| part.part != 0.0)
+    }
+
+    /// What the first lag brings.
+    fn main(&self) -> f64 {
+        1.0 - self.share - self.parts().map(|part| part.part).sum::<f64>()
+    }
+
+    /// Writes itself into a plant file.
+    pub fn extend(&self, file: &mut PlantFile) {
+        let mut tau_s = vec![self.tau_s];
+        tau_s.extend(self.parts().map(|part| part.tau_s));
+        let weights = match tau_s.len() {
+            1 => Vec::new(),
+            _ => std::iter::once(self.main()).chain(self.parts().map(|part| part.part)).collect(),
+        };
+        let tau_high_s = self.varies().then_some(self.tau_high_s);
+        file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s };
+    }
+
+    /// The relaxation of a plant file, which has been checked.
+    pub fn of(file: &plant_file::Relaxation) -> Self {
+        let tau_s = file.tau_s.first().copied().unwrap_or_default();
+        let mut relaxation = Self { tau_high_s: file.tau_high_s.unwrap_or(tau_s), ..Self::plain(file.share, tau_s) };
+        let parts = file.tau_s.iter().zip(&file.weights).skip(1);
+        for (further, (&tau_s, &part)) in relaxation.further.iter_mut().zip(parts) {
+            *further = Part { part, tau_s };
+        }
+        relaxation
+    }
+
+    /// True if the time constant depends on the voltage.
+    pub fn varies(&self) -> bool {
+        self.tau_high_s != self.tau_s
+    }
+
+    /// What becomes of the static stiffness; `levels_v` is the voltage across the spring in the middle of each piece,
+    /// needed only if the time constant varies.
+    pub fn pass(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
+        let before = signal.before;
+        let (share, main) = (self.share, self.main());
+        let mut at_first = |tau_s| Lag::at(tau_s, before + start.ask());
+        let mut lag = at_first(self.tau_s);
+        let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, at_first(it.tau_s))).collect();
+        if further.is_empty() && !self.varies() {
+            return signal.pass(|piece| {
+                let (start, end) = lag.pass(piece);
+                (share * piece.from + main * start, share * piece.to + main * end)
+            });
+        }
+        let by_state = self.by_state.filter(|_| self.varies());
+        let mut levels = levels_v.iter().copied().filter(|_| self.varies() && by_state.is_none());
+        let mut level = f64::NAN;
+        signal.pass(|piece: Piece| {
+            if let Some(next) = levels.next()
+                && next != level
+            {
+                level = next;
+                lag = lag.with_tau(self.tau_at(level));
+            }
+            let (start, end) = match by_state {
+                Some(at_once) => self.led(at_once, &mut lag, piece),
+                None => lag.pass(piece),
+            };
+            let (mut from, mut to) = (share * piece.from + main * start, share * piece.to + main * end);
+            for (part, lag) in &mut further {
+                let (start, end) = lag.pass(piece);
+                from += *part * start;
+                to += *part * end;
+            }
+            (from, to)
+        });
+    }
+
+    /// Start and end of the first lag over a piece of its input, where the spring's state sets its time constant. Exact for the
+    /// time constant that it has in the middle of each step.
+    fn led(&self, at_once: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
+        let start = lag.value();
+        let fastest_s = self.tau_s.min(self.tau_high_s);
+        let steps = (piece.duration_s / (STEP * fastest_s)).ceil().clamp(1.0, MOST_STEPS);
+        let duration_s = piece.duration_s / steps;
+        let rise = (piece.to - piece.from) / steps;
+        let mut from = piece.from;
+        for _ in 0..steps as usize {
+            // Implicitly, so that it lies between the output and what that follows, however long the step.
+            let ahead = 0.5 * duration_s / (lag.tau_s() + 0.5 * duration_s);
+            let to_come = from + 0.5 * rise - lag.value();
+            let middle = lag.value() + (ahead + at_once * (1.0 - ahead)) * to_come;
+            *lag = lag.with_tau(self.tau_at(middle));
+            lag.pass(Piece { duration_s, from, to: from + rise });
+            from += rise;
+        }
+        (start, lag.value())
+    }
+}

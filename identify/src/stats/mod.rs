@@ -1,0 +1,5 @@
+//! Medians, sums, scales, a periodogram: numbers in, numbers out.
+
+pub mod median;
+pub mod periodogram;
+pub mod sums;

@@ -1,0 +1,63 @@
+//! The cure: the extended simulation as a plant file, and how well the fixed-point tick runs it.
+
+use crate::effects::model::Model;
+use crate::fit::engine::Engine;
+use crate::plant::base::Base;
+use crate::record::data::Data;
+use crate::record::signal::Signal;
+use simulation::open_loop;
+use simulation::plant_file::PlantFile;
+use simulation::record::{Record, Row};
+use simulation::schedule::{Between, Schedule};
+
+/// The rate at which the tick is tried, in Hz.
+const RATE_HZ: f64 = 1000.0;
+/// Longer records are not run tick by tick, in s.
+const LONGEST_S: f64 = 5000.0;
+/// What goes beyond, in V, is said to be no small thing.
+pub const SMALL_ERROR_V: f64 = 1.0;
+
+/// The extended spring.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cure {
+    /// As a file for `vsj stair --plant`.
+    pub file: PlantFile,
+    /// Largest difference between the fixed-point tick on that file and the fitted spring, in V: both from rest, under
+    /// the voltages that the fitted amplifier puts out at the record's rows, each held until the next. What the file
+    /// only mentions is in neither. `None` if the tick refuses the spring, or the record's voltage is not held.
+    pub fixed_point_error_v: Option<f64>,
+    /// Why the tick refuses the spring, if it does.
+    pub tick_refuses: Option<String>,
+}
+
+/// Of a fitted model.
+pub(crate) fn of(engine: &Engine, model: &Model, held: bool) -> Cure {
+    let (data, base) = (engine.data, engine.simulator.base);
+    let file = model.extend(base, data);
+    let tick_refuses = file.check().err().map(|error| error.to_string());
+    let runs = held && data.duration_s() < LONGEST_S && tick_refuses.is_none();
+    let fixed_point_error_v = runs.then(|| error(model, base, data, &file)).flatten();
+    Cure { file, fixed_point_error_v, tick_refuses }
+}
+
+fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f64> {
+    let mut applied = data.command.clone();
+    model.chain(base, data).amplify(&mut applied);
+    let row = |(&time_s, voltage_v)| Row { line: 0, time_s, voltage_v, measured: None };
+    let rows: Vec<Row> = data.time_s.iter().zip(applied.at_rows()).map(row).collect();
+    let voltage_v: Vec<f64> = rows.iter().map(|row| row.voltage_v).collect();
+    let fixed = open_loop::simulate(&file.extended(), RATE_HZ, &data.time_s, &voltage_v).ok()?;
+
+    let schedule = Schedule::from_record(&Record { name: String::new(), rows }, Between::Hold);
+    let voltage = Signal::new(&schedule, &data.time_s, 0.0);
+    let mut written = model.clone();
+    for (block, _) in &model.unmodelled(base, data).blocks {
+        written = written.without(block.effect);
+    }
+    let mut chain = written.chain(base, data);
+    chain.memory = chain.memory.at_rest();
+    let mut fitted = voltage.clone();
+    chain.settle(&mut fitted);
+    chain.relax(&mut fitted, &voltage, &mut Vec::new());
+    Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (fitted - fixed).abs()).fold(0.0, f64::max))
+}

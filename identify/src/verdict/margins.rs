@@ -1,0 +1,47 @@
+//! What a record would have shown, where nothing is wrong.
+//!
+//! ```text
+//! margin = (sqrt(2 N) + 1.64) / sqrt(J' W J)
+//! ```
+//!
+//! An error of the gain that large, or of the time constant's logarithm, is likelier than no error by the `N` nats that its
+//! cause and a rival's odds ask for. It shows in about nine of ten records like this one, in noise with a long memory, which
+//! may hide it, in two of three. "Nothing is wrong" is worth no more than that.
+
+use serde::Serialize;
+
+use crate::adequacy::informative::{gain_and_time_constant, of_both};
+use crate::fit::engine::{Engine, Fit};
+use crate::fit::interval::information;
+use crate::search::Judge;
+use crate::verdict::alternatives::RIVAL;
+
+/// 95 % of the standard normal.
+const Z: f64 = 1.64;
+/// An error of half the gain, or of a factor of 2 in the time constant, that need not show: the record can tell nothing.
+const WIDEST: Margins = Margins { gain: 0.5, time_constant: 1.0 };
+
+/// Errors from which on they show, as parts of what is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Margins {
+    /// Of the gain.
+    pub gain: f64,
+    /// Of the time constant, when it is too long.
+    pub time_constant: f64,
+}
+
+impl Margins {
+    /// Of a record on which nothing was found; `caution` multiplies what a cause costs.
+    pub(crate) fn of(engine: &mut Engine, nothing: &Fit, caution: f64) -> Self {
+        let model = of_both(engine.simulator.base.relaxation.tau_s);
+        let known = information(engine, &Fit { model, ..nothing.clone() });
+        let nats = gain_and_time_constant().map(|block| RIVAL + caution * Judge::price(engine, &block));
+        let margin = |of: usize| ((2.0 * nats[of]).sqrt() + Z) / known[(of, of)].sqrt();
+        Self { gain: margin(0), time_constant: margin(1).exp_m1() }
+    }
+
+    /// True if they are narrow enough for "nothing is wrong" to mean anything.
+    pub(crate) fn tell(&self) -> bool {
+        self.gain < WIDEST.gain && self.time_constant < WIDEST.time_constant
+    }
+}

@@ -1,0 +1,83 @@
+//! Causes that the readings themselves show: a lattice, a bound, outliers.
+
+use crate::adequacy::spikes::far_off;
+use crate::answer::{Finding, Parameter};
+use crate::fit::engine::Fit;
+use crate::noise::{FINEST_V, scale_of_squares};
+use crate::record::data::Data;
+use crate::record::observed::Observed;
+use crate::record::quantisation_grid::Lattice;
+use crate::verdict::quality::Z;
+
+/// A step of the readings this many of the noise's scales wide is worth naming.
+const COARSE_STEP: f64 = 0.5;
+
+/// What the readings themselves show; those far off are outliers only if each is `alone`, neither in runs nor in time with
+/// the command.
+pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alone: bool) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let raw = scale_of_squares(&fit.residual);
+    let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
+    let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
+    let single = |name: &str, value: f64, low: f64, high: f64, unit| {
+        vec![(name.to_owned(), Parameter { value, low, high, unit })]
+    };
+    if let Some(Lattice { step, low, high }) = observed.lattice
+        && (step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V) || observed.cut_v > 0.0)
+    {
+        let grid = data.reading[0];
+        let after: Vec<f64> = data
+            .reading
+            .iter()
+            .zip(&predicted)
+            .map(|(reading, predicted)| reading - (((predicted - grid) / step).round() * step + grid))
+            .collect();
+        findings.push(Finding {
+            cause: "quantisation",
+            probability: 1.0,
+            parameters: single("step", step, low, high, "V"),
+            rmse_before: scale_of_squares(&fit.residual.iter().map(|left| left - observed.cut_v).collect::<Vec<_>>()),
+            rmse_after: scale_of_squares(&after).min(raw),
+            evidence: format!(
+                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left{}",
+                step / raw,
+                if observed.cut_v == 0.0 { "" } else { "; what is less than a step was cut off" }
+            ),
+        });
+    }
+    for (bound, upper) in [(observed.upper, true), (observed.lower, false)] {
+        let Some(bound) = bound else { continue };
+        let stopped = data.reading.iter().filter(|&&reading| reading == bound).count();
+        findings.push(Finding {
+            cause: "sensor-saturation",
+            probability: 1.0,
+            parameters: single("limit", bound, bound - 1e-6 * bound.abs(), bound + 1e-6 * bound.abs(), "V"),
+            rmse_before: raw,
+            rmse_after: stopped_raw,
+            evidence: format!(
+                "{stopped} readings are exactly {bound}, the {} of all",
+                if upper { "highest" } else { "lowest" }
+            ),
+        });
+    }
+    if let Some((_, wide)) = fit.noise.wide.filter(|_| alone) {
+        let errors = observed.errors(&fit.residual);
+        let far = far_off(&fit.noise, &fit.noise.innovations(&errors));
+        let kept: Vec<f64> = errors.iter().zip(&far).filter(|(_, far)| !**far).map(|(error, _)| *error).collect();
+        let (rows, off) = (errors.len(), errors.len() - kept.len());
+        let fraction = off as f64 / rows as f64;
+        let spread = (fraction * (1.0 - fraction) / rows as f64).sqrt();
+        findings.push(Finding {
+            cause: "outliers",
+            probability: 1.0,
+            parameters: single("fraction", fraction, (fraction - Z * spread).max(0.0), fraction + Z * spread, ""),
+            rmse_before: stopped_raw,
+            rmse_after: scale_of_squares(&kept),
+            evidence: format!(
+                "{off} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
+                wide / fit.noise.sigma
+            ),
+        });
+    }
+    findings
+}

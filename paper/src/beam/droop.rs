@@ -1,0 +1,178 @@
+//! Droop: the linear result is no longer valid, and the exact one takes its place.
+//!
+//! The linear displacement is compared with the exact one all along the beam. Where the largest difference exceeds a
+//! tolerated part of the largest exact displacement, the beam droops.
+
+use anyhow::Result;
+use serde::Serialize;
+
+use crate::beam::cantilever::{Beam, Load};
+use crate::beam::elastica::{self, Point};
+use simulation::bad_input::check;
+
+/// A loaded beam, solved by the simplest theory that is valid.
+#[derive(Clone, Debug)]
+pub struct Deflection {
+    beam: Beam,
+    load: Load,
+    exact: Vec<Point>,
+    /// Largest difference between linear and exact displacement, by the largest exact one.
+    pub linear_error: f64,
+    /// True if that is more than was tolerated.
+    pub droops: bool,
+}
+
+/// One place along the beam.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// Along the beam from the clamp, in mm.
+    pub at_mm: f64,
+    /// By the linear theory, upwards, in mm.
+    pub linear_mm: f64,
+    /// By the exact theory, upwards, in mm.
+    pub exact_mm: f64,
+    /// Distance from the clamp in the direction of the straight beam, in mm: shorter than `at_mm` when bent.
+    pub exact_x_mm: f64,
+    /// The valid one of the two.
+    pub valid_mm: f64,
+}
+
+impl Deflection {
+    /// Solves by both theories.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] for what is no beam, load or tolerance (0.0001 to 1); another if the exact theory finds no
+    /// equilibrium.
+    pub fn new(beam: &Beam, load: &Load, tolerance: f64) -> Result<Self> {
+        checked(beam, load, tolerance)?;
+        Self::of(beam, load, tolerance)
+    }
+
+    /// The same of a load that may be beyond what is allowed.
+    fn of(beam: &Beam, load: &Load, tolerance: f64) -> Result<Self> {
+        let exact = elastica::shape(beam, load)?;
+        let linear_error = linear_error(beam, load, &exact);
+        Ok(Self { beam: *beam, load: *load, exact, linear_error, droops: linear_error > tolerance })
+    }
+
+    /// Displacement at a distance along the beam, in m.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] for a place that is not on the beam.
+    pub fn at(&self, arc_m: f64) -> Result<Place> {
+        let length = self.beam.length_m;
+        // In mm as it is asked for; a last bit beyond the end is still the end.
+        let last_bit = if arc_m <= length * (1.0 + 1e-12) { arc_m.min(length) } else { arc_m };
+        check("at_mm", 1e3 * last_bit, 0.0..=1e3 * length, "mm along the beam")?;
+        let cells = (self.exact.len() - 1) as f64;
+        let cell = (arc_m / length * cells).floor().min(cells - 1.0);
+        let part = arc_m / length * cells - cell;
+        let (from, to) = (self.exact[cell as usize], self.exact[cell as usize + 1]);
+        let between = |from: f64, to: f64| 1e3 * (from + part * (to - from));
+        let (linear_mm, exact_mm) = (1e3 * self.beam.linear_m(&self.load, arc_m), between(from.y_m, to.y_m));
+        Ok(Place {
+            at_mm: 1e3 * arc_m,
+            linear_mm,
+            exact_mm,
+            exact_x_mm: between(from.x_m, to.x_m),
+            valid_mm: if self.droops { exact_mm } else { linear_mm },
+        })
+    }
+
+    /// The shape by the exact theory.
+    pub fn exact(&self) -> &[Point] {
+        &self.exact
+    }
+}
+
+fn checked(beam: &Beam, load: &Load, tolerance: f64) -> Result<()> {
+    check("tolerance", tolerance, 1e-4..=1.0, "of the largest displacement")?;
+    beam.checked()?;
+    load.checked()?;
+    Ok(())
+}
+
+fn linear_error(beam: &Beam, load: &Load, exact: &[Point]) -> f64 {
+    let largest = |value: &dyn Fn(&Point) -> f64| exact.iter().map(|point| value(point).abs()).fold(0.0, f64::max);
+    let displacement = largest(&|point| point.y_m);
+    if displacement == 0.0 {
+        return 0.0;
+    }
+    largest(&|point| point.y_m - beam.linear_m(load, point.arc_m)) / displacement
+}
+
+/// How many times the load (force and weight together) the linear result is off by just the tolerated part; `None` if
+/// nothing acts.
+///
+/// # Errors
+/// As [`Deflection::new`].
+pub fn limit(beam: &Beam, load: &Load, tolerance: f64) -> Result<Option<f64>> {
+    checked(beam, load, tolerance)?;
+    let droops = |factor: f64| Ok::<_, anyhow::Error>(Deflection::of(beam, &load.scaled(factor), tolerance)?.droops);
+    let size = (load.tip_n * beam.length_m.powi(2) / beam.bending_stiffness_n_m2()).abs().max(
+        (beam.weight_n_per_m(load.gravity_m_per_s2) * beam.length_m.powi(3) / beam.bending_stiffness_n_m2()).abs(),
+    );
+    if size == 0.0 {
+        return Ok(None);
+    }
+    // From a load that bends by a hundredth upwards.
+    let mut high = 0.03 / size;
+    while !droops(high)? {
+        high *= 1.5;
+        if high * size > 1e6 {
+            return Ok(None);
+        }
+    }
+    let mut low = high / 1.5;
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if droops(middle)? { high = middle } else { low = middle }
+    }
+    Ok(Some(high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::beam::cantilever::tests::FOIL;
+
+    const PUSHED: Load = Load { tip_n: 1e-6, gravity_m_per_s2: 0.0 };
+
+    /// For a tip force the exact tip is at y/L = 0.30172 at P L^2 / E I = 1, where the linear one is at 1/3: 10.5 % off.
+    #[test]
+    fn the_limit_of_a_tip_load_is_where_the_elastica_says() {
+        let unit = FOIL.bending_stiffness_n_m2() / FOIL.length_m.powi(2);
+        let factor = limit(&FOIL, &PUSHED, (1.0 / 3.0 - 0.301_720_774) / 0.301_720_774).unwrap().unwrap();
+        assert!((factor * PUSHED.tip_n / unit - 1.0).abs() < 1e-3, "{}", factor * PUSHED.tip_n / unit);
+    }
+
+    #[test]
+    fn the_valid_theory_changes_at_the_limit() {
+        let factor = limit(&FOIL, &PUSHED, 0.05).unwrap().unwrap();
+        for (factor, droops) in [(0.99 * factor, false), (1.01 * factor, true)] {
+            let bent = Deflection::new(&FOIL, &PUSHED.scaled(factor), 0.05).unwrap();
+            let tip = bent.at(FOIL.length_m).unwrap();
+            assert_eq!(bent.droops, droops);
+            assert_eq!(tip.valid_mm, if droops { tip.exact_mm } else { tip.linear_mm });
+            assert!(tip.exact_mm < tip.linear_mm);
+        }
+        assert_eq!(limit(&FOIL, &PUSHED.scaled(0.0), 0.05).unwrap(), None);
+    }
+
+    /// Bending goes by P L^2 / E I, however large the force that it takes.
+    #[test]
+    fn a_beam_that_bends_under_no_allowed_load_has_its_limit() {
+        let thick = Beam { thickness_m: 1e5 * FOIL.thickness_m, ..FOIL };
+        let [usual, limit] = [FOIL, thick].map(|beam| limit(&beam, &PUSHED, 0.05).unwrap().unwrap());
+        assert!((limit / usual / 1e15 - 1.0).abs() < 1e-6, "{}", limit / usual);
+    }
+
+    #[test]
+    fn a_place_off_the_beam_is_refused() {
+        let bent = Deflection::new(&FOIL, &PUSHED, 0.05).unwrap();
+        for at in [-1e-3, 0.06, f64::NAN] {
+            assert!(bent.at(at).unwrap_err().is::<simulation::bad_input::BadInput>());
+        }
+        assert!(Deflection::new(&FOIL, &PUSHED, f64::NAN).is_err());
+    }
+}

@@ -1,0 +1,45 @@
+//! The stack between its limits, in closed form: bonded, so that sections stay plane, and sliding freely.
+
+use crate::beam::stack::Stack;
+
+/// Tip force by tip deflection, in N/m, where nothing slips: plane sections, `1 / integral of (L - x)^2 / EI(x)`.
+pub fn bonded_n_per_m(stack: &Stack) -> f64 {
+    by_section(stack, |axial, bending, heights| {
+        let total: f64 = axial.iter().sum();
+        let neutral = axial.iter().zip(heights).map(|(axial, height)| axial * height).sum::<f64>() / total;
+        let steiner: f64 = axial.iter().zip(heights).map(|(axial, height)| axial * (height - neutral).powi(2)).sum();
+        bending.iter().sum::<f64>() + steiner
+    })
+}
+
+/// The same in closed form where everything slides: the layers bend side by side.
+pub fn sliding_n_per_m(stack: &Stack) -> f64 {
+    by_section(stack, |_, bending, _| bending.iter().sum())
+}
+
+/// Spring constant by the bending stiffness of each section, from axial and bending stiffness and height of its layers.
+fn by_section(stack: &Stack, bending_stiffness: impl Fn(&[f64], &[f64], &[f64]) -> f64) -> f64 {
+    let length = stack.length_m();
+    let heights = stack.heights_m();
+    let ends = section_ends(stack);
+    let compliance: f64 = ends
+        .windows(2)
+        .map(|ends| {
+            let here = || stack.layers().iter().zip(&heights).filter(|(layer, _)| layer.length_m >= ends[1]);
+            let axial: Vec<f64> = here().map(|(layer, _)| layer.axial_n()).collect();
+            let bending: Vec<f64> = here().map(|(layer, _)| layer.bending_n_m2()).collect();
+            let heights: Vec<f64> = here().map(|(_, &height)| height).collect();
+            let arm = |x: f64| (length - x).powi(3) / 3.0;
+            (arm(ends[0]) - arm(ends[1])) / bending_stiffness(&axial, &bending, &heights)
+        })
+        .sum();
+    1.0 / compliance
+}
+
+/// The clamp and where layers end, ascending.
+pub(super) fn section_ends(stack: &Stack) -> Vec<f64> {
+    let mut ends: Vec<f64> = stack.layers().iter().map(|layer| layer.length_m).chain([0.0]).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup();
+    ends
+}

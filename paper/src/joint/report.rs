@@ -1,0 +1,233 @@
+//! What `vsj joint` says: the joint's stiffness, and the report's requirement against range, size and time.
+
+use anyhow::Result;
+use serde::Serialize;
+
+use crate::beam::cantilever::Beam;
+use crate::beam::experiment::Experiment;
+use crate::beam::regression::Interval;
+use crate::joint::Joint;
+use simulation::bad_input::check;
+use simulation::bound::shortest_time;
+use simulation::reference::Loop;
+
+/// What the report asks of the joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Requirement {
+    /// Softest, in N m/rad.
+    pub low_n_m_per_rad: f64,
+    /// Stiffest, in N m/rad.
+    pub high_n_m_per_rad: f64,
+    /// In which time, in s.
+    pub within_s: f64,
+    /// How much of the change then has to be made.
+    pub part: f64,
+}
+
+impl Requirement {
+    /// The introduction's; the part is that of section 3.2.1.
+    pub const PAPER: Self = Self { low_n_m_per_rad: 0.7, high_n_m_per_rad: 948.0, within_s: 0.6, part: 0.97 };
+
+    /// Returns the requirement if it is one.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] names the field.
+    pub fn checked(self) -> Result<Self> {
+        check("low_n_m_per_rad", self.low_n_m_per_rad, 1e-12..=1e12, "N m/rad")?;
+        check("high_n_m_per_rad", self.high_n_m_per_rad, self.low_n_m_per_rad..=1e12, "N m/rad")?;
+        check("within_s", self.within_s, 1e-6..=1e6, "s")?;
+        check("part", self.part, 0.01..=0.9999, "of the change")?;
+        Ok(self)
+    }
+}
+
+/// The whole answer of `vsj joint --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The joint.
+    pub joint: Joint,
+    /// What is asked of it.
+    pub requirement: Requirement,
+    /// The amplifier's highest voltage, in V.
+    pub limit_v: f64,
+    /// Spring constants without voltage and at the limit, in N/m.
+    pub springs_n_per_m: [f64; 2],
+    /// Joint stiffness without voltage and at the limit, in N m/rad.
+    pub reach_n_m_per_rad: [f64; 2],
+    /// Stiffest by softest, whatever the geometry.
+    pub reach_ratio: f64,
+    /// The same over the voltages that were measured, with its 95 % interval.
+    pub measured_ratio: Interval,
+    /// What is asked for.
+    pub required_ratio: f64,
+    /// Springs that the softest and the stiffest demand would each need in this geometry, alone.
+    pub springs_needed: [f64; 2],
+    /// The shortest time, in s, for the part asked for of the change from no voltage to `to_v`; `None`: never.
+    pub times: Vec<Time>,
+    /// The highest goal to which the part asked for of a change from 0 V can be made within the time asked for, in V.
+    pub in_time_v: f64,
+    /// Stiffness there by stiffness without voltage.
+    pub in_time_ratio: f64,
+    /// A joint stiffness asked for, and the spring constant in N/m that gives it.
+    pub asked: Option<[f64; 2]>,
+}
+
+/// One change from no voltage.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Time {
+    /// Static voltage of the goal, in V.
+    pub to_v: f64,
+    /// In s.
+    pub shortest_s: Option<f64>,
+}
+
+impl Report {
+    /// Answers for springs of the report's material and `beam`'s dimensions, driven through `system`'s range.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] names what cannot be.
+    pub fn new(
+        joint: Joint,
+        requirement: Requirement,
+        beam: &Beam,
+        system: &Loop,
+        asked_n_m_per_rad: Option<f64>,
+    ) -> Result<Self> {
+        let (joint, requirement, beam) = (joint.checked()?, requirement.checked()?, beam.checked()?);
+        let limit_v = check("limit_v", system.range_v.1, 50.0..=1000.0, "V")?;
+        check("slew_v_per_s", system.slew_v_per_s, 1e-3..=f64::INFINITY, "V/s")?;
+        if let Some(asked) = asked_n_m_per_rad {
+            check("stiffness_n_m_per_rad", asked, 1e-12..=1e12, "N m/rad")?;
+        }
+        let law = Experiment::paper()?;
+        let springs = [0.0, limit_v]
+            .map(|volts| Beam { youngs_modulus_pa: law.youngs_modulus_pa(volts), ..beam }.spring_constant_n_per_m());
+        let Requirement { low_n_m_per_rad: low, high_n_m_per_rad: high, within_s, part } = requirement;
+        let one = Joint { springs: 1, ..joint };
+        let time = |to_v: f64| shortest_time(system, 0.0, to_v, part);
+        // The higher the goal, the longer it takes.
+        let (mut in_time_v, mut too_far) = (0.0, limit_v / part);
+        for _ in 0..60 {
+            let middle = 0.5 * (in_time_v + too_far);
+            if time(middle).is_some_and(|seconds| seconds <= within_s) { in_time_v = middle } else { too_far = middle }
+        }
+        let in_time_v = in_time_v.min(limit_v);
+        Ok(Self {
+            joint,
+            requirement,
+            limit_v,
+            springs_n_per_m: springs,
+            reach_n_m_per_rad: springs.map(|k| joint.stiffness_n_m_per_rad(k)),
+            reach_ratio: springs[1] / springs[0],
+            measured_ratio: law.reach_ratio,
+            required_ratio: high / low,
+            springs_needed: [low / one.stiffness_n_m_per_rad(springs[0]), high / one.stiffness_n_m_per_rad(springs[1])],
+            times: [0.2, 0.4, 0.6, 0.8, 1.0]
+                .map(|share| share * limit_v)
+                .map(|to_v| Time { to_v, shortest_s: time(to_v) })
+                .to_vec(),
+            in_time_v,
+            in_time_ratio: 1.0 + (springs[1] / springs[0] - 1.0) * in_time_v / limit_v,
+            asked: asked_n_m_per_rad.map(|asked| [asked, joint.spring_constant_n_per_m(asked)]),
+        })
+    }
+
+    /// For the terminal.
+    pub fn text(&self) -> String {
+        let Self { joint, requirement, limit_v, springs_n_per_m: [soft, stiff], reach_n_m_per_rad, .. } = self;
+        let Requirement { low_n_m_per_rad, high_n_m_per_rad, within_s, part } = requirement;
+        let mut text = format!(
+            "{} springs, inner radius {:.1} mm, outer {:.1} mm, outer end {}.\n\
+             Spring constant {soft:.4} N/m without voltage, {stiff:.4} N/m at {limit_v} V: joint stiffness {:.5} to {:.5} \
+             N m/rad.\n",
+            joint.springs,
+            1e3 * joint.inner_radius_m,
+            1e3 * (joint.inner_radius_m + joint.spring_length_m),
+            format!("{:?}", joint.outer_end).to_lowercase(),
+            reach_n_m_per_rad[0],
+            reach_n_m_per_rad[1],
+        );
+        if let Some([asked, constant]) = self.asked {
+            let reach = if (*soft..=*stiff).contains(&constant) { "within" } else { "out of" };
+            text += &format!("{asked} N m/rad needs a spring constant of {constant:.5} N/m: {reach} reach.\n");
+        }
+        text += &format!(
+            "\nThe requirement, {low_n_m_per_rad} to {high_n_m_per_rad} N m/rad in {within_s} s, {}.\n\
+             Range: a ratio of {:.0} is asked for; the material gives {:.3} at {limit_v} V ({:.3} +- {:.3} over the voltages \
+             measured), in any geometry.\n\
+             Size: the soft end alone would take {:.0} springs here, the stiff end {:.0}.\n\
+             Time: {:.0} % of a change from 0 V takes at least\n",
+            if self.in_time_ratio >= self.required_ratio { "can be met" } else { "cannot be met with this material" },
+            self.required_ratio,
+            self.reach_ratio,
+            self.measured_ratio.value,
+            self.measured_ratio.high - self.measured_ratio.value,
+            self.springs_needed[0],
+            self.springs_needed[1],
+            1e2 * part,
+        );
+        for Time { to_v, shortest_s } in &self.times {
+            let time = shortest_s.map_or_else(|| "never".to_owned(), |seconds| format!("{seconds:.3} s"));
+            text += &format!("  to {to_v:6.1} V  {time:>9}\n");
+        }
+        text + &format!(
+            "Within {within_s} s no controller makes {:.0} % of a change to more than {:.1} V, a stiffness ratio of {:.3}.\n",
+            1e2 * part,
+            self.in_time_v,
+            self.in_time_ratio
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::beam::experiment::SPRING;
+    use crate::joint::tests::JOINT;
+
+    fn report(beam: &Beam, limit_v: f64, requirement: Requirement) -> Report {
+        let system = Loop {
+            share: 1.0 / 11.0,
+            time_constant_s: 5.5,
+            gains: None,
+            range_v: (0.0, limit_v),
+            slew_v_per_s: f64::INFINITY,
+        };
+        Report::new(JOINT, requirement, beam, &system, Some(0.01)).unwrap()
+    }
+
+    /// At 700 V: 97 % of V within 0.6 s needs 0.97 V <= 700 (1 - 10/11 exp(-0.6/5.5)).
+    #[test]
+    fn what_can_be_done_in_time() {
+        for limit in [700.0, 1000.0] {
+            let report = report(&SPRING, limit, Requirement::PAPER);
+            let expected = limit * (1.0 - 10.0 / 11.0 * (-0.6f64 / 5.5).exp()) / 0.97;
+            assert!((report.in_time_v - expected).abs() < 1e-6, "{} {expected}", report.in_time_v);
+            assert!(report.required_ratio / report.reach_ratio > 700.0);
+        }
+        let whole = report(&SPRING, 700.0, Requirement::PAPER).times[4].shortest_s.unwrap();
+        assert!((whole - 5.5 * (10.0f64 / 11.0 / 0.03).ln()).abs() < 1e-6, "{whole}");
+    }
+
+    /// The material's Young's modulus does not depend on what is made of it: `k` grows with `b h^3 / L^3`.
+    #[test]
+    fn springs_of_other_dimensions() {
+        let [soft, stiff] = report(&SPRING, 700.0, Requirement::PAPER).springs_n_per_m;
+        // By hand, from the lines of Table 1.
+        assert!((soft - 0.206_46).abs() < 1e-5 && (stiff - 0.323_76).abs() < 1e-5, "{soft} {stiff}");
+        let other = Beam { length_m: 0.5 * 59.8e-3, width_m: 3.0 * 19.8e-3, thickness_m: 2.0 * 190e-6, ..SPRING };
+        let found = report(&other, 700.0, Requirement::PAPER).springs_n_per_m;
+        assert!((found[0] / soft - 192.0).abs() < 1e-6 && (found[1] / stiff - 192.0).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn a_requirement_within_range_takes_time() {
+        let ask = |within_s: f64| Requirement { low_n_m_per_rad: 1.0, high_n_m_per_rad: 1.5, within_s, part: 0.97 };
+        for (within_s, verdict) in [(9.0, "cannot be met"), (11.0, "can be met")] {
+            let said = report(&SPRING, 700.0, ask(within_s)).text();
+            assert!(said.contains(&format!("in {within_s} s, {verdict}")), "{said}");
+        }
+        let upside_down = Requirement { high_n_m_per_rad: 0.1, ..Requirement::PAPER };
+        assert!(upside_down.checked().unwrap_err().to_string().starts_with("high_n_m_per_rad"));
+    }
+}

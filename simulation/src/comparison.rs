@@ -1,0 +1,86 @@
+//! The same steps under every controller: what each makes of them, and what none could better.
+
+use anyhow::Result;
+use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Settings};
+use serde::Serialize;
+
+use crate::experiment::{Experiment, Judged, StartsFrom, with_plant};
+use crate::plant_file::PlantFile;
+use crate::response::Response;
+use crate::response::responses;
+use crate::schedule::Schedule;
+
+/// The whole answer of `vsj compare --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Where the fastest drive of each `bound_t97_s` starts.
+    pub bound_from: StartsFrom,
+    /// One an amplifier.
+    pub limits: Vec<AtLimit>,
+}
+
+/// The steps behind one amplifier.
+#[derive(Clone, Debug, Serialize)]
+pub struct AtLimit {
+    /// Its highest voltage, in V.
+    pub limit_v: f64,
+    /// One a change of the target.
+    pub steps: Vec<Step>,
+}
+
+/// One change of the target under each controller.
+#[derive(Clone, Debug, Serialize)]
+pub struct Step {
+    /// The spring left alone.
+    pub none: Response,
+    /// The report's controller.
+    pub paper: Response,
+    /// As fast as the amplifier allows.
+    pub fast: Response,
+}
+
+impl Step {
+    /// Each with its name.
+    pub fn each(&self) -> [(&'static str, &Response); 3] {
+        [("none", &self.none), ("paper", &self.paper), ("fast", &self.fast)]
+    }
+}
+
+/// Runs the stair of ideal steps on a spring, behind each of some amplifiers.
+///
+/// # Errors
+/// [`crate::bad_input::BadInput`] for what the controller refuses.
+pub fn compare(file: &PlantFile, rate_hz: f64, amplifiers: &[Amplifier]) -> Result<Comparison> {
+    let settings = |amplifier| Settings {
+        rate_hz,
+        plant: file.extended(),
+        compensation: Compensation::None,
+        amplifier: file.behind(amplifier),
+        feedback: None,
+    };
+    let limits = amplifiers.iter().map(|&amplifier| {
+        let settings = settings(amplifier);
+        // As in `vsj stair`: below its end only the sampled reference takes a target at the end of the range.
+        let steps = match settings.plant.plain().filter(|_| settings.amplifier.max_v == amplifier.max_v) {
+            Some(plant) => steps(with_plant(&settings, plant))?,
+            None => steps(settings)?,
+        };
+        Ok(AtLimit { limit_v: settings.amplifier.max_v, steps })
+    });
+    let bound_from = ExtendedPlant::bounds_from(&settings(Amplifier::PAPER));
+    Ok(Comparison { bound_from, limits: limits.collect::<Result<_>>()? })
+}
+
+fn steps<P: Judged>(settings: Settings<P>) -> Result<Vec<Step>> {
+    let of = |compensation| {
+        let settings = Settings { compensation, ..settings };
+        let experiment =
+            Experiment { name: "the stair of ideal steps".to_owned(), schedule: Schedule::ideal_stair(), settings };
+        let run = experiment.run(|_, _| ())?;
+        Ok::<_, anyhow::Error>((responses(&experiment, &run, &run.with), responses(&experiment, &run, &run.without)))
+    };
+    let (paper, none) = of(Compensation::ProportionalIntegral(Gains::PAPER))?;
+    let (fast, _) = of(Compensation::TimeOptimal(Approach::DEAD_BEAT))?;
+    let together = none.into_iter().zip(paper).zip(fast);
+    Ok(together.map(|((none, paper), fast)| Step { none, paper, fast }).collect())
+}

@@ -1,0 +1,94 @@
+//! A schedule run through the fixed-point controller, tick by tick, beside a reference in double precision.
+//!
+//! The plain spring's reference is the exact solution in continuous time, the extended spring's the loop at the same rate.
+//! Both with the pre-compensator and without it, so that each run shows what the controller is worth.
+
+use anyhow::Result;
+use model::estimator::Estimator;
+use model::{Compensation, Config, Input, Output, Plant, Settings, Spring, State, Volts};
+
+use crate::bad_input;
+use crate::bad_input::{BadInput, number};
+pub use crate::judged::{Judged, StartsFrom, continuous, reference_at, with_plant};
+pub use crate::run::{Run, Sample};
+use crate::schedule::Schedule;
+
+/// More ticks than this are refused: a run keeps 48 bytes of each.
+const MOST_TICKS: f64 = 10e6;
+
+/// What is run.
+#[derive(Clone, Debug)]
+pub struct Experiment<P = Plant> {
+    /// What the schedule is called in messages.
+    pub name: String,
+    /// The voltages asked for.
+    pub schedule: Schedule,
+    /// Spring, pre-compensator and amplifier of the controlled loop.
+    pub settings: Settings<P>,
+}
+
+impl<P: Judged> Experiment<P> {
+    /// Runs it; `progress` hears of the ticks done, every few thousand, and of their total.
+    ///
+    /// # Errors
+    /// [`BadInput`] for settings that the model refuses and schedules beyond the amplifier's range.
+    pub fn run(&self, mut progress: impl FnMut(usize, usize)) -> Result<Run> {
+        let rate_hz = self.settings.rate_hz;
+        let uncontrolled = Settings { compensation: Compensation::None, ..self.settings };
+        let controlled = self.settings.check().map_err(|error| BadInput(error.to_string()))?;
+        let alone = uncontrolled.check().map_err(|error| BadInput(error.to_string()))?;
+        self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;
+
+        let last = self.schedule.last_tick(rate_hz);
+        if last >= MOST_TICKS {
+            let (name, ticks) = (&self.name, number(last));
+            bad_input!("{name} takes {ticks} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}");
+        }
+        let targets = self.schedule.at_ticks(rate_hz);
+        let ticks = targets.len();
+        let mut run = Run { start_s: self.schedule.start_s(), rate_hz, with: Vec::new(), without: Vec::new() };
+        run.with = one_loop(&controlled, &targets, |done| progress(done, 2 * ticks))?;
+        run.without = one_loop(&alone, &targets, |done| progress(ticks + done, 2 * ticks))?;
+        for (settings, samples) in [(&self.settings, &mut run.with), (&uncontrolled, &mut run.without)] {
+            let references = P::reference_at_ticks(settings, &self.schedule, &targets);
+            for (sample, reference) in samples.iter_mut().zip(references) {
+                sample.reference = reference;
+            }
+        }
+        Ok(run)
+    }
+}
+
+/// Largest difference between fixed point and reference over every tick of a loop, in V.
+///
+/// A tick makes its share of a slew at once, the reference in the time up to the next tick: the tick that starts a slew
+/// is ahead by as much.
+pub fn max_fixed_point_error(samples: &[Sample]) -> f64 {
+    samples.iter().map(|sample| (sample.stiffness.to_f64() - sample.reference).abs()).fold(0.0, f64::max)
+}
+
+/// The report's leaf spring over the whole range of the model's amplifiers.
+pub fn paper_spring() -> Result<Spring> {
+    use model::stiffness::{Cantilever, YoungsModulus};
+    Ok(Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 1000.0)?)
+}
+
+/// The fixed-point loop over one target a tick; its reference is not known yet.
+pub fn one_loop<E: Estimator>(
+    config: &Config<E>,
+    targets: &[f64],
+    mut progress: impl FnMut(usize),
+) -> Result<Vec<Sample>> {
+    let mut state = State::default();
+    let mut samples = Vec::with_capacity(targets.len());
+    for (tick, &target) in targets.iter().enumerate() {
+        if tick % 8192 == 0 {
+            progress(tick);
+        }
+        let target = Volts::new(target).map_err(|error| BadInput(error.to_string()))?;
+        let Output { code, applied, stiffness, limits, .. } =
+            config.tick(&mut state, Input { target, ..Input::default() });
+        samples.push(Sample { code, applied, stiffness, limits, reference: 0.0 });
+    }
+    Ok(samples)
+}

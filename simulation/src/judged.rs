@@ -1,0 +1,223 @@
+//! What the fixed-point run of a spring is laid beside: a reference in double precision.
+//!
+//! The plain spring's is the exact solution in continuous time, [`crate::reference`]; the extended spring's, and that of the
+//! time-optimal pre-compensator, which thinks in ticks, is the loop at the controller's own rate, [`crate::sampled`].
+
+use model::estimator::Model;
+use model::{Compensation, ExtendedPlant, Plant, Settings};
+
+use serde::Serialize;
+
+use crate::bound::{from_where_it_is, shortest_time};
+use crate::reference::{Loop, Moment};
+use crate::run::{Run, Sample};
+use crate::sampled::{Controller, SampledLoop, Spring};
+use crate::schedule::{Change, Schedule};
+
+/// Where the fastest drive starts that a step is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StartsFrom {
+    /// At the old value, settled.
+    Settled,
+    /// Where the loop has brought the spring.
+    Reached,
+}
+
+/// A spring whose fixed-point run is laid beside a reference.
+pub trait Judged: Model {
+    /// The highest voltage that may be asked for: what the reference treats as the tick does.
+    fn highest_target(settings: &Settings<Self>) -> f64;
+
+    /// The reference's stiffness at every tick, in V, for one target a tick.
+    fn reference_at_ticks(settings: &Settings<Self>, schedule: &Schedule, targets: &[f64]) -> Vec<f64>;
+
+    /// The same at increasing moments; `samples` are those of the loop.
+    fn reference_at(
+        settings: &Settings<Self>,
+        schedule: &Schedule,
+        run: &Run,
+        samples: &[Sample],
+        times_s: &[f64],
+    ) -> Vec<f64>;
+
+    /// The shortest time, in s, in which any controller could make 97 % of each change, from the state that is meant.
+    fn bounds(settings: &Settings<Self>, run: &Run, samples: &[Sample], changes: &[Change]) -> Vec<Option<f64>>;
+
+    /// The state that is meant.
+    fn bounds_from(settings: &Settings<Self>) -> StartsFrom;
+}
+
+impl Judged for Plant {
+    fn highest_target(settings: &Settings) -> f64 {
+        settings.amplifier.max_v
+    }
+
+    fn reference_at_ticks(settings: &Settings, schedule: &Schedule, targets: &[f64]) -> Vec<f64> {
+        match settings.compensation {
+            Compensation::TimeOptimal(_) => sampled_at_ticks(settings, targets),
+            _ => exact_at_ticks(continuous(settings), schedule, settings.rate_hz, targets),
+        }
+    }
+
+    fn reference_at(
+        settings: &Settings,
+        schedule: &Schedule,
+        run: &Run,
+        samples: &[Sample],
+        times_s: &[f64],
+    ) -> Vec<f64> {
+        match settings.compensation {
+            Compensation::TimeOptimal(_) => at_last_ticks(run, samples, times_s),
+            _ => reference_at(continuous(settings), schedule, times_s.iter().copied()),
+        }
+    }
+
+    fn bounds(settings: &Settings, _: &Run, _: &[Sample], changes: &[Change]) -> Vec<Option<f64>> {
+        let system = continuous(settings);
+        changes.iter().map(|change| shortest_time(&system, change.from_v, change.to_v, 0.97)).collect()
+    }
+
+    fn bounds_from(_: &Settings) -> StartsFrom {
+        StartsFrom::Settled
+    }
+}
+
+/// In steps of the tick: between ticks the last one counts.
+impl Judged for ExtendedPlant<'_> {
+    /// Where the amplifier ends below its full scale, both take a higher target at that end.
+    fn highest_target(settings: &Settings<Self>) -> f64 {
+        settings.amplifier.full_scale_v
+    }
+
+    fn reference_at_ticks(settings: &Settings<Self>, _: &Schedule, targets: &[f64]) -> Vec<f64> {
+        sampled_at_ticks(settings, targets)
+    }
+
+    fn reference_at(_: &Settings<Self>, _: &Schedule, run: &Run, samples: &[Sample], times_s: &[f64]) -> Vec<f64> {
+        at_last_ticks(run, samples, times_s)
+    }
+
+    fn bounds(settings: &Settings<Self>, run: &Run, samples: &[Sample], changes: &[Change]) -> Vec<Option<f64>> {
+        match settings.plant.plain() {
+            Some(plant) => Plant::bounds(&with_plant(settings, plant), run, samples, changes),
+            None => from_where_it_is(&SampledLoop::from(settings), run, samples, changes, 0.97),
+        }
+    }
+
+    fn bounds_from(settings: &Settings<Self>) -> StartsFrom {
+        if settings.plant.plain().is_some() { StartsFrom::Settled } else { StartsFrom::Reached }
+    }
+}
+
+/// The settings with another spring.
+pub fn with_plant<P, Q>(settings: &Settings<P>, plant: Q) -> Settings<Q> {
+    let Settings { rate_hz, compensation, amplifier, feedback, .. } = *settings;
+    Settings { rate_hz, plant, compensation, amplifier, feedback }
+}
+
+/// The settings as the reference takes them; the target is put out as it is where it cannot be led by gains.
+pub fn continuous(settings: &Settings) -> Loop {
+    Loop {
+        share: settings.plant.share,
+        time_constant_s: settings.plant.time_constant_s,
+        gains: match settings.compensation {
+            Compensation::ProportionalIntegral(gains) => Some((gains.proportional, gains.integral_per_s)),
+            _ => None,
+        },
+        range_v: (settings.amplifier.min_v, settings.amplifier.max_v),
+        slew_v_per_s: slew(settings),
+    }
+}
+
+/// The sampled loop's stiffness, in V, for one target a tick.
+fn sampled_at_ticks<P: Copy + Into<Spring>>(settings: &Settings<P>, targets: &[f64]) -> Vec<f64> {
+    let sampled = SampledLoop::from(settings);
+    let mut state = sampled.at_rest();
+    let at = |&target: &f64| {
+        let voltage = sampled.drive(&mut state, target);
+        sampled.apply(&mut state, voltage)
+    };
+    targets.iter().map(at).collect()
+}
+
+/// Between ticks the last one counts.
+fn at_last_ticks(run: &Run, samples: &[Sample], times_s: &[f64]) -> Vec<f64> {
+    times_s.iter().map(|&time| samples[run.tick_at(time)].reference).collect()
+}
+
+/// The amplifier's slew, in V/s; what it makes within a tick is no limit to it.
+fn slew<P>(settings: &Settings<P>) -> f64 {
+    let amplifier = &settings.amplifier;
+    let acts = |slew: &f64| slew / settings.rate_hz < amplifier.full_scale_v;
+    amplifier.slew_v_per_s.filter(acts).unwrap_or(f64::INFINITY)
+}
+
+impl<P: Copy + Into<Spring>> From<&Settings<P>> for SampledLoop {
+    fn from(settings: &Settings<P>) -> Self {
+        Self {
+            sample_s: 1.0 / settings.rate_hz,
+            spring: settings.plant.into(),
+            controller: match settings.compensation {
+                Compensation::None => Controller::None,
+                Compensation::ProportionalIntegral(gains) => {
+                    Controller::ProportionalIntegral(gains.proportional, gains.integral_per_s)
+                }
+                Compensation::TimeOptimal(approach) => Controller::TimeOptimal(approach.time_constant_s),
+            },
+            range_v: (settings.amplifier.min_v, settings.amplifier.max_v),
+            slew_v_per_s: slew(settings),
+        }
+    }
+}
+
+/// The stiffness of the exact solution at every tick, in V.
+fn exact_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f64]) -> Vec<f64> {
+    let mut stiffness = vec![0.0; targets.len()];
+    let mut solution = system.at_rest(1.0 / rate_hz);
+    let time = |tick: usize| schedule.start_s() + tick as f64 / rate_hz;
+    // Where the target goes straight from tick to tick, and does not jump at the next, whole runs of ticks are one call.
+    let mut reader = schedule.reader();
+    let mut straight = |tick: usize| {
+        reader.at(time(tick));
+        let mut stretches = reader.clone().stretches(time(tick), time(tick + 1));
+        let first = stretches.next();
+        stretches.next().is_none() && first.is_some_and(|first| (first.to_v() - targets[tick + 1]).abs() < 1e-9)
+    };
+    let mut moments = vec![Moment::default(); targets.len()];
+    // Goes along, like the other: found from the start each time, a long file would take the square of its rows.
+    let mut behind = schedule.reader();
+    let mut tick = 0;
+    while tick < targets.len() {
+        solution.jump(targets[tick]);
+        stiffness[tick] = solution.moment().stiffness;
+        let end = (tick..targets.len() - 1).find(|&tick| !straight(tick)).unwrap_or(targets.len() - 1);
+        solution.run(&targets[tick..=end], &mut moments[tick..end]);
+        for at in tick..end {
+            stiffness[at + 1] = moments[at].stiffness;
+        }
+        behind.at(time(end));
+        for stretch in behind.clone().stretches(time(end), time(end + 1)) {
+            solution.advance(stretch.from_v, stretch.slope, stretch.duration_s);
+        }
+        tick = end + 1;
+    }
+    stiffness
+}
+
+/// The stiffness of the exact solution at increasing moments of a schedule, in V.
+pub fn reference_at(system: Loop, schedule: &Schedule, times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut solution = system.at_rest(1e-3);
+    let mut now = schedule.start_s();
+    let mut reader = schedule.reader();
+    let at = |time: f64| {
+        let next = time.clamp(now, schedule.end_s());
+        for stretch in reader.clone().stretches(now, next) {
+            solution.advance(stretch.from_v, stretch.slope, stretch.duration_s);
+        }
+        now = next;
+        solution.jump(reader.at(next));
+        solution.moment().stiffness
+    };
+    times_s.into_iter().map(at).collect()
+}

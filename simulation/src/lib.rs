@@ -1,0 +1,32 @@
+//! The fixed-point loop of the `model` crate run over a schedule on a host, compared with references in double precision.
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`schedule`], [`record`] | the commanded voltage over time: the report's stair, or a file |
+//! | [`csv_table`], [`mod@bad_input`] | CSV tables, and errors that name what was expected |
+//! | [`plant_file`] | the spring as a file |
+//! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
+//! | [`sampled`] | the loop at the controller's own rate, in double precision |
+//! | [`run`], [`judged`], [`experiment`] | fixed point and reference over a schedule |
+//! | [`open_loop`] | the fixed-point spring alone over a record |
+//! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the shortest possible t97 |
+//! | [`comparison`], [`tune`] | controllers compared on the same steps; gains for a spring and the cost of a model error |
+
+pub mod bad_input;
+pub mod bound;
+pub mod comparison;
+pub mod csv_table;
+pub mod experiment;
+pub mod judged;
+mod leap;
+pub mod open_loop;
+pub mod plant_file;
+pub mod record;
+pub mod reference;
+pub mod response;
+pub mod run;
+pub mod sampled;
+pub mod schedule;
+pub mod tune;
+
+pub use bad_input::BadInput;

@@ -1,0 +1,84 @@
+use crate::plant_file::*;
+
+/// Every table and field.
+const WHOLE: &str = include_str!("../../../docs/plant.toml");
+
+#[test]
+fn a_file_gives_its_numbers() {
+    let file = parse("p", "schema = 1\n[relaxation]\nshare = 0.2\ntau_s = 3\n").unwrap();
+    assert_eq!(file.extended().plain(), Some(Plant { share: 0.2, time_constant_s: 3.0 }));
+    assert_eq!(file, Plant { share: 0.2, time_constant_s: 3.0 }.into());
+    let whole = parse("p", WHOLE).unwrap();
+    assert_eq!(whole.extended().plain(), None);
+    assert_eq!(whole.left_out(), ["amplifier.delay_s", "drift", "remarks"]);
+    let plant = whole.extended();
+    assert_eq!(plant.memory.unwrap().thresholds_v, [10.0, 25.0]);
+    assert_eq!(plant.law.unwrap().stiffness[4], 410.0);
+    assert_eq!(plant.relaxation.lags().collect::<Vec<_>>(), [(5.5, 0.8), (40.0, 0.109)]);
+}
+
+#[test]
+fn the_plain_spring_can_be_asked_for() {
+    assert_eq!(load_plain("paper").unwrap(), Plant::PAPER);
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/plant.toml");
+    assert!(load_plain(example).unwrap_err().to_string().contains("expected [relaxation] with one share and tau_s"));
+    assert!(load(example).is_ok());
+}
+
+#[test]
+fn what_is_written_is_read_again() {
+    let whole = parse("p", WHOLE).unwrap();
+    let mut slim = whole.clone();
+    (slim.memory, slim.law, slim.leakage, slim.unmodelled) = (None, None, None, None);
+    slim.relaxation.tau_s = vec![1.0 / 3.0];
+    slim.relaxation.tau_high_s = Some(0.7);
+    slim.relaxation.weights.clear();
+    slim.amplifier = Some(Amplifier { slew_v_per_s: Some(0.1 + 0.2 + 1.0), ..Amplifier::default() });
+    let paper = PlantFile::from(Plant::PAPER);
+    for file in [whole, slim, paper] {
+        let text = file.to_toml().unwrap();
+        assert_eq!(parse("p", &text).unwrap(), file, "{text}");
+    }
+}
+
+#[test]
+fn faults_are_one_line_with_their_place() {
+    let plain = "schema = 1\n[relaxation]\nshare = 0.2\ntau_s = 3.0\n";
+    let changed = |from: &str, to: &str| WHOLE.replace(from, to);
+    for (text, expected) in [
+        ("schema = 1\n[relaxation]\nshare = \"much\"\ntau_s = 3.0\n".into(), "p, line 3, column 9:"),
+        ("schema = 1\n[relaxation]\nshare = 0.2\n".into(), "missing field `tau_s`"),
+        (format!("{plain}ta = 1.0\n"), "p, line 5, column 1: unknown field `ta`"),
+        (format!("{plain}[hysteresis]\nwidth = 1\n"), "p, line 5, column 2: unknown field `hysteresis`"),
+        (plain.replace("schema = 1", "schema = 2"), "p, line 1, column 10: schema = 2 is not allowed: expected 1 as"),
+        (plain.replace("0.2", "-1.0"), "p, line 3, column 9: share = -1 is not allowed: expected 0 to 0.9"),
+        (plain.replace("3.0", "nan"), "p, line 4, column 9: tau_s = NaN"),
+        (plain.replace("3.0", "\"slow\""), "p, line 4, column 9: invalid type: string \"slow\", expected a number or"),
+        ("schema = ".into(), "p, line 1"),
+        (changed("[10.0, 25.0]", "[10.0, 2500]"), "p, line 5, column 23: thresholds_v = 2500 is not allowed"),
+        (changed("[10.0, 25.0]", "[10.0]"), "p, line 6, column 11: weights = 2 is not allowed: expected 1 weights"),
+        (changed("[0, 100, 200", "[0, 300, 200"), "p, line 9, column 22: voltage_v = 200 is not allowed"),
+        (
+            changed("[0, 100, 200", "[5, 100, 200"),
+            "p, line 9, column 14: voltage_v = 5 is not allowed: expected 0 V, where the law starts",
+        ),
+        (
+            changed("[0, 90", "[0, 9000"),
+            "p, line 10, column 17: stiffness = 9000 is not allowed: expected -1000 to 1000",
+        ),
+        (changed("share = 0.1\n", "share = 1.5\n"), "p, line 13, column 9: share = 1.5 is not allowed"),
+        (changed("weights = [0.8, 0.109]\n", ""), "weights = 0 is not allowed: expected 2 weights"),
+        (changed("tau_high_s = 8.0", "tau_high_s = 80"), "p, line 20, column 14: tau_high_s = 80 is not allowed"),
+        (changed("650.0", "4"), "p, line 23, column 11: limit_v = 4 is not allowed: expected 10 to 1000 V"),
+        (changed("limit_v = 650.0", "limit = 650.0"), "p, line 23, column 1: unknown field `limit`"),
+    ] {
+        let got = parse("p", &text).unwrap_err().to_string();
+        assert!(got.contains(expected) && !got.contains('\n'), "{text:?}: {got}");
+    }
+}
+
+#[test]
+fn what_is_left_out_is_named_in_one_line() {
+    let text = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 5.5\n[unmodelled]\ndrift = 1\n\"a\\nb\\u0000\" = 1\n";
+    assert_eq!(parse("t", text).unwrap().left_out(), [r"a\nb\0", "drift"]);
+}

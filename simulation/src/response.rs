@@ -1,0 +1,118 @@
+//! How a loop answers each change of its target.
+
+use serde::Serialize;
+
+use crate::experiment::{Experiment, Judged};
+use crate::run::{Run, Sample};
+use crate::schedule::Change;
+
+/// The answer to one change. Times are in s from the moment the target starts to change.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Response {
+    /// The plateau before, in V.
+    pub from_v: f64,
+    /// The plateau after, in V.
+    pub to_v: f64,
+    /// When half of the change is first reached; `None` if never before the next change.
+    pub t50_s: Option<f64>,
+    /// When 90 % is first reached.
+    pub t90_s: Option<f64>,
+    /// When 97 % is first reached.
+    pub t97_s: Option<f64>,
+    /// How far the stiffness goes beyond, in percent of the change.
+    pub overshoot_percent: f64,
+    /// The voltage that goes farthest in the direction of the change, in V.
+    pub peak_v: f64,
+    /// The shortest `t97_s` that any controller could reach within the amplifier's limits, with an ideal step: from a
+    /// settled spring, or for an extended one from the state that this loop has brought it to (see [`crate::bound`]).
+    /// `None` if out of reach.
+    pub bound_t97_s: Option<f64>,
+}
+
+/// Measures one loop of a run, tick by tick, straight between ticks.
+pub fn measure(run: &Run, samples: &[Sample], change: &Change, bound_t97_s: Option<f64>) -> Response {
+    let Change { start_s, end_s, from_v, to_v } = *change;
+    let first = run.tick_at(start_s);
+    // The tick at the end may show the next change already.
+    let last = run.tick_at(end_s).max(first + 1);
+    let part = |sample: &Sample| (sample.stiffness.to_f64() - from_v) / (to_v - from_v);
+    let window = &samples[first..last];
+
+    let reaches = |goal: f64| {
+        let after = window.iter().position(|sample| part(sample) >= goal)?;
+        let time = |index: usize| run.time_s(first + index) - start_s;
+        if after == 0 {
+            return Some(time(0).max(0.0));
+        }
+        let (low, high) = (part(&window[after - 1]), part(&window[after]));
+        let missing = (part(&window[after]) - goal) / (high - low);
+        Some((time(after) - missing / run.rate_hz).max(0.0))
+    };
+    let farthest = |value: &dyn Fn(&Sample) -> f64| window.iter().map(value).fold(f64::NEG_INFINITY, f64::max);
+    let direction = (to_v - from_v).signum();
+    Response {
+        from_v,
+        to_v,
+        t50_s: reaches(0.5),
+        t90_s: reaches(0.9),
+        t97_s: reaches(0.97),
+        overshoot_percent: 100.0 * (farthest(&part) - 1.0).max(0.0),
+        peak_v: direction * farthest(&|sample| direction * sample.applied.to_f64()),
+        bound_t97_s,
+    }
+}
+
+/// The answer of one loop of a run to each change of its target.
+pub fn responses<P: Judged>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> Vec<Response> {
+    let changes = experiment.schedule.changes();
+    let bounds = P::bounds(&experiment.settings, run, samples, &changes);
+    let each = |(change, bound): (&Change, _)| measure(run, samples, change, bound);
+    changes.iter().zip(bounds).map(each).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use model::{DacCode, Limits, ScaledStiffness, Volts};
+
+    use super::*;
+
+    /// A run whose stiffness and voltage are given functions of time.
+    fn run(rate_hz: f64, ticks: usize, stiffness: impl Fn(f64) -> f64, voltage: impl Fn(f64) -> f64) -> Run {
+        let sample = |tick: usize| {
+            let time = 2.0 + tick as f64 / rate_hz;
+            Sample {
+                code: DacCode(0),
+                applied: Volts::new(voltage(time)).unwrap(),
+                stiffness: ScaledStiffness(Volts::new(stiffness(time)).unwrap().0),
+                limits: Limits::NONE,
+                reference: 0.0,
+            }
+        };
+        Run { start_s: 2.0, rate_hz, with: (0..ticks).map(sample).collect(), without: Vec::new() }
+    }
+
+    /// Straight lines at a rate that no time falls on: the crossings lie between ticks.
+    #[test]
+    fn crossings_lie_between_ticks() {
+        let run = run(333.0, 3330, |t| (50.0 * (t - 3.0)).clamp(0.0, 110.0), |t| if t < 4.0 { 300.0 } else { 100.0 });
+        let change = Change { start_s: 3.0, end_s: 8.0, from_v: 0.0, to_v: 100.0 };
+        let got = measure(&run, &run.with, &change, Some(0.1));
+        for (got, expected) in [(got.t50_s, 1.0), (got.t90_s, 1.8), (got.t97_s, 1.94)] {
+            assert!((got.unwrap() - expected).abs() < 1e-5, "{got:?} {expected}");
+        }
+        assert!((got.overshoot_percent - 10.0).abs() < 1e-3);
+        assert_eq!(got.peak_v, 300.0);
+    }
+
+    /// Downwards, never complete, and the next change right behind: its first tick does not count.
+    #[test]
+    fn a_step_down_has_its_peak_below() {
+        let stiffness = |t: f64| if t < 5.0 { 300.0 - 30.0 * (t - 3.0).max(0.0) } else { 0.0 };
+        let run = run(100.0, 600, stiffness, |t| if t < 4.0 { 50.0 } else { 250.0 });
+        let change = Change { start_s: 3.0, end_s: 5.0, from_v: 300.0, to_v: 200.0 };
+        let got = measure(&run, &run.with, &change, Some(0.1));
+        assert!((got.t50_s.unwrap() - 5.0 / 3.0).abs() < 1e-5);
+        assert_eq!((got.t90_s, got.t97_s, got.overshoot_percent, got.peak_v), (None, None, 0.0, 50.0));
+        assert_eq!(got.bound_t97_s, Some(0.1));
+    }
+}

@@ -1,0 +1,211 @@
+//! Which gains and settings for a spring and an amplifier, and what an error of the spring's model costs.
+//!
+//! - The proportional-integral controller: the gains with the shortest t97 of the slowest step of the ideal stair, at most
+//!   so much overshoot on any, and [`margins`] of the linearised loop that are not below [`Margins::LEAST`]. Found on the
+//!   controller's own fixed-point tick, limits included: a grid, then a compass search.
+//! - The fast controller: the longest approach that leaves every step within [`WITHIN`] of the dead-beat t97, and of the
+//!   overshoot that is allowed. It is the smoothest of those that are as good as the fastest.
+//! - [`trade`]: both, built for the spring as it is said to be, on springs that are not.
+
+pub mod margins;
+pub mod trade;
+
+use anyhow::Result;
+use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Settings};
+use serde::Serialize;
+
+use crate::bad_input::BadInput;
+use crate::experiment::{Run, one_loop};
+use crate::plant_file::PlantFile;
+use crate::response::measure;
+use crate::schedule::Schedule;
+
+pub use margins::Margins;
+pub use trade::Trade;
+
+/// How much longer than dead-beat a smoother approach may take.
+pub const WITHIN: f64 = 1.05;
+
+/// What is tuned for.
+#[derive(Clone, Debug)]
+pub struct Question<'a> {
+    /// The spring.
+    pub file: &'a PlantFile,
+    /// The amplifier that it is behind.
+    pub amplifier: Amplifier,
+    /// Ticks per second.
+    pub rate_hz: f64,
+    /// The most overshoot of any step, in percent.
+    pub overshoot_percent: f64,
+}
+
+/// The answer of `vsj tune --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tuning {
+    /// Highest voltage that the amplifier gives, in V.
+    pub limit_v: f64,
+    /// Gains of the proportional-integral controller; `None` if no gains keep what is asked.
+    pub proportional_integral: Option<TunedGains>,
+    /// Settings of the fast controller.
+    pub fast: TunedApproach,
+    /// The trade against model error.
+    pub trade: Vec<Trade>,
+}
+
+/// Gains and what they are worth.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct TunedGains {
+    /// For `--kp`.
+    pub proportional: f64,
+    /// For `--ki`, in 1/s.
+    pub integral_per_s: f64,
+    /// Of the linearised loop.
+    pub margins: Margins,
+    /// On the stair.
+    #[serde(flatten)]
+    pub worst: Worst,
+}
+
+/// An approach and what it is worth.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct TunedApproach {
+    /// For `--approach-s`, in s.
+    pub approach_s: f64,
+    /// On the stair.
+    #[serde(flatten)]
+    pub worst: Worst,
+}
+
+/// The worst of the steps of the stair.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Worst {
+    /// In s; `None` if a step does not get there.
+    pub t97_s: Option<f64>,
+    /// In percent of the step.
+    pub overshoot_percent: f64,
+}
+
+impl Question<'_> {
+    fn settings(&self, compensation: Compensation) -> Settings<ExtendedPlant<'_>> {
+        Settings {
+            rate_hz: self.rate_hz,
+            plant: self.file.extended(),
+            compensation,
+            amplifier: self.amplifier,
+            feedback: None,
+        }
+    }
+
+    /// The fixed-point loop over the stair: its voltages, and stiffness by its own model.
+    ///
+    /// # Errors
+    /// [`BadInput`] for what the tick refuses.
+    fn run(&self, compensation: Compensation) -> Result<Run> {
+        let config = self.settings(compensation).check().map_err(|error| BadInput(error.to_string()))?;
+        let schedule = Schedule::ideal_stair();
+        let with = one_loop(&config, &schedule.at_ticks(self.rate_hz), |_| ())?;
+        Ok(Run { start_s: schedule.start_s(), rate_hz: self.rate_hz, with, without: Vec::new() })
+    }
+
+    /// The worst step; `None` if the tick refuses the settings.
+    fn worst(&self, compensation: Compensation) -> Option<Worst> {
+        Some(worst(&self.run(compensation).ok()?))
+    }
+
+    /// The fastest gains.
+    fn gains(&self) -> Option<TunedGains> {
+        let tried = |proportional, integral_per_s| {
+            let gains = Gains { proportional, integral_per_s };
+            let margins = Margins::of(self.file, &gains, self.rate_hz);
+            let worst = margins.enough().then(|| self.worst(Compensation::ProportionalIntegral(gains))).flatten()?;
+            let t97 = worst.t97_s.filter(|_| worst.overshoot_percent <= self.overshoot_percent)?;
+            Some((t97, TunedGains { proportional, integral_per_s, margins, worst }))
+        };
+        // Decades of the gain and of the reset time.
+        let at_point = |[gain, reset]: [f64; 2]| tried(10f64.powf(gain), 10f64.powf(gain - reset));
+        let better = |one: &(f64, TunedGains), other: &(f64, TunedGains)| one.0.total_cmp(&other.0);
+        let grid = (0..9).flat_map(|row| {
+            (0..9).map(move |column| [-1.0 + 0.375 * f64::from(row), -1.0 + 0.375 * f64::from(column)])
+        });
+        let (mut at, mut best) =
+            grid.filter_map(|point| Some((point, at_point(point)?))).min_by(|one, other| better(&one.1, &other.1))?;
+        let mut step = 0.2;
+        while step > 0.01 {
+            let around = [[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]];
+            let next = around.map(|[by_gain, by_reset]| [at[0] + by_gain, at[1] + by_reset]);
+            let next = next.into_iter().filter_map(|point| Some((point, at_point(point)?)));
+            match next.min_by(|one, other| better(&one.1, &other.1)) {
+                Some((point, found)) if found.0 < best.0 => (at, best) = (point, found),
+                _ => step *= 0.5,
+            }
+        }
+        // Three digits are what a person types.
+        let rounded = tried(three_digits(best.1.proportional), three_digits(best.1.integral_per_s));
+        rounded.or(Some(best)).map(|(_, found)| found)
+    }
+
+    /// The longest approach that is as good as none.
+    fn approach(&self) -> Result<TunedApproach> {
+        let with = |time_constant_s| Compensation::TimeOptimal(Approach { time_constant_s });
+        let steps = |compensation| self.run(compensation).map(|run| responses(&run));
+        let dead_beat = steps(with(0.0))?;
+        let good_enough = |approach_s: f64| -> Result<bool> {
+            let mut pairs = steps(with(approach_s))?.into_iter().zip(&dead_beat);
+            Ok(pairs.all(|(step, fastest)| {
+                let most = fastest.t97_s.map_or(f64::INFINITY, |t97| WITHIN * t97);
+                step.t97_s.unwrap_or(f64::INFINITY) <= most
+                    && step.overshoot_percent <= self.overshoot_percent.max(fastest.overshoot_percent)
+            }))
+        };
+        let mut approach_s = 0.0;
+        for tried in [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0] {
+            if !good_enough(tried)? {
+                break;
+            }
+            approach_s = tried;
+        }
+        Ok(TunedApproach { approach_s, worst: worst(&self.run(with(approach_s))?) })
+    }
+}
+
+/// Answers it.
+///
+/// # Errors
+/// [`BadInput`] for a spring or amplifier that the tick refuses.
+pub fn tune(question: &Question<'_>) -> Result<Tuning> {
+    let fast = question.approach()?;
+    let proportional_integral = question.gains();
+    let compensations = [
+        proportional_integral.map(|TunedGains { proportional, integral_per_s, .. }| {
+            Compensation::ProportionalIntegral(Gains { proportional, integral_per_s })
+        }),
+        Some(Compensation::TimeOptimal(Approach { time_constant_s: fast.approach_s })),
+    ];
+    let runs = compensations.map(|compensation| compensation.map(|it| question.run(it)).transpose());
+    let [with_gains, with_approach] = runs;
+    let trade = trade::over_errors(question.file, with_gains?.as_ref(), with_approach?.as_ref());
+    Ok(Tuning { limit_v: question.amplifier.max_v, proportional_integral, fast, trade })
+}
+
+fn responses(run: &Run) -> Vec<crate::response::Response> {
+    Schedule::ideal_stair().changes().iter().map(|change| measure(run, &run.with, change, None)).collect()
+}
+
+/// The worst step of a run over the stair.
+fn worst(run: &Run) -> Worst {
+    Worst::of(responses(run).iter().map(|step| (step.t97_s, step.overshoot_percent)))
+}
+
+impl Worst {
+    fn of(steps: impl Iterator<Item = (Option<f64>, f64)>) -> Self {
+        let start = Self { t97_s: Some(0.0), overshoot_percent: 0.0 };
+        steps.fold(start, |worst, (t97_s, overshoot)| Self {
+            t97_s: worst.t97_s.zip(t97_s).map(|(one, other)| f64::max(one, other)),
+            overshoot_percent: worst.overshoot_percent.max(overshoot),
+        })
+    }
+}
+
+fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}

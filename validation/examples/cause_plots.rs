@@ -1,0 +1,74 @@
+//! Draws what each cause looks like, for docs/causes: one record of the hidden spring, beside the paper's simulation.
+//!
+//! ```sh
+//! cargo run --release -p end-to-end --example cause_plots -- docs/causes
+//! ```
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use host_sim::output::diagnosis::panels::panels;
+use identify::effects::model::Model;
+use identify::fit::simulator::Simulator;
+use identify::record::data::Data;
+use identify::{Input, Options};
+use validation::hidden::{Cause, Effect, Hidden, Noise, Schedule};
+
+/// What is hidden, in the order of [`Effect::values`], and the schedule that shows it.
+fn shown(cause: Cause) -> (Vec<f64>, Schedule) {
+    match cause {
+        Cause::GainError => (vec![1.1], slow()),
+        Cause::InstantaneousShare => (vec![0.2], slow()),
+        Cause::TimeConstant => (vec![8.0], slow()),
+        Cause::SecondRelaxation => (vec![0.2, 40.0], slow()),
+        Cause::VoltageDependentTimeConstant => (vec![4.0, 9.0], slow()),
+        Cause::StaticNonlinearity => (vec![0.3], slow()),
+        Cause::Hysteresis => (vec![60.0], slow()),
+        Cause::ChargeLeakage => (vec![0.2, 30.0], slow()),
+        Cause::Drift => (vec![0.001], slow()),
+        Cause::Resonance => (vec![4.0, 0.08, 1.0], fast()),
+        Cause::Delay => (vec![0.1], fast()),
+        Cause::AmplifierLimit => (vec![400.0], slow()),
+        Cause::AmplifierSlew => (vec![1.0 / 800.0], fast()),
+        Cause::SensorSaturation => (vec![0.8], slow()),
+        Cause::Quantisation => (vec![15.0], slow()),
+        Cause::Hum => (vec![6.0, 1.5, 0.0], fast()),
+        Cause::ReadingOffset => (vec![52.0, 71.0, 15.0], slow()),
+        Cause::Outliers => (vec![0.01, 40.0], slow()),
+    }
+}
+
+/// A stair up and down and one full step, 15 s each, ten rows a second.
+fn slow() -> Schedule {
+    schedule(&[0.0, 125.0, 250.0, 375.0, 500.0, 375.0, 250.0, 125.0, 0.0, 500.0, 500.0, 0.0, 0.0], 15.0, 0.1)
+}
+
+/// Steps of different heights, 2 s each, a hundred rows a second.
+fn fast() -> Schedule {
+    schedule(&[0.0, 100.0, 500.0, 300.0, 0.0], 2.0, 0.01)
+}
+
+fn schedule(levels_v: &[f64], hold_s: f64, every_s: f64) -> Schedule {
+    let rows_per_level = (hold_s / every_s).round() as usize;
+    let rows = levels_v.len() * rows_per_level;
+    Schedule {
+        time_s: (0..rows).map(|row| row as f64 * every_s).collect(),
+        voltage_v: (0..rows).map(|row| levels_v[row / rows_per_level]).collect(),
+    }
+}
+
+fn main() -> anyhow::Result<()> {
+    let folder = PathBuf::from(std::env::args().nth(1).context("expected a folder to write to")?);
+    for cause in Cause::ALL {
+        let (values, schedule) = shown(cause);
+        let effect = Effect { cause, form: 0, plain: values.clone(), neutral: values, size: 1.0 };
+        let hidden = Hidden::new(schedule, vec![effect], Noise::white(0.1), 1);
+        let data = Data::new(&hidden.record(), Input::Hold);
+        let mut simulation = Vec::new();
+        Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulation);
+        let path = folder.join(format!("{cause}.svg"));
+        std::fs::write(&path, panels(&data, &simulation)).with_context(|| path.display().to_string())?;
+        println!("wrote {}", path.display());
+    }
+    Ok(())
+}
