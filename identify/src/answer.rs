@@ -2,8 +2,6 @@
 
 use serde::{Serialize, Serializer};
 
-use crate::verdict::margins::Margins;
-
 /// Version of the form.
 pub const SCHEMA: u32 = 1;
 
@@ -140,4 +138,13 @@ pub struct ResidualReport {
     pub input_correlation: Vec<f64>,
     /// 95 % of chance values lie within this.
     pub band: f64,
+}
+
+/// Errors from which on they show, as parts of what is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Margins {
+    /// Of the gain.
+    pub gain: f64,
+    /// Of the time constant, when it is too long.
+    pub time_constant: f64,
 }

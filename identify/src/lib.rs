@@ -32,8 +32,7 @@ pub mod search;
 pub mod stats;
 pub mod verdict;
 
-pub use answer::{Report, Verdict};
+pub use answer::{Margins, Report, Verdict};
 pub use examine::{Options, diagnose, examine};
 pub use record::data::Input;
 pub use verdict::diagnosis::Diagnosis;
-pub use verdict::margins::Margins;

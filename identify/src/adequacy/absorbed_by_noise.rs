@@ -14,11 +14,11 @@
 //! autoregression with a coefficient of 0.99.
 
 use crate::adequacy::localisation::whereabouts;
-use crate::adequacy::spectrum;
 use crate::adequacy::unmodelled::Leftover;
 use crate::noise::memory::Memory;
-use crate::noise::{scale, scale_of_squares};
 use crate::record::data::Data;
+use crate::record::spectrum;
+use crate::stats::scale::{scale, scale_of_squares};
 
 /// Long parts of the record.
 const PARTS: usize = 8;

@@ -14,7 +14,7 @@
 
 use crate::adequacy::unmodelled::Leftover;
 use crate::fit::engine::{Engine, Fit};
-use crate::noise::scale_of_squares;
+use crate::stats::scale::scale_of_squares;
 use crate::stats::sums::dot;
 
 /// Parts of the record: many show quick changes, few those in loud noise.
@@ -99,7 +99,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::normals;
+    use crate::stats::scale::normals;
 
     const ROWS: usize = 2400;
     const STAIR: usize = 150;

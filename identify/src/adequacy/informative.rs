@@ -10,7 +10,6 @@ use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::covariance;
 use crate::noise::Noise;
 use crate::record::data::Data;
-use crate::search::Scored;
 use crate::stats::sums::dot;
 
 /// A stair moves the simulation at least so far, in V: readings that stay where they are then are no spring's.
@@ -117,8 +116,8 @@ pub(crate) fn of_both(tau_s: f64) -> Model {
 }
 
 /// Of a spring that was found, if one that stands still is as likely.
-pub(crate) fn no_spring(engine: &mut Engine, baseline: &Fit, found: &Scored) -> Option<Silent> {
-    let still = !found.fit.model.blocks.is_empty() && standstill::as_likely(engine, &found.fit.model, found.score);
+pub(crate) fn no_spring(engine: &mut Engine, baseline: &Fit, found: &Fit, score: f64) -> Option<Silent> {
+    let still = !found.model.blocks.is_empty() && standstill::as_likely(engine, &found.model, score);
     still.then(|| Silent::Sensor(Beside::of(engine.data, baseline).still()))
 }
 

@@ -4,7 +4,6 @@ pub mod absorbed_by_noise;
 pub mod in_step;
 pub mod informative;
 pub mod localisation;
-pub mod spectrum;
 pub mod spikes;
 pub mod standstill;
 pub mod unmodelled;

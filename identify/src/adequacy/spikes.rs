@@ -96,10 +96,10 @@ mod tests {
     use super::*;
     use crate::effects::model::Model;
     use crate::fit::simulator::Simulator;
-    use crate::noise::normals;
     use crate::plant::base::Base;
     use crate::record::data::Input;
     use crate::record::observed::Observed;
+    use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 
     const ROWS: usize = 800;

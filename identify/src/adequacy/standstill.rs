@@ -10,8 +10,9 @@
 use crate::effects::index_of;
 use crate::effects::model::Model;
 use crate::fit::engine::Engine;
-use crate::noise::{Noise, scale};
+use crate::noise::Noise;
 use crate::stats::median::median;
+use crate::stats::scale::scale;
 
 /// What is added to readings, whatever is read.
 const ADDED: [&str; 2] = ["hum", "reading-offset"];

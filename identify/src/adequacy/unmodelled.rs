@@ -7,10 +7,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::adequacy::localisation::whereabouts;
-use crate::adequacy::spectrum;
 use crate::fit::engine::{Engine, Fit, Jacobian};
 use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece};
+use crate::record::spectrum;
 use crate::stats::sums::dot;
 
 /// Structure that no block has taken.

@@ -84,10 +84,10 @@ mod tests {
     use crate::effects::model::{Block, Model};
     use crate::fit::engine::Engine;
     use crate::fit::simulator::Simulator;
-    use crate::noise::normals;
     use crate::plant::base::Base;
     use crate::record::data::Input;
     use crate::record::observed::Observed;
+    use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 
     /// Whole rows and a part of one, from starts on either side.

@@ -1,8 +1,8 @@
 //! A periodic disturbance rides on the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
 
-use crate::adequacy::spectrum;
 use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
 use crate::record::data::Data;
+use crate::record::spectrum;
 
 pub(super) struct Hum;
 

@@ -7,8 +7,8 @@
 
 use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
 use crate::record::data::Data;
-use crate::record::observed::bends;
 use crate::stats::median::{deviation, median};
+use crate::stats::scale::bends;
 
 pub(super) struct ReadingOffset;
 

@@ -8,10 +8,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::effects::effect::Scene;
 use crate::effects::model::Model;
 use crate::fit::simulator::Simulator;
-use crate::noise::{Noise, Term, scale};
+use crate::noise::{Noise, Term};
 use crate::plant::start;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
+use crate::stats::scale::scale;
 use crate::stats::sums::dot;
 
 /// A model with its points fitted.

@@ -106,10 +106,10 @@ mod tests {
     use crate::effects::index_of;
     use crate::effects::model::Block;
     use crate::fit::simulator::Simulator;
-    use crate::noise::normals;
     use crate::plant::base::Base;
     use crate::record::data::{Data, Input};
     use crate::record::observed::Observed;
+    use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 
     const ROWS: usize = 800;

@@ -16,7 +16,7 @@ use crate::effects::effect::{Quantity, Scene};
 use crate::effects::model::Block;
 use crate::fit::engine::{Engine, Fit, normal_equations};
 use crate::record::data::Data;
-use crate::verdict::quality::Z;
+use crate::stats::scale::Z;
 
 /// What the readings tell of the fitted coordinates.
 pub(crate) fn information(engine: &mut Engine, fit: &Fit) -> DMatrix<f64> {

@@ -10,8 +10,8 @@
 //! with zeros and poles in turn (Oustaloup 2000), from the record's length up to half a row.
 
 use crate::noise::octaves::Octaves;
-use crate::noise::scale as robust_scale;
 use crate::stats::median::running;
+use crate::stats::scale::scale as robust_scale;
 use crate::stats::sums::dot;
 
 /// A filter that turns noise with a memory into independent innovations.
@@ -208,7 +208,7 @@ fn autoregression(correlation: &[f64], rows: usize) -> (Vec<f64>, f64) {
 
 #[cfg(test)]
 mod tests {
-    use crate::noise::normals;
+    use crate::stats::scale::normals;
 
     use super::*;
 

@@ -21,14 +21,10 @@ pub use memory::Memory;
 
 use crate::record::observed::{COARSE, Kind, Observed};
 use crate::record::quantisation_grid::Lattice;
-use crate::stats::median::deviation;
+use crate::stats::scale::{FINEST_V, negligible, scale, scale_of_squares};
 use crate::stats::sums::dot;
 use reading::{in_cell, stopped};
 use tail::tail_constant;
-
-/// No reading is taken to be better than this, in V: the tick itself says no more, and a record without noise, as another
-/// simulation writes it, differs from ours by the steps in which both were computed.
-pub const FINEST_V: f64 = 0.01;
 
 /// The law of the noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -269,38 +265,10 @@ fn exact<'i>(innovations: &'i [f64], observed: &Observed) -> Cow<'i, [f64]> {
     innovations.iter().zip(&observed.kinds).filter(|(_, kind)| **kind == Kind::Exact).map(|(e, _)| *e).collect()
 }
 
-/// Robust scale around zero: the median size, as a normal's standard deviation, [`FINEST_V`] at least. Noise is never exactly
-/// zero; rows that are (a spring at rest, read without noise) say nothing of it.
-pub fn scale(residual: &[f64]) -> f64 {
-    deviation(residual.iter().copied().filter(|r| *r != 0.0)).map_or(FINEST_V, |scale| scale.max(FINEST_V))
-}
-
-/// True if what is left is the arithmetic's.
-pub fn negligible(residual: &[f64]) -> bool {
-    scale_of_squares(residual) <= FINEST_V
-}
-
-/// Root of the mean square.
-pub fn scale_of_squares(residual: &[f64]) -> f64 {
-    (dot(residual, residual) / residual.len().max(1) as f64).sqrt()
-}
-
-/// Independent numbers, nearly normal: sums of twelve of splitmix64's.
-#[cfg(test)]
-pub(super) fn normals(rows: usize) -> Vec<f64> {
-    let mut state = 20_261_121u64;
-    let mut uniform = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..rows).map(|_| (0..12).map(|_| uniform() - 0.5).sum()).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::scale::normals;
 
     fn as_read(rows: usize) -> Observed {
         Observed {

@@ -62,7 +62,7 @@ impl Octaves {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::normals;
+    use crate::stats::scale::normals;
 
     #[test]
     fn without_a_difference_it_is_the_correlation_itself() {

@@ -1,8 +1,9 @@
 //! What a reading that was rounded, or that stopped at a bound, says of the noise: the probability of its cell.
 
 use crate::noise::tail::sizes;
-use crate::noise::{FINEST_V, HALF_LN_TAU, Noise, Term, exact, scale_of_squares};
+use crate::noise::{HALF_LN_TAU, Noise, Term, exact};
 use crate::record::observed::{Kind, Observed};
+use crate::stats::scale::{FINEST_V, scale_of_squares};
 use crate::stats::sums::total;
 
 /// Half a cell, in scales of the noise, from which on it is a point.

@@ -1,6 +1,7 @@
 //! The tail of the innovations: a normal's, Student's t, or a mixture of two normals, by likelihood.
 
-use crate::noise::{FINEST_V, Noise, scale, scale_of_squares};
+use crate::noise::Noise;
+use crate::stats::scale::{FINEST_V, scale, scale_of_squares};
 use crate::stats::sums::total;
 
 const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];

@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::noise::scale;
+use crate::stats::scale::scale;
 use crate::stats::sums::dot;
 
 /// Errors this many scales large count as that large.

@@ -7,9 +7,9 @@ use model::Plant;
 use simulation::record::Record;
 use simulation::schedule::{Between, Schedule};
 
-use crate::noise::scale;
-use crate::record::observed::bends;
 use crate::record::signal::Signal;
+use crate::stats::scale::bends;
+use crate::stats::scale::scale;
 
 /// What the voltage did between the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -186,7 +186,7 @@ fn folds(voltage_v: &[f64]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::normals;
+    use crate::stats::scale::normals;
     use simulation::record::Row;
 
     #[test]

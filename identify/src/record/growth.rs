@@ -10,10 +10,10 @@
 
 use std::sync::Arc;
 
-use crate::noise::scale;
 use crate::record::data::Data;
-use crate::record::observed::bends;
 use crate::stats::median::running;
+use crate::stats::scale::bends;
+use crate::stats::scale::scale;
 
 /// Groups of like level.
 const GROUPS: usize = 10;
@@ -65,8 +65,8 @@ pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::normals;
     use crate::record::data::Input;
+    use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 
     /// A sweep up and down under noise of a scale for each level.

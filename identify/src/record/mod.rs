@@ -5,3 +5,4 @@ pub mod growth;
 pub mod observed;
 pub mod quantisation_grid;
 pub mod signal;
+pub mod spectrum;

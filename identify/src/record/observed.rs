@@ -6,11 +6,11 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::noise::FINEST_V;
 use crate::record::data::Data;
 use crate::record::growth;
 use crate::record::quantisation_grid::Lattice;
 use crate::stats::median::deviation;
+use crate::stats::scale::{FINEST_V, bends};
 
 /// One row's reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,9 +157,4 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
 /// Scale of independent noise on readings; none where most are the same.
 fn scatter(reading: &[f64]) -> f64 {
     deviation(bends(reading)).unwrap_or(f64::INFINITY)
-}
-
-/// Second differences, as large as independent noise: a slow signal has none.
-pub(crate) fn bends(reading: &[f64]) -> impl Iterator<Item = f64> {
-    reading.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]) / 6f64.sqrt())
 }

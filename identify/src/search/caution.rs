@@ -33,7 +33,7 @@ pub(super) fn long_memory(terms: &[Term]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::normals;
+    use crate::stats::scale::normals;
 
     /// Slow swings ask for caution, and chance does not: it would cost small effects their names.
     #[test]

@@ -6,9 +6,10 @@ use crate::effects::EFFECTS;
 use crate::effects::effect::Scene;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
-use crate::noise::{Noise, memory, negligible, scale, scale_of_squares};
+use crate::noise::{Noise, memory};
 use crate::search::caution::long_memory;
 use crate::search::promise::Metric;
+use crate::stats::scale::{negligible, scale, scale_of_squares};
 
 /// What a block costs, in nats, beside its places and forms: so many are tried.
 const PRICE: f64 = 4.3;

@@ -2,4 +2,5 @@
 
 pub mod median;
 pub mod periodogram;
+pub mod scale;
 pub mod sums;

@@ -8,14 +8,14 @@ use crate::adequacy::unmodelled::{self, Leftover};
 use crate::answer::{Extended, Finding, Report, SCHEMA, Verdict};
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
-use crate::noise::{FINEST_V, scale_of_squares};
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::search::{Lead, Scored, Search, effects};
+use crate::stats::scale::{FINEST_V, scale_of_squares};
 use crate::verdict::alternatives::{never_reverses, next_experiment, rivals, twin};
 use crate::verdict::export;
 use crate::verdict::finding::{explained, finding};
-use crate::verdict::margins::Margins;
+use crate::verdict::margins;
 use crate::verdict::quality::{noise_report, quality, residual_report};
 use crate::verdict::ranking::{self, Standing};
 use crate::verdict::reading_findings::reading_findings;
@@ -87,7 +87,7 @@ pub(crate) fn diagnose(
     if after > WORSE * before {
         best = search.root();
     }
-    if let Some(silent) = no_spring(search.judge(), &baseline, &best) {
+    if let Some(silent) = no_spring(search.judge(), &baseline, &best.fit, best.score) {
         return unsearched(data, observed, engine, baseline, &silent);
     }
     let mut alternatives = rivals(&search, &best);
@@ -124,11 +124,11 @@ pub(crate) fn diagnose(
     }
     let cure = export::of(engine, &best.fit.model, held);
     let material = left.as_ref().is_some_and(|left| left.share > MATERIAL);
-    let would_show = (findings.is_empty() && !material).then(|| Margins::of(engine, &best.fit, lead.caution));
+    let would_show = (findings.is_empty() && !material).then(|| margins::margins(engine, &best.fit, lead.caution));
     let verdict = match () {
         () if material => Verdict::Unexplained,
         () if !alternatives.is_empty() => Verdict::Ambiguous,
-        () if would_show.is_some_and(|margins| !margins.tell()) => Verdict::Insufficient,
+        () if would_show.as_ref().is_some_and(|margins| !margins::informative(margins)) => Verdict::Insufficient,
         () if findings.is_empty() => Verdict::Consistent,
         () => Verdict::Explained,
     };

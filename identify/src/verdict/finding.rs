@@ -4,8 +4,8 @@ use crate::answer::Finding;
 use crate::effects::EFFECTS;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::parameters;
-use crate::noise::scale_of_squares;
 use crate::search::{Scored, effects};
+use crate::stats::scale::scale_of_squares;
 
 pub(crate) fn explained(finding: &Finding) -> f64 {
     finding.rmse_before.powi(2) - finding.rmse_after.powi(2)

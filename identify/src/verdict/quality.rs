@@ -4,12 +4,11 @@ use std::ops::RangeInclusive;
 
 use crate::answer::{NoiseReport, Quality, ResidualReport};
 use crate::fit::engine::{Engine, Fit};
-use crate::noise::{FINEST_V, Noise, scale_of_squares};
+use crate::noise::Noise;
 use crate::record::data::Data;
+use crate::stats::scale::{FINEST_V, Z, scale_of_squares};
 use crate::stats::sums::dot;
 
-/// 97.5 % of the standard normal.
-pub(crate) const Z: f64 = 1.96;
 /// Lags of the residual's correlations.
 const LAGS: usize = 20;
 

@@ -4,9 +4,9 @@ use crate::effects::EFFECTS;
 use crate::effects::effect::Quantity;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
-use crate::noise::scale_of_squares;
 use crate::record::data::Data;
 use crate::search::{Judge, Scored, Search, effects};
+use crate::stats::scale::scale_of_squares;
 
 /// A set of causes in its best forms.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,11 +3,11 @@
 use crate::adequacy::spikes::far_off;
 use crate::answer::{Finding, Parameter};
 use crate::fit::engine::Fit;
-use crate::noise::{FINEST_V, scale_of_squares};
 use crate::record::data::Data;
 use crate::record::observed::Observed;
 use crate::record::quantisation_grid::Lattice;
-use crate::verdict::quality::Z;
+use crate::stats::scale::Z;
+use crate::stats::scale::{FINEST_V, scale_of_squares};
 
 /// A step of the readings this many of the noise's scales wide is worth naming.
 const COARSE_STEP: f64 = 0.5;

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::output::diagnosis::is_extended;
 use identify::answer::{Finding, Parameter};
-use identify::noise::scale_of_squares;
+use identify::stats::scale::scale_of_squares;
 use identify::verdict::diagnosis::Diagnosis;
 use identify::verdict::ranking::Standing;
 

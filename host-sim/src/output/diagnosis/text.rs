@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
+use identify::answer::Margins;
 use identify::answer::{Extended, Finding, Quality, Report, Verdict};
 use identify::effects::effect::Stage;
 use identify::effects::{EFFECTS, index_of};
 use identify::verdict::export::SMALL_ERROR_V;
-use identify::verdict::margins::Margins;
 
 /// A gain below this is none.
 const FORETOLD: f64 = 0.005;
