@@ -1,42 +1,52 @@
-//! What a board must be able to do. The control task knows nothing else of it.
+//! Traits that a board implements. The control task and the host's task access the hardware only through them.
 //!
-//! A board also has a `kill()` of its own, outside of this trait because a panic has no board in its hands: zero volts and
-//! amplifier off, by register, from any context, even before anything is set up.
+//! A board also defines the function `switch_amplifier_off`, see the module `stop`.
+
+use core::future::Future;
 
 use model::Volts;
 use model::supervisor::{Drive, Monitors};
 
-/// Where the voltage goes. A simulated plant can stand behind it as well as a converter.
+/// Output to the amplifier, and the sensors at it. A simulated plant can implement it as well as a converter.
 pub trait Amplifier {
-    /// Puts a code and the enable out. Must not wait.
+    /// Writes the DAC code and the enable output. Must not block.
     fn put(&mut self, drive: Drive);
 
-    /// The amplifier's own view of the last tick; `None` without monitors.
+    /// Readings of the amplifier's voltage and current monitors for the last tick; `None` without monitors.
     fn monitors(&mut self) -> Option<Monitors> {
         None
     }
 
-    /// What the spring's stiffness sensor read since the last voltage went out, on the scale of volts; `None` without sensor,
-    /// or without a new reading.
+    /// Reading of the stiffness sensor since the last output, as equivalent static voltage; `None` without a sensor or without a
+    /// new reading.
     fn measured(&mut self) -> Option<Volts> {
         None
     }
 }
 
-/// Everything else that the control task needs.
+/// Hardware of the control task.
 pub trait Board {
-    /// The amplifier that this board drives.
+    /// Type of the amplifier port.
     type Amplifier: Amplifier;
 
     /// The amplifier port.
     fn amplifier(&mut self) -> &mut Self::Amplifier;
 
-    /// The safety circuit is closed. A broken wire must read as open.
+    /// True if the safety circuit is closed. A broken wire must read as open.
     fn interlock_closed(&mut self) -> bool;
 
-    /// Every task has checked in: the chip may live for another period of its watchdog.
+    /// Restarts the period of the hardware watchdog.
     fn feed_watchdog(&mut self);
 
-    /// A light for people: on while voltages may leave.
+    /// Switches the indicator that the output is enabled.
     fn show_armed(&mut self, _armed: bool) {}
+}
+
+/// Serial line to the host.
+pub trait Line {
+    /// Waits for bytes and returns their number. May be cancelled without losing bytes.
+    fn read(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize>;
+
+    /// Sends all of `bytes`.
+    fn write(&mut self, bytes: &[u8]) -> impl Future<Output = ()>;
 }

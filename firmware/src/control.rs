@@ -1,62 +1,51 @@
-//! One control tick: the supervisor decides, the model computes, the supervisor releases.
+//! One control tick: the supervisor decides, the model computes, the supervisor enables the output.
 //!
-//! Pure: no clock, no pin, no log. The same bits on the host and on the MCU.
+//! The tick is a pure function of its inputs and its state, without clock, pins and log: host and MCU compute the same bits.
 
-use link::WireModel;
+use link::{Command, WireModel};
 use model::estimator::{Estimator, Model};
-use model::supervisor::{self, Command, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
+use model::supervisor::{self, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
 use model::{
     Config, ExtendedPlant, Input, OutOfRange, Output, Reading, SampleTime, ScaledStiffness, Settings, State, Volts,
     estimator, extended,
 };
 
-/// What the host ordered since the last tick.
+/// Inputs of one tick from the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Orders {
-    /// At least one valid frame came in.
-    pub heard: bool,
-    /// Arm or disarm.
-    pub command: Option<Command>,
-    /// A new static voltage of the desired stiffness; the last one stays without.
-    pub target: Option<Volts>,
-}
-
-/// What the board saw since the last tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Senses {
-    /// The safety circuit is closed.
+pub struct Sensors {
+    /// True if the safety circuit is closed.
     pub interlock_closed: bool,
-    /// Ticks left out just before this one.
+    /// Number of ticks missed just before this one.
     pub missed_ticks: u32,
-    /// The amplifier's readings.
+    /// Readings of the amplifier's monitors; `None` without monitors.
     pub monitors: Option<Monitors>,
-    /// A fault that somebody else found.
+    /// Fault detected outside of the tick, for example by the task watchdog.
     pub fault: Option<Fault>,
-    /// The stiffness sensor's reading, on the scale of volts. Sampled after the last tick's voltage had gone out; an older
-    /// one is none.
+    /// Reading of the stiffness sensor, as equivalent static voltage, sampled after the output of the last tick; `None` without
+    /// a new reading.
     pub measured: Option<Volts>,
 }
 
-/// What a tick says.
+/// Result of one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tick {
-    /// For the amplifier.
+    /// Output to the amplifier.
     pub drive: Drive,
-    /// The controller's view, zero volts while nothing may leave.
+    /// Output of the controller; 0 V while the output is disabled.
     pub output: Output,
-    /// The reading that came before it.
+    /// The sensor reading that the tick has used.
     pub measured: Option<Volts>,
 }
 
-/// Looks at a clock before and after the model's tick.
+/// Measures the duration of the model's tick.
 pub trait Stopwatch {
-    /// The tick begins.
+    /// Called before the model's tick.
     fn start(&mut self);
-    /// The tick is over.
+    /// Called after the model's tick.
     fn stop(&mut self);
 }
 
-/// Looks at no clock.
+/// A stopwatch that measures nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Untimed;
 
@@ -67,7 +56,16 @@ impl Stopwatch for Untimed {
     fn stop(&mut self) {}
 }
 
-/// Controller and supervisor with all that they remember.
+/// Source of the host's commands for the control task.
+pub trait Source {
+    /// Command for tick number `tick`; `None` ends the control task.
+    fn command(&mut self, tick: u32) -> Option<Command>;
+
+    /// Called after each tick with its result and the number of ticks missed so far.
+    fn done(&mut self, _tick: &Tick, _control: &Control, _overruns: u32) {}
+}
+
+/// Controller and supervisor, with configuration and state.
 #[derive(Clone, Debug)]
 pub struct Control {
     spring: Spring,
@@ -76,7 +74,7 @@ pub struct Control {
     ticks_since_host: u32,
 }
 
-/// The controller for either kind of spring: the plain one's tick is the leaner.
+/// Controller for a plain or an extended spring; the plain one has the faster tick.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is no heap, and only one")]
 enum Spring {
@@ -91,10 +89,10 @@ struct Loop<E: Estimator> {
 }
 
 impl Control {
-    /// At rest and disarmed; faulted if `last_fault` reset the chip.
+    /// A controller at rest, in the disarmed state, or in the faulted state with `last_fault`.
     ///
     /// # Errors
-    /// [`OutOfRange`] names the setting.
+    /// [`OutOfRange`] names the invalid setting.
     pub fn new(
         settings: &Settings,
         supervision: &supervisor::Settings,
@@ -106,71 +104,72 @@ impl Control {
         Ok(Self { spring, supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
     }
 
-    /// Before the first tick: `found` replaces the settings' spring, and what its amplifier cannot do counts.
+    /// Replaces the spring of `settings` by the identified `model`, and the amplifier's limits by its own where those are
+    /// stricter. Call it before the first tick.
     ///
     /// # Errors
-    /// [`OutOfRange`] names what is wrong with it; then the spring stays.
-    pub fn take_on(&mut self, settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
-        let settings = Found::new(settings, found);
+    /// [`OutOfRange`] names the invalid field of the model; the spring is not changed.
+    pub fn use_model(&mut self, settings: &Settings, model: &WireModel) -> Result<(), OutOfRange> {
+        let settings = Identified::new(settings, model);
         let sample_time = settings.judge()?;
         self.spring = match &settings {
-            Found::Plain(settings) => Spring::Plain(Loop::new(settings, sample_time)),
-            Found::Extended(settings) => Spring::Extended(Loop::new(settings, sample_time)),
+            Identified::Plain(settings) => Spring::Plain(Loop::new(settings, sample_time)),
+            Identified::Extended(settings) => Spring::Extended(Loop::new(settings, sample_time)),
         };
         Ok(())
     }
 
-    /// Whether a controller can be built for this model.
+    /// Validates an identified `model` without using it.
     ///
     /// # Errors
-    /// [`OutOfRange`] names what is wrong with it.
-    pub fn check(settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
-        Found::new(settings, found).judge().map(drop)
+    /// [`OutOfRange`] names the invalid field of the model.
+    pub fn check(settings: &Settings, model: &WireModel) -> Result<(), OutOfRange> {
+        Identified::new(settings, model).judge().map(drop)
     }
 
-    /// Before the first tick: nothing may leave until this is acknowledged.
+    /// Enters the faulted state with `fault`. Call it before the first tick.
     pub fn fault(&mut self, fault: Fault) {
         self.supervisor.fail(fault);
     }
 
-    /// The supervisor, for logs and answers to the host.
+    /// The supervisor, for the log and the replies to the host.
     pub fn supervisor(&self) -> &Supervisor {
         &self.supervisor
     }
 
-    /// One tick. Not inlined, so that it can be found in the image and searched for ways into a panic.
+    /// Executes one tick. Not inlined, so that the audit of the image finds it and verifies that it cannot panic.
     #[inline(never)]
-    pub fn tick(&mut self, orders: &Orders, senses: &Senses, stopwatch: &mut impl Stopwatch) -> Tick {
-        self.ticks_since_host = if orders.heard { 0 } else { self.ticks_since_host.saturating_add(1) };
-        self.target = orders.target.unwrap_or(self.target);
+    pub fn tick(&mut self, command: &Command, sensors: &Sensors, stopwatch: &mut impl Stopwatch) -> Tick {
+        self.ticks_since_host = if command.heard { 0 } else { self.ticks_since_host.saturating_add(1) };
+        self.target = command.target.unwrap_or(self.target);
         let decision = self.supervisor.decide(&Inputs {
-            command: orders.command,
+            command: command.arming,
             target: self.target,
             ticks_since_host: self.ticks_since_host,
-            interlock_closed: senses.interlock_closed,
-            missed_ticks: senses.missed_ticks,
-            monitors: senses.monitors,
-            fault: senses.fault,
+            interlock_closed: sensors.interlock_closed,
+            missed_ticks: sensors.missed_ticks,
+            monitors: sensors.monitors,
+            fault: sensors.fault,
         });
-        let measured = senses.measured.and_then(|volts| Reading::fresh(ScaledStiffness(volts.0)));
+        let measured = sensors.measured.and_then(|volts| Reading::fresh(ScaledStiffness(volts.0)));
         let output = match &mut self.spring {
-            Spring::Plain(spring) => spring.follow(decision, measured, stopwatch),
-            Spring::Extended(spring) => spring.follow(decision, measured, stopwatch),
+            Spring::Plain(spring) => spring.step(decision, measured, stopwatch),
+            Spring::Extended(spring) => spring.step(decision, measured, stopwatch),
         };
-        Tick { drive: self.supervisor.release(&output), output, measured: senses.measured }
+        Tick { drive: self.supervisor.release(&output), output, measured: sensors.measured }
     }
 }
 
-/// Settings with a model that was found in the place of their spring.
-enum Found<'a> {
+/// Settings with an identified model instead of their own spring.
+enum Identified<'a> {
     Plain(Settings),
     Extended(Settings<ExtendedPlant<'a>>),
 }
 
-impl<'a> Found<'a> {
-    fn new(settings: &Settings, found: &'a WireModel) -> Self {
+impl<'a> Identified<'a> {
+    fn new(settings: &Settings, model: &'a WireModel) -> Self {
         let Settings { rate_hz, compensation, feedback, .. } = *settings;
-        let (plant, amplifier) = (found.plant(), found.behind(settings.amplifier));
+        let (plant, amplifier) = (model.plant(), model.behind(settings.amplifier));
         match plant.plain() {
             Some(plant) => Self::Plain(Settings { rate_hz, plant, compensation, amplifier, feedback }),
             None => Self::Extended(Settings { rate_hz, plant, compensation, amplifier, feedback }),
@@ -186,17 +185,17 @@ impl<'a> Found<'a> {
 }
 
 impl<E: Estimator> Loop<E> {
-    /// At rest.
+    /// The controller at rest.
     fn new<P: Model<Config = E>>(settings: &Settings<P>, sample_time: SampleTime) -> Self {
         Self { config: settings.scaled(sample_time), state: State::default() }
     }
 
     #[inline(always)]
-    fn follow(&mut self, decision: Decision, measured: Option<Reading>, stopwatch: &mut impl Stopwatch) -> Output {
+    fn step(&mut self, decision: Decision, measured: Option<Reading>, stopwatch: &mut impl Stopwatch) -> Output {
         match decision {
             Decision::Rest => self.config.rest(&mut self.state, measured),
             Decision::Start(target) => {
-                // From zero volts, as if zero had been asked for until now.
+                // The initial condition is the steady state at a target of 0 V.
                 self.config.adopt(&mut self.state, Volts::ZERO);
                 self.timed(Input { target, measured }, stopwatch)
             }
@@ -213,9 +212,9 @@ impl<E: Estimator> Loop<E> {
     }
 }
 
-/// The model's tick as one function: it is counted as it would be called.
+/// The model's tick as a function of its own, so that its instructions are counted including the call.
 #[inline(never)]
-pub(crate) fn whole_tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, input: Input) -> Output {
+pub fn whole_tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, input: Input) -> Output {
     config.tick(state, input)
 }
 
@@ -225,9 +224,9 @@ mod tests {
     use crate::settings::SETTINGS;
     use model::Amplifier;
 
-    /// Taken for no limit it would put 700 V on a spring that asks for protection.
+    /// If NaN meant no limit, the amplifier would apply 700 V to a spring with a lower limit.
     #[test]
-    fn a_limit_that_is_no_number_is_refused() {
+    fn a_nan_limit_is_rejected() {
         let slow = Settings { amplifier: Amplifier { slew_v_per_s: Some(5000.0), ..SETTINGS.amplifier }, ..SETTINGS };
         let model = |limit_v, slew_v_per_s| {
             let time_constants_s = [5.5].into_iter().collect();

@@ -1,7 +1,7 @@
-//! A control task that hangs loses its voltage within [`LONGEST_HANG_MS`], not only when the watchdog bites.
+//! Stop of a control task that hangs, within [`LONGEST_HANG_MS`] instead of the watchdog's 100 ms.
 //!
-//! SysTick counts milliseconds down, above all tasks, and every tick starts the count anew. At its end the program stops:
-//! voltage off by register, then last words, log, reset. Who hangs with interrupts off is left to the watchdog.
+//! The SysTick interrupt has a higher priority than all tasks. It counts milliseconds down and every tick restarts the count;
+//! at zero it performs the emergency stop. A task that hangs with interrupts off is left to the watchdog.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -9,12 +9,13 @@ use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use model::supervisor::Fault;
 
-use crate::{LONGEST_HANG_MS, stop};
+use crate::settings::LONGEST_HANG_MS;
+use crate::stop;
 
-/// Milliseconds left; zero while nobody ticks.
+/// Remaining milliseconds, or 0 while the guard is inactive.
 static LEFT: AtomicU32 = AtomicU32::new(0);
 
-/// Starts the clock; `core_hz` is the processor's.
+/// Starts SysTick with a period of 1 ms; `core_hz` is the processor's clock, in Hz. The guard is inactive until [`feed`].
 pub fn start(clock: &mut SYST, core_hz: u32) {
     clock.set_clock_source(SystClkSource::Core);
     clock.set_reload(core_hz / 1000 - 1);
@@ -23,19 +24,19 @@ pub fn start(clock: &mut SYST, core_hz: u32) {
     clock.enable_counter();
 }
 
-/// A tick was done.
+/// Restarts the count after a tick.
 pub fn feed() {
     LEFT.store(LONGEST_HANG_MS, Ordering::Relaxed);
 }
 
-/// There will be no further tick, on purpose.
+/// Deactivates the guard after the last tick of a run.
 pub fn rest() {
     LEFT.store(0, Ordering::Relaxed);
 }
 
 #[cortex_m_rt::exception]
 fn SysTick() {
-    // Nobody interrupts this but who stops for ever.
+    // Only the emergency stop can interrupt this.
     match LEFT.load(Ordering::Relaxed) {
         0 => {}
         1 => stop::on_fresh_stack(Fault::Watchdog),

@@ -1,61 +1,58 @@
-//! When things happen on the MCU, and on which pin.
+//! Timing and input/output of the stiffness controller on the amplifier's MCU: everything that is flashed.
 //!
-//! | module | what it is |
+//! | term | meaning |
 //! | --- | --- |
-//! | `blocks` | the tick of each kind of spring under each controller, to be counted (feature `fast`) |
-//! | [`board`] | what a board must be able to do |
-//! | [`cause`] | why the chip was reset |
-//! | [`control`] | one control tick: supervisor, model, supervisor |
-//! | [`pace`] | when the next tick is due, and how many were missed |
-//! | [`post`] | between the host's task and the tick: an order made before a fault never acknowledges it |
-//! | [`roll_call`] | the watchdog is fed only when every task has checked in |
-//! | [`store`] | the model that outlives a power cut |
-//! | [`start`] | the controller, from what is stored |
-//! | [`script`] | runs of the emulated firmware: the stair, random commands, fault drills |
-//! | [`rehearsal`] | the same without a board, for the host |
-//! | [`settings`] | what an image runs |
-//! | [`digest`] | one number for a whole run |
-//! | `last_words`, `stop` | what survives a reset; panic and hard fault |
-//! | `hang_guard` | a control task that hangs is stopped |
-//! | `stack_guard` | an overflow of the stack is a fault |
-//! | `log` | every log line, in one place |
-//! | `tasks` | the control task and the housekeeping below it |
-//! | `host` | the host's task, and its orders as the control task sees them |
-//! | `mps2` | the emulated board |
-//! | `nucleo` | the real board |
+//! | tick | One period of the control task, 1 ms: read inputs, compute, write the DAC. |
+//! | command | What the host changes in one tick, see [`link::Command`]. |
+//! | overrun | Ticks that were missed because the control task ran late. |
+//! | crash record | A record in RAM that survives a reset and contains the fault that caused it. |
 //!
-//! The modules with links build on a host too: they are the half of the firmware that can be compared bit for bit.
+//! | module | content |
+//! | --- | --- |
+//! | [`board`] | Traits that a board implements. |
+//! | [`control`] | One control tick: supervisor, model, supervisor. |
+//! | [`mailbox`] | Hand-over of commands to the control tick; drops commands that a fault has made obsolete. |
+//! | [`pace`] | Time of the next tick, and the number of missed ticks. |
+//! | [`reset_cause`] | Cause of the last reset, from the chip's flags and the crash record. |
+//! | [`settings`] | Settings of spring, controller and amplifier in an image. |
+//! | [`start`] | Construction of the controller at the start, from the stored model. |
+//! | [`store`] | Storage of a model in flash, safe against power cuts. |
+//! | [`task_watchdog`] | Check that every task is alive, before the hardware watchdog is fed. |
+//! | `crash_record` | Memory of the crash record. |
+//! | `hang_guard` | Stop of a control task that hangs. |
+//! | `host` | Communication with the host. |
+//! | `log` | All log lines. |
+//! | `nucleo` | The board NUCLEO-G474RE. |
+//! | `stack_guard` | Detection of a stack overflow. |
+//! | `stop` | Emergency stop after a panic, hard fault or unexpected interrupt. |
+//! | `tasks` | Control task and housekeeping task. |
+//!
+//! The modules with links build on a host as well, where their results can be compared with the MCU's bit for bit. The others
+//! require the feature `mcu`.
 #![no_std]
 #![deny(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
-#[cfg(feature = "fast")]
-pub mod blocks;
 pub mod board;
-pub mod cause;
 pub mod control;
-pub mod digest;
+pub mod mailbox;
 pub mod pace;
-pub mod post;
-pub mod rehearsal;
-pub mod roll_call;
-pub mod script;
+pub mod reset_cause;
 pub mod settings;
 pub mod start;
 pub mod store;
+pub mod task_watchdog;
 
+#[cfg(feature = "mcu")]
+pub mod crash_record;
 #[cfg(feature = "mcu")]
 pub mod hang_guard;
 #[cfg(feature = "mcu")]
 pub mod host;
 #[cfg(feature = "mcu")]
-pub mod last_words;
-#[cfg(feature = "mcu")]
 pub mod log;
-#[cfg(feature = "mps2-an386")]
-pub mod mps2;
 #[cfg(feature = "nucleo-g474re")]
 pub mod nucleo;
 #[cfg(feature = "mcu")]
@@ -65,9 +62,4 @@ pub mod stop;
 #[cfg(feature = "mcu")]
 pub mod tasks;
 
-/// Ticks per second.
-pub const RATE_HZ: u32 = 1000;
-
-/// Longest time without a tick before `hang_guard` stops the program, in ms: more than the supervisor forgives, so that a
-/// late task can still say so itself.
-pub const LONGEST_HANG_MS: u32 = 12;
+pub use settings::{LONGEST_HANG_MS, RATE_HZ};

@@ -1,8 +1,8 @@
-//! Every log line, in one place: `vsj log` reads them by these very formats. Times in us since boot.
+//! All log lines of the firmware. `vsj log` interprets these formats. Times are in us since boot.
 //!
-//! The control task does not log, because a logger takes its time. It puts [`Event`]s into a queue and goes on; housekeeping
-//! logs them. On the real board a logger never waits for a reader: what nobody reads in time is overwritten. Panics and hard
-//! faults log directly, after the voltage is gone.
+//! The control task does not log, because logging takes an unbounded time. It queues [`Event`]s, which the housekeeping task
+//! logs. On the real board the logger never waits for a reader: unread lines are overwritten. Panics and hard faults are
+//! logged directly, after the amplifier is switched off.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -15,86 +15,60 @@ use micromath::F32Ext;
 use model::supervisor::Fault;
 use model::{Sensor, Volts};
 
-use crate::settings::AMPLIFIER;
+use crate::settings::{AMPLIFIER, RATE_HZ};
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
-/// What the control task has to say.
+/// An event of the control task.
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
-    /// From one state to another.
+    /// Change of state: the previous and the new one.
     State(&'static str, &'static str),
-    /// A fault and its tick.
+    /// A fault, and the tick that detected it.
     Fault(Fault, u32),
-    /// The limits that act have changed.
+    /// Change of the active limits: the new ones as [`model::Limits::bits`], and the tick.
     Limits(u8, u32),
-    /// The stiffness sensor is trusted from this tick on, or is not.
+    /// Change of the stiffness sensor's diagnosis, and the tick.
     Sensor(Sensor, u32),
-    /// Once a second.
+    /// Statistics, once per second.
     Summary(Summary),
-    /// The end of an emulated run.
-    Done(Done),
 }
 
-/// The last second and all before.
+/// Statistics of the last second and since boot.
 #[derive(Clone, Copy, Debug)]
 pub struct Summary {
-    /// Ticks since boot.
+    /// Number of ticks since boot.
     pub tick: u32,
-    /// Ticks missed since boot.
+    /// Number of missed ticks since boot.
     pub overruns: u32,
-    /// Since boot, in us.
+    /// Largest delay of a tick since boot, in us.
     pub worst_lateness_us: u32,
-    /// Of the last second's ticks, squared and summed up, in us^2.
+    /// Sum of the squared delays of the last second's ticks, in us^2.
     pub squared_lateness_us2: u32,
-    /// Ticks in a limit since boot.
+    /// Number of ticks with an active limit since boot.
     pub limited_ticks: u32,
-    /// As the link names it.
+    /// State of the output, as named by [`link::State`].
     pub state: &'static str,
-    /// Pursued.
+    /// Target after limitation and ramping, as equivalent static voltage.
     pub target: Volts,
-    /// Put out.
+    /// Output voltage.
     pub applied: Volts,
-    /// Estimated, on the scale of volts.
+    /// Estimated stiffness, as equivalent static voltage.
     pub stiffness: Volts,
 }
 
-/// An emulated run.
-#[derive(Clone, Copy, Debug)]
-pub struct Done {
-    /// Ticks that were run.
-    pub ticks: u32,
-    /// Ticks that were missed.
-    pub missed: u32,
-    /// See [`crate::digest`].
-    pub digest: u64,
-    /// Instructions of a tick of the model.
-    pub instructions: Instructions,
-}
-
-/// Instructions of a tick of the model.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Instructions {
-    /// Fewest.
-    pub min: u32,
-    /// Rounded.
-    pub mean: u32,
-    /// Most.
-    pub max: u32,
-}
-
-/// From the control task to housekeeping.
+/// Events from the control task to the housekeeping task.
 pub static EVENTS: Channel<CriticalSectionRawMutex, Event, 16> = Channel::new();
 static DROPPED: AtomicU32 = AtomicU32::new(0);
 
-/// Queues an event; if the queue is full, counts it instead.
+/// Queues an event. If the queue is full, the event is dropped and counted.
 pub fn queue(event: Event) {
     if EVENTS.try_send(event).is_err() {
         DROPPED.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// The first lines after a reset; `controller` leads the spring.
+/// Logs the first lines after a reset: its cause, the code of the last fault, and the controller in use.
 pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
     let (version, git) = (env!("CARGO_PKG_VERSION"), env!("GIT_REVISION"));
     info!(
@@ -103,26 +77,26 @@ pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
         git,
         reset,
         last_fault,
-        crate::RATE_HZ,
+        RATE_HZ,
         controller.name()
     );
-    // The report's goes without saying.
+    // Only if it differs from the source report's.
     if cfg!(feature = "kilovolt") {
         info!("amplifier limit_v={=u16}", const { AMPLIFIER.max_v as u16 });
     }
 }
 
-/// A fault, from the control task's queue or from the one who found it.
+/// Logs a fault.
 pub fn fault(fault: Fault, tick: u32) {
     error!("fault code={=u8} name={=str} tick={=u32}", fault.code(), fault.name(), tick);
 }
 
-/// Where the program stopped itself.
+/// Logs the location of a panic.
 pub fn panicked(file: &str, line: u32) {
     error!("panic at {=str}:{=u32}", file, line);
 }
 
-/// Settings that were refused.
+/// Logs the field of a model or setting that failed its validation.
 pub fn refused(field: &'static str) {
     error!("config refused field={=str}", field);
 }
@@ -150,20 +124,16 @@ pub fn event(event: Event) {
             millivolts(s.applied),
             millivolts(s.stiffness)
         ),
-        Event::Done(d) => info!(
-            "done ticks={=u32} missed={=u32} digest={=u64:x} min={=u32} mean={=u32} max={=u32}",
-            d.ticks, d.missed, d.digest, d.instructions.min, d.instructions.mean, d.instructions.max
-        ),
     }
 }
 
-/// Root mean square of a second's ticks, to 6 % and in steps of 0.1 us.
+/// Root mean square of one second's delays, in us, from the sum of their squares. Accurate to 6 %, in steps of 0.1 us.
 fn rms_us(sum_us2: u32) -> f32 {
-    let mean = sum_us2 as f32 / crate::RATE_HZ as f32;
+    let mean = sum_us2 as f32 / RATE_HZ as f32;
     (mean.sqrt() * 10.0).round() / 10.0
 }
 
-/// Rounded down.
+/// `volts` in mV, rounded down.
 fn millivolts(volts: Volts) -> i32 {
     ((i64::from(volts.0.to_bits()) * 1000) >> 20) as i32
 }

@@ -1,66 +1,53 @@
-//! What an image runs: spring, controller and amplifier, and how they are supervised.
+//! Settings of an image: spring, controller, amplifier, supervision and timing.
 
 use model::{Amplifier, Feedback, Settings, supervisor};
 #[cfg(feature = "fast")]
 use model::{Approach, Compensation};
 
-/// Reaches 1000 V, which the report's requirement takes (97 % within 0.6 s).
+/// Rate of the control tick, in Hz.
+pub const RATE_HZ: u32 = 1000;
+
+/// Longest time without a tick before the hang guard performs the emergency stop, in ms. It exceeds the overrun that the
+/// supervisor tolerates, so that a late control task still reports its overrun itself.
+pub const LONGEST_HANG_MS: u32 = 12;
+
+/// An amplifier for 1000 V, which the source report's requirement (97 % within 0.6 s) needs.
 pub const KILOVOLT: Amplifier = Amplifier::up_to(1000.0);
-/// The one that the image drives.
+/// The amplifier of this image.
 pub const AMPLIFIER: Amplifier = if cfg!(feature = "kilovolt") { KILOVOLT } else { Amplifier::PAPER };
-/// Of every run under the paper's controller.
+/// The paper's controller with this image's amplifier, without a sensor.
 pub const SETTINGS: Settings = paper(AMPLIFIER);
-/// Of every run under the time-optimal controller.
+/// The time-optimal controller with this image's amplifier, without a sensor.
 #[cfg(feature = "fast")]
 pub const FAST: Settings = fast(AMPLIFIER);
 
-/// Of what a host commands: what is flashed, and the emulated board at its link.
+/// Settings of a run that the host commands: those of the flashed image.
 #[cfg(not(feature = "fast"))]
-pub const FLASHED: Settings = sensing(SETTINGS);
-/// Of what a host commands: what is flashed, and the emulated board at its link.
+pub const FLASHED: Settings = with_sensor(SETTINGS);
+/// Settings of a run that the host commands: those of the flashed image.
 #[cfg(feature = "fast")]
-pub const FLASHED: Settings = sensing(FAST);
-/// A stiffness sensor, which corrects nothing until a board has one.
+pub const FLASHED: Settings = with_sensor(FAST);
+/// Correction by the stiffness sensor; it has no effect on a board without one.
 #[cfg(not(feature = "feedback"))]
 const SENSOR: Option<Feedback> = None;
-/// A stiffness sensor, which corrects nothing until a board has one.
+/// Correction by the stiffness sensor; it has no effect on a board without one.
 #[cfg(feature = "feedback")]
 const SENSOR: Option<Feedback> = Some(Feedback::TYPICAL);
-/// Supervision of every run.
+/// Settings of the supervisor in every run.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 
-/// Who leads the spring up and down.
-#[derive(Debug, PartialEq)]
-pub struct Leader {
-    /// Name of the run.
-    pub run: &'static str,
-    /// What the controller is built from.
-    pub settings: &'static Settings,
-}
-
-/// All that are in the image.
-pub static LEADERS: &[Leader] = &[
-    Leader { run: "up-down", settings: &SETTINGS },
-    #[cfg(feature = "fast")]
-    Leader { run: "up-down fast", settings: &FAST },
-    #[cfg(feature = "feedback")]
-    Leader { run: "up-down sensor", settings: &const { sensing(SETTINGS) } },
-    #[cfg(all(feature = "fast", feature = "feedback"))]
-    Leader { run: "up-down fast sensor", settings: &const { sensing(FAST) } },
-];
-
-/// The paper's controller with this amplifier.
+/// The paper's controller with `amplifier`, without a sensor.
 pub const fn paper(amplifier: Amplifier) -> Settings {
     Settings { amplifier, ..Settings::PAPER }
 }
 
-/// The time-optimal controller with this amplifier.
+/// The time-optimal controller with `amplifier`, without a sensor.
 #[cfg(feature = "fast")]
 pub const fn fast(amplifier: Amplifier) -> Settings {
     Settings { compensation: Compensation::TimeOptimal(Approach::DEAD_BEAT), ..paper(amplifier) }
 }
 
-/// The same with the sensor, if there is one.
-const fn sensing(settings: Settings) -> Settings {
+/// `settings` with the correction by the stiffness sensor if the feature `feedback` is enabled.
+pub const fn with_sensor(settings: Settings) -> Settings {
     Settings { feedback: SENSOR, ..settings }
 }

@@ -1,4 +1,4 @@
-//! The controller, from what is stored and from why the last run ended.
+//! Construction of the controller at the start, from the stored model and the fault of the last run.
 
 use link::{ModelId, Reason, WireModel};
 use model::supervisor::Fault;
@@ -7,25 +7,25 @@ use model::{Amplifier, OutOfRange, Settings};
 use crate::control::Control;
 use crate::settings::{FLASHED, SUPERVISION};
 
-/// What a start comes to.
+/// Result of the start.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
-    /// The model that it runs.
+    /// Running model.
     pub model: ModelId,
-    /// The one that is stored, if it was refused, too.
+    /// Stored model, even if its validation failed; the built-in model if none is stored.
     pub stored: ModelId,
-    /// The amplifier, as far as the running model knows it.
+    /// Amplifier with the limits of the running model.
     pub amplifier: Amplifier,
-    /// Why voltages were taken away before.
+    /// Fault of the last run.
     pub last_fault: Option<Fault>,
-    /// What is wrong with the stored model.
-    pub refused: Option<&'static str>,
+    /// Invalid field of the stored model, or `format`; `None` if it is valid.
+    pub rejected: Option<&'static str>,
 }
 
-/// Builds the controller, with the model that is built in unless there is a sound one among what is `stored`.
+/// Builds the controller in `place`, with the `stored` model if it is valid, otherwise with the built-in one.
 ///
 /// # Errors
-/// [`OutOfRange`] names the setting.
+/// [`OutOfRange`] names the invalid setting.
 #[inline(never)]
 pub fn control<'a>(
     settings: &Settings,
@@ -35,38 +35,38 @@ pub fn control<'a>(
 ) -> Result<(&'a mut Control, Start), OutOfRange> {
     let control = build(settings, place)?;
     let (builtin, amplifier) = (ModelId::default(), settings.amplifier);
-    let mut start = Start { model: builtin, stored: builtin, amplifier, last_fault, refused: None };
+    let mut start = Start { model: builtin, stored: builtin, amplifier, last_fault, rejected: None };
     if let Some((stored, payload)) = stored {
         start.stored = stored;
-        match take_on(settings, control, payload) {
+        match use_model(settings, control, payload) {
             Ok(amplifier) => (start.model, start.amplifier) = (stored, amplifier),
-            Err(field) => start.refused = Some(field),
+            Err(field) => start.rejected = Some(field),
         }
     }
-    // The refusal is what has to be acknowledged. Why the last run ended is told beside it.
-    if let Some(fault) = start.refused.map_or(last_fault, |_| Some(Fault::Config)) {
+    // The rejection has to be acknowledged. The fault of the last run is reported separately.
+    if let Some(fault) = start.rejected.map_or(last_fault, |_| Some(Fault::Config)) {
         control.fault(fault);
     }
     Ok((control, start))
 }
 
-/// Whether a payload holds a model that can be run.
+/// Validates the model in `payload` for the flashed settings.
 ///
 /// # Errors
-/// The [`Reason`] to refuse it with.
+/// The [`Reason`] for rejecting the model.
 #[inline(never)]
 pub fn check(payload: &[u8]) -> Result<(), Reason> {
-    let found = WireModel::read(payload);
-    let Some(found) = &found else { return Err(Reason::ModelDamaged) };
-    Control::check(&FLASHED, found).map_err(|error| Reason::of_model(&error))
+    let model = WireModel::read(payload);
+    let Some(model) = &model else { return Err(Reason::ModelDamaged) };
+    Control::check(&FLASHED, model).map_err(|error| Reason::of_model(&error))
 }
 
 #[inline(never)]
-fn take_on(settings: &Settings, control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
-    let found = WireModel::read(payload);
-    let Some(found) = &found else { return Err("format") };
-    control.take_on(settings, found).map_err(|error| error.field)?;
-    Ok(found.behind(settings.amplifier))
+fn use_model(settings: &Settings, control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
+    let model = WireModel::read(payload);
+    let Some(model) = &model else { return Err("format") };
+    control.use_model(settings, model).map_err(|error| error.field)?;
+    Ok(model.behind(settings.amplifier))
 }
 
 #[inline(never)]
@@ -86,29 +86,29 @@ mod tests {
     }
 
     #[test]
-    fn a_refused_model_is_a_fault_of_its_own_whatever_ended_the_last_run() {
+    fn a_rejected_model_is_a_config_fault_whatever_the_last_fault() {
         let start = |stored: Option<&[u8]>, last_fault| {
             let mut place = None;
             let stored = stored.map(|payload| (ModelId::of(3, payload), payload));
             let (control, start) = control(&SETTINGS, stored, last_fault, &mut place).unwrap();
             (control.supervisor().state(), start)
         };
-        let (sound, unsound) = (model(0.1).payload().unwrap(), model(2.0).payload().unwrap());
+        let (valid, invalid) = (model(0.1).payload().unwrap(), model(2.0).payload().unwrap());
         let faulted = State::Faulted;
-        for (stored, last_fault, state, refused, limit_v) in [
+        for (stored, last_fault, state, rejected, limit_v) in [
             (None, None, State::Disarmed, None, 700.0),
             (None, Some(Fault::Panic), faulted(Fault::Panic), None, 700.0),
-            (Some(&sound[..]), None, State::Disarmed, None, 650.0),
-            (Some(&sound), Some(Fault::Panic), faulted(Fault::Panic), None, 650.0),
-            (Some(&unsound), None, faulted(Fault::Config), Some("share"), 700.0),
-            (Some(&unsound), Some(Fault::Panic), faulted(Fault::Config), Some("share"), 700.0),
+            (Some(&valid[..]), None, State::Disarmed, None, 650.0),
+            (Some(&valid), Some(Fault::Panic), faulted(Fault::Panic), None, 650.0),
+            (Some(&invalid), None, faulted(Fault::Config), Some("share"), 700.0),
+            (Some(&invalid), Some(Fault::Panic), faulted(Fault::Config), Some("share"), 700.0),
             (Some(b"noise"), Some(Fault::Panic), faulted(Fault::Config), Some("format"), 700.0),
         ] {
             let (is, start) = start(stored, last_fault);
-            assert_eq!((is, start.refused, start.amplifier.max_v), (state, refused, limit_v));
-            assert_eq!(start.last_fault, last_fault, "told beside it");
-            assert_eq!(start.stored.number, if stored.is_some() { 3 } else { 0 }, "refused or not");
-            assert_eq!(start.model, if refused.is_some() { ModelId::default() } else { start.stored });
+            assert_eq!((is, start.rejected, start.amplifier.max_v), (state, rejected, limit_v));
+            assert_eq!(start.last_fault, last_fault, "reported in any case");
+            assert_eq!(start.stored.number, if stored.is_some() { 3 } else { 0 }, "valid or not");
+            assert_eq!(start.model, if rejected.is_some() { ModelId::default() } else { start.stored });
         }
     }
 }

@@ -1,6 +1,7 @@
-//! Panic, hard fault, unexpected interrupt: voltage off by register first, then last words, log, reset.
+//! Emergency stop after a panic, a hard fault or an unexpected interrupt: the amplifier is switched off by register access
+//! first, then the fault is recorded and logged, then the chip is reset.
 //!
-//! The next run starts faulted and needs an acknowledgement and an arm command.
+//! The next run starts in the faulted state and requires an acknowledgement and an arm command.
 
 #![allow(unsafe_code)]
 
@@ -10,25 +11,27 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use model::supervisor::Fault;
 
-#[cfg(feature = "mps2-an386")]
-use crate::mps2 as board;
-#[cfg(feature = "nucleo-g474re")]
-use crate::nucleo as board;
-use crate::{last_words, log};
+use crate::{crash_record, log};
 
-/// Ticks since boot, for the log of a fault.
+unsafe extern "Rust" {
+    /// Sets 0 V and disables the amplifier by register access. Every board defines it; it must work in any context, even
+    /// before any initialisation. It is resolved by the linker because a panic has no access to a board's value.
+    safe fn switch_amplifier_off();
+}
+
+/// Number of ticks since boot, for the log of a fault.
 pub static TICK: AtomicU32 = AtomicU32::new(0);
 
-/// Set by the first who stops: what fails while stopping must not stop again, only reset.
+/// True from the first stop on: a failure during the stop only resets.
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
-/// Takes the voltage away and resets.
+/// Switches the amplifier off, records and logs `fault` and, for a panic, its location, and resets.
 pub fn stop(fault: Fault, panic: Option<&Location<'_>>) -> ! {
     cortex_m::interrupt::disable();
-    board::kill();
+    switch_amplifier_off();
     if !STOPPING.swap(true, Ordering::Relaxed) {
         let tick = TICK.load(Ordering::Relaxed);
-        last_words::leave(fault, tick);
+        crash_record::record(fault, tick);
         log::fault(fault, tick);
         if let Some(location) = panic {
             log::panicked(location.file(), location.line());
@@ -37,15 +40,15 @@ pub fn stop(fault: Fault, panic: Option<&Location<'_>>) -> ! {
     SCB::sys_reset()
 }
 
-/// Restarts because it was told to, while no voltage may leave.
+/// Restarts on the host's request; the output is disabled already.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
-    board::kill();
-    last_words::leave_in_order();
+    switch_amplifier_off();
+    crash_record::record_restart();
     SCB::sys_reset()
 }
 
-/// Inlined, so that the optimiser sees that nobody reads the message, and leaves all messages out of the image.
+/// Handles a panic. Inlined, so that the optimiser removes all panic messages, which nobody reads.
 #[panic_handler]
 #[expect(unused_attributes, reason = "it is not ignored when all crates are optimised at once")]
 #[inline(always)]
@@ -53,7 +56,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     stop(Fault::Panic, info.location())
 }
 
-/// The processor stopped the program.
+/// Handles a hard fault.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {
@@ -65,9 +68,9 @@ unsafe extern "C" fn hard_fault() -> ! {
     )
 }
 
-/// Stops for `fault`, from the top of the stack: when it ran out there is none left to stand on. Nothing
-/// returns to the old one, so the float registers that the processor still means to save there (FPCCR.LSPACT) are given up:
-/// the first float instruction would fault again.
+/// Stops for `fault` from the top of the stack, because the stack may have overflowed. The float registers that the
+/// processor has still to save on the old stack (FPCCR.LSPACT) are discarded: the first float instruction would otherwise
+/// fault again.
 #[unsafe(naked)]
 pub extern "C" fn on_fresh_stack(fault: Fault) -> ! {
     core::arch::naked_asm!(
@@ -80,15 +83,15 @@ pub extern "C" fn on_fresh_stack(fault: Fault) -> ! {
         "dsb",
         "isb",
         "b {on}",
-        on = sym stop_there
+        on = sym stop_without_location
     )
 }
 
-extern "C" fn stop_there(fault: Fault) -> ! {
+extern "C" fn stop_without_location(fault: Fault) -> ! {
     stop(fault, None)
 }
 
-/// An interrupt that nobody enabled.
+/// Handles an interrupt without a handler.
 #[unsafe(export_name = "DefaultHandler")]
 extern "C" fn unexpected() -> ! {
     on_fresh_stack(Fault::HardFault)

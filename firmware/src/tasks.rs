@@ -1,4 +1,4 @@
-//! The control task, and the housekeeping below it.
+//! The control task, and the housekeeping task with a lower priority.
 
 use core::sync::atomic::Ordering;
 
@@ -7,51 +7,41 @@ use model::supervisor::{Fault, State};
 use model::{Limits, Sensor, Volts};
 
 use crate::board::{Amplifier, Board};
-use crate::control::{Control, Orders, Senses, Stopwatch, Tick};
+use crate::control::{Control, Sensors, Source, Stopwatch, Tick};
 use crate::log::{self, EVENTS, Event, Summary, queue};
 use crate::pace::Pace;
-use crate::roll_call::{Member, RollCall};
-use crate::{RATE_HZ, hang_guard, last_words, stop};
+use crate::settings::RATE_HZ;
+use crate::task_watchdog::{TASK_WATCHDOG, Task};
+use crate::{crash_record, hang_guard, stop};
 
-/// Who must be alive.
-pub static ROLL_CALL: RollCall = RollCall::new();
+/// Ticks without a complete round of the task watchdog after which the output is disabled: 50 ms. The hardware watchdog
+/// expires after 100 ms.
+const INCOMPLETE_TICKS: u32 = RATE_HZ / 20;
 
-/// Ticks without a complete roll call after which the voltage is taken away, 50 ms; the watchdog follows at 100 ms.
-const ROLL_CALL_TICKS: u32 = RATE_HZ / 20;
-
-/// Where orders come from.
-pub trait Source {
-    /// What came in since the last tick; `None` ends the task.
-    fn orders(&mut self, tick: u32) -> Option<Orders>;
-
-    /// What was done about it, and the ticks missed so far.
-    fn done(&mut self, _tick: &Tick, _control: &Control, _overruns: u32) {}
-}
-
-/// Ticks until `source` ends. Returns ticks run and ticks missed.
+/// Runs control ticks until `source` ends. Returns the numbers of executed and of missed ticks.
 pub async fn control<B: Board>(
     board: &mut B,
     control: &mut Control,
     source: &mut impl Source,
     stopwatch: &mut impl Stopwatch,
 ) -> (u32, u32) {
-    ROLL_CALL.enrol(Member::Control);
+    TASK_WATCHDOG.register(Task::Control);
     let mut pace = Pace::new(Instant::now().as_micros(), u64::from(1_000_000 / RATE_HZ));
     let mut report = Report { state: link::State::from(control.supervisor()).name(), ..Report::default() };
-    let mut absent: u32 = 0;
+    let mut incomplete: u32 = 0;
     let mut ticks: u32 = 0;
     loop {
         Timer::at(Instant::from_micros(pace.due_us())).await;
         let arrival = pace.arrive(Instant::now().as_micros());
-        let Some(orders) = source.orders(ticks) else { break };
-        let senses = Senses {
+        let Some(command) = source.command(ticks) else { break };
+        let sensors = Sensors {
             interlock_closed: board.interlock_closed(),
             missed_ticks: arrival.missed_ticks,
             monitors: board.amplifier().monitors(),
-            fault: (absent > ROLL_CALL_TICKS).then_some(Fault::Watchdog),
+            fault: (incomplete > INCOMPLETE_TICKS).then_some(Fault::Watchdog),
             measured: board.amplifier().measured(),
         };
-        let tick = control.tick(&orders, &senses, stopwatch);
+        let tick = control.tick(&command, &sensors, stopwatch);
         board.amplifier().put(tick.drive);
         board.show_armed(tick.drive.enabled());
         report.overruns = report.overruns.saturating_add(arrival.missed_ticks);
@@ -63,19 +53,19 @@ pub async fn control<B: Board>(
         report.tick(ticks, control, &tick);
 
         hang_guard::feed();
-        ROLL_CALL.check_in(Member::Control);
-        if ROLL_CALL.complete() {
-            absent = 0;
+        TASK_WATCHDOG.check_in(Task::Control);
+        if TASK_WATCHDOG.complete() {
+            incomplete = 0;
             board.feed_watchdog();
         } else {
-            absent = absent.saturating_add(1);
+            incomplete = incomplete.saturating_add(1);
         }
     }
     hang_guard::rest();
     (ticks, report.overruns)
 }
 
-/// What was said last, so that only changes are said.
+/// The last reported values, so that only changes are logged.
 #[derive(Default)]
 struct Report {
     state: &'static str,
@@ -108,9 +98,9 @@ impl Report {
         match (fault, self.fault) {
             (Some(fault), false) => {
                 queue(Event::Fault(fault, number));
-                last_words::leave(fault, number);
+                crash_record::record(fault, number);
             }
-            (None, true) => last_words::acknowledge(),
+            (None, true) => crash_record::clear(),
             _ => {}
         }
         self.fault = fault.is_some();
@@ -142,15 +132,16 @@ impl Report {
     }
 }
 
-/// Logs what the control task queued, and checks in. `each` is called after every event and every 10 ms.
+/// Logs the events that the control task has queued, and checks in. `each` is called after every event, and with `None` once
+/// the queue has been empty for 10 ms.
 pub async fn housekeeping(mut each: impl FnMut(Option<&Event>)) -> ! {
-    ROLL_CALL.enrol(Member::Housekeeping);
+    TASK_WATCHDOG.register(Task::Housekeeping);
     loop {
         let event = with_timeout(Duration::from_millis(10), EVENTS.receive()).await.ok();
         if let Some(event) = event {
             log::event(event);
         }
         each(event.as_ref());
-        ROLL_CALL.check_in(Member::Housekeeping);
+        TASK_WATCHDOG.check_in(Task::Housekeeping);
     }
 }

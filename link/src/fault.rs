@@ -1,12 +1,12 @@
-//! Codes of what went wrong in the MCU.
+//! Numeric codes of the MCU's faults.
 
 use core::fmt;
 
 use model::supervisor;
 use serde::{Deserialize, Serialize};
 
-/// Why the MCU took the voltage away: [`supervisor::Fault`] by its number, so that an older host can show what a newer MCU
-/// says.
+/// Fault because of which the MCU switched the voltage off: the code of a [`supervisor::Fault`], or 0 for none. Codes that
+/// this version does not know are kept, so that an older host can display the faults of a newer MCU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault(pub u8);
 
@@ -14,7 +14,7 @@ impl Fault {
     /// No fault.
     pub const NONE: Self = Self(0);
 
-    /// The fault of a state.
+    /// Fault of the supervisor's `state`, [`Fault::NONE`] unless it is faulted.
     pub fn of(state: supervisor::State) -> Self {
         match state {
             supervisor::State::Faulted(fault) => fault.into(),
@@ -22,7 +22,7 @@ impl Fault {
         }
     }
 
-    /// One word for tables and JSON.
+    /// Name for tables and JSON; `unknown` for a code that this version does not know.
     pub fn name(self) -> &'static str {
         match supervisor::Fault::from_code(self.0) {
             Some(fault) => fault.name(),

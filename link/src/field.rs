@@ -1,14 +1,15 @@
-//! Which field of a model was refused.
+//! Numeric codes of the fields that a model's validation can reject.
 
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A field of a plant file or a setting, by its number: an older host can show what a newer MCU says.
+/// Code of a field of a plant file or of a setting: the index of its name in the list of this module. Codes that this
+/// version does not know are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Field(pub u8);
 
-/// In the order of their numbers; new ones go to the end.
+/// Names in the order of their codes. The order is part of the protocol: new names are appended.
 const NAMES: [&str; 18] = [
     "memory.direct",
     "memory.thresholds_v",
@@ -31,15 +32,15 @@ const NAMES: [&str; 18] = [
 ];
 
 impl Field {
-    /// One that has no number.
+    /// Code of a field without an entry in the list.
     pub const OTHER: Self = Self(u8::MAX);
 
-    /// The field of that name.
+    /// Code of the field that the model's validation calls `name`, [`Field::OTHER`] if the list does not contain it.
     pub fn named(name: &str) -> Self {
         NAMES.iter().position(|known| *known == name).map_or(Self::OTHER, |number| Self(number as u8))
     }
 
-    /// As the model's check names it.
+    /// Name that the model's validation uses, `another setting` for an unknown code.
     pub fn name(self) -> &'static str {
         NAMES.get(usize::from(self.0)).unwrap_or(&"another setting")
     }

@@ -1,52 +1,43 @@
-//! Message to bytes, and a checked packet back to a message.
+//! Encoding of a message into a frame, and decoding of a packet into a message.
 //!
 //! ```text
 //! frame = 0x00, COBS(packet), 0x00
 //! packet = version, kind, sequence (2 bytes, low first), postcard(message), CRC-32C of all before it (4 bytes, low first)
 //! ```
 //!
-//! The delimiter in front ends whatever noise stood on the line, so that noise costs no frame. Between two frames there
-//! may be any number of delimiters. Version, kind, sequence and CRC stay where they are in every protocol version.
-//!
-//! CRC-32C (Castagnoli) detects every pattern of up to five flipped bits in a packet of this size, and lets one in 2^32 of
-//! all others through. It is computed bit by bit: a table would cost 1 KB of flash for a few kilobytes a second.
+//! The leading delimiter terminates noise that was received before it, so that noise does not corrupt the frame. Any number
+//! of delimiters may separate two frames. The positions of version, kind, sequence and CRC are the same in every protocol
+//! version.
 
-use crc::{CRC_32_ISCSI, Crc, NoTable};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+pub use crate::checksum::checksum;
 use crate::reply::Reply;
 use crate::request::Request;
 use crate::sequence::Sequence;
-use crate::stuffing;
+use crate::stuffing::{self, Bytes};
 
-/// Ends a frame, and starts it.
+/// Byte before and after every frame. COBS removes it from the encoded packet.
 pub const DELIMITER: u8 = 0;
-/// Longest frame in bytes, both delimiters included.
+/// Length of the longest frame, in bytes, including both delimiters.
 pub const MAX_FRAME: usize = 128;
-/// Most bytes between two delimiters.
+/// Largest number of bytes between two delimiters.
 pub const MAX_ENCODED: usize = MAX_FRAME - 2;
-/// Longest packet in bytes: COBS adds one byte to anything below 255.
+/// Length of the longest packet, in bytes: COBS adds one byte to a packet of less than 255 bytes.
 pub const MAX_PACKET: usize = MAX_ENCODED - 1;
-/// Longest postcard message in bytes.
+/// Length of the longest serialised message, in bytes.
 pub const MAX_MESSAGE: usize = MAX_PACKET - HEADER - CHECKSUM;
 
-// The short form of COBS.
+// The encoder does not implement the COBS blocks of 254 and more bytes.
 const _: () = assert!(MAX_PACKET < 254);
 
 const HEADER: usize = 4;
 const CHECKSUM: usize = 4;
 
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
-
-/// CRC-32C of anything.
-pub fn checksum(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
-}
-
 /// A request or a reply.
 pub trait Message: Serialize + DeserializeOwned {
-    /// Tells the two directions apart: a host that hears its own echo must not take it for an answer.
+    /// Byte that identifies the direction, so that a host does not accept the echo of its own request as a reply.
     const KIND: u8;
 }
 
@@ -58,33 +49,30 @@ impl Message for Reply {
     const KIND: u8 = b'A';
 }
 
-/// A message as it goes onto the wire.
+/// An encoded message, ready to be sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame(Bytes<MAX_FRAME>);
 
-/// At most `N` bytes, their number in one of its own.
-pub(crate) type Bytes<const N: usize> = heapless::Vec<u8, N, u8>;
-
 impl Frame {
-    /// Nothing to send.
+    /// A frame without bytes: nothing is sent.
     pub const EMPTY: Self = Self(Bytes::new());
 
-    /// The frame of a message; every message fits (a test holds the largest of each against [`MAX_FRAME`]).
+    /// Encodes `message`. Every message fits into [`MAX_FRAME`] bytes, which `tests/round_trip.rs` verifies for the longest.
     pub fn new<M: Message>(sequence: Sequence, message: &M) -> Self {
         Self::with_version(crate::VERSION, sequence, message)
     }
 
-    /// As [`Frame::new`], but as another protocol version would send it.
+    /// Encodes `message` with the version byte of another protocol version.
     pub fn with_version<M: Message>(version: u8, sequence: Sequence, message: &M) -> Self {
         let mut frame = Self::EMPTY;
-        // None would be a message beyond MAX_MESSAGE. Sending nothing is the harmless way out: the other side asks again.
+        // Only a message longer than MAX_MESSAGE. An empty frame is safe: the host repeats its request.
         if frame.fill(version, sequence, message).is_none() {
             frame.0.clear();
         }
         frame
     }
 
-    /// The bytes to send, delimiters included; empty if there is nothing to send.
+    /// The bytes to send, including both delimiters; empty if there is nothing to send.
     pub fn as_bytes(&self) -> &[u8] {
         &self.0
     }
@@ -103,34 +91,34 @@ impl Frame {
     }
 }
 
-/// What lay between two delimiters, with a sound CRC.
+/// A decoded packet whose CRC is correct.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packet<'a> {
     /// Protocol version of the sender.
     pub version: u8,
-    /// [`Message::KIND`].
+    /// Direction of the message, see [`Message::KIND`].
     pub kind: u8,
-    /// Sequence number.
+    /// Sequence number of the request, or of the telemetry sample.
     pub sequence: Sequence,
-    /// The message, still in postcard.
+    /// The message, serialised with postcard.
     pub message: &'a [u8],
-    /// CRC of all of it: tells a repeated frame from another one of the same number.
+    /// CRC-32C of the packet. It distinguishes a repeated frame from a different one with the same sequence number.
     pub checksum: u32,
 }
 
-/// Why a sound packet is not the message that was expected.
+/// Why a packet with a correct CRC is not a message of the expected type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unreadable {
-    /// Another direction: an echo.
+    /// The packet is of the other direction, for example an echo.
     Kind,
-    /// Another protocol version.
+    /// The packet is of another protocol version, given here.
     Version(u8),
-    /// No message of this version.
+    /// The bytes are not a message of this protocol version.
     Message,
 }
 
 impl<'a> Packet<'a> {
-    /// Decodes what lay between two delimiters, in place. `None` if it is damaged.
+    /// Decodes in place the bytes between two delimiters. `None` if the encoding or the CRC is wrong.
     pub(crate) fn open(encoded: &'a mut [u8]) -> Option<Self> {
         let length = stuffing::decode_in_place(encoded)?;
         let packet = encoded.get(..length)?;
@@ -141,10 +129,10 @@ impl<'a> Packet<'a> {
         (self::checksum(checked) == checksum).then_some(Self { version, kind, sequence, message, checksum })
     }
 
-    /// The message.
+    /// Deserialises the message.
     ///
     /// # Errors
-    /// [`Unreadable`] if the packet holds another kind, another version, or bytes that are no message, too few or too many.
+    /// [`Unreadable`] if kind or version differ, or if the bytes are not exactly one message.
     pub fn read<M: Message>(&self) -> Result<M, Unreadable> {
         if self.kind != M::KIND {
             return Err(Unreadable::Kind);

@@ -1,58 +1,70 @@
-//! The serial link between the robot's computer (host) and the amplifier's MCU.
+//! The serial link between the robot's computer (host) and the amplifier's MCU. It needs no heap, no `unsafe` code and no
+//! hardware; both ends use it. `docs/link.md` specifies the protocol and the reaction to every fault.
 //!
-//! The host asks, the MCU answers; the MCU pushes nothing but telemetry that was asked for. Used by both sides: no heap,
-//! no `unsafe`, no hardware. The whole protocol, with what happens on each fault, is in `docs/link.md`.
+//! | term | meaning |
+//! | --- | --- |
+//! | frame | The bytes on the wire between two `0x00` delimiters: one packet, encoded with COBS. |
+//! | packet | Version, kind, sequence number, message and CRC-32C. |
+//! | message | A [`Request`] of the host or a [`Reply`] of the MCU, serialised with postcard. |
+//! | sequence number | 16-bit request counter modulo 65 536; a reply carries the number of its request. |
+//! | session | The exchange since the host's last `Hello`, which defines the first sequence number. |
+//! | command | What one request changes in the control tick: [`Command`]. |
+//! | telemetry | Samples of the control loop that the MCU sends periodically once the host has requested them. |
 //!
 //! ```text
 //! frame = 0x00, COBS( version, kind, sequence (2 bytes, low first), postcard(message), CRC-32C (4 bytes, low first) ), 0x00
 //! ```
 //!
-//! | module | what it is |
+//! The host sends requests, the MCU replies. Apart from replies the MCU sends only telemetry.
+//!
+//! | module | content |
 //! | --- | --- |
-//! | [`request`], [`reply`], [`reason`] | the messages |
-//! | [`value`] | voltages and desired stiffness as they travel |
-//! | [`wire_model`] | a spring's model as it is sent and stored |
-//! | [`fault`], [`field`] | codes of what went wrong in the MCU, and of what is wrong with a model |
-//! | [`frame`] | message to bytes, and a checked packet back to a message |
-//! | [`receiver`] | bytes to checked packets; finds its way back after damage |
-//! | [`sequence`] | which of two sequence numbers is newer |
-//! | [`order`] | from a request to what the supervisor is told |
-//! | [`session`] | the MCU's side: what to apply, what to answer, how long the host has been silent |
-//! | [`desk`] | the MCU's side, whole: between the wire and the control tick |
+//! | [`request`], [`reply`], [`reason`] | The messages. |
+//! | [`value`] | Voltages and desired stiffness in their wire format. |
+//! | [`wire_model`] | A spring's model in the format in which it is sent and stored. |
+//! | [`fault`], [`field`] | Numeric codes of the MCU's faults and of a model's fields. |
+//! | [`frame`] | Encoding of a message and decoding of a packet. |
+//! | [`checksum`](mod@checksum) | CRC-32C. |
+//! | [`receiver`] | Bytes in, packets with a correct CRC out; resynchronises after corrupted bytes. |
+//! | [`sequence`] | Order of sequence numbers. |
+//! | [`command`] | Conversion of a request into a command for the control tick. |
+//! | [`session`] | Acceptance, repetition and rejection of requests, and the host's silence. |
+//! | [`server`] | The MCU's end of the link: bytes in, commands and replies out. |
 #![no_std]
 #![forbid(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
-pub mod desk;
+pub mod checksum;
+pub mod command;
 pub mod fault;
 pub mod field;
 pub mod frame;
-pub mod order;
 pub mod reason;
 pub mod receiver;
 pub mod reply;
 pub mod request;
 pub mod sequence;
+pub mod server;
 pub mod session;
 mod stuffing;
 pub mod value;
 pub mod wire_model;
 
-pub use desk::{About, Desk, Keep, Step, View};
+pub use command::Command;
 pub use fault::Fault;
 pub use field::Field;
 pub use frame::{Frame, Message, Packet, Unreadable};
-pub use order::Order;
 pub use reason::Reason;
 pub use receiver::Receiver;
 pub use reply::{Controller, Models, Reply, State, Status, Telemetry};
 pub use request::Request;
 pub use sequence::Sequence;
+pub use server::{About, ModelUpdate, Server, Step, View};
 pub use session::{Action, Session};
 pub use value::{Desired, WireVolts};
 pub use wire_model::{ModelId, WireModel};
 
-/// Version of the protocol. Any change of a golden frame in `tests/golden.rs` needs a new one.
+/// Version of the protocol. Any change of a golden frame in `tests/golden.rs` requires a new number.
 pub const VERSION: u8 = 4;

@@ -1,4 +1,4 @@
-//! Why the MCU refuses.
+//! Why the MCU rejects a request.
 
 use core::fmt;
 
@@ -8,64 +8,65 @@ use serde::{Deserialize, Serialize};
 use crate::fault::Fault;
 use crate::field::Field;
 
-/// Why a request was not applied. Half of it never is.
+/// Why a request was rejected. A rejected request has no effect at all.
 ///
-/// The order of the variants is their code on the wire.
+/// The order of the variants defines their codes on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reason {
-    /// Static voltage beyond the amplifier's range; the range in the unit of the request.
+    /// The desired stiffness requires a static voltage outside of the amplifier's range. The bounds are in the unit of the
+    /// request.
     OutOfRange {
-        /// Lowest reachable stiffness.
+        /// Lowest stiffness within the range.
         lowest: f64,
-        /// Highest reachable stiffness.
+        /// Highest stiffness within the range.
         highest: f64,
     },
-    /// Only an armed MCU does this.
+    /// The request requires the armed state.
     NotArmed,
-    /// A fault has to be acknowledged first.
+    /// The given fault must be acknowledged first.
     Faulted(Fault),
-    /// The frame is of another protocol version; this is the MCU's.
+    /// The frame is of another protocol version than the MCU's, which is given here.
     BadVersion(u8),
-    /// The MCU has not been greeted since it started: it may have restarted.
+    /// The MCU has received no `Hello` since its start; it may have restarted during the session.
     HelloFirst,
-    /// The frame is older than one that was accepted.
+    /// The sequence number is older than that of an accepted request.
     Stale {
         /// The newest accepted sequence number.
         newest: u16,
     },
-    /// A different request came before with this same sequence number.
+    /// A different request with the same sequence number was accepted before.
     SequenceReused,
-    /// The frame is sound, its message is none of this version's.
+    /// The CRC is correct, but the message does not exist in this protocol version.
     UnknownRequest,
     /// The interlock is open.
     InterlockOpen,
-    /// The fault to be acknowledged is not the one that is present.
+    /// The fault to be acknowledged differs from the present one, which is given here.
     OtherFault(Fault),
-    /// The host had been silent for too long when it armed.
+    /// The host's silence exceeded the limit when the request to arm was executed.
     HostSilent,
-    /// Only a disarmed MCU does this.
+    /// The request requires the disarmed state.
     Armed,
-    /// Parts of the model are missing; the one that is expected next.
+    /// Parts of the model are missing; the number of the next expected part is given.
     PartMissing(u8),
-    /// The model's checksum is wrong, or its payload is none of this version's.
+    /// The model's checksum is wrong, or the format of its payload is unknown.
     ModelDamaged,
-    /// The model was checked and cannot be run.
+    /// The model failed its validation.
     BadModel {
-        /// What is wrong with it.
+        /// Field that is out of bounds.
         field: Field,
-        /// Lowest value allowed.
+        /// Lowest permitted value.
         lowest: f64,
-        /// Highest value allowed.
+        /// Highest permitted value.
         highest: f64,
     },
-    /// The memory did not take the model; the old one stays.
+    /// The flash could not be written; the previously stored model remains valid.
     NotStored,
-    /// The amplifier holds a voltage, or a current flows, although it is off.
+    /// The monitors show a voltage or a current although the amplifier is switched off.
     Live,
 }
 
 impl Reason {
-    /// Stable code, as on the wire.
+    /// Code of the reason on the wire; it never changes.
     pub const fn code(&self) -> u8 {
         match self {
             Self::OutOfRange { .. } => 0,
@@ -92,33 +93,33 @@ impl Reason {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::OutOfRange { lowest, highest } => write!(f, "out of reach: expected {lowest} to {highest}"),
+            Self::OutOfRange { lowest, highest } => write!(f, "out of range: expected {lowest} to {highest}"),
             Self::NotArmed => f.write_str("not armed"),
             Self::Faulted(fault) => write!(f, "faulted: {fault}; acknowledge it first"),
             Self::BadVersion(version) => {
                 write!(f, "the MCU speaks version {version} of the protocol, this program {}", crate::VERSION)
             }
             Self::HelloFirst => f.write_str("the MCU has restarted and waits for a Hello"),
-            Self::Stale { newest } => write!(f, "came too late: request {newest} was already accepted"),
-            Self::SequenceReused => f.write_str("another request had the same sequence number"),
+            Self::Stale { newest } => write!(f, "too late: request {newest} is already accepted"),
+            Self::SequenceReused => f.write_str("a different request has the same sequence number"),
             Self::UnknownRequest => f.write_str("the MCU does not know this request"),
             Self::InterlockOpen => f.write_str("the interlock is open"),
-            Self::OtherFault(fault) => write!(f, "the fault is another one: {fault}"),
-            Self::HostSilent => f.write_str("the host had been silent for too long"),
+            Self::OtherFault(fault) => write!(f, "a different fault is present: {fault}"),
+            Self::HostSilent => f.write_str("the host was silent for too long"),
             Self::Armed => f.write_str("armed; disarm it first"),
-            Self::PartMissing(expected) => write!(f, "a part of the model is missing; part {expected} was expected"),
+            Self::PartMissing(expected) => write!(f, "a part of the model is missing; expected part {expected}"),
             Self::ModelDamaged => f.write_str("the model arrived damaged, or the MCU does not know its format"),
             Self::BadModel { field, lowest, highest } => {
                 write!(f, "the model cannot be run: {field} has to lie within {lowest} to {highest}")
             }
-            Self::NotStored => f.write_str("the memory did not take the model; the old one stays"),
+            Self::NotStored => f.write_str("the flash could not be written; the previous model stays"),
             Self::Live => f.write_str("the amplifier is off, and its monitors still show a voltage or a current"),
         }
     }
 }
 
 impl Reason {
-    /// What the model's own check says of a model.
+    /// The reason that reports an error of the model's validation.
     pub fn of_model(error: &OutOfRange) -> Self {
         Self::BadModel { field: Field::named(error.field), lowest: error.lowest, highest: error.highest }
     }

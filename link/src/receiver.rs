@@ -1,15 +1,15 @@
-//! Bytes to checked packets.
+//! Bytes in, packets with a correct CRC out.
 //!
-//! Everything between two delimiters is one candidate. It is taken only if it fits, decodes and has a sound CRC; if not, it
-//! is dropped and counted, and the next delimiter starts anew. Damage therefore never costs a frame that it did not touch.
+//! The bytes between two delimiters are one candidate. It is dropped and counted if it is too long, does not decode or has a
+//! wrong CRC; the next delimiter starts the next candidate. Corrupted bytes therefore affect only the frame they are in.
 
 use crate::frame::{DELIMITER, MAX_ENCODED, Packet};
 
-/// A receiver with a fixed buffer.
+/// Decoder of the byte stream, with a buffer for one frame.
 #[derive(Clone, Debug)]
 pub struct Receiver {
     buffer: [u8; MAX_ENCODED],
-    /// Bytes since the last delimiter; beyond the buffer's size it says that the frame is lost.
+    /// Number of bytes since the last delimiter, limited to one more than the buffer holds: then the frame is lost.
     length: usize,
     damaged: u32,
     oversize: u32,
@@ -22,18 +22,18 @@ impl Default for Receiver {
 }
 
 impl Receiver {
-    /// A receiver that has heard nothing.
+    /// A receiver in its initial state, with all counters at zero.
     pub const fn new() -> Self {
         Self { buffer: [0; MAX_ENCODED], length: 0, damaged: 0, oversize: 0 }
     }
 
-    /// Takes a byte; the last one of a sound frame gives its packet.
+    /// Processes the next byte and returns the packet that it completes, if any.
     pub fn on_byte(&mut self, byte: u8) -> Option<Packet<'_>> {
         if byte != DELIMITER {
             if let Some(place) = self.buffer.get_mut(self.length) {
                 *place = byte;
             }
-            // One past the buffer is enough to know, and cannot wrap.
+            // Saturates, so that the counter cannot overflow.
             self.length = (self.length + 1).min(MAX_ENCODED + 1);
             return None;
         }
@@ -56,12 +56,12 @@ impl Receiver {
         }
     }
 
-    /// Candidates that did not decode or whose CRC was wrong.
+    /// Number of candidates that did not decode or had a wrong CRC.
     pub fn damaged(&self) -> u32 {
         self.damaged
     }
 
-    /// Candidates that were longer than any frame.
+    /// Number of candidates longer than [`MAX_ENCODED`] bytes.
     pub fn oversize(&self) -> u32 {
         self.oversize
     }

@@ -1,4 +1,4 @@
-//! What the MCU answers.
+//! Replies of the MCU.
 
 use core::fmt;
 
@@ -8,81 +8,99 @@ use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
 use crate::reason::Reason;
-use crate::session::Counters;
 use crate::value::WireVolts;
 use crate::wire_model::ModelId;
 
-/// A reply. It carries the sequence number of its request; telemetry, which nobody waits for, counts its own.
+/// Reply to a request, with the sequence number of that request. Telemetry has sequence numbers of its own.
 ///
-/// The order of the variants is their code on the wire.
+/// The order of the variants defines their codes on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply {
-    /// Done.
+    /// The request was executed.
     Ack {
-        /// The state afterwards.
+        /// State after the request.
         state: State,
-        /// The target afterwards.
+        /// Target after the request.
         target: WireVolts,
     },
-    /// Not done, and nothing has changed.
+    /// The request was rejected and has changed nothing.
     Refused(Reason),
-    /// Everything about the MCU.
+    /// Complete state of the MCU.
     Status(Status),
-    /// One sample of the loop.
+    /// One sample of the control loop.
     Telemetry(Telemetry),
-    /// What runs, and what will.
+    /// The running and the stored model.
     Model(Models),
 }
 
-/// The models of an MCU.
+/// The running and the stored model of an MCU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Models {
-    /// The one that runs.
+    /// Model that runs since the start.
     pub active: ModelId,
-    /// The one that the next start will find.
+    /// Model that the next start will use.
     pub stored: ModelId,
 }
 
-/// Whether voltage may leave.
+/// State of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
-    /// No voltage, output disabled; waits to be armed.
+    /// 0 V, output disabled; can be armed.
     #[default]
     Disarmed,
-    /// The loop follows the target.
+    /// The output is enabled and the controller follows the target.
     Armed,
-    /// Armed, but the host is silent: the target falls to zero, then the MCU disarms. A sign of life ends it.
+    /// Armed, but the host is silent: the target ramps down to 0 V, then the MCU disarms. An accepted frame ends the ramp.
     Ramping,
-    /// No voltage, output disabled; the fault must be acknowledged first.
+    /// 0 V, output disabled; the fault must be acknowledged first.
     Faulted,
 }
 
-/// The whole state of the MCU.
+/// Complete state of the MCU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Status {
-    /// What was built in.
+    /// Version of the program and its controller.
     pub firmware: Firmware,
-    /// Ticks per second, in Hz.
+    /// Rate of the control tick, in Hz.
     pub rate_hz: u32,
-    /// Ticks of host silence until the MCU acts on it.
+    /// Permitted silence of the host, in ticks.
     pub silence_limit_ticks: u32,
-    /// Lowest scaled stiffness that may be asked for: the amplifier's range, whatever the spring.
+    /// Lowest permitted target, as equivalent static voltage: the amplifier's range, independent of the spring's model.
     pub lowest: WireVolts,
-    /// Highest scaled stiffness that may be asked for.
+    /// Highest permitted target, as equivalent static voltage.
     pub highest: WireVolts,
-    /// Late ticks since the start.
+    /// Number of missed ticks since the start.
     pub overruns: u32,
-    /// The fault that is present or, if none is, [`Fault::NONE`].
+    /// Present fault, or [`Fault::NONE`].
     pub fault: Fault,
-    /// The fault that caused the last reset.
+    /// Fault that caused the last reset, or [`Fault::NONE`].
     pub last_fault: Fault,
-    /// The loop's latest sample.
+    /// Latest sample of the control loop.
     pub sample: Telemetry,
-    /// What came over the link.
+    /// Counters of the received frames.
     pub counters: Counters,
 }
 
-/// Which program runs on the MCU.
+/// Counters of the received frames since the start. Each counter saturates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counters {
+    /// Requests that were executed.
+    pub accepted: u32,
+    /// Repeated requests, to which the same reply was sent again.
+    pub repeated: u32,
+    /// Frames that did not decode or had a wrong CRC.
+    pub damaged: u32,
+    /// Frames that were longer than the longest message.
+    pub oversize: u32,
+    /// Frames with a correct CRC but another protocol version.
+    pub bad_version: u32,
+    /// Frames with a correct CRC that were rejected because of their sequence number.
+    pub out_of_order: u32,
+    /// Frames with a correct CRC that were not a request.
+    pub unknown: u32,
+}
+
+/// Identity of the program on the MCU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Firmware {
     /// Major version.
@@ -91,26 +109,26 @@ pub struct Firmware {
     pub minor: u8,
     /// Patch version.
     pub patch: u8,
-    /// First eight hexadecimal digits of the git revision; 0 if it is not known.
+    /// First eight hexadecimal digits of the git revision, or 0 if it is unknown.
     pub revision: u32,
-    /// Who leads the spring.
+    /// Pre-compensator in use.
     pub controller: Controller,
 }
 
-/// Which pre-compensator leads the spring.
+/// Type of the pre-compensator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Controller {
-    /// None.
+    /// No pre-compensation: the target is the voltage.
     #[default]
     None,
-    /// The paper's.
+    /// The source report's proportional-integral controller.
     Paper,
-    /// The time-optimal one.
+    /// The time-optimal controller.
     Fast,
 }
 
 impl Controller {
-    /// Of these settings.
+    /// Type of the controller with the settings `compensation`.
     pub const fn of(compensation: &Compensation) -> Self {
         match compensation {
             Compensation::None => Self::None,
@@ -119,7 +137,7 @@ impl Controller {
         }
     }
 
-    /// As `vsj` has it on its command line.
+    /// Name on the command line of `vsj` and in the log.
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -129,24 +147,24 @@ impl Controller {
     }
 }
 
-/// One sample of the loop: all of the same tick.
+/// One sample of the control loop; all values are of the same tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Telemetry {
-    /// Number of the tick since the start.
+    /// Number of the tick, counted from the start.
     pub tick: u64,
-    /// Whether voltage may leave.
+    /// State of the output.
     pub state: State,
-    /// The target that is pursued.
+    /// Target after limitation and ramping, as equivalent static voltage.
     pub target: WireVolts,
-    /// The voltage that `code` stands for.
+    /// Voltage that corresponds to `code`.
     pub applied: WireVolts,
-    /// The estimator's scaled stiffness.
+    /// Estimated stiffness, as equivalent static voltage.
     pub estimate: WireVolts,
-    /// The sensor's scaled stiffness, where there is one.
+    /// Measured stiffness, as equivalent static voltage; `None` without a new reading.
     pub measured: Option<WireVolts>,
-    /// What the DAC was told, 0 to 65 535.
+    /// Code written to the DAC, 0 to 65 535.
     pub code: u16,
-    /// Limits that acted, as [`model::Limits::bits`]: upper 1, lower 2, slew 4, target 8.
+    /// Active limits as [`model::Limits::bits`]: upper 1, lower 2, slew 4, target 8.
     pub limits: u8,
 }
 
@@ -162,7 +180,7 @@ impl From<&Supervisor> for State {
 }
 
 impl State {
-    /// One word for tables and JSON.
+    /// Name for tables and JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Disarmed => "disarmed",

@@ -1,4 +1,4 @@
-//! What the host asks.
+//! Requests of the host.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,52 +6,52 @@ use crate::fault::Fault;
 use crate::value::Desired;
 use crate::wire_model::PART;
 
-/// A request. Each is answered by exactly one [`crate::Reply`] with the request's own sequence number.
+/// Request of the host. The MCU sends exactly one [`crate::Reply`] to each, with the same sequence number.
 ///
-/// The order of the variants is their code on the wire.
+/// The order of the variants defines their codes on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Request {
-    /// Opens the talk: sequence numbers start anew from this frame's, telemetry stops. Answered with the status.
+    /// Starts a session: the sequence number of this frame becomes the reference, telemetry stops. The reply is the status.
     Hello,
-    /// Answered with the status.
+    /// Reads the status.
     Status,
-    /// Follow this stiffness. Refused unless armed, and if it is out of reach.
+    /// Sets the desired stiffness. Rejected unless armed, and if it is out of range.
     Set(Desired),
-    /// Let voltage out. The target starts at 0 V, whatever was set before.
+    /// Enables the output with a target of 0 V.
     Arm,
-    /// Take the voltage away. Always applied: without a Hello, late, and from any protocol version. Leaves a fault as it is.
+    /// Disables the output. Executed without a `Hello`, with any sequence number and from any protocol version. It does not
+    /// acknowledge a fault.
     Disarm,
-    /// Leave the fault state, but only if it still is this fault.
+    /// Acknowledges the given fault; rejected if another fault is present.
     Acknowledge(Fault),
-    /// Says that the host is alive, nothing else.
+    /// Restarts the measurement of the host's silence and has no other effect.
     Heartbeat,
-    /// Push telemetry every so many ticks; 0 stops it. It also stops with Hello and when the host falls silent.
+    /// Starts periodic telemetry. It stops with `every_ticks` = 0, with `Hello`, and while the host is silent.
     Stream {
-        /// Ticks between two samples.
+        /// Period of the samples, in ticks; 0 stops them.
         every_ticks: u16,
     },
-    /// Answered with the models: the one that runs and the one that is stored.
+    /// Reads the identities of the running and of the stored model.
     Model,
-    /// A part of a model's payload. Number 0 begins anew; refused out of order, and unless disarmed.
+    /// Sends a part of a model's payload; part 0 starts a new transfer. Rejected out of order and unless disarmed.
     ModelPart {
-        /// From 0.
+        /// Number of the part, counted from 0.
         number: u8,
-        /// The last part is filled up with zeros.
+        /// Content; the last part is padded with zeros.
         bytes: [u8; PART],
     },
-    /// The payload is complete: check it, and store it if it is sound. It runs from the next start on. Refused unless
-    /// disarmed.
+    /// Ends the transfer: the model is validated and stored, and runs from the next start on. Rejected unless disarmed.
     ModelEnd {
-        /// Of the payload, in bytes.
+        /// Length of the payload, in bytes.
         length: u16,
         /// CRC-32C of the payload.
         checksum: u32,
     },
-    /// Start anew, with the stored model. Refused unless disarmed.
+    /// Restarts the MCU with the stored model. Rejected unless disarmed.
     Restart,
 }
 
 impl Request {
-    /// [`Request::Disarm`] as its bytes. They never change, so that every version can disarm every other.
+    /// Serialised [`Request::Disarm`]. It is the same in every protocol version, so that any host can disarm any MCU.
     pub(crate) const DISARM: &'static [u8] = &[4];
 }

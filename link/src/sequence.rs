@@ -1,27 +1,27 @@
-//! Which of two sequence numbers is newer.
+//! Order of sequence numbers, which count modulo 65 536.
 //!
-//! Numbers run 0 to 65 535 and on from 0. `b` is newer than `a` if it lies less than half of the circle ahead:
+//! `b` is newer than `a` if
 //! `0 < (b - a) mod 65 536 < 32 768`.
 
 use core::cmp::Ordering;
 
-/// The number of a request.
+/// Sequence number of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sequence(pub u16);
 
 impl Sequence {
-    /// The number after this one.
+    /// The next sequence number.
     #[must_use]
     pub const fn next(self) -> Self {
         Self(self.0.wrapping_add(1))
     }
 
-    /// `Greater` if this one is newer than `other`.
+    /// `Greater` if `self` is newer than `other`, `Less` if it is older.
     pub const fn compare(self, other: Self) -> Ordering {
         match self.0.wrapping_sub(other.0) {
             0 => Ordering::Equal,
             1..0x8000 => Ordering::Greater,
-            // Exactly half way round could be either; the careful answer is that it came late.
+            // A distance of exactly 32 768 is ambiguous; taking it as older leads to a rejection, which is safe.
             _ => Ordering::Less,
         }
     }
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn newer_is_ahead_by_less_than_half_of_the_circle() {
+    fn a_number_is_newer_if_it_is_less_than_32_768_ahead() {
         for (a, b, expected) in [
             (5, 4, Ordering::Greater),
             (0, 65_535, Ordering::Greater),

@@ -1,89 +1,69 @@
-//! The MCU's side of the talk: what to apply, what to answer, how long the host has been silent.
+//! Acceptance, repetition and rejection of requests on the MCU, and measurement of the host's silence.
 //!
-//! Every byte from the wire goes into [`Session::on_byte`]. It says either to apply a request, whose reply then goes through
-//! [`Session::answer`], or to send bytes at once, or nothing. The rules, in the order in which they are tried:
+//! Every received byte is passed to [`Session::on_byte`]. The result is a request to execute, whose reply is then encoded
+//! by [`Session::answer`], or bytes to send, or nothing. The first matching row of this table applies:
 //!
-//! | the frame is | what happens |
+//! | frame | reaction |
 //! | --- | --- |
-//! | damaged or too long | dropped and counted |
+//! | corrupted or too long | dropped and counted |
 //! | not a request (an echo) | dropped and counted |
-//! | of another protocol version | refused, except Disarm |
-//! | no request of this version | refused |
-//! | Hello | applied; sequence numbers start anew from its own, telemetry stops |
-//! | the first one and no Hello | refused, except Disarm |
-//! | newer than the last accepted one | applied |
-//! | the last accepted one again | answered as before, not applied again |
-//! | another one with the same number | refused, except Disarm |
-//! | older | refused, except Disarm |
+//! | of another protocol version | rejected, except `Disarm` |
+//! | unknown request | rejected |
+//! | `Hello` | executed; its sequence number becomes the reference, telemetry stops |
+//! | before the first `Hello` | rejected, except `Disarm` |
+//! | newer than the last accepted request | executed |
+//! | the last accepted request again | the same reply is sent again, the request is not executed again |
+//! | a different request with the same number | rejected, except `Disarm` |
+//! | older | rejected, except `Disarm` |
 //!
-//! Hello, newer and repeated frames show that the host is alive; nothing else does.
+//! `Hello`, newer and repeated requests end the host's silence; no other frame does.
 
 use core::cmp::Ordering;
-
-use serde::{Deserialize, Serialize};
 
 use crate::frame::{Frame, Message, Packet, Unreadable};
 use crate::reason::Reason;
 use crate::receiver::Receiver;
+pub use crate::reply::Counters;
 use crate::reply::{Reply, Telemetry};
 use crate::request::Request;
 use crate::sequence::Sequence;
 
-/// What came over the link since the start. Each counter stops at its end.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counters {
-    /// Requests that were handed out to be applied.
-    pub accepted: u32,
-    /// Frames that came again and were answered again.
-    pub repeated: u32,
-    /// Frames that did not decode or whose CRC was wrong.
-    pub damaged: u32,
-    /// Frames longer than any message.
-    pub oversize: u32,
-    /// Sound frames of another protocol version.
-    pub bad_version: u32,
-    /// Sound frames that were refused for their sequence number.
-    pub out_of_order: u32,
-    /// Sound frames that were no request.
-    pub unknown: u32,
-}
-
-/// What to do after a byte.
+/// Reaction to a received byte.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action<'a> {
-    /// Apply this, then send what [`Session::answer`] makes of the reply.
+    /// Execute the request, then send the frame that [`Session::answer`] returns for the reply.
     Apply(Request),
-    /// Apply nothing, send this.
+    /// Send these bytes; there is nothing to execute.
     Send(&'a [u8]),
 }
 
-/// The last request that was accepted in order.
+/// Identity of the last request that was accepted in sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Accepted {
     sequence: Sequence,
     checksum: u32,
 }
 
-/// What a sound frame amounts to.
+/// Reaction to a frame with a correct CRC.
 enum Verdict {
     Drop,
     Apply(Request),
-    Again,
-    Refuse(Reason),
+    Repeat,
+    Reject(Reason),
 }
 
-/// The MCU's side of the talk.
+/// State of a session on the MCU.
 #[derive(Clone, Debug)]
 pub struct Session {
     receiver: Receiver,
     accepted: Option<Accepted>,
-    /// Number of the request that waits for its answer.
-    asked: Sequence,
-    /// It is the last accepted one: its answer is kept.
-    kept: bool,
-    /// The answer to the last accepted request, for when it comes again.
+    /// Number of the request whose reply is pending.
+    pending: Sequence,
+    /// The pending request is the last accepted one, so that its reply is stored for a repetition.
+    stores_answer: bool,
+    /// Reply to the last accepted request; empty while it is pending.
     answer: Frame,
-    /// Any other frame on its way out.
+    /// The frame to send, or the last one sent.
     outgoing: Frame,
     counters: Counters,
     silence_limit_ticks: u32,
@@ -95,13 +75,13 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session without a host; the host counts as silent after `silence_limit_ticks` without a frame of its.
+    /// A session before its first `Hello`. The host is silent once `silence_limit_ticks` have passed without an accepted frame.
     pub const fn new(silence_limit_ticks: u32) -> Self {
         Self {
             receiver: Receiver::new(),
             accepted: None,
-            asked: Sequence(0),
-            kept: false,
+            pending: Sequence(0),
+            stores_answer: false,
             answer: Frame::EMPTY,
             outgoing: Frame::EMPTY,
             counters: Counters {
@@ -122,17 +102,17 @@ impl Session {
         }
     }
 
-    /// Takes a byte from the wire at tick `now`. What is to be applied must be answered before the next byte.
+    /// Processes a byte received at tick `now`. After [`Action::Apply`], call [`Session::answer`] before the next byte.
     pub fn on_byte(&mut self, byte: u8, now: u64) -> Option<Action<'_>> {
         let packet = self.receiver.on_byte(byte)?;
         let sequence = packet.sequence;
         let this = Accepted { sequence, checksum: packet.checksum };
-        match judge(&packet, self.accepted.as_ref()) {
+        match classify(&packet, self.accepted.as_ref()) {
             Verdict::Drop => {
                 count(&mut self.counters.unknown);
                 None
             }
-            Verdict::Refuse(reason) => {
+            Verdict::Reject(reason) => {
                 count(match reason {
                     Reason::BadVersion(_) => &mut self.counters.bad_version,
                     Reason::UnknownRequest => &mut self.counters.unknown,
@@ -141,19 +121,19 @@ impl Session {
                 self.outgoing = Frame::new(sequence, &Reply::Refused(reason));
                 Some(Action::Send(self.outgoing.as_bytes()))
             }
-            Verdict::Again => {
+            Verdict::Repeat => {
                 count(&mut self.counters.repeated);
                 self.heard_at = Some(now);
                 self.heard = true;
                 self.outgoing.clone_from(&self.answer);
-                // Nothing to send yet means that the answer is still being worked on, and comes.
+                // Empty while the request is being executed: its reply follows.
                 Some(Action::Send(self.outgoing.as_bytes())).filter(|_| self.answer != Frame::EMPTY)
             }
             Verdict::Apply(request) => {
                 count(&mut self.counters.accepted);
-                self.asked = sequence;
-                self.kept = self.in_order(request, sequence);
-                if self.kept {
+                self.pending = sequence;
+                self.stores_answer = self.in_order(request, sequence);
+                if self.stores_answer {
                     self.accepted = Some(this);
                     self.answer = Frame::EMPTY;
                     self.heard_at = Some(now);
@@ -169,30 +149,29 @@ impl Session {
         }
     }
 
-    /// The frame that answers the request which [`Action::Apply`] handed out last.
+    /// Encodes the reply to the request of the last [`Action::Apply`].
     pub fn answer(&mut self, reply: &Reply) -> &[u8] {
-        let frame = Frame::new(self.asked, reply);
-        if self.kept {
+        let frame = Frame::new(self.pending, reply);
+        if self.stores_answer {
             self.answer.clone_from(&frame);
         }
         self.outgoing = frame;
         self.outgoing.as_bytes()
     }
 
-    /// The frame that went out last, or is to go out.
+    /// The frame to send, or the last one sent.
     pub fn outgoing(&self) -> &[u8] {
         self.outgoing.as_bytes()
     }
 
-    /// True if the host wants telemetry now. Never while it is silent.
+    /// True if a telemetry sample is due at tick `now`; always false while the host is silent.
     pub fn telemetry_due(&self, now: u64) -> bool {
         self.every_ticks != 0
             && now.saturating_sub(self.pushed_at) >= u64::from(self.every_ticks)
             && !self.host_silent(now)
     }
 
-    /// The frame that pushes a sample. The next one is due one period after the last was; periods that were missed are
-    /// left out, not made up for.
+    /// Encodes a telemetry sample at tick `now`. The next one is due on the same grid of periods; missed periods are skipped.
     pub fn telemetry(&mut self, sample: Telemetry, now: u64) -> &[u8] {
         let every = u64::from(self.every_ticks.max(1));
         self.pushed_at += now.saturating_sub(self.pushed_at) / every * every;
@@ -201,32 +180,32 @@ impl Session {
         self.outgoing.as_bytes()
     }
 
-    /// Ticks since the last sign of life of the host; `None` before the first one.
+    /// Ticks since the last frame that ended the host's silence; `None` before the first one.
     pub fn silent_ticks(&self, now: u64) -> Option<u64> {
         self.heard_at.map(|at| now.saturating_sub(at))
     }
 
-    /// True once after each sign of life of the host, for who counts its silence elsewhere.
+    /// True once after each frame that ended the host's silence, for the supervisor's own measurement.
     pub fn take_heard(&mut self) -> bool {
         core::mem::take(&mut self.heard)
     }
 
-    /// True if the host has been silent for longer than the limit, or has never been heard.
+    /// True if the silence exceeds the limit, or if no frame has been accepted yet.
     pub fn host_silent(&self, now: u64) -> bool {
         self.silent_ticks(now).is_none_or(|silent| silent > u64::from(self.silence_limit_ticks))
     }
 
-    /// Ticks of silence that are allowed.
+    /// Permitted silence of the host, in ticks.
     pub fn silence_limit_ticks(&self) -> u32 {
         self.silence_limit_ticks
     }
 
-    /// What came over the link.
+    /// Counters of the received frames.
     pub fn counters(&self) -> Counters {
         Counters { damaged: self.receiver.damaged(), oversize: self.receiver.oversize(), ..self.counters }
     }
 
-    /// False for a Disarm that is applied although its place in the order is wrong: it must not shift the order.
+    /// False for a `Disarm` that is executed out of sequence: it must not change the reference.
     fn in_order(&self, request: Request, sequence: Sequence) -> bool {
         match self.accepted {
             _ if request == Request::Hello => true,
@@ -236,27 +215,27 @@ impl Session {
     }
 }
 
-fn judge(packet: &Packet<'_>, last: Option<&Accepted>) -> Verdict {
+fn classify(packet: &Packet<'_>, last: Option<&Accepted>) -> Verdict {
     let request = match packet.read::<Request>() {
         Ok(request) => request,
         Err(Unreadable::Kind) => return Verdict::Drop,
         Err(_) if packet.kind == Request::KIND && packet.message == Request::DISARM => Request::Disarm,
-        Err(Unreadable::Version(_)) => return Verdict::Refuse(Reason::BadVersion(crate::VERSION)),
-        Err(Unreadable::Message) => return Verdict::Refuse(Reason::UnknownRequest),
+        Err(Unreadable::Version(_)) => return Verdict::Reject(Reason::BadVersion(crate::VERSION)),
+        Err(Unreadable::Message) => return Verdict::Reject(Reason::UnknownRequest),
     };
     let sequence = packet.sequence;
     let verdict = match last {
         _ if request == Request::Hello => Verdict::Apply(request),
-        None => Verdict::Refuse(Reason::HelloFirst),
+        None => Verdict::Reject(Reason::HelloFirst),
         Some(last) => match sequence.compare(last.sequence) {
             Ordering::Greater => Verdict::Apply(request),
-            Ordering::Equal if packet.checksum == last.checksum => Verdict::Again,
-            Ordering::Equal => Verdict::Refuse(Reason::SequenceReused),
-            Ordering::Less => Verdict::Refuse(Reason::Stale { newest: last.sequence.0 }),
+            Ordering::Equal if packet.checksum == last.checksum => Verdict::Repeat,
+            Ordering::Equal => Verdict::Reject(Reason::SequenceReused),
+            Ordering::Less => Verdict::Reject(Reason::Stale { newest: last.sequence.0 }),
         },
     };
     match verdict {
-        Verdict::Refuse(_) if request == Request::Disarm => Verdict::Apply(request),
+        Verdict::Reject(_) if request == Request::Disarm => Verdict::Apply(request),
         verdict => verdict,
     }
 }

@@ -1,16 +1,16 @@
-//! Consistent overhead byte stuffing: a packet without its zeros, one byte longer.
+//! Consistent overhead byte stuffing (COBS): encodes a packet of less than 254 bytes without zeros, one byte longer.
 //!
-//! The packet is cut at its zeros. Each piece is sent behind its own length plus one, which stands for the zero in front of
-//! it. For packets of less than 254 bytes, so that no piece needs the long form.
+//! The packet is split at its zeros. Each block is preceded by its length plus one, which replaces the zero before it.
 //!
-//! Not from a crate: a decoder that takes bytes from a wire must have no way to panic, and here the compiler sees that it
-//! has none. The tests hold it against one.
+//! The implementation is not from a crate because a decoder of untrusted bytes must not be able to panic, which the audit of
+//! the image verifies here. The tests compare it with the crate `cobs`.
 
-use crate::frame::Bytes;
+/// At most `N` bytes, with a length field of one byte.
+pub(crate) type Bytes<const N: usize> = heapless::Vec<u8, N, u8>;
 
-/// Encodes `packet` behind what `out` holds. `None` if it does not fit.
+/// Appends the encoded `packet` to `out`. `None` if it does not fit.
 pub(crate) fn encode<const N: usize>(packet: &[u8], out: &mut Bytes<N>) -> Option<()> {
-    // Each piece's length is filled in at its end.
+    // The length of a block is updated with each of its bytes.
     let mut start = out.len();
     out.push(1).ok()?;
     for &byte in packet {
@@ -23,7 +23,7 @@ pub(crate) fn encode<const N: usize>(packet: &[u8], out: &mut Bytes<N>) -> Optio
     Some(())
 }
 
-/// Decodes `bytes`, which hold no zero, in place; gives the length. `None` if a piece is cut short.
+/// Decodes `bytes`, which contain no zero, in place and returns the length of the packet. `None` if a block is incomplete.
 pub(crate) fn decode_in_place(bytes: &mut [u8]) -> Option<usize> {
     let (mut from, mut to) = (0, 0);
     while let Some(&code) = bytes.get(from) {
@@ -51,7 +51,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(5000))]
 
         #[test]
-        fn a_packet_is_encoded_as_by_the_crate_and_comes_back(
+        fn encoding_matches_the_crate_cobs_and_is_reversible(
             packet in prop::collection::vec(prop_oneof![Just(0), any::<u8>()], 0..=MAX_PACKET),
         ) {
             let mut encoded = Bytes::<MAX_ENCODED>::new();
@@ -63,7 +63,7 @@ mod tests {
         }
 
         #[test]
-        fn anything_is_decoded_as_by_the_crate(
+        fn decoding_matches_the_crate_cobs(
             bytes in prop::collection::vec(prop_oneof![1..=9u8, 1..=255u8], 1..=MAX_ENCODED),
         ) {
             let mut decoded = bytes.clone();
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused() {
+    fn encoding_into_a_full_buffer_returns_none() {
         assert_eq!(encode(&[1, 2, 3], &mut Bytes::<3>::new()), None);
         assert_eq!(encode(&[1, 2, 0], &mut Bytes::<3>::new()), None);
         assert_eq!(encode(&[], &mut Bytes::<0>::new()), None);

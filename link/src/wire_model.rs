@@ -1,11 +1,11 @@
-//! A spring's model as it is sent and stored: all of a plant file that the tick or its amplifier runs.
+//! A spring's model in the format in which it is sent and stored: the fields of a plant file that control uses.
 //!
 //! ```text
 //! payload = FORMAT, postcard(WireModel)          checksum = CRC-32C(payload)
 //! ```
 //!
-//! A payload goes out in parts of [`PART`] bytes, the last one filled up with zeros. Numbers are those of the file, bit
-//! for bit; whether a tick can run them is said by the model's own check.
+//! A payload is sent in parts of [`PART`] bytes, the last one padded with zeros. The numbers have the same bits as those of
+//! the file. Decoding does not validate them; that is done by the model's own validation.
 
 use core::fmt;
 
@@ -15,68 +15,68 @@ use model::extended::{lags::MOST_LAGS, law::MOST_POINTS, memory::MOST_PLAYS};
 use model::{Amplifier, ExtendedPlant};
 use serde::{Deserialize, Serialize};
 
-use crate::frame;
+use crate::checksum::checksum;
 
-/// Version of the payload.
+/// Version of the payload's format.
 pub const FORMAT: u8 = 1;
-/// Bytes of a part, a whole number of the flash's words.
+/// Length of a part, in bytes; a multiple of the flash's word.
 pub const PART: usize = 32;
-/// Most parts of a payload.
+/// Largest number of parts of a payload.
 pub const MOST_PARTS: u8 = 13;
-/// Longest payload, in bytes.
+/// Length of the longest payload, in bytes.
 pub const MOST_BYTES: usize = PART * MOST_PARTS as usize;
 
 type List<const N: usize> = Vec<f64, N, u8>;
 
-/// The model, in SI units. `None` and empty lists mean the same as in a plant file.
+/// Model of a spring and its amplifier, in SI units. `None` and empty lists have the same meaning as in a plant file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WireModel {
-    /// Hysteresis.
+    /// Hysteresis as a bank of play operators.
     pub memory: Option<WireMemory>,
-    /// Sensitivity over the voltage: voltages and stiffness, in V.
+    /// Static nonlinearity: voltages and the stiffness at each, as equivalent static voltage, both in V.
     pub law: Option<(List<MOST_POINTS>, List<MOST_POINTS>)>,
-    /// Loss of charge: share, and time constant in s.
+    /// Charge leakage: share of the response that decays, and its time constant in s.
     pub leakage: Option<(f64, f64)>,
-    /// Part of a change that comes at once.
+    /// Feedthrough: share of a step response that is instantaneous.
     pub share: f64,
-    /// In s.
+    /// Time constants of the relaxation, in s.
     pub time_constants_s: List<MOST_LAGS>,
-    /// What each time constant brings.
+    /// Share of the step response of each time constant.
     pub weights: List<MOST_LAGS>,
-    /// The first time constant at 500 V, in s.
+    /// First time constant at 500 V, in s, if it depends on the voltage.
     pub time_constant_high_s: Option<f64>,
-    /// Where the amplifier's voltage ends, in V.
+    /// Identified maximum voltage of the amplifier, in V.
     pub limit_v: Option<f64>,
-    /// The amplifier's fastest change, in V/s.
+    /// Identified slew rate of the amplifier, in V/s.
     pub slew_v_per_s: Option<f64>,
 }
 
-/// A bank of play operators.
+/// Parameters of a bank of play operators.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WireMemory {
-    /// Weight of the voltage itself.
+    /// Weight of the voltage without hysteresis.
     pub direct: f64,
-    /// Half the width of each play, in V.
+    /// Half width of each play operator, in V.
     pub thresholds_v: List<MOST_PLAYS>,
-    /// Weight of each play.
+    /// Weight of each play operator.
     pub weights: List<MOST_PLAYS>,
 }
 
-/// Which model, of all that an MCU has been given.
+/// Identity of a model on an MCU. The default value is the built-in model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModelId {
-    /// Counts what was stored; 0 is the one that is built in.
+    /// Number of the stored model, counted from 1; 0 is the built-in model.
     pub number: u32,
-    /// Format of its payload.
+    /// Format of the payload.
     pub format: u8,
-    /// Bytes of its payload.
+    /// Length of the payload, in bytes.
     pub length: u16,
-    /// CRC-32C of its payload.
+    /// CRC-32C of the payload.
     pub checksum: u32,
 }
 
 impl WireModel {
-    /// `None` where a list is longer than any that a tick can run.
+    /// Converts an identified plant and amplifier. `None` if a list is longer than the control tick supports.
     pub fn new(plant: &ExtendedPlant<'_>, limit_v: Option<f64>, slew_v_per_s: Option<f64>) -> Option<Self> {
         let ExtendedPlant { memory, law, leakage, relaxation } = plant;
         let memory = match memory {
@@ -102,7 +102,7 @@ impl WireModel {
         })
     }
 
-    /// The spring, for the estimator.
+    /// The plant of the estimator.
     pub fn plant(&self) -> ExtendedPlant<'_> {
         let leakage = |&(share, time_constant_s): &(f64, f64)| Leakage { share, time_constant_s };
         ExtendedPlant {
@@ -122,12 +122,12 @@ impl WireModel {
         }
     }
 
-    /// The stricter of `amplifier` and the one that was found.
+    /// `amplifier` with the identified limits where they are stricter.
     pub fn behind(&self, amplifier: Amplifier) -> Amplifier {
         amplifier.found_with(self.limit_v, self.slew_v_per_s)
     }
 
-    /// The payload. `None` if it does not fit, which no model does.
+    /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the largest model.
     pub fn payload(&self) -> Option<Vec<u8, MOST_BYTES, u16>> {
         let mut bytes = Vec::new();
         bytes.resize_default(MOST_BYTES).ok()?;
@@ -138,7 +138,7 @@ impl WireModel {
         Some(bytes)
     }
 
-    /// Reads a payload; `None` for another format and for bytes that are no model, too few or too many.
+    /// Deserialises a payload. `None` for another format and for bytes that are not exactly one model.
     #[inline(never)]
     pub fn read(payload: &[u8]) -> Option<Self> {
         match payload.split_first() {
@@ -152,10 +152,10 @@ impl WireModel {
 }
 
 impl ModelId {
-    /// Of a payload.
+    /// Identity of the model with this `number` and `payload`.
     pub fn of(number: u32, payload: &[u8]) -> Self {
         let format = payload.first().copied().unwrap_or(0);
-        Self { number, format, length: payload.len() as u16, checksum: frame::checksum(payload) }
+        Self { number, format, length: payload.len() as u16, checksum: checksum(payload) }
     }
 }
 
@@ -177,7 +177,7 @@ fn list<const N: usize>(values: &[f64]) -> Option<List<N>> {
 mod tests {
     use super::*;
 
-    /// Everything at its longest.
+    /// A model with every list at its maximum length.
     fn largest() -> WireModel {
         let (points, plays, lags) = ([1.5; MOST_POINTS], [2.5; MOST_PLAYS], [3.5; MOST_LAGS]);
         let plant = ExtendedPlant {
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_fits_and_comes_back() {
+    fn the_largest_model_fits_and_survives_a_round_trip() {
         let model = largest();
         let payload = model.payload().unwrap();
         assert_eq!((payload.len(), WireModel::read(&payload)), (405, Some(model.clone())));
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_model_is_refused() {
+    fn bytes_that_are_not_one_model_are_rejected() {
         let payload = largest().payload().unwrap();
         for end in 0..payload.len() {
             assert_eq!(WireModel::read(&payload[..end]), None, "{end} bytes");
@@ -215,8 +215,8 @@ mod tests {
         bytes[0] = FORMAT + 1;
         assert_eq!(WireModel::read(&bytes), None, "another format");
         bytes[0] = FORMAT;
-        // The number of plays.
+        // The number of play operators.
         bytes[10] = 9;
-        assert_eq!(WireModel::read(&bytes), None, "a longer list than any");
+        assert_eq!(WireModel::read(&bytes), None, "a list longer than the maximum");
     }
 }

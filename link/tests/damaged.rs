@@ -1,4 +1,4 @@
-//! Damaged frames: none accepted wrongly, none crashes, and the first whole frame afterwards is understood.
+//! Corrupted frames: none is accepted, none causes a panic, and the first intact frame afterwards is decoded.
 
 mod by_hand;
 mod common;
@@ -11,39 +11,39 @@ use link::{Action, Frame, Packet, Receiver, Reply, Request, Sequence, Session, S
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
-/// What makes a packet itself.
-type Told = (u8, u8, u16, Vec<u8>);
+/// Version, kind, sequence number and message of a packet.
+type Content = (u8, u8, u16, Vec<u8>);
 
-fn told(packet: &Packet<'_>) -> Told {
+fn content(packet: &Packet<'_>) -> Content {
     (packet.version, packet.kind, packet.sequence.0, packet.message.to_vec())
 }
 
-fn received(receiver: &mut Receiver, bytes: &[u8]) -> Vec<Told> {
-    bytes.iter().filter_map(|&byte| receiver.on_byte(byte).as_ref().map(told)).collect()
+fn received(receiver: &mut Receiver, bytes: &[u8]) -> Vec<Content> {
+    bytes.iter().filter_map(|&byte| receiver.on_byte(byte).as_ref().map(content)).collect()
 }
 
-fn only(frame: &Frame) -> Told {
-    received(&mut Receiver::new(), frame.as_bytes()).pop().expect("a whole frame is understood")
+fn only(frame: &Frame) -> Content {
+    received(&mut Receiver::new(), frame.as_bytes()).pop().expect("an intact frame is decoded")
 }
 
-/// What may happen to a frame on its way.
+/// Corruption of a frame.
 #[derive(Clone, Debug)]
 enum Damage {
-    /// Bits flipped, by position.
+    /// The bits at these positions are flipped.
     Flip(Vec<prop::sample::Index>),
     /// The end is missing.
     Truncate(prop::sample::Index),
     /// The beginning is missing.
     Behead(prop::sample::Index),
-    /// A stretch is missing.
+    /// A range is missing.
     Cut(prop::sample::Index, prop::sample::Index),
-    /// A stretch came twice.
+    /// A range is repeated.
     Double(prop::sample::Index, prop::sample::Index),
-    /// The head of this frame, the tail of another one.
+    /// The beginning of this frame is followed by the end of another one.
     Splice(prop::sample::Index, prop::sample::Index),
-    /// Something in the middle of it.
+    /// Bytes are inserted.
     Insert(prop::sample::Index, Vec<u8>),
-    /// Something in its place.
+    /// The frame is replaced by other bytes.
     Garbage(Vec<u8>),
 }
 
@@ -92,7 +92,7 @@ fn damaged(frame: &[u8], other: &[u8], damage: &Damage) -> Vec<u8> {
     bytes
 }
 
-/// Always the same 10 000, so that a failure can be repeated.
+/// Runs the same 10 000 cases each time, so that a failure is reproducible.
 fn runner() -> TestRunner {
     let config = Config { cases: 10_000, failure_persistence: None, ..Config::default() };
     TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &[7; 32]))
@@ -103,7 +103,7 @@ fn frames() -> impl Strategy<Value = Vec<(u16, Request, Damage)>> {
 }
 
 #[test]
-fn ten_thousand_damaged_streams_give_nothing_that_was_not_sent() {
+fn ten_thousand_corrupted_streams_yield_only_packets_that_were_sent() {
     let replies = (frames(), any::<u16>(), common::reply());
     let (kept, lost) = (Cell::new(0), Cell::new(0));
     runner()
@@ -111,7 +111,7 @@ fn ten_thousand_damaged_streams_give_nothing_that_was_not_sent() {
             let last = Frame::new(Sequence(sequence), &reply);
             let frames: Vec<Frame> =
                 sent.iter().map(|(sequence, request, _)| Frame::new(Sequence(*sequence), request)).collect();
-            let mut allowed: Vec<Told> = frames.iter().map(only).collect();
+            let mut allowed: Vec<Content> = frames.iter().map(only).collect();
             allowed.push(only(&last));
 
             let mut receiver = Receiver::new();
@@ -120,22 +120,22 @@ fn ten_thousand_damaged_streams_give_nothing_that_was_not_sent() {
                 wire.extend(damaged(frame.as_bytes(), last.as_bytes(), damage));
             }
             let got = received(&mut receiver, &wire);
-            prop_assert!(got.iter().all(|told| allowed.contains(told)), "{got:?} from {wire:?}");
+            prop_assert!(got.iter().all(|packet| allowed.contains(packet)), "{got:?} from {wire:?}");
             kept.set(kept.get() + got.len());
             lost.set(lost.get() + frames.len().saturating_sub(got.len()));
-            // Whatever came before, and without any pause. The delimiter in front may complete a frame whose own was lost.
+            // Independent of the bytes before. The leading delimiter may complete a frame that has lost its own.
             let got = received(&mut receiver, last.as_bytes());
             prop_assert_eq!(got.last(), Some(&only(&last)));
-            prop_assert!(got.iter().all(|told| allowed.contains(told)));
+            prop_assert!(got.iter().all(|packet| allowed.contains(packet)));
             Ok(())
         })
         .unwrap();
-    // Damage that changes nothing (a cut of nothing) or hits only a delimiter leaves a frame whole; most do not.
+    // An empty cut, or damage to a delimiter alone, leaves the frame intact; most corruptions do not.
     assert!(lost.get() > 10_000, "{kept:?} kept, {lost:?} lost");
 }
 
 #[test]
-fn a_session_under_ten_thousand_damaged_streams_applies_only_what_was_sent() {
+fn a_session_executes_only_requests_that_were_sent_in_ten_thousand_corrupted_streams() {
     runner()
         .run(&frames(), |sent| {
             let mut session = Session::new(500);
@@ -159,7 +159,7 @@ fn a_session_under_ten_thousand_damaged_streams_applies_only_what_was_sent() {
                 prop_assert!(was_sent || matches!(request, Request::Hello | Request::Disarm), "{request:?}");
             }
             prop_assert!(session.counters().accepted as usize == applied.len());
-            // The Disarm at the end: applied whatever came before, unless a whole frame with its very number and content did.
+            // The final Disarm is executed unless an intact frame with the same number and content was executed before.
             let repeated = session.counters().repeated > 0 && applied.contains(&Request::Disarm);
             prop_assert!(applied.last() == Some(&Request::Disarm) || repeated);
             Ok(())
@@ -167,9 +167,9 @@ fn a_session_under_ten_thousand_damaged_streams_applies_only_what_was_sent() {
         .unwrap();
 }
 
-/// Sound CRC, arbitrary content: what a program with another idea of the protocol would send.
+/// Frames with a correct CRC and arbitrary content, as from a different protocol.
 #[test]
-fn ten_thousand_sound_frames_with_foreign_content_are_answered_or_dropped() {
+fn each_of_ten_thousand_valid_frames_with_arbitrary_content_causes_one_reaction() {
     let content = (any::<u8>(), any::<u16>(), prop::collection::vec(any::<u8>(), 0..60));
     runner()
         .run(&content, |(version, sequence, bytes)| {
@@ -186,7 +186,7 @@ fn ten_thousand_sound_frames_with_foreign_content_are_answered_or_dropped() {
 }
 
 #[test]
-fn every_single_and_double_bit_flip_is_noticed() {
+fn every_single_and_double_bit_flip_is_detected() {
     let frame = Frame::new(Sequence(0x0102), &Reply::Status(Status::default()));
     let bits = 8 * frame.as_bytes().len();
     let whole = only(&frame);
@@ -198,7 +198,7 @@ fn every_single_and_double_bit_flip_is_noticed() {
             if second != first {
                 bytes[second / 8] ^= 1 << (second % 8);
             }
-            // A delimiter at the end, in case the frame's own is hit: then the rest may be whole.
+            // An additional delimiter, in case the frame's own is corrupted: then the rest may be intact.
             bytes.push(0);
             let got = received(&mut receiver, &bytes);
             assert!(got.is_empty() || got == [whole.clone()], "bits {first} and {second}: {got:?}");
@@ -209,7 +209,7 @@ fn every_single_and_double_bit_flip_is_noticed() {
 }
 
 #[test]
-fn a_frame_that_never_ends_is_dropped_and_counted_once() {
+fn an_endless_frame_is_dropped_and_counted_once() {
     let mut receiver = Receiver::new();
     for _ in 0..100_000 {
         assert!(receiver.on_byte(0x55).is_none());
@@ -217,7 +217,7 @@ fn a_frame_that_never_ends_is_dropped_and_counted_once() {
     let frame = Frame::new(Sequence(9), &Request::Heartbeat);
     assert_eq!(received(&mut receiver, frame.as_bytes()).len(), 1);
     assert_eq!((receiver.oversize(), receiver.damaged()), (1, 0));
-    // One byte too long, and just not.
+    // One byte longer than permitted, then the longest permitted candidate.
     assert!(received(&mut receiver, &[&[1; MAX_FRAME - 1][..], &[0]].concat()).is_empty());
     assert_eq!((receiver.oversize(), receiver.damaged()), (2, 0));
     assert!(received(&mut receiver, &[&[1; MAX_FRAME - 2][..], &[0]].concat()).is_empty());

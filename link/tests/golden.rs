@@ -1,5 +1,5 @@
-//! The wire format, byte by byte. If one of these changes, hosts and MCUs in the field no longer understand each other:
-//! give [`link::VERSION`] a new number. CRC and framing are checked here against independent code, bit by bit.
+//! The wire format, byte by byte. A change makes existing hosts and MCUs incompatible and requires a new [`link::VERSION`].
+//! CRC and framing are compared with an independent implementation.
 
 mod by_hand;
 
@@ -15,7 +15,7 @@ fn check<M: Message>(message: &M, kind: u8, golden: &str) {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     let bytes: Vec<u8> =
         (0..golden.len() / 2).map(|at| u8::from_str_radix(&golden[2 * at..2 * at + 2], 16).unwrap()).collect();
-    // Neither 0 nor symmetric, so that a swap shows.
+    // Two different bytes, so that a swapped order is detected.
     let frame = Frame::new(Sequence(0x0102), message);
     assert_eq!(hex(frame.as_bytes()), hex(&by_hand(link::VERSION, kind, 0x0102, &bytes)), "expected message {golden}");
 }
@@ -117,9 +117,9 @@ fn replies() {
     }
 }
 
-/// One whole frame as it lies on the wire.
+/// The bytes of one complete frame on the wire.
 #[test]
-fn a_whole_frame() {
+fn a_complete_frame() {
     let frame = Frame::new(Sequence(1), &Request::Hello);
     assert_eq!(frame.as_bytes(), by_hand(link::VERSION, b'Q', 1, &[0]));
     assert_eq!(frame.as_bytes(), [0, 4, 4, b'Q', 1, 1, 5, 0x99, 0x1e, 0xf1, 0x9f, 0]);

@@ -1,4 +1,4 @@
-//! Every message arrives as it was sent, within the bound of a frame.
+//! Every message survives encoding and decoding and fits into a frame.
 
 mod common;
 
@@ -10,51 +10,51 @@ use link::{
 };
 use proptest::prelude::*;
 
-fn arrive<M: Message>(frame: &Frame) -> Vec<(Sequence, M)> {
+fn decode<M: Message>(frame: &Frame) -> Vec<(Sequence, M)> {
     let mut receiver = Receiver::new();
-    let mut arrived = Vec::new();
+    let mut decoded = Vec::new();
     for &byte in frame.as_bytes() {
         if let Some(packet) = receiver.on_byte(byte) {
-            arrived.push((packet.sequence, packet.read().unwrap()));
+            decoded.push((packet.sequence, packet.read().unwrap()));
         }
     }
-    arrived
+    decoded
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn a_request_arrives_once_as_it_was_sent(sequence: u16, request in common::request()) {
+    fn a_request_survives_a_round_trip(sequence: u16, request in common::request()) {
         let frame = Frame::new(Sequence(sequence), &request);
         prop_assert!(frame.as_bytes().len() <= MAX_FRAME);
-        prop_assert_eq!(arrive(&frame), vec![(Sequence(sequence), request)]);
-        prop_assert!(arrive_nothing_as_reply(&frame));
+        prop_assert_eq!(decode(&frame), vec![(Sequence(sequence), request)]);
+        prop_assert!(is_not_a_reply(&frame));
     }
 
     #[test]
-    fn a_reply_arrives_once_as_it_was_sent(sequence: u16, reply in common::reply()) {
+    fn a_reply_survives_a_round_trip(sequence: u16, reply in common::reply()) {
         let frame = Frame::new(Sequence(sequence), &reply);
         prop_assert!(!frame.as_bytes().is_empty());
-        prop_assert_eq!(arrive(&frame), vec![(Sequence(sequence), reply)]);
+        prop_assert_eq!(decode(&frame), vec![(Sequence(sequence), reply)]);
     }
 }
 
-/// A host that hears its own request does not take it for an answer.
-fn arrive_nothing_as_reply(frame: &Frame) -> bool {
+/// A host that receives the echo of its own request does not accept it as a reply.
+fn is_not_a_reply(frame: &Frame) -> bool {
     let mut receiver = Receiver::new();
     frame.as_bytes().iter().all(|&byte| receiver.on_byte(byte).is_none_or(|packet| packet.read::<Reply>().is_err()))
 }
 
 #[test]
-fn a_number_that_is_none_arrives_as_such() {
-    let arrived = arrive::<Request>(&Frame::new(Sequence(0), &Request::Set(Desired::Pascal(f64::NAN))));
-    assert!(matches!(arrived[..], [(_, Request::Set(Desired::Pascal(number)))] if number.is_nan()));
+fn nan_survives_a_round_trip() {
+    let decoded = decode::<Request>(&Frame::new(Sequence(0), &Request::Set(Desired::Pascal(f64::NAN))));
+    assert!(matches!(decoded[..], [(_, Request::Set(Desired::Pascal(number)))] if number.is_nan()));
 }
 
-/// The largest message there is: every number at its longest.
+/// The longest message, with the longest encoding of every number.
 #[test]
-fn the_largest_message_fits_a_frame() {
+fn the_longest_message_fits_into_a_frame() {
     let most = u32::MAX;
     let volts = WireVolts(i32::MIN);
     let sample = Telemetry {

@@ -1,4 +1,4 @@
-//! The MCU's side of the talk: what is applied, what is answered, what is dropped.
+//! The session on the MCU: which requests are executed, answered and dropped.
 
 use link::session::Counters;
 use link::{Action, Desired, Frame, Message, Reason, Receiver, Reply, Request, Sequence, Session, State};
@@ -7,11 +7,11 @@ use link::{Telemetry, WireVolts};
 const ACK: Reply = Reply::Ack { state: State::Armed, target: WireVolts(5) };
 const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
 
-/// A session, with what it applied and what it answered.
+/// A session with the requests that it executed.
 struct Mcu {
     session: Session,
     now: u64,
-    /// What it answers.
+    /// Reply to every executed request.
     reply: Reply,
     applied: Vec<Request>,
 }
@@ -21,7 +21,7 @@ impl Mcu {
         Self { session: Session::new(500), now: 0, reply: ACK, applied: Vec::new() }
     }
 
-    fn greeted(sequence: u16) -> Self {
+    fn after_hello(sequence: u16) -> Self {
         let mut mcu = Self::new();
         assert_eq!(mcu.hear(sequence, &Request::Hello), Some((sequence, ACK)));
         mcu.applied.clear();
@@ -64,8 +64,8 @@ fn reply(bytes: &[u8]) -> Option<(u16, Reply)> {
 }
 
 #[test]
-fn a_repeated_request_is_answered_again_and_applied_once() {
-    let mut mcu = Mcu::greeted(10);
+fn a_repeated_request_is_answered_again_and_executed_once() {
+    let mut mcu = Mcu::after_hello(10);
     for _ in 0..3 {
         assert_eq!(mcu.hear(11, &SET), Some((11, ACK)));
     }
@@ -73,10 +73,10 @@ fn a_repeated_request_is_answered_again_and_applied_once() {
     assert_eq!(mcu.session.counters(), Counters { accepted: 2, repeated: 2, ..Counters::default() });
 }
 
-/// Also when telemetry and refusals went out in between, and a Disarm that was late or used its number.
+/// The stored reply survives telemetry, rejections, and a Disarm that is late or has the same number.
 #[test]
-fn the_answer_to_be_repeated_is_kept() {
-    let mut mcu = Mcu::greeted(10);
+fn the_reply_to_a_repeated_request_is_preserved() {
+    let mut mcu = Mcu::after_hello(10);
     mcu.hear(11, &SET);
     mcu.session.telemetry(Telemetry::default(), 0);
     assert!(mcu.refusal(9, &SET).is_some());
@@ -89,8 +89,8 @@ fn the_answer_to_be_repeated_is_kept() {
 }
 
 #[test]
-fn a_late_request_is_refused() {
-    let mut mcu = Mcu::greeted(10);
+fn a_late_request_is_rejected() {
+    let mut mcu = Mcu::after_hello(10);
     mcu.hear(12, &Request::Arm);
     assert_eq!(mcu.refusal(11, &SET), Some(Reason::Stale { newest: 12 }));
     assert_eq!(mcu.refusal(10, &SET), Some(Reason::Stale { newest: 12 }));
@@ -99,8 +99,8 @@ fn a_late_request_is_refused() {
 }
 
 #[test]
-fn lost_requests_leave_a_gap_that_does_not_matter_and_numbers_run_on_past_their_end() {
-    let mut mcu = Mcu::greeted(65_500);
+fn gaps_in_the_sequence_are_accepted_and_numbers_wrap_around() {
+    let mut mcu = Mcu::after_hello(65_500);
     mcu.hear(65_535, &Request::Arm);
     mcu.hear(3, &SET);
     assert_eq!(mcu.applied, [Request::Arm, SET]);
@@ -108,8 +108,8 @@ fn lost_requests_leave_a_gap_that_does_not_matter_and_numbers_run_on_past_their_
 }
 
 #[test]
-fn another_request_of_the_same_number_is_refused() {
-    let mut mcu = Mcu::greeted(10);
+fn a_different_request_with_the_same_number_is_rejected() {
+    let mut mcu = Mcu::after_hello(10);
     mcu.hear(11, &SET);
     assert_eq!(mcu.refusal(11, &Request::Arm), Some(Reason::SequenceReused));
     assert_eq!(mcu.refusal(11, &Request::Set(Desired::ScaledVolts(300.1))), Some(Reason::SequenceReused));
@@ -117,7 +117,7 @@ fn another_request_of_the_same_number_is_refused() {
 }
 
 #[test]
-fn nothing_but_disarm_is_applied_before_a_hello() {
+fn only_disarm_is_executed_before_a_hello() {
     let mut mcu = Mcu::new();
     for (sequence, request) in [Request::Status, SET, Request::Arm, Request::Heartbeat].iter().enumerate() {
         assert_eq!(mcu.refusal(sequence as u16, request), Some(Reason::HelloFirst));
@@ -125,12 +125,12 @@ fn nothing_but_disarm_is_applied_before_a_hello() {
     assert!(mcu.session.host_silent(0));
     assert_eq!(mcu.hear(4, &Request::Disarm), Some((4, ACK)));
     assert_eq!(mcu.applied, [Request::Disarm]);
-    assert_eq!(mcu.refusal(5, &SET), Some(Reason::HelloFirst), "a Disarm is no Hello");
+    assert_eq!(mcu.refusal(5, &SET), Some(Reason::HelloFirst), "a Disarm does not start a session");
 }
 
 #[test]
-fn disarm_is_applied_late_reused_and_from_another_version_and_does_not_shift_the_order() {
-    let mut mcu = Mcu::greeted(10);
+fn disarm_is_executed_late_reused_or_from_another_version_without_changing_the_sequence() {
+    let mut mcu = Mcu::after_hello(10);
     mcu.hear(20, &SET);
     assert_eq!(mcu.hear(15, &Request::Disarm), Some((15, ACK)));
     assert_eq!(mcu.hear(20, &Request::Disarm), Some((20, ACK)));
@@ -139,36 +139,40 @@ fn disarm_is_applied_late_reused_and_from_another_version_and_does_not_shift_the
     assert_eq!(mcu.applied, [SET, Request::Disarm, Request::Disarm, Request::Disarm]);
     assert_eq!(mcu.refusal(19, &SET), Some(Reason::Stale { newest: 20 }));
     mcu.hear(21, &Request::Disarm);
-    assert_eq!(mcu.refusal(21, &SET), Some(Reason::SequenceReused), "one in its place counts as any other");
+    assert_eq!(
+        mcu.refusal(21, &SET),
+        Some(Reason::SequenceReused),
+        "a Disarm in sequence counts like any other request"
+    );
 }
 
 #[test]
-fn a_hello_starts_the_order_anew() {
-    let mut mcu = Mcu::greeted(40_000);
+fn a_hello_restarts_the_sequence_and_stops_telemetry() {
+    let mut mcu = Mcu::after_hello(40_000);
     mcu.hear(40_001, &Request::Stream { every_ticks: 10 });
     assert!(mcu.session.telemetry_due(10));
     assert_eq!(mcu.hear(7, &Request::Hello), Some((7, ACK)));
-    assert!(!mcu.session.telemetry_due(1000), "telemetry goes on for a host that did not ask");
+    assert!(!mcu.session.telemetry_due(1000), "telemetry continues although the new session has not requested it");
     assert_eq!(mcu.hear(8, &SET), Some((8, ACK)));
 }
 
 #[test]
-fn another_version_is_told_ours() {
-    let mut mcu = Mcu::greeted(0);
+fn a_request_of_another_version_is_rejected_with_this_version() {
+    let mut mcu = Mcu::after_hello(0);
     let frame = Frame::with_version(9, Sequence(1), &SET);
     assert_eq!(mcu.hear_frame(&frame), Some((1, Reply::Refused(Reason::BadVersion(link::VERSION)))));
     assert_eq!((mcu.session.counters().bad_version, mcu.applied.len()), (1, 0));
 }
 
 #[test]
-fn an_echo_of_our_own_answer_is_dropped() {
-    let mut mcu = Mcu::greeted(0);
+fn an_echo_of_a_reply_is_dropped() {
+    let mut mcu = Mcu::after_hello(0);
     assert_eq!(mcu.hear(1, &ACK), None);
     assert_eq!(mcu.session.counters().unknown, 1);
 }
 
 #[test]
-fn only_accepted_and_repeated_frames_are_signs_of_life() {
+fn only_accepted_and_repeated_requests_end_the_silence() {
     let mut mcu = Mcu::new();
     assert_eq!(mcu.session.silent_ticks(1000), None);
     mcu.now = 1000;
@@ -190,8 +194,8 @@ fn only_accepted_and_repeated_frames_are_signs_of_life() {
 }
 
 #[test]
-fn telemetry_keeps_its_period_leaves_out_what_was_missed_and_stops_with_the_host() {
-    let mut mcu = Mcu::greeted(0);
+fn telemetry_keeps_its_period_skips_missed_samples_and_stops_while_the_host_is_silent() {
+    let mut mcu = Mcu::after_hello(0);
     mcu.hear(1, &Request::Stream { every_ticks: 10 });
     let mut pushed = Vec::new();
     for now in (0..48).chain(95..700) {
@@ -203,6 +207,6 @@ fn telemetry_keeps_its_period_leaves_out_what_was_missed_and_stops_with_the_host
             pushed.push(now);
         }
     }
-    assert_eq!(pushed[..8], [10, 20, 30, 40, 95, 100, 110, 120], "no burst after the gap, and back on the beat");
+    assert_eq!(pushed[..8], [10, 20, 30, 40, 95, 100, 110, 120], "no burst after the gap, and back on the grid");
     assert_eq!(pushed.last(), Some(&500), "the host fell silent at 500");
 }

@@ -3,18 +3,18 @@
 //! `cargo xtask proof` holds the emulated image against the same code, so that simulator, firmware on the host and
 //! firmware on the MCU are one chain of equal bits.
 
-use firmware::rehearsal::rehearse;
-use firmware::script::{STAIR_TICKS, Script};
 use firmware::settings::SETTINGS;
 use simulation::experiment::Experiment;
 use simulation::schedule::Schedule;
+use test_bench::script::{STAIR_TICKS, Script};
+use test_bench::simulation::simulate;
 
 #[test]
 fn every_code_and_estimate_of_the_stair_is_the_simulators() {
     let experiment = Experiment { name: "the stair".into(), schedule: Schedule::stair(), settings: SETTINGS };
     let run = experiment.run(|_, _| {}).unwrap();
     let mut tick = 0;
-    rehearse(Script::Stair, |_, firmware| {
+    simulate(Script::Stair, |_, firmware| {
         let simulator = run.with[tick];
         assert_eq!(firmware.drive.code(), simulator.code, "code at tick {tick}");
         assert_eq!(firmware.output.stiffness, simulator.stiffness, "estimate at tick {tick}");

@@ -2,11 +2,13 @@
 //!
 //! `cargo xtask story --feedback` holds the emulated image against the same code.
 
-use firmware::control::{Control, Orders, Senses, Untimed};
+use validation::closed_loop::stair;
+use validation::hidden::{Cause, Effect, Live, Noise};
+use firmware::control::{Control, Sensors, Untimed};
 use firmware::settings::{SETTINGS, SUPERVISION};
+use link::Command;
 use model::feedback::Fault;
-use model::supervisor::Command;
-use model::{Feedback, Sensor, Settings, Volts};
+use model::{Feedback, Sensor, Settings, Volts, supervisor};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use validation::closed_loop::stair;
@@ -40,10 +42,10 @@ fn lead(feedback: Option<Feedback>, cause: Cause, sense: Sense) -> Vec<Moment> {
     let mut control = Control::new(&Settings { feedback, ..SETTINGS }, &SUPERVISION, None).unwrap();
     let mut measured = None;
     let tick = |number: usize| {
-        let command = (number == 0).then_some(Command::Arm);
-        let orders = Orders { heard: true, command, target: Some(Volts::new(300.0).unwrap()) };
-        let senses = Senses { interlock_closed: true, measured, ..Senses::default() };
-        let tick = control.tick(&orders, &senses, &mut Untimed);
+        let arming = (number == 0).then_some(supervisor::Command::Arm);
+        let command = Command { heard: true, arming, target: Some(Volts::new(300.0).unwrap()) };
+        let sensors = Sensors { interlock_closed: true, measured, ..Sensors::default() };
+        let tick = control.tick(&command, &sensors, &mut Untimed);
         let applied_v = tick.output.applied.to_f64();
         let (truth_v, reading) = spring.hold(applied_v, 1e-3);
         measured = sense(number, reading.read).map(|read| Volts::new(read).unwrap());
@@ -108,7 +110,8 @@ fn a_dead_sensor_changes_nothing() {
 fn it_is_heard_while_disarmed() {
     let settings = Settings { feedback: Some(Feedback::TYPICAL), ..SETTINGS };
     let mut control = Control::new(&settings, &SUPERVISION, None).unwrap();
-    let mut hear = |measured| control.tick(&Orders::default(), &Senses { measured, ..Senses::default() }, &mut Untimed);
+    let mut hear =
+        |measured| control.tick(&Command::default(), &Sensors { measured, ..Sensors::default() }, &mut Untimed);
     assert_eq!(hear(None).output.sensor, Some(Sensor::Failed(Fault::Absent)));
     let last = (0..60).map(|tick| hear(Some(Volts::new(f64::from(tick % 2)).unwrap()))).last().unwrap();
     assert_eq!(last.output.sensor, Some(Sensor::Trusted));

@@ -1,10 +1,10 @@
-//! Instructions a tick for each kind of spring under each controller: counted in one run by `firmware/examples/blocks.rs`,
+//! Instructions a tick for each kind of spring under each controller: counted in one run by `test-bench/examples/blocks.rs`,
 //! every run's digest held against this machine's.
 
 use anyhow::{Result, ensure};
-use firmware::blocks::{CONTROLLERS, SPRINGS, run as on_this_machine};
 use firmware::control::Untimed;
 use serde_json::{Value, json};
+use test_bench::blocks::{CONTROLLERS, SPRINGS, run as on_this_machine};
 
 use crate::emulator;
 use crate::image::Opt;

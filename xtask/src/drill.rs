@@ -1,7 +1,7 @@
 //! Fault drills: each mishap under QEMU, its decoded log held against the one that was read and approved.
 //!
 //! Whether the voltage went away is not taken from the log but from the DAC's wire. The approved logs are in
-//! `firmware/drills/`; what depends on the build (revision, line numbers, lateness, digest, counts) stands there as `_`.
+//! `test-bench/drills/`; what depends on the build (revision, line numbers, lateness, digest, counts) stands there as `_`.
 
 use std::fmt::Write;
 use std::fs;
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::LONGEST_HANG_MS;
-use firmware::script::{ARM_TICK, MISHAP_TICK, Mishap};
 use host_sim::log::{Event, Line};
+use test_bench::script::{ARM_TICK, FAULT_TICK as MISHAP_TICK, FaultInjection as Mishap};
 
 use crate::emulator::{self, Run, SAFE, Written};
 use crate::image::{self, Board, Opt};
@@ -152,7 +152,7 @@ fn golden_text(mishap: Mishap, run: &Run) -> String {
 }
 
 fn approved(mishap: Mishap) -> PathBuf {
-    shell::root().join("firmware/drills").join(mishap.name()).with_extension("log")
+    shell::root().join("test-bench/drills").join(mishap.name()).with_extension("log")
 }
 
 #[cfg(test)]

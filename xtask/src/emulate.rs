@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use firmware::rehearsal;
-use firmware::script::Script;
 use link::WireModel;
 use model::Volts;
 use serde_json::{Value, json};
+use test_bench::script::Script;
+use test_bench::simulation;
 
 use crate::emulator::{self, Run, SAFE, Written};
 use crate::image::{self, Board, Opt};
@@ -91,7 +91,7 @@ impl Comparison {
         let Some(script) = Script::parse(name) else { bail!("no script `{name}`") };
         // The board writes zero once before its first tick.
         let mut expected = vec![SAFE];
-        let digest = rehearsal::rehearse_with(script, found, measured, |_, tick| {
+        let digest = simulation::simulate_with(script, found, measured, |_, tick| {
             expected.push(Written { code: tick.drive.code().0, enabled: tick.drive.enabled() });
         })?;
         let different = expected.iter().zip(&run.dac).position(|(host, target)| host != target);

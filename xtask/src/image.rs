@@ -52,6 +52,13 @@ impl Board {
             Self::Mps2 => "mps2-an386",
         }
     }
+
+    const fn package(self) -> &'static str {
+        match self {
+            Self::Nucleo => "firmware",
+            Self::Mps2 => "test-bench",
+        }
+    }
 }
 
 /// Builds an image as it is flashed and returns its ELF file.
@@ -62,16 +69,16 @@ pub(crate) fn build(board: Board, opt: Opt) -> Result<PathBuf> {
 /// As [`build`], with these features of the firmware's.
 pub(crate) fn build_with(features: &[&str], board: Board, opt: Opt) -> Result<PathBuf> {
     let features = [&[board.name()], features].concat();
-    compile(&features.join(","), opt, ["--bin", board.name()], board.name(), &features.join("-"))
+    compile(board.package(), &features.join(","), opt, ["--bin", board.name()], board.name(), &features.join("-"))
 }
 
-/// As [`build`], of an example of the firmware, with these features of it.
+/// As [`build`], of an example of the test bench, with these features of it.
 pub(crate) fn example(name: &str, features: &str, opt: Opt) -> Result<PathBuf> {
-    compile(features, opt, ["--example", name], &format!("examples/{name}"), name)
+    compile(Board::Mps2.package(), features, opt, ["--example", name], &format!("examples/{name}"), name)
 }
 
 /// Under a name of its own: cargo gives the images of all sets of features the same.
-fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str, name: &str) -> Result<PathBuf> {
+fn compile(package: &str, features: &str, opt: Opt, what: [&str; 2], file: &str, name: &str) -> Result<PathBuf> {
     let target = target_directory()?;
     let folder = target.join(shell::MCU).join(opt.profile());
     let images = folder.join("image");
@@ -79,7 +86,7 @@ fn compile(features: &str, opt: Opt, what: [&str; 2], file: &str, name: &str) ->
     // Between building and copying nobody else may build.
     let turn = fs::File::create(folder.join("turn.lock")).context("cannot make a lock")?;
     turn.lock().context("cannot wait for a lock")?;
-    shell::run(shell::cargo().args(["build", "--quiet", "--package", "firmware"]).args(what).args([
+    shell::run(shell::cargo().args(["build", "--quiet", "--package", package]).args(what).args([
         "--features",
         features,
         "--profile",

@@ -1,4 +1,4 @@
-//! Instructions a tick, beside what one could run instead: counted in one run by `firmware/examples/rivals.rs`.
+//! Instructions a tick, beside what one could run instead: counted in one run by `test-bench/examples/rivals.rs`.
 
 use anyhow::{Result, ensure};
 use serde_json::{Value, json};

@@ -20,18 +20,18 @@ struct Step {
 const STEPS: &[Step] = &[
     Step { name: "format", args: &["fmt", "--all", "--check"], env: None },
     Step { name: "lint host", args: &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"], env: None },
-    Step { name: "lint nucleo", args: &lint("nucleo-g474re"), env: None },
-    Step { name: "all nucleo", args: &lint("nucleo-g474re,fast,feedback,kilovolt"), env: None },
-    Step { name: "lint mps2", args: &lint("mps2-an386"), env: None },
-    Step { name: "all mps2", args: &lint("mps2-an386,fast,feedback,kilovolt"), env: None },
+    Step { name: "lint nucleo", args: &lint("-pfirmware", "nucleo-g474re"), env: None },
+    Step { name: "all nucleo", args: &lint("-pfirmware", "nucleo-g474re,fast,feedback,kilovolt"), env: None },
+    Step { name: "lint mps2", args: &lint("-ptest-bench", "mps2-an386"), env: None },
+    Step { name: "all mps2", args: &lint("-ptest-bench", "mps2-an386,fast,feedback,kilovolt"), env: None },
     Step { name: "document", args: &["doc", "--no-deps", "--workspace"], env: Some(("RUSTDOCFLAGS", "-Dwarnings")) },
     Step { name: "test", args: &["test", "--workspace"], env: None },
     Step { name: "build vsj", args: &["build", "--release", "-p", "host-sim", "--bin", "vsj"], env: None },
 ];
 
 #[rustfmt::skip]
-const fn lint(features: &'static str) -> [&'static str; 13] {
-    ["clippy", "-pfirmware", "--lib", "--bins", "--examples", "--profile", "firmware", "--target", shell::MCU,
+const fn lint(package: &'static str, features: &'static str) -> [&'static str; 13] {
+    ["clippy", package, "--lib", "--bins", "--examples", "--profile", "firmware", "--target", shell::MCU,
      "--features", features, "--", "-Dwarnings"]
 }
 

@@ -1,4 +1,4 @@
-//! The image of the real board.
+//! The image of the board NUCLEO-G474RE.
 
 #![no_std]
 #![no_main]
@@ -13,20 +13,20 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
-use firmware::nucleo::{Nucleo, clocks, kill, reset};
+use firmware::nucleo::{Nucleo, clocks, reset, switch_amplifier_off};
 use firmware::settings::FLASHED;
 use firmware::store::Store;
 use firmware::tasks;
-use firmware::{hang_guard, last_words, log, stack_guard};
-use link::{Controller, Desk};
+use firmware::{crash_record, hang_guard, log, stack_guard};
+use link::{Controller, Server};
 use model::supervisor::Fault;
 
-/// Leads the spring.
+/// Controller of this image.
 const CONTROLLER: Controller = Controller::of(&FLASHED.compensation);
 
-/// Runs the control task, on the interrupt of a peripheral that is not used.
+/// Executor of the control task, on the interrupt of an unused peripheral.
 static HIGH: InterruptExecutor = InterruptExecutor::new();
-/// Runs everything else, likewise.
+/// Executor of all other tasks, on the interrupt of an unused peripheral.
 static LOW: InterruptExecutor = InterruptExecutor::new();
 
 #[interrupt]
@@ -43,8 +43,8 @@ unsafe fn FMAC() {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    kill();
-    let (reset, last_fault) = last_words::reset_cause(Some(reset()));
+    switch_amplifier_off();
+    let (reset, last_fault) = crash_record::reset_cause(Some(reset()));
     let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
     log::boot(reset, last_fault.map_or(0, Fault::code), CONTROLLER);
     if let Some(mut core) = Peripherals::take() {
@@ -58,26 +58,26 @@ fn main() -> ! {
     let high = HIGH.start(interrupt::CORDIC);
     let mut store = Store::new(flash);
     match host::open(&FLASHED, &store, last_fault) {
-        // Built once.
+        // Impossible: this is the first call.
         Ok(None) => {}
-        Ok(Some((control, desk))) => {
+        Ok(Some((control, server))) => {
             if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control)) {
                 low.spawn(housekeeping);
                 high.spawn(control);
             }
-            // Without a line nobody can arm.
-            if let Some(talk) = line.and_then(|line| talk(line, desk).ok()) {
+            // Without a line the output cannot be enabled.
+            if let Some(talk) = line.and_then(|line| talk(line, server).ok()) {
                 low.spawn(talk);
             }
         }
-        // Nothing feeds the watchdog: the chip resets and says it again, its output at zero.
+        // Nothing feeds the watchdog, so that the chip resets and logs this again, with its output at zero.
         Err(error) => {
-            last_words::leave(Fault::Config, 0);
+            crash_record::record(Fault::Config, 0);
             log::refused(error.field);
         }
     }
     loop {
-        host::keep(&mut store);
+        host::serve_model_store(&mut store);
         cortex_m::asm::wfi();
     }
 }
@@ -86,13 +86,13 @@ fn main() -> ! {
 async fn run(mut board: Nucleo, control: &'static mut Control) {
     let mut host = Host::new(control);
     tasks::control(&mut board, control, &mut host, &mut Untimed).await;
-    // Returning would drop the DAC, and the pin would float.
+    // Returning would drop the DAC, and its pin would float.
     pending().await
 }
 
 #[embassy_executor::task]
-async fn talk(mut line: Uart, desk: &'static mut Desk) {
-    host::talk(&mut line, desk).await
+async fn talk(mut line: Uart, server: &'static mut Server) {
+    host::talk(&mut line, server).await
 }
 
 #[embassy_executor::task]

@@ -1,7 +1,10 @@
-//! The amplifier: DAC and enable out, monitors in.
+//! The amplifier port: DAC and enable as outputs, voltage and current monitors as inputs.
 //!
-//! Assumed of the amplifier, to be changed with it: its voltage monitor gives 3.3 V at 1000 V, whatever its own range; its
-//! current monitor gives 1.65 V without current and 3.3 V at 5 mA.
+//! Assumptions about the amplifier, to be adapted to the real one: the voltage monitor gives 3.3 V at 1000 V, independent of the
+//! amplifier's range; the current monitor gives 1.65 V at 0 mA and 3.3 V at 5 mA.
+
+// For the name under which the linker finds the emergency stop.
+#![allow(unsafe_code)]
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};
@@ -16,15 +19,16 @@ use model::units::Signal;
 
 use crate::board;
 
-/// Number of the enable's pin on port B.
+/// Number of the enable pin on port B.
 const ENABLE_PIN: usize = 5;
-/// Volts of the spring for the whole range of the ADC. Not those of the DAC, which are the image's: a monitor on that scale
-/// would agree with any amplifier. On its own it finds one of 1000 V behind an image for 700 V from 82 V on.
+/// Amplifier voltage at the full scale of the ADC, in V. It differs from the DAC's scale, which depends on the image: on that
+/// scale the monitor would agree with any amplifier. With a scale of its own it detects an amplifier for 1000 V behind an image
+/// for 700 V from 82 V on.
 const MONITOR_SCALE_V: i32 = 1000;
-/// Current in uA for half the range of the ADC.
+/// Current at half of the ADC's range, in uA.
 const HALF_SCALE_UA: i32 = 5000;
 
-/// DAC, enable and monitors.
+/// The amplifier port.
 pub struct Amplifier {
     dac: DacChannel<'static, Blocking>,
     enable: Output<'static>,
@@ -34,7 +38,7 @@ pub struct Amplifier {
 }
 
 impl Amplifier {
-    /// Zero volts before anything else; a pin that is not driven would float.
+    /// Initialises the port with 0 V and the output disabled.
     pub fn new(
         dac: Peri<'static, DAC1>,
         output: Peri<'static, PA4>,
@@ -45,7 +49,7 @@ impl Amplifier {
     ) -> Self {
         let enable = Output::new(enable, Level::Low, Speed::Low);
         let mut dac = DacChannel::new_blocking(dac, output);
-        // Behind the chip's buffer the first and the last 0.2 V would not come out: zero could be 6 % of the full scale.
+        // The chip's buffer does not reach the first and the last 0.2 V: zero could be 6 % of the full scale.
         dac.set_mode(Mode::NormalExternalUnbuffered);
         dac.set(Value::Bit12Right(0));
         dac.enable();
@@ -55,7 +59,7 @@ impl Amplifier {
 }
 
 impl board::Amplifier for Amplifier {
-    /// The code before the enable when it goes on, after it when it goes off: zero volts meet a closed switch.
+    /// Writes the code before switching the enable on, and after switching it off.
     fn put(&mut self, drive: Drive) {
         if !drive.enabled() {
             self.enable.set_low();
@@ -66,7 +70,7 @@ impl board::Amplifier for Amplifier {
         }
     }
 
-    /// 2 us of waiting for both conversions.
+    /// Blocks for 2 us during both conversions.
     fn monitors(&mut self) -> Option<Monitors> {
         let time = SampleTime::CYCLES24_5;
         let voltage = i32::from(self.adc.blocking_read(&mut self.voltage, time));
@@ -80,8 +84,10 @@ impl board::Amplifier for Amplifier {
     }
 }
 
-/// Zero volts, amplifier off, by register: from any context, even with nothing set up (then the pins are not driven yet).
-pub fn kill() {
+/// Sets 0 V and disables the amplifier by register access, in any context. Before the initialisation of the pins they are not
+/// driven, and the registers have no effect.
+#[unsafe(no_mangle)]
+pub fn switch_amplifier_off() {
     pac::GPIOB.bsrr().write(|w| w.set_br(ENABLE_PIN, true));
     pac::DAC1.dhr12r(0).write(|w| w.set_dhr(0));
 }

@@ -3,10 +3,10 @@
 use embassy_stm32::Config;
 use embassy_stm32::rcc::{Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux};
 
-/// Of the processor, in Hz: HSI 16 MHz / 4 * 85 / 2.
+/// Clock of the processor, in Hz: HSI 16 MHz / 4 * 85 / 2.
 pub const CORE_HZ: u32 = 170_000_000;
 
-/// For `embassy_stm32::init`.
+/// Configuration for `embassy_stm32::init`.
 pub fn config() -> Config {
     let mut config = Config::default();
     config.rcc.pll = Some(Pll {

@@ -1,9 +1,9 @@
-//! The last two pages of the chip's flash, for the store. They lie in its second bank: the program goes on in the first,
-//! which is all that the linker gives it, while one of them is erased (22 ms) or written.
+//! The last two pages of the chip's flash, for the model store. They are in its second bank: the program, which the linker
+//! places in the first bank only, continues while a page is erased (22 ms) or written.
 //!
-//! A word that a power cut tore may have more wrong bits than the flash's code corrects. Reading it raises an interrupt
-//! that nothing masks; what it reads then is noise, and the store's checksum says so. Anywhere else such a word is code or
-//! a constant, and the program stops.
+//! A word whose writing was interrupted by a power cut can have more wrong bits than the flash's error correction (ECC) can
+//! correct. Reading it raises a non-maskable interrupt and returns undefined data, which the store's checksum detects. Any
+//! other such word is code or a constant, and causes an emergency stop.
 
 #![allow(unsafe_code)]
 
@@ -16,22 +16,22 @@ use embassy_stm32::peripherals;
 use model::supervisor::Fault;
 
 use crate::stop;
-use crate::store::{PAGE, Pages, Side, WORD, Worn};
+use crate::store::{FlashError, PAGE, Pages, Side, WORD};
 
-/// Where the flash begins.
+/// Address of the flash.
 const BASE: u32 = 0x0800_0000;
-/// Of the first of the two pages, from there.
+/// Offset of the first of the two pages, in bytes.
 const OFFSET: u32 = (512 << 10) - 2 * PAGE as u32;
 
-/// The pages are being looked through. Nothing else goes on below the tasks meanwhile, and no voltage may leave: before the
-/// first tick, or while a model is taken.
+/// True while the pages are read. The output is disabled during that time, before the first tick or while a model is stored,
+/// and the thread does nothing else.
 static READING: AtomicBool = AtomicBool::new(false);
 
 /// The pages.
 pub struct Flash(Driver<'static, Blocking>);
 
 impl Flash {
-    /// Takes the flash.
+    /// Initialises the access to the flash.
     pub fn new(flash: Peri<'static, peripherals::FLASH>) -> Self {
         Self(Driver::new_blocking(flash))
     }
@@ -43,13 +43,13 @@ const fn offset(side: Side) -> u32 {
 
 impl Pages for Flash {
     fn bytes(&self, side: Side) -> &[u8; PAGE] {
-        // SAFETY: flash, aligned, and written through `self` only.
+        // SAFETY: an aligned page of the flash, which is written through `self` only.
         unsafe { &*((BASE + offset(side)) as *const [u8; PAGE]) }
     }
 
-    fn forgiving<T>(&self, read: impl FnOnce() -> T) -> T {
+    fn tolerate_bit_errors<T>(&self, read: impl FnOnce() -> T) -> T {
         READING.store(true, Ordering::Relaxed);
-        // Nothing is read before that, and all of it before the next.
+        // The barriers keep all accesses of `read` within the marked period.
         cortex_m::asm::dsb();
         let result = read();
         cortex_m::asm::dsb();
@@ -57,18 +57,18 @@ impl Pages for Flash {
         result
     }
 
-    fn erase(&mut self, side: Side) -> Result<(), Worn> {
+    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
         let from = offset(side);
-        self.0.blocking_erase(from, from + PAGE as u32).map_err(|_| Worn)
+        self.0.blocking_erase(from, from + PAGE as u32).map_err(|_| FlashError)
     }
 
-    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), Worn> {
-        self.0.blocking_write(offset(side) + at as u32, &word).map_err(|_| Worn)
+    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+        self.0.blocking_write(offset(side) + at as u32, &word).map_err(|_| FlashError)
     }
 }
 
-/// A word with two wrong bits was read: forgiven in the store only. What is being read says where, not the register's
-/// address and bank: ST's own EEPROM emulation for this chip does not go by them either.
+/// Handles a word with an uncorrectable error, which is tolerated in the model store only. The flag decides, not the address
+/// and bank in the register: ST's EEPROM emulation for this chip does not rely on those either.
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {
     if FLASH.eccr().read().eccd() && READING.load(Ordering::Relaxed) {

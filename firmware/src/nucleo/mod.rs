@@ -1,24 +1,25 @@
-//! The real board: NUCLEO-G474RE, an STM32G474RE at 170 MHz.
+//! The board NUCLEO-G474RE: an STM32G474RE at 170 MHz.
 //!
-//! | pin | what it is |
+//! | pin | function |
 //! | --- | --- |
 //! | PA4 | DAC1 channel 1, the amplifier's input: 0 to 3.3 V for 0 V to its full scale, from up to 15 kOhm (unbuffered) |
-//! | PB5 | amplifier's enable, high is on; a pull-down on the amplifier's side keeps it off while the chip is in reset |
-//! | PB10 | interlock, high is closed; pulled down, so that a broken wire reads as open |
+//! | PB5 | enable of the amplifier, active high; a pull-down at the amplifier keeps it off while the chip is in reset |
+//! | PB10 | interlock, high when closed; pulled down, so that a broken wire reads as open |
 //! | PA0, PA1 | ADC1, the amplifier's voltage and current monitors |
-//! | PA5 | LED, on while voltages may leave |
-//! | PA2, PA3 | LPUART1, the host's line, 115 200 bit/s: the debugger's USB port |
+//! | PA5 | LED, on while the output is enabled |
+//! | PA2, PA3 | LPUART1, line to the host, 115 200 bit/s: the debugger's USB port |
 //!
-//! The DAC's buffer ends 0.2 V before either supply, so it is off, and nothing but its own resistance drives PA4. An
-//! amplifier whose input takes current needs a follower at PA4: 1.5 MOhm cost 1 % of the voltage, 60 MOhm one code.
+//! The DAC's output buffer ends 0.2 V before either supply and is therefore off: PA4 is driven through the DAC's own resistance.
+//! An amplifier with an input current needs a voltage follower at PA4: an input resistance of 1.5 MOhm reduces the voltage by
+//! 1 %, one of 60 MOhm by one code.
 //!
-//! | module | what it is |
+//! | module | content |
 //! | --- | --- |
-//! | [`clocks`] | 170 MHz without a crystal |
-//! | [`amplifier`] | DAC, enable, monitors |
-//! | [`uart`] | the host's line |
-//! | [`flash`] | two pages for the store |
-//! | [`reset`] | why the chip was reset |
+//! | [`clocks`] | Clock configuration, without a crystal. |
+//! | [`amplifier`] | Amplifier port: DAC, enable, monitors. |
+//! | [`uart`] | Line to the host. |
+//! | [`flash`] | Two pages for the model store. |
+//! | [`reset`] | Source of the last reset. |
 
 pub mod amplifier;
 pub mod clocks;
@@ -33,13 +34,13 @@ use embassy_stm32::wdg::IndependentWatchdog;
 
 use crate::board::Board;
 
-pub use amplifier::kill;
+pub use amplifier::switch_amplifier_off;
 pub use reset::reset;
 
-/// Without food for this long the chip is reset, in us.
+/// Period of the hardware watchdog, in us.
 const WATCHDOG_US: u32 = 100_000;
 
-/// The board.
+/// Hardware of the control task.
 pub struct Nucleo {
     amplifier: amplifier::Amplifier,
     interlock: Input<'static>,
@@ -48,8 +49,8 @@ pub struct Nucleo {
 }
 
 impl Nucleo {
-    /// Sets everything up, voltage first; the host's line and the flash apart, because another task owns them. `None`
-    /// without a line.
+    /// Initialises the hardware, the amplifier port first. The line to the host (`None` if it is in use already) and the flash are
+    /// returned separately because other tasks own them.
     pub fn init(p: Peripherals) -> (Self, Option<uart::Uart>, flash::Flash) {
         let amplifier = amplifier::Amplifier::new(p.DAC1, p.PA4, p.PB5, p.ADC1, p.PA0, p.PA1);
         let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);

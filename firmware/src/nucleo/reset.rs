@@ -1,14 +1,14 @@
-//! Why the chip was reset, by its own flags.
+//! Source of the last reset, from the chip's flags.
 
 use embassy_stm32::pac::RCC;
 
-use crate::cause::Reset;
+use crate::reset_cause::Reset;
 
-/// What the flags say. Clears them: once, at boot.
+/// Reads and clears the reset flags. Call it once at boot.
 pub fn reset() -> Reset {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
-    // A brown-out sets the pin's flag as well, and so does every other reset: the most telling one first.
+    // Every reset sets the pin's flag as well, so that flag comes last.
     if flags.borrstf() {
         Reset::Supply
     } else if flags.iwdgrstf() {

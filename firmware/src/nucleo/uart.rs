@@ -1,6 +1,6 @@
-//! The host's line: LPUART1, every byte by interrupt, through a buffer in each direction.
+//! Line to the host: LPUART1, driven by interrupts, with a buffer in each direction.
 
-// The two macros', which take a buffer once and connect an interrupt.
+// For the macros that take a buffer once and bind an interrupt.
 #![allow(unsafe_code)]
 
 use cortex_m::singleton;
@@ -11,22 +11,22 @@ use embassy_time::{Duration, with_timeout};
 use embedded_io_async::{Read, Write};
 use link::frame::MAX_FRAME;
 
-use crate::host::Line;
+use crate::board::Line;
 
 bind_interrupts!(struct Interrupts {
     LPUART1 => usart::BufferedInterruptHandler<LPUART1>;
 });
 
-/// Bytes that may wait for this task: it may be waiting itself until a frame has left.
+/// Length of the receive buffer, in bytes: the task may be waiting until a frame has been sent.
 const RECEIVED: usize = 2 * MAX_FRAME;
-/// How often to look whether there is room to send: the driver's `write` does not wake who waits for it.
-const LOOK: Duration = Duration::from_millis(1);
+/// Period of the check for free space in the send buffer: the driver's `write` does not wake its task.
+const POLL: Duration = Duration::from_millis(1);
 
-/// The line.
+/// The line to the host.
 pub struct Uart(BufferedUart<'static>);
 
 impl Uart {
-    /// Sets it up, 115 200 bit/s; `None` if it is in use already.
+    /// Initialises the line with 115 200 bit/s; `None` if it is in use already.
     pub fn new(uart: Peri<'static, LPUART1>, rx: Peri<'static, PA3>, tx: Peri<'static, PA2>) -> Option<Self> {
         let to_send = singleton!(: [u8; MAX_FRAME] = [0; MAX_FRAME])?;
         let received = singleton!(: [u8; RECEIVED] = [0; RECEIVED])?;
@@ -36,12 +36,12 @@ impl Uart {
 
 impl Line for Uart {
     async fn read(&mut self, buffer: &mut [u8]) -> usize {
-        // An error costs bytes, and the frame that they were in is dropped by its CRC.
+        // After an error bytes are missing, and the CRC rejects their frame.
         self.0.read(buffer).await.unwrap_or(0)
     }
 
     async fn write(&mut self, bytes: &[u8]) {
-        // All of it goes into the buffer at once, or nothing.
-        while with_timeout(LOOK, self.0.write(bytes)).await.is_err() {}
+        // The driver accepts all bytes or none.
+        while with_timeout(POLL, self.0.write(bytes)).await.is_err() {}
     }
 }

@@ -1,26 +1,26 @@
-//! Power cuts at every step of storing a model, each in every way in which a step can be cut.
+//! Power cuts at every step of storing a model, with eight ways of interrupting the step.
 
 use std::vec::Vec;
 
 use super::*;
 
-/// Flash whose power fails.
+/// Simulated flash with a power cut.
 #[derive(Clone, Debug)]
 struct Flash {
     pages: [[u8; PAGE]; 2],
-    /// Steps until the power fails; `None`: never.
+    /// Number of steps until the power cut; `None` without one.
     steps: Option<usize>,
     torn: Torn,
 }
 
-/// What the step leaves during which the power fails.
+/// Effect of the step that the power cut interrupts.
 #[derive(Clone, Copy, Debug)]
 enum Torn {
-    /// As if it had not begun.
+    /// No bit is changed.
     Nothing,
-    /// As if it had just ended.
+    /// All bits are changed.
     All,
-    /// Some of the bits, by this pattern.
+    /// The bits of this pattern are changed.
     Some(u64),
 }
 
@@ -38,11 +38,11 @@ const TORN: [Torn; 8] = [
 impl Flash {
     const BLANK: Self = Self { pages: [[0xff; PAGE]; 2], steps: None, torn: Torn::Nothing };
 
-    /// What of the bits of this step is done; and whether it is the last.
-    fn power(&mut self) -> Result<(u64, bool), Worn> {
+    /// The bits that this step changes, and whether the power is still on after it.
+    fn power(&mut self) -> Result<(u64, bool), FlashError> {
         match &mut self.steps {
             None => Ok((u64::MAX, true)),
-            Some(0) => Err(Worn),
+            Some(0) => Err(FlashError),
             Some(steps) => {
                 *steps -= 1;
                 let done = match (*steps, self.torn) {
@@ -61,20 +61,20 @@ impl Pages for Flash {
         &self.pages[side as usize]
     }
 
-    fn erase(&mut self, side: Side) -> Result<(), Worn> {
+    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
         let (done, whole) = self.power()?;
         for word in self.pages[side as usize].as_chunks_mut::<WORD>().0 {
             *word = (u64::from_le_bytes(*word) | done).to_le_bytes();
         }
-        if whole { Ok(()) } else { Err(Worn) }
+        if whole { Ok(()) } else { Err(FlashError) }
     }
 
-    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), Worn> {
+    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
         let (done, whole) = self.power()?;
         let place = &mut self.pages[side as usize].as_chunks_mut::<WORD>().0[at / WORD];
-        assert!(*place == [0xff; WORD] || self.steps.is_some(), "a word is written once");
+        assert!(*place == [0xff; WORD] || self.steps.is_some(), "a word is written only once");
         *place = (u64::from_le_bytes(*place) & (u64::from_le_bytes(word) | !done)).to_le_bytes();
-        if whole { Ok(()) } else { Err(Worn) }
+        if whole { Ok(()) } else { Err(FlashError) }
     }
 }
 
@@ -99,7 +99,7 @@ fn newest(flash: &Flash) -> Option<Vec<u8>> {
 }
 
 #[test]
-fn the_newest_counts() {
+fn the_model_with_the_highest_number_is_valid() {
     let mut flash = Flash::BLANK;
     assert_eq!(newest(&flash), None);
     for number in 1..6 {
@@ -111,24 +111,24 @@ fn the_newest_counts() {
 }
 
 #[test]
-fn a_power_cut_leaves_the_old_one_or_the_new_one() {
+fn a_power_cut_preserves_the_old_or_the_new_model() {
     let mut before = Flash::BLANK;
     let (mut cuts, mut old_ones, mut new_ones) = (0, 0, 0);
     for number in 1..4 {
         let (old, new) = (newest(&before), payload(number));
         let (after, _) = store(&before, &new, Ok(()));
-        // One erase, the parts' words, the header's two.
+        // One erase, the words of the parts, and two words of the header.
         let steps = 1 + new.len().div_ceil(PART) * PART / WORD + 2;
         for (cut, torn) in (1..=steps).flat_map(|cut| TORN.map(|torn| (cut, torn))) {
             let (cut_off, stored) = store(&Flash { steps: Some(cut), torn, ..before.clone() }, &new, Ok(()));
-            assert!(stored.is_err(), "nothing is said to be stored without power");
+            assert!(stored.is_err(), "success is never reported after a power cut");
             let again = Flash { steps: None, ..cut_off };
             let found = newest(&again);
             assert!(found == old || found.as_ref() == Some(&new), "step {cut}, {torn:?}: {found:?}");
-            assert!(cut == steps || found == old, "only the last step makes it count");
+            assert!(cut == steps || found == old, "only the last step makes the new model valid");
             (cuts, old_ones, new_ones) =
                 (cuts + 1, old_ones + u32::from(found == old), new_ones + u32::from(found != old));
-            // And the next attempt finds a sound memory.
+            // The next attempt succeeds.
             let (repaired, stored) = store(&again, &new, Ok(()));
             assert!(stored.is_ok() && newest(&repaired).as_ref() == Some(&new), "step {cut}, {torn:?}");
         }
@@ -138,17 +138,17 @@ fn a_power_cut_leaves_the_old_one_or_the_new_one() {
 }
 
 #[test]
-fn what_is_not_sound_is_not_stored() {
+fn an_invalid_or_incomplete_model_is_not_stored() {
     let (flash, _) = store(&Flash::BLANK, &payload(1), Ok(()));
     let bad = Reason::ModelDamaged;
     let (after, stored) = store(&flash, &payload(2), Err(bad));
-    assert_eq!((stored, newest(&after)), (Err(bad), Some(payload(1))), "refused by its check");
+    assert_eq!((stored, newest(&after)), (Err(bad), Some(payload(1))), "rejected by its validation");
 
     let mut store = Store::new(flash);
     assert_eq!(store.part(1, &[0; PART]), Err(Reason::PartMissing(0)), "the first part is missing");
     store.part(0, &[0; PART]).unwrap();
     assert_eq!(store.part(2, &[0; PART]), Err(Reason::PartMissing(1)), "a part is missing");
-    assert_eq!(store.part(13, &[0; PART]), Err(Reason::PartMissing(1)), "beyond the longest");
+    assert_eq!(store.part(13, &[0; PART]), Err(Reason::PartMissing(1)), "beyond the longest payload");
     assert_eq!(store.end(40, 0, |_| Ok(())), Err(Reason::PartMissing(1)), "the end is missing");
     store.part(0, &[0; PART]).unwrap();
     assert_eq!(store.end(20, 1, |_| Ok(())), Err(Reason::ModelDamaged), "another checksum");
@@ -156,9 +156,9 @@ fn what_is_not_sound_is_not_stored() {
     assert_eq!(store.newest().map(|(id, _)| id.number), Some(1));
 }
 
-/// Whatever a page holds: no panic, and no model.
+/// Random bits in a page cause neither a panic nor a valid model.
 #[test]
-fn noise_is_no_model() {
+fn random_pages_contain_no_model() {
     let mut bits = 1u32;
     for round in 0..200 {
         let mut flash = Flash::BLANK;

@@ -5,9 +5,8 @@ use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 use host_sim::link::{Client, Patience, Port};
-use link::{Desired, Frame, Order, Request, Sequence};
-use model::Volts;
-use model::supervisor::Command;
+use link::{Command, Desired, Frame, Request, Sequence};
+use model::{Volts, supervisor};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 
@@ -26,8 +25,8 @@ fn set(number: u16) -> Request {
     Request::Set(Desired::ScaledVolts(volts(number)))
 }
 
-fn order(number: u16) -> Order {
-    Order { command: None, target: Some(Volts::new(volts(number)).unwrap()) }
+fn order(number: u16) -> Command {
+    Command { heard: true, arming: None, target: Some(Volts::new(volts(number)).unwrap()) }
 }
 
 /// One byte in 60 is wrong in both directions: most answers and many requests are lost, and asked for again.
@@ -39,7 +38,8 @@ fn every_order_is_applied_once_and_in_order(mcu: &Mcu) {
         assert_eq!(target.to_f64(), volts(number), "an answer to something else");
     }
     let ordered = mcu.with(|shared| shared.ordered.clone());
-    assert_eq!(ordered[0], Order { command: Some(Command::Arm), target: Some(Volts::ZERO) });
+    let arm = Command { heard: true, arming: Some(supervisor::Command::Arm), target: Some(Volts::ZERO) };
+    assert_eq!(ordered[0], arm);
     assert_eq!(ordered[1..], (0..150).map(order).collect::<Vec<_>>());
     let counters = mcu.with(|shared| shared.counters);
     assert!(counters.damaged > 10 && counters.repeated > 10, "{counters:?}");
@@ -86,7 +86,7 @@ fn ten_thousand_damaged_frames_over_a_socket_apply_nothing_that_was_not_sent() {
     }
     // The first whole frame is understood.
     stream.write_all(Frame::new(Sequence(20_000), &Request::Disarm).as_bytes()).unwrap();
-    let disarm = Order { command: Some(Command::Disarm), target: None };
+    let disarm = Command { heard: true, arming: Some(supervisor::Command::Disarm), target: None };
     while mcu.with(|shared| shared.ordered.last() != Some(&disarm)) {
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -94,7 +94,7 @@ fn ten_thousand_damaged_frames_over_a_socket_apply_nothing_that_was_not_sent() {
     drained.join().unwrap();
 
     let ordered = mcu.with(|shared| shared.ordered.clone());
-    let known: Vec<Order> = (2..=10_002).map(order).collect();
+    let known: Vec<Command> = (2..=10_002).map(order).collect();
     let (targets, counters) = (&ordered[1..ordered.len() - 1], mcu.with(|shared| shared.counters));
     assert!(targets.iter().all(|order| known.contains(order)), "{ordered:?}");
     assert!(counters.damaged > 8000 && !targets.is_empty(), "{counters:?}");

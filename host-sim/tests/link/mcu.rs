@@ -1,4 +1,4 @@
-//! An MCU in the test process: the firmware's control loop behind [`link::Desk`], on a socket or a pseudo-terminal, with
+//! An MCU in the test process: the firmware's control loop behind [`link::Server`], on a socket or a pseudo-terminal, with
 //! a line that can be bad.
 
 use std::fs::File;
@@ -10,11 +10,11 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use firmware::control::{Control, Orders, Senses, Untimed};
-use firmware::store::{PAGE, Pages, Side, Store, WORD, Worn};
+use firmware::control::{Control, Sensors, Untimed};
+use firmware::store::{FlashError, PAGE, Pages, Side, Store, WORD};
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{About, Controller, Desk, Fault, Keep, Order, Reason, State, Step, Telemetry, View, WireModel};
+use link::{About, Command, Controller, Fault, ModelUpdate, Reason, Server, State, Step, Telemetry, View, WireModel};
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Settings, Spring, supervisor};
 use serialport::{SerialPort, TTYPort};
@@ -43,7 +43,7 @@ impl Default for Setup {
 #[derive(Default)]
 pub(crate) struct Shared {
     /// What reached the control tick.
-    pub(crate) ordered: Vec<Order>,
+    pub(crate) ordered: Vec<Command>,
     /// The latest sample.
     pub(crate) sample: Telemetry,
     /// What came over the link.
@@ -71,12 +71,12 @@ impl Pages for Flash {
         &self.0[side as usize]
     }
 
-    fn erase(&mut self, side: Side) -> Result<(), Worn> {
+    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
         self.0[side as usize].fill(0xff);
         Ok(())
     }
 
-    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), Worn> {
+    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
         self.0[side as usize][at..at + WORD].copy_from_slice(&word);
         Ok(())
     }
@@ -200,12 +200,12 @@ impl Mcu {
                     (chip, start) = (Chip::new(setup, chip.shared), Instant::now());
                 }
                 while u128::from(chip.view.sample.tick) < start.elapsed().as_millis() {
-                    chip.tick(Orders::default());
+                    chip.tick(Command::default());
                 }
                 for byte in &bytes[..count] {
                     chip.hear(*byte, &mut out);
                 }
-                out.extend_from_slice(chip.desk.telemetry(&chip.view).unwrap_or_default());
+                out.extend_from_slice(chip.server.telemetry(&chip.view).unwrap_or_default());
             }
         }));
     }
@@ -223,7 +223,7 @@ impl Drop for Mcu {
 struct Chip {
     setup: Setup,
     shared: Arc<Mutex<Shared>>,
-    desk: Desk,
+    server: Server,
     control: Control,
     store: Store<Flash>,
     view: View,
@@ -239,7 +239,7 @@ impl Chip {
         let model = id.unwrap_or_default();
         let mut control = Control::new(&Settings::PAPER, &supervision, None).unwrap();
         if let Some(found) = found {
-            control.take_on(&Settings::PAPER, &found).unwrap();
+            control.use_model(&Settings::PAPER, &found).unwrap();
         }
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
         let about = About {
@@ -252,16 +252,16 @@ impl Chip {
         };
         let view =
             View { sample: Telemetry::default(), state: supervisor::State::Disarmed, refusal: None, overruns: 0 };
-        let mut chip = Self { setup, shared, desk: Desk::new(spring, about), control, store, view };
-        chip.tick(Orders::default());
+        let mut chip = Self { setup, shared, server: Server::new(spring, about), control, store, view };
+        chip.tick(Command::default());
         chip
     }
 
-    fn tick(&mut self, orders: Orders) {
-        let heard = self.desk.take_heard();
+    fn tick(&mut self, command: Command) {
+        let heard = self.server.take_heard();
         let interlock_closed = !self.shared.lock().unwrap().interlock_open;
-        let senses = Senses { interlock_closed, ..Senses::default() };
-        let tick = self.control.tick(&Orders { heard: heard || orders.heard, ..orders }, &senses, &mut Untimed);
+        let sensors = Sensors { interlock_closed, ..Sensors::default() };
+        let tick = self.control.tick(&Command { heard: heard || command.heard, ..command }, &sensors, &mut Untimed);
         let supervisor = self.control.supervisor();
         let sample = Telemetry {
             tick: self.view.sample.tick + 1,
@@ -274,24 +274,24 @@ impl Chip {
             limits: supervisor.limits(&tick.output).bits(),
         };
         let mut shared = self.shared.lock().unwrap();
-        (shared.sample, shared.counters) = (sample, self.desk.counters());
+        (shared.sample, shared.counters) = (sample, self.server.counters());
         self.view = View { sample, state: supervisor.state(), refusal: supervisor.refusal(), overruns: 0 };
     }
 
     fn hear(&mut self, byte: u8, out: &mut Vec<u8>) {
-        match self.desk.on_byte(byte, &self.view) {
-            Some(Step::Order(Order { command, target })) => {
-                self.shared.lock().unwrap().ordered.push(Order { command, target });
-                self.tick(Orders { heard: true, command, target });
-                out.extend_from_slice(self.desk.settle(&self.view));
+        match self.server.on_byte(byte, &self.view) {
+            Some(Step::Command(command)) => {
+                self.shared.lock().unwrap().ordered.push(command);
+                self.tick(Command { heard: true, ..command });
+                out.extend_from_slice(self.server.command_done(&self.view));
             }
             Some(Step::Send(bytes)) => out.extend_from_slice(bytes),
-            Some(Step::Keep(keep)) => {
-                let kept = match keep {
-                    Keep::Part(number, bytes) => self.store.part(number, &bytes).map(|()| None),
-                    Keep::End { length, checksum } => self.store.end(length, checksum, check).map(Some),
+            Some(Step::UpdateModel(update)) => {
+                let kept = match update {
+                    ModelUpdate::Part(number, bytes) => self.store.part(number, &bytes).map(|()| None),
+                    ModelUpdate::End { length, checksum } => self.store.end(length, checksum, check).map(Some),
                 };
-                out.extend_from_slice(self.desk.kept(kept, &self.view));
+                out.extend_from_slice(self.server.model_updated(kept, &self.view));
             }
             Some(Step::Restart(bytes)) => {
                 out.extend_from_slice(bytes);

@@ -1,6 +1,6 @@
-//! Frames without the crate's own means.
+//! An independent implementation of the framing.
 
-/// A frame of any content, with CRC-32C bit by bit and COBS for packets of less than 254 bytes.
+/// Encodes a frame with any content: CRC-32C bit by bit, COBS for packets of less than 254 bytes.
 pub(crate) fn by_hand(version: u8, kind: u8, sequence: u16, message: &[u8]) -> Vec<u8> {
     let mut packet = vec![version, kind, sequence as u8, (sequence >> 8) as u8];
     packet.extend_from_slice(message);

@@ -1,4 +1,4 @@
-//! Messages of every kind, for the tests.
+//! Strategies that generate every kind of message.
 
 use link::reply::Firmware;
 use link::session::Counters;
@@ -7,7 +7,7 @@ use link::{
 };
 use proptest::prelude::*;
 
-/// Any finite or infinite number. NaN is left out because it does not equal itself; it has its own test.
+/// Any number but NaN, which does not equal itself and has its own test.
 fn number() -> impl Strategy<Value = f64> {
     any::<f64>().prop_filter("NaN", |number| !number.is_nan())
 }

@@ -4,11 +4,10 @@
 //! model says every code.
 
 use anyhow::{Context, Result, bail, ensure};
-use firmware::control::{Control, Orders, Senses, Untimed};
+use firmware::control::{Control, Sensors, Untimed};
 use firmware::settings::SUPERVISION;
-use link::{Desired, Frame, Packet, Receiver, Reply, Request, Sequence, State, WireVolts};
-use model::supervisor::Command;
-use model::{Settings, Volts};
+use link::{Command, Desired, Frame, Packet, Receiver, Reply, Request, Sequence, State, WireVolts};
+use model::{Settings, Volts, supervisor};
 use serde_json::{Value, json};
 
 use super::{Event, Events};
@@ -50,7 +49,7 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     let schedule = schedule();
     ensure!(answers.len() == schedule.len(), "{} answers to {} requests", answers.len(), schedule.len());
 
-    let mut orders = vec![Orders::default(); written.len()];
+    let mut orders = vec![Command::default(); written.len()];
     for ((number, (_, request)), (us, sequence, reply)) in (0u16..).zip(&schedule).zip(&answers) {
         ensure!(sequence.0 == number, "answer {} to request {number}", sequence.0);
         let next = written.iter().position(|(at, ..)| at > us).context("no tick after an answer")?;
@@ -60,11 +59,11 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
             _ => next,
         };
         orders[tick] = match request {
-            Request::Arm => Orders { heard: true, command: Some(Command::Arm), target: Some(Volts::ZERO) },
+            Request::Arm => Command { heard: true, arming: Some(supervisor::Command::Arm), target: Some(Volts::ZERO) },
             Request::Set(Desired::ScaledVolts(volts)) => {
-                Orders { heard: true, command: None, target: Some(Volts::new(*volts)?) }
+                Command { heard: true, arming: None, target: Some(Volts::new(*volts)?) }
             }
-            _ => Orders { heard: true, ..Orders::default() },
+            _ => Command { heard: true, ..Command::default() },
         };
         expect(number, request, reply, variant).with_context(|| format!("{request:?} is answered with {reply:?}"))?;
     }
@@ -100,10 +99,10 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
 }
 
 /// Code and enable of every tick, as this machine has them for `variant`.
-fn drives(variant: Variant, orders: &[Orders]) -> Result<Vec<(u16, bool)>> {
+fn drives(variant: Variant, orders: &[Command]) -> Result<Vec<(u16, bool)>> {
     let mut control = Control::new(&variant.settings(), &SUPERVISION, None)?;
-    let senses = Senses { interlock_closed: true, ..Senses::default() };
-    let drive = |orders| control.tick(orders, &senses, &mut Untimed).drive;
+    let sensors = Sensors { interlock_closed: true, ..Sensors::default() };
+    let drive = |orders| control.tick(orders, &sensors, &mut Untimed).drive;
     Ok(orders.iter().map(drive).map(|drive| (drive.code().0, drive.enabled())).collect())
 }
 

@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use firmware::RATE_HZ;
-use firmware::rehearsal::rehearse;
-use firmware::script::{Script, UP_DOWN_TICKS, up_down_v};
 use link::WireModel;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use validation::hidden::live::Live;
 use validation::hidden::{Cause, Effect, Noise, Schedule};
+use test_bench::script::{Script, UP_DOWN_TICKS, up_down_v};
+use test_bench::simulation::simulate;
 
 use super::lock_step::{self, Moment};
 use crate::emulate::Comparison;
@@ -79,7 +79,7 @@ impl Stage {
         let features = [&["story"], controller.features(), features].concat();
         let elf = image::build_with(&features[1..], Board::Mps2, Opt::S)?;
         let (mut rows, mut top_v, mut tick) = (Vec::new(), 0f64, 0);
-        rehearse(Script::parse(run).context("no such run")?, |_, done| {
+        simulate(Script::parse(run).context("no such run")?, |_, done| {
             if tick % EVERY == 0 {
                 rows.push((tick as f64 / f64::from(RATE_HZ), done.output.applied.to_f64()));
             }

@@ -1,0 +1,62 @@
+//! The task that owns the line to the host.
+
+use embassy_time::{Duration, Timer, with_timeout};
+use link::{Server, Step};
+
+use super::model_store::update_model;
+use super::shared_mailbox::{hand_over, with_mailbox};
+use crate::board::Line;
+use crate::stop;
+use crate::task_watchdog::{TASK_WATCHDOG, Task};
+
+/// Longest wait for a byte, and thereby the period of the check whether telemetry is due.
+const READ_TIMEOUT: Duration = Duration::from_millis(1);
+/// Longest wait until the line accepts a frame; the longest frame needs less. If the host does not read, the rest of the frame
+/// is lost and the host repeats its request, but this task still checks in.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(20);
+
+/// Runs the server on the line.
+pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
+    TASK_WATCHDOG.register(Task::Link);
+    let mut buffer = [0; 32];
+    loop {
+        TASK_WATCHDOG.check_in(Task::Link);
+        let count = with_timeout(READ_TIMEOUT, line.read(&mut buffer)).await.unwrap_or(0);
+        for byte in buffer.iter().take(count) {
+            // None before the first tick: there is no state to report yet, and hosts repeat their requests.
+            let Some(view) = with_mailbox(|mailbox| mailbox.view()) else { break };
+            match server.on_byte(*byte, &view) {
+                None => {}
+                Some(Step::Send(bytes)) => send(line, bytes).await,
+                Some(Step::Command(command)) => {
+                    let after = hand_over(command, view.state).await;
+                    send(line, server.command_done(&after)).await;
+                }
+                Some(Step::UpdateModel(update)) => {
+                    let result = update_model(update).await;
+                    send(line, server.model_updated(result, &view)).await;
+                }
+                Some(Step::Restart(bytes)) => {
+                    send(line, bytes).await;
+                    // Until the last bytes have been sent.
+                    Timer::after(WRITE_TIMEOUT).await;
+                    stop::restart()
+                }
+            }
+            if server.take_heard() {
+                with_mailbox(|mailbox| mailbox.hear());
+            }
+        }
+        if let Some(view) = with_mailbox(|mailbox| mailbox.view())
+            && let Some(bytes) = server.telemetry(&view)
+        {
+            send(line, bytes).await;
+        }
+    }
+}
+
+async fn send(line: &mut impl Line, bytes: &[u8]) {
+    // After a timeout the frame is incomplete, and the host drops it.
+    let _ = with_timeout(WRITE_TIMEOUT, line.write(bytes)).await;
+    TASK_WATCHDOG.check_in(Task::Link);
+}

@@ -1,0 +1,204 @@
+//! The MCU's end of the link: bytes in, commands for the control tick and replies out.
+//!
+//! The task that owns the line uses it as follows:
+//!
+//! 1. Pass each received byte to [`Server::on_byte`] with the latest [`View`]. [`Step::Send`]: send the bytes.
+//!    [`Step::Command`]: pass the command to the control tick, wait until that tick has run, then send what
+//!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::UpdateModel`]: likewise with the
+//!    model store and [`Server::model_updated`]. [`Step::Restart`]: send the bytes and restart.
+//! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
+//! 3. Periodically send what [`Server::telemetry`] returns.
+//!
+//! A reply reports the result of the request because it is built from the view after the tick.
+
+use model::Spring;
+use model::supervisor::{self, Refusal};
+
+use crate::command::Command;
+use crate::fault::Fault;
+use crate::reason::Reason;
+use crate::reply::{Firmware, Models, Reply, Status, Telemetry};
+use crate::request::Request;
+use crate::session::{Action, Counters, Session};
+use crate::value::WireVolts;
+use crate::wire_model::{ModelId, PART};
+
+/// State of the control loop after a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Sample for the host.
+    pub sample: Telemetry,
+    /// State of the supervisor.
+    pub state: supervisor::State,
+    /// Why the supervisor refused the command of this tick, if it did.
+    pub refusal: Option<Refusal>,
+    /// Number of missed ticks since the start.
+    pub overruns: u32,
+}
+
+/// Properties of the MCU that are constant from its start to its reset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct About {
+    /// Version of the program and its controller.
+    pub firmware: Firmware,
+    /// Rate of the control tick, in Hz.
+    pub rate_hz: u32,
+    /// Permitted silence of the host, in ticks.
+    pub silence_limit_ticks: u32,
+    /// Fault that caused the last reset, or [`Fault::NONE`].
+    pub last_fault: Fault,
+    /// Running model.
+    pub model: ModelId,
+    /// Model that was stored at the start, even if its validation failed.
+    pub stored: ModelId,
+}
+
+/// Reaction to a received byte.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step<'a> {
+    /// Pass the command to the control tick, then call [`Server::command_done`].
+    Command(Command),
+    /// Send the bytes.
+    Send(&'a [u8]),
+    /// Pass the update to the model store, then call [`Server::model_updated`].
+    UpdateModel(ModelUpdate),
+    /// Send the bytes, then restart.
+    Restart(&'a [u8]),
+}
+
+/// Operation of the model store.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ModelUpdate {
+    /// Number and content of a part, see [`Request::ModelPart`].
+    Part(u8, [u8; PART]),
+    /// End of the transfer, see [`Request::ModelEnd`].
+    End {
+        /// Length of the payload, in bytes.
+        length: u16,
+        /// CRC-32C of the payload.
+        checksum: u32,
+    },
+}
+
+/// State of the MCU's end of the link.
+#[derive(Clone, Debug)]
+pub struct Server {
+    session: Session,
+    spring: Spring,
+    about: About,
+    stored: ModelId,
+    /// Request whose command is being executed.
+    pending: Option<Request>,
+}
+
+impl Server {
+    /// A server before its first frame; `spring` defines the range of the targets.
+    pub const fn new(spring: Spring, about: About) -> Self {
+        Self { session: Session::new(about.silence_limit_ticks), spring, about, stored: about.stored, pending: None }
+    }
+
+    /// Processes a received byte.
+    pub fn on_byte(&mut self, byte: u8, view: &View) -> Option<Step<'_>> {
+        if let Action::Apply(request) = self.session.on_byte(byte, view.sample.tick)? {
+            let reply = match request {
+                Request::Hello | Request::Status => Reply::Status(self.status(view)),
+                Request::Model => Reply::Model(Models { active: self.about.model, stored: self.stored }),
+                Request::ModelPart { .. } | Request::ModelEnd { .. } | Request::Restart
+                    if view.state != supervisor::State::Disarmed =>
+                {
+                    Reply::Refused(match Fault::of(view.state) {
+                        Fault::NONE => Reason::Armed,
+                        fault => Reason::Faulted(fault),
+                    })
+                }
+                Request::ModelPart { number, bytes } => {
+                    return Some(Step::UpdateModel(ModelUpdate::Part(number, bytes)));
+                }
+                Request::ModelEnd { length, checksum } => {
+                    return Some(Step::UpdateModel(ModelUpdate::End { length, checksum }));
+                }
+                Request::Restart => return Some(Step::Restart(self.session.answer(&done(view)))),
+                request => match Command::new(request, view.state, &self.spring) {
+                    Err(reason) => Reply::Refused(reason),
+                    Ok(command) if command == Command::default() => done(view),
+                    Ok(command) => {
+                        self.pending = Some(request);
+                        return Some(Step::Command(Command { heard: self.session.take_heard(), ..command }));
+                    }
+                },
+            };
+            self.session.answer(&reply);
+        }
+        Some(Step::Send(self.session.outgoing()))
+    }
+
+    /// The reply to the request of the last [`Step::Command`]; `view` is that of the tick that has processed the command.
+    pub fn command_done(&mut self, view: &View) -> &[u8] {
+        let fault = Fault::of(view.state);
+        let refused = match (self.pending.take(), view.state, view.refusal) {
+            (
+                Some(Request::Arm | Request::Acknowledge(_)),
+                supervisor::State::Disarmed | supervisor::State::Faulted(_),
+                Some(refusal),
+            ) => Some(Reason::of_refusal(refusal, fault)),
+            (Some(Request::Acknowledge(_)), supervisor::State::Faulted(_), _) => Some(Reason::OtherFault(fault)),
+            // The state has changed since the request was accepted. A target that was set meanwhile is reset by arming.
+            (Some(Request::Arm | Request::Set(_)), supervisor::State::Faulted(_), _) => Some(Reason::Faulted(fault)),
+            (Some(Request::Arm | Request::Set(_)), supervisor::State::Disarmed, _) => Some(Reason::NotArmed),
+            _ => None,
+        };
+        self.session.answer(&refused.map_or(done(view), Reply::Refused))
+    }
+
+    /// The reply to the request of the last [`Step::UpdateModel`]; `result` contains the model if a new one was stored.
+    pub fn model_updated(&mut self, result: Result<Option<ModelId>, Reason>, view: &View) -> &[u8] {
+        let reply = match result {
+            Err(reason) => Reply::Refused(reason),
+            Ok(stored) => {
+                self.stored = stored.unwrap_or(self.stored);
+                done(view)
+            }
+        };
+        self.session.answer(&reply)
+    }
+
+    /// The telemetry frame to send, if a sample is due.
+    pub fn telemetry(&mut self, view: &View) -> Option<&[u8]> {
+        let now = view.sample.tick;
+        self.session.telemetry_due(now).then(|| self.session.telemetry(view.sample, now))
+    }
+
+    /// True once after each frame that ended the host's silence. A command carries this in [`Command::heard`] itself.
+    pub fn take_heard(&mut self) -> bool {
+        self.session.take_heard()
+    }
+
+    /// Counters of the received frames.
+    pub fn counters(&self) -> Counters {
+        self.session.counters()
+    }
+
+    fn status(&self, view: &View) -> Status {
+        let About { firmware, rate_hz, silence_limit_ticks, last_fault, .. } = self.about;
+        let (lowest, highest) = self.spring.reach_v();
+        Status {
+            lowest: WireVolts::from_f64(lowest),
+            highest: WireVolts::from_f64(highest),
+            firmware,
+            rate_hz,
+            silence_limit_ticks,
+            overruns: view.overruns,
+            fault: Fault::of(view.state),
+            last_fault,
+            sample: view.sample,
+            counters: self.counters(),
+        }
+    }
+}
+
+fn done(view: &View) -> Reply {
+    Reply::Ack { state: view.sample.state, target: view.sample.target }
+}
+
+#[cfg(test)]
+mod tests;

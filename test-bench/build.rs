@@ -1,0 +1,23 @@
+//! Passes the linker scripts of the emulated board to the linker.
+
+use std::env;
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    if env::var_os("CARGO_FEATURE_MPS2_AN386").is_none() {
+        return;
+    }
+    // memory.x of the workspace includes the board's flash.x.
+    let package = env::var("CARGO_MANIFEST_DIR").unwrap();
+    for (folder, scripts) in [(format!("{package}/.."), &["memory.x"][..]), (package, &["flash.x", "device.x"])] {
+        println!("cargo:rustc-link-search={folder}");
+        for script in scripts {
+            println!("cargo:rerun-if-changed={folder}/{script}");
+        }
+    }
+    // nmagic: no padding to page size, which would move the sections to other flash addresses.
+    for arg in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+        println!("cargo:rustc-link-arg-bins={arg}");
+        println!("cargo:rustc-link-arg-examples={arg}");
+    }
+}

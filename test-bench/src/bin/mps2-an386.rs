@@ -1,0 +1,175 @@
+//! The image of the emulated board. It executes the script that the emulator's command line names, then ends the emulator. With
+//! the name `link` it executes the commands of a host at its UART until the emulator is ended, with its interlock closed.
+
+#![no_std]
+#![no_main]
+
+use cortex_m::peripheral::Peripherals;
+use defmt_semihosting as _;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use firmware::board::Board;
+use firmware::control::{Control, Untimed};
+use firmware::host::{self, Host};
+use firmware::settings::FLASHED;
+use firmware::store::Store;
+use firmware::{crash_record, hang_guard, log, stack_guard, tasks};
+use link::{Controller, Server};
+use test_bench::mps2::flash::Flash;
+use test_bench::mps2::instructions::{Counter, Instructions};
+use test_bench::mps2::interrupts::Interrupt;
+use test_bench::mps2::registers::CLOCK_HZ;
+use test_bench::mps2::uart::Uart;
+use test_bench::mps2::vectors::{HIGH, LOW};
+use test_bench::mps2::{INTERLOCK_CLOSED, Mps2, semihosting};
+use test_bench::player::{self, Player};
+use test_bench::script::Script;
+
+use core::sync::atomic::Ordering;
+
+/// Exit code: the command line does not name a script.
+const EXIT_NO_SCRIPT: u32 = 2;
+/// Exit code: there is no simulated spring in the emulator's folder.
+const EXIT_NO_SPRING: u32 = 5;
+/// Name of the run with the commands of a host.
+const LINK: &str = "link";
+
+/// Result of a script, from the control task to the housekeeping task.
+static DONE: Signal<CriticalSectionRawMutex, Done> = Signal::new();
+
+/// Result of a script.
+struct Done {
+    /// Number of executed ticks.
+    ticks: u32,
+    /// Number of missed ticks.
+    missed: u32,
+    /// Digest of every DAC code and every estimate.
+    digest: u64,
+    /// Instructions of the model's tick.
+    instructions: Instructions,
+}
+
+/// Source of the commands.
+enum Mode {
+    Play(Script),
+    Link,
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let mut board = Mps2::init();
+    let (reset, last_fault) = crash_record::reset_cause(None);
+
+    let mut buffer = [0; 64];
+    let name = semihosting::command_line(&mut buffer);
+    let mode = match (last_fault, Script::parse(name)) {
+        _ if name.trim() == LINK => Mode::Link,
+        (Some(_), _) => Mode::Play(Script::Aftermath),
+        (None, Some(script)) => Mode::Play(script),
+        (None, None) => semihosting::exit(EXIT_NO_SCRIPT),
+    };
+    let settings = match &mode {
+        Mode::Play(script) => script.settings(),
+        Mode::Link => &FLASHED,
+    };
+    let controller = Controller::of(&settings.compensation);
+    log::boot(reset, last_fault.map_or(0, |fault| fault.code()), controller);
+    if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
+        semihosting::exit(EXIT_NO_SPRING);
+    }
+    let mut store = Store::new(Flash::init());
+    let (control, server) = match host::open(settings, &store, last_fault) {
+        Ok(Some(both)) => both,
+        Ok(None) => semihosting::exit(1),
+        Err(error) => {
+            log::refused(error.field);
+            semihosting::exit(1)
+        }
+    };
+
+    if let Some(mut core) = Peripherals::take() {
+        stack_guard::set(&mut core.MPU);
+        hang_guard::start(&mut core.SYST, CLOCK_HZ);
+        // SAFETY: the interrupts are not enabled yet. A smaller number is a higher priority: the alarm wakes the control task,
+        // which preempts everything else.
+        unsafe {
+            core.NVIC.set_priority(Interrupt::Timer0, 0x20);
+            core.NVIC.set_priority(Interrupt::Timer1, 0x20);
+            core.NVIC.set_priority(Interrupt::High, 0x40);
+            core.NVIC.set_priority(Interrupt::Received, 0x80);
+            core.NVIC.set_priority(Interrupt::Sent, 0x80);
+            core.NVIC.set_priority(Interrupt::Low, 0xc0);
+        }
+    }
+    let low = LOW.start(Interrupt::Low);
+    let high = HIGH.start(Interrupt::High);
+    if let Ok(housekeeping) = housekeeping() {
+        low.spawn(housekeeping);
+    }
+    match mode {
+        Mode::Play(script) => {
+            if let Ok(control) = play(board, control, script) {
+                high.spawn(control);
+            }
+        }
+        Mode::Link => {
+            INTERLOCK_CLOSED.store(true, Ordering::Relaxed);
+            if let (Ok(talk), Ok(control)) = (talk(server), obey(board, control)) {
+                low.spawn(talk);
+                high.spawn(control);
+            }
+            // Without sleeping: while the processor sleeps, the emulator's clock can follow the real one and skip ticks; while it
+            // runs, the instructions alone determine the time.
+            loop {
+                host::serve_model_store(&mut store);
+            }
+        }
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+#[embassy_executor::task]
+async fn play(mut board: Mps2, control: &'static mut Control, script: Script) {
+    let mut player = Player::new(script);
+    let mut counter = Counter::begin();
+    let (ticks, missed) = tasks::control(&mut board, control, &mut player, &mut counter).await;
+    DONE.signal(Done { ticks, missed, digest: player.digest(), instructions: counter.instructions() });
+}
+
+#[embassy_executor::task]
+async fn obey(mut board: Mps2, control: &'static mut Control) {
+    let mut host = Host::new(control);
+    tasks::control(&mut board, control, &mut host, &mut Untimed).await;
+}
+
+#[embassy_executor::task]
+async fn talk(server: &'static mut Server) {
+    host::talk(&mut Uart::init(), server).await
+}
+
+#[embassy_executor::task]
+async fn housekeeping() {
+    tasks::housekeeping(|event| {
+        // Once all events are logged.
+        if event.is_none()
+            && let Some(Done { ticks, missed, digest, instructions: Instructions { min, mean, max } }) = DONE.try_take()
+        {
+            defmt::info!(
+                "done ticks={=u32} missed={=u32} digest={=u64:x} min={=u32} mean={=u32} max={=u32}",
+                ticks,
+                missed,
+                digest,
+                min,
+                mean,
+                max
+            );
+            semihosting::exit(0);
+        }
+        if player::STALL.load(Ordering::Relaxed) {
+            player::hang();
+        }
+    })
+    .await
+}

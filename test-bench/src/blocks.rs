@@ -1,0 +1,101 @@
+//! Runs of the tick with each kind of spring and each controller, on the host and on the target, for counting instructions and
+//! comparing results bit for bit.
+
+use firmware::control::{Stopwatch, whole_tick};
+use model::estimator::{Estimator, Model};
+use model::extended::{Law, Leakage, Memory, Relaxation};
+use model::units::Signal;
+use model::{Approach, Compensation, ExtendedPlant, Gains, Input, OutOfRange, Plant, Settings, State, Volts};
+
+use crate::digest::Digest;
+
+/// Number of ticks of a run. The target changes every 50 ticks.
+pub const TICKS: u32 = 10_000;
+
+/// The controllers with their names.
+pub const CONTROLLERS: [(&str, Compensation); 3] = [
+    ("none", Compensation::None),
+    ("paper", Compensation::ProportionalIntegral(Gains::PAPER)),
+    ("fast", Compensation::TimeOptimal(Approach { time_constant_s: 0.0 })),
+];
+
+/// The springs with their names. The first is the plain spring, which has a tick of its own. The others use the extended tick,
+/// the first of them with the paper's relaxation only.
+pub const SPRINGS: [(&str, Option<ExtendedPlant<'static>>); 9] = [
+    ("plain", None),
+    ("extended, one lag", Some(ONE_LAG)),
+    ("+ memory, 8 plays", Some(ExtendedPlant { memory: Some(MEMORY), ..ONE_LAG })),
+    ("+ law, 9 points", Some(ExtendedPlant { law: Some(LAW), ..ONE_LAG })),
+    ("+ leakage", Some(ExtendedPlant { leakage: Some(LEAKAGE), ..ONE_LAG })),
+    ("+ a varying time constant", Some(ExtendedPlant { relaxation: lags(1, Some(8.0)), ..ONE_LAG })),
+    ("+ a second lag", Some(ExtendedPlant { relaxation: lags(2, None), ..ONE_LAG })),
+    ("+ three more lags", Some(ExtendedPlant { relaxation: lags(4, None), ..ONE_LAG })),
+    (
+        "all of it",
+        Some(ExtendedPlant {
+            memory: Some(MEMORY),
+            law: Some(LAW),
+            leakage: Some(LEAKAGE),
+            relaxation: lags(4, Some(8.0)),
+        }),
+    ),
+];
+
+const ONE_LAG: ExtendedPlant<'static> =
+    ExtendedPlant { memory: None, law: None, leakage: None, relaxation: lags(1, None) };
+const MEMORY: Memory<'static> =
+    Memory { direct: 0.6, thresholds_v: &[5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0], weights: &[0.05; 8] };
+const LAW: Law<'static> = Law {
+    voltage_v: &[0.0, 80.0, 160.0, 240.0, 320.0, 400.0, 480.0, 560.0, 700.0],
+    stiffness: &[0.0, 72.0, 150.0, 232.0, 316.0, 400.0, 486.0, 574.0, 720.0],
+};
+const LEAKAGE: Leakage = Leakage { share: 0.1, time_constant_s: 40.0 };
+
+const fn lags(count: usize, time_constant_high_s: Option<f64>) -> Relaxation<'static> {
+    let share = Plant::PAPER.share;
+    let (time_constants_s, weights): (&'static [f64], &'static [f64]) = match count {
+        1 => (&[5.5], &[1.0 - Plant::PAPER.share]),
+        2 => (&[5.5, 40.0], &[0.8, 0.1]),
+        _ => (&[5.5, 1.0, 15.0, 40.0], &[0.6, 0.1, 0.1, 0.1]),
+    };
+    Relaxation { share, time_constants_s, weights, time_constant_high_s }
+}
+
+/// Executes one run and returns the digest of its codes and estimates.
+///
+/// # Errors
+/// [`OutOfRange`] if the settings are invalid, which does not occur for [`SPRINGS`] and [`CONTROLLERS`].
+pub fn run(
+    spring: Option<&ExtendedPlant<'static>>,
+    compensation: Compensation,
+    stopwatch: &mut impl Stopwatch,
+) -> Result<u64, OutOfRange> {
+    let Settings { rate_hz, plant, amplifier, feedback, .. } = Settings::PAPER;
+    match spring {
+        None => ticks(&Settings { rate_hz, plant, compensation, amplifier, feedback }, stopwatch),
+        Some(&plant) => ticks(&Settings { rate_hz, plant, compensation, amplifier, feedback }, stopwatch),
+    }
+}
+
+/// Not inlined: together, all variants exceed the range of a branch instruction.
+#[inline(never)]
+fn ticks<P: Model>(settings: &Settings<P>, stopwatch: &mut impl Stopwatch) -> Result<u64, OutOfRange> {
+    let (config, mut state) = (settings.check()?, State::<<P::Config as Estimator>::State>::default());
+    let mut digest = Digest::default();
+    let (mut bits, mut target) = (1u32, 0);
+    for tick in 0..TICKS {
+        if tick.is_multiple_of(50) {
+            // Xorshift generator of Marsaglia; 0 to 511 V.
+            bits ^= bits << 13;
+            bits ^= bits >> 17;
+            bits ^= bits << 5;
+            target = (bits >> 3) as i32;
+        }
+        let input = Input { target: Volts(Signal::from_bits(target)), ..Input::default() };
+        stopwatch.start();
+        let output = whole_tick(&config, &mut state, input);
+        stopwatch.stop();
+        digest.add_output(&output);
+    }
+    Ok(digest.value())
+}

@@ -1,0 +1,31 @@
+//! Test bench of the firmware: the same scripted runs on a host and on an emulated board, compared bit for bit.
+//!
+//! A run starts with the name of a [`Script`](script::Script) and ends with the [`Digest`](digest::Digest) of every DAC code and
+//! every estimate. No image that is flashed contains this crate.
+//!
+//! | module | content |
+//! | --- | --- |
+//! | `blocks` | Runs of the tick with each kind of spring and each controller, for counting instructions (feature `fast`). |
+//! | [`digest`] | Checksum of a whole run. |
+//! | [`script`] | Commands and injected faults of every run. |
+//! | [`simulation`] | Execution of a script on a host, without a board. |
+//! | `mps2` | The emulated board. |
+//! | `player` | Execution of a script on the emulated board. |
+//!
+//! `mps2` and `player` require the feature `mps2-an386`; the other modules build on any host.
+#![no_std]
+#![deny(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+#[cfg(feature = "fast")]
+pub mod blocks;
+pub mod digest;
+pub mod script;
+pub mod simulation;
+
+#[cfg(feature = "mps2-an386")]
+pub mod mps2;
+#[cfg(feature = "mps2-an386")]
+pub mod player;

@@ -1,0 +1,63 @@
+//! Two pages for the model store. The board has no flash: the pages are in its PSRAM, which keeps its content during a reset,
+//! and in the file `model.flash` of the emulator's folder if it exists, which keeps it beyond the emulator's end.
+
+use firmware::store::{FlashError, PAGE, Pages, Side, WORD};
+
+use super::semihosting::{File, Mode};
+
+/// Address of the PSRAM; nothing else uses it.
+const ADDRESS: u32 = 0x2100_0000;
+
+/// The pages.
+#[derive(Debug)]
+pub struct Flash {
+    file: Option<File>,
+}
+
+impl Flash {
+    /// Reads the pages from the file, or erases them. Call it once at boot.
+    pub fn init() -> Self {
+        let mut flash = Self { file: File::open(c"model.flash", Mode::Update) };
+        for side in [Side::A, Side::B] {
+            let page = flash.page(side);
+            let read = flash.file.as_mut().is_some_and(|file| file.seek(side as usize * PAGE) && file.read(page));
+            if !read {
+                page.fill(0xff);
+            }
+        }
+        flash
+    }
+
+    fn page(&mut self, side: Side) -> &'static mut [u8; PAGE] {
+        // SAFETY: nothing else refers to this memory; `bytes` borrows from `self`, and so do the functions that change it.
+        unsafe { &mut *((ADDRESS + side as u32 * PAGE as u32) as *mut [u8; PAGE]) }
+    }
+
+    fn save(&mut self, side: Side, at: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        let saved = self.file.as_mut().is_none_or(|file| file.seek(side as usize * PAGE + at) && file.write(bytes));
+        if saved { Ok(()) } else { Err(FlashError) }
+    }
+}
+
+impl Pages for Flash {
+    fn bytes(&self, side: Side) -> &[u8; PAGE] {
+        // SAFETY: as above.
+        unsafe { &*((ADDRESS + side as u32 * PAGE as u32) as *const [u8; PAGE]) }
+    }
+
+    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
+        let page = self.page(side);
+        page.fill(0xff);
+        self.save(side, 0, page)
+    }
+
+    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+        let place = self.page(side).get_mut(at..at + WORD).ok_or(FlashError)?;
+        // Only an erased word can be written, as in flash.
+        if place != [0xff; WORD] {
+            return Err(FlashError);
+        }
+        place.copy_from_slice(&word);
+        self.save(side, at, &word)
+    }
+}
