@@ -6,7 +6,7 @@ use link::{Command, WireModel};
 use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
 use model::{
-    Config, ExtendedPlant, Input, OutOfRange, Output, Reading, SampleTime, ScaledStiffness, Settings, State, Volts,
+    Config, ExtendedPlant, Input, OutOfRange, Output, Reading, ScaledStiffness, Settings, State, Validated, Volts,
     estimator, extended,
 };
 
@@ -98,9 +98,10 @@ impl Control {
         supervision: &supervisor::Settings,
         last_fault: Option<Fault>,
     ) -> Result<Self, OutOfRange> {
-        let sample_time = settings.judge()?;
-        let supervisor = Supervisor::new(supervision.check(sample_time)?, last_fault);
-        let spring = Spring::Plain(Loop::new(settings, sample_time));
+        let settings = settings.validate()?;
+        let supervision = supervision.validate(settings.sample_time())?;
+        let supervisor = Supervisor::new(supervision.quantize(), last_fault);
+        let spring = Spring::Plain(Loop::new(settings));
         Ok(Self { spring, supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
     }
 
@@ -111,10 +112,9 @@ impl Control {
     /// [`OutOfRange`] names the invalid field of the model; the spring is not changed.
     pub fn use_model(&mut self, settings: &Settings, model: &WireModel) -> Result<(), OutOfRange> {
         let settings = Identified::new(settings, model);
-        let sample_time = settings.judge()?;
         self.spring = match &settings {
-            Identified::Plain(settings) => Spring::Plain(Loop::new(settings, sample_time)),
-            Identified::Extended(settings) => Spring::Extended(Loop::new(settings, sample_time)),
+            Identified::Plain(settings) => Spring::Plain(Loop::new(settings.validate()?)),
+            Identified::Extended(settings) => Spring::Extended(Loop::new(settings.validate()?)),
         };
         Ok(())
     }
@@ -124,7 +124,7 @@ impl Control {
     /// # Errors
     /// [`OutOfRange`] names the invalid field of the model.
     pub fn check(settings: &Settings, model: &WireModel) -> Result<(), OutOfRange> {
-        Identified::new(settings, model).judge().map(drop)
+        Identified::new(settings, model).check()
     }
 
     /// Enters the faulted state with `fault`. Call it before the first tick.
@@ -176,18 +176,18 @@ impl<'a> Identified<'a> {
         }
     }
 
-    fn judge(&self) -> Result<SampleTime, OutOfRange> {
+    fn check(&self) -> Result<(), OutOfRange> {
         match self {
-            Self::Plain(settings) => settings.judge(),
-            Self::Extended(settings) => settings.judge(),
+            Self::Plain(settings) => settings.validate().map(drop),
+            Self::Extended(settings) => settings.validate().map(drop),
         }
     }
 }
 
 impl<E: Estimator> Loop<E> {
     /// The controller at rest.
-    fn new<P: Model<Config = E>>(settings: &Settings<P>, sample_time: SampleTime) -> Self {
-        Self { config: settings.scaled(sample_time), state: State::default() }
+    fn new<P: Model<Config = E>>(settings: Validated<'_, Settings<P>>) -> Self {
+        Self { config: settings.quantize(), state: State::default() }
     }
 
     #[inline(always)]
@@ -196,7 +196,7 @@ impl<E: Estimator> Loop<E> {
             Decision::Rest => self.config.rest(&mut self.state, measured),
             Decision::Start(target) => {
                 // The initial condition is the steady state at a target of 0 V.
-                self.config.adopt(&mut self.state, Volts::ZERO);
+                self.config.bumpless_transfer(&mut self.state, Volts::ZERO);
                 self.timed(Input { target, measured }, stopwatch)
             }
             Decision::Pursue(target) => self.timed(Input { target, measured }, stopwatch),

@@ -11,7 +11,7 @@ use core::fmt;
 
 use heapless::Vec;
 use model::extended::{Law, Leakage, Memory, Relaxation};
-use model::extended::{lags::MOST_LAGS, law::MOST_POINTS, memory::MOST_PLAYS};
+use model::extended::{lags::MAX_LAGS, law::MAX_POINTS, memory::MAX_PLAYS};
 use model::{Amplifier, ExtendedPlant};
 use serde::{Deserialize, Serialize};
 
@@ -34,15 +34,15 @@ pub struct WireModel {
     /// Hysteresis as a bank of play operators.
     pub memory: Option<WireMemory>,
     /// Static nonlinearity: voltages and the stiffness at each, as equivalent static voltage, both in V.
-    pub law: Option<(List<MOST_POINTS>, List<MOST_POINTS>)>,
+    pub law: Option<(List<MAX_POINTS>, List<MAX_POINTS>)>,
     /// Charge leakage: share of the response that decays, and its time constant in s.
     pub leakage: Option<(f64, f64)>,
     /// Feedthrough: share of a step response that is instantaneous.
     pub share: f64,
     /// Time constants of the relaxation, in s.
-    pub time_constants_s: List<MOST_LAGS>,
+    pub time_constants_s: List<MAX_LAGS>,
     /// Share of the step response of each time constant.
-    pub weights: List<MOST_LAGS>,
+    pub weights: List<MAX_LAGS>,
     /// First time constant at 500 V, in s, if it depends on the voltage.
     pub time_constant_high_s: Option<f64>,
     /// Identified maximum voltage of the amplifier, in V.
@@ -57,9 +57,9 @@ pub struct WireMemory {
     /// Weight of the voltage without hysteresis.
     pub direct: f64,
     /// Half width of each play operator, in V.
-    pub thresholds_v: List<MOST_PLAYS>,
+    pub thresholds_v: List<MAX_PLAYS>,
     /// Weight of each play operator.
-    pub weights: List<MOST_PLAYS>,
+    pub weights: List<MAX_PLAYS>,
 }
 
 /// Identity of a model on an MCU. The default value is the built-in model.
@@ -124,7 +124,7 @@ impl WireModel {
 
     /// `amplifier` with the identified limits where they are stricter.
     pub fn behind(&self, amplifier: Amplifier) -> Amplifier {
-        amplifier.found_with(self.limit_v, self.slew_v_per_s)
+        amplifier.limited_to(self.limit_v, self.slew_v_per_s)
     }
 
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the largest model.
@@ -179,7 +179,7 @@ mod tests {
 
     /// A model with every list at its maximum length.
     fn largest() -> WireModel {
-        let (points, plays, lags) = ([1.5; MOST_POINTS], [2.5; MOST_PLAYS], [3.5; MOST_LAGS]);
+        let (points, plays, lags) = ([1.5; MAX_POINTS], [2.5; MAX_PLAYS], [3.5; MAX_LAGS]);
         let plant = ExtendedPlant {
             memory: Some(Memory { direct: 0.5, thresholds_v: &plays, weights: &plays }),
             law: Some(Law { voltage_v: &points, stiffness: &points }),
