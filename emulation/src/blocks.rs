@@ -1,5 +1,5 @@
-//! Instructions a tick for each kind of spring under each controller: counted in one run by `firmware/examples/blocks.rs`,
-//! every run's digest held against this machine's.
+//! `cargo xtask emulate --blocks`: instructions per tick for each kind of spring under each controller. One run of
+//! `firmware/examples/blocks.rs` counts them; the digest of each combination is compared with the host's.
 
 use anyhow::{Result, ensure};
 use firmware::blocks::{CONTROLLERS, SPRINGS, run as on_this_machine};
@@ -10,10 +10,10 @@ use xtask::build::Opt;
 
 use crate::qemu::emulator;
 
-/// Mean and most instructions of a tick, a row a spring, a column a controller.
+/// Mean and largest number of instructions per tick: one row for each spring, one column for each controller.
 type Table = Vec<[(u32, u32); CONTROLLERS.len()]>;
 
-/// `cargo xtask emulate --blocks`.
+/// Counts and prints the table. A digest that differs from the host's is an error.
 pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
     let counted = count(opt)?;
     if as_json {
@@ -40,7 +40,7 @@ fn count(opt: Opt) -> Result<Table> {
 }
 
 fn table(opt: Opt, counted: &Table) -> String {
-    let head = format!("instructions a tick, opt-level {}: mean, most", opt.name());
+    let head = format!("instructions/tick, opt-level {}: mean, max", opt.name());
     let mut text = format!("{head:<44}");
     for (name, _) in CONTROLLERS {
         text += &format!("{name:>14}");
@@ -53,7 +53,7 @@ fn table(opt: Opt, counted: &Table) -> String {
         }
         text.push('\n');
     }
-    text + "every code and estimate as on this machine\n"
+    text + "every code and estimate as on the host\n"
 }
 
 fn report(opt: Opt, counted: &Table) -> Value {

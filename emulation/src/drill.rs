@@ -1,7 +1,7 @@
-//! Fault drills: each mishap under QEMU, its decoded log held against the one that was read and approved.
+//! `cargo xtask drill`: injects each fault under QEMU and compares the decoded log with the approved one.
 //!
-//! Whether the voltage went away is not taken from the log but from the DAC's wire. The approved logs are in
-//! `firmware/drills/`; what depends on the build (revision, line numbers, lateness, digest, counts) stands there as `_`.
+//! That the voltage goes away is checked on the DAC's wire, not in the log. The approved logs are in `firmware/drills/`; values
+//! that depend on the build (revision, line numbers, lateness, digest, counts) are replaced by `_`.
 
 use std::fmt::Write;
 use std::fs;
@@ -25,13 +25,13 @@ pub(crate) struct Args {
     bless: bool,
 }
 
-/// `cargo xtask drill`.
+/// Builds the image and runs every drill.
 pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
     all(&build::image(Board::Mps2, Opt::S)?, args.bless)
 }
 
-/// Every drill; an error names the first that fails.
+/// Runs every drill. An error names the first that fails.
 pub(crate) fn all(elf: &Path, bless: bool) -> Result<()> {
     for mishap in Mishap::ALL {
         let name = mishap.name();
@@ -65,51 +65,52 @@ fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
     Ok(())
 }
 
-/// Ticks from the mishap until no voltage may leave any more.
+/// Most ticks from the injected fault until the output is zero and disabled for good.
 fn grace(mishap: Mishap) -> usize {
     match mishap {
-        // Not one more code.
+        // No further code.
         Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow | Mishap::Interlock => 0,
-        // The tick that takes too long still ends; the next one finds it out.
+        // The tick that overruns still ends; the next one detects it.
         Mishap::Overrun => 1,
-        // Nothing is written while the control task hangs; the next write is the zero of who finds it.
+        // Nothing is written while the control task hangs; the next write is the zero after its detection.
         Mishap::Hang | Mishap::Deaf => 0,
-        // The roll call is found incomplete after 50 ms and what was on its way.
+        // The task watchdog detects the stalled task after 50 ms and its own period.
         Mishap::Stall => 65,
-        // 500 ms of patience, then 300 V at 700 V/s.
+        // A time-out of 500 ms, then a ramp of 300 V at 700 V/s.
         Mishap::Silence => 500 + 430,
     }
 }
 
-/// How long a task may hang; its wire does not tell, because nothing is written meanwhile.
+/// Longest time that a task may hang before the fault, in us. The wire cannot show it, because nothing is written meanwhile.
 fn patience_us(mishap: Mishap) -> Option<u64> {
     match mishap {
         Mishap::Hang => Some(u64::from(LONGEST_HANG_MS) * 1000),
-        // The watchdog's first bite.
+        // The hardware watchdog.
         Mishap::Deaf => Some(100_000),
         _ => None,
     }
 }
 
-/// The fault comes that soon after the mishap, which has its place in time from the tick that armed.
+/// An error unless the fault is logged within `limit_us` after its injection, whose time is counted from the tick that armed.
 fn found_within(log: &[Line], limit_us: u64) -> Result<()> {
     let time = |is: fn(&Event) -> bool| log.iter().find(|line| is(&line.event)).and_then(|line| line.time_us);
     let armed = time(|event| matches!(event, Event::State { to, .. } if to == "armed")).context("never armed")?;
     let fault = time(|event| matches!(event, Event::Fault { .. })).context("no fault")?;
     let mishap = armed + u64::from(MISHAP_TICK - ARM_TICK) * 1000;
     let hung = fault.saturating_sub(mishap);
-    // The log is a little later than what it tells of.
+    // A log line is written up to 1 ms after the event.
     ensure!(hung <= limit_us + 1000, "the control task hangs for {hung} us");
     Ok(())
 }
 
-/// Zero before arming, voltage until the mishap, zero after it; voltage again only where somebody armed again.
+/// An error unless the output is zero before arming, carries voltage until the fault, is zero after it, and carries voltage again
+/// only in the drills that arm a second time.
 fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
     // One zero is written before the first tick.
     let (armed, mishap_at) = (1 + ARM_TICK as usize, 1 + MISHAP_TICK as usize);
     let gone = mishap_at + grace(mishap);
     let rearmed = matches!(mishap, Mishap::Interlock | Mishap::Overrun);
-    // An overrun of 8 ms leaves out that many ticks, not orders.
+    // An overrun of 8 ms skips ticks but no command.
     let again = if rearmed { 1 + 1300 } else { dac.len() };
     ensure!(dac.len() > gone + 100, "the wire ends after {} writes", dac.len());
     let zero = |from: usize, to: usize| match dac[from..to].iter().position(|written| *written != SAFE) {
@@ -118,15 +119,15 @@ fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
     };
     zero(0, armed)?;
     let driven = |from: usize, to: usize| dac[from..to].iter().all(|written| written.enabled && written.code > 0);
-    ensure!(driven(armed, mishap_at), "no voltage before the mishap, so that the drill shows nothing");
+    ensure!(driven(armed, mishap_at), "no voltage before the fault, so that the drill shows nothing");
     zero(gone, again)?;
-    ensure!(again == dac.len() || driven(again, dac.len()), "arming again is to work");
+    ensure!(again == dac.len() || driven(again, dac.len()), "no voltage after arming again");
     Ok(())
 }
 
-/// Log and wire, without what depends on the build.
+/// Log and wire as text, values that depend on the build replaced by `_`.
 fn golden_text(mishap: Mishap, run: &Run) -> String {
-    // When a task is missed depends on where it was in its own 10 ms.
+    // The tick of the detection depends on the phase of the stalled task's period of 10 ms.
     let any_tick = mishap == Mishap::Stall;
     let mut text = String::new();
     for line in run.log.iter().map(emulator::text) {
@@ -161,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_code_too_many_is_found() {
+    fn a_voltage_after_the_fault_is_an_error() {
         let on = Written { code: 1755, enabled: true };
         let wire = |driven: usize| [vec![SAFE; 11], vec![on; driven], vec![SAFE; 1200]].concat();
         voltage_goes(Mishap::Panic, &wire(290)).unwrap();

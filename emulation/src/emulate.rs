@@ -1,4 +1,4 @@
-//! The stair under QEMU, held against the same code on this machine; or a board that a host commands.
+//! `cargo xtask emulate`: the stair under QEMU compared with the same code on the host, or a board that a host commands.
 
 use std::path::PathBuf;
 
@@ -18,23 +18,23 @@ pub(crate) struct Args {
     /// Print the result as JSON; the log goes to stderr
     #[arg(long)]
     json: bool,
-    /// Play nothing: wait for `vsj link unix:PATH` on this socket until Ctrl-C
+    /// Run no script: wait for `vsj link unix:PATH` on this socket until Ctrl-C
     #[arg(long, value_name = "PATH", conflicts_with = "json")]
     link: Option<PathBuf>,
     #[command(flatten)]
     variant: Variant,
-    /// Count instructions a tick of this controller beside those of other crates and of double precision
+    /// Count instructions per tick of this controller, of other crates and of double precision
     #[arg(long, conflicts_with = "link")]
     rivals: bool,
-    /// Count instructions a tick for each kind of spring under each controller
+    /// Count instructions per tick for each kind of spring under each controller
     #[arg(long, conflicts_with_all = ["link", "rivals"])]
     blocks: bool,
-    /// What the optimiser aims at
+    /// Goal of the optimiser
     #[arg(long, value_enum, default_value = "s")]
     opt: Opt,
 }
 
-/// `cargo xtask emulate`.
+/// Runs the stair, a count of instructions or a board for a host, and prints the result.
 pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
     if args.rivals {

@@ -1,4 +1,4 @@
-//! What the emulated firmware must show, as a step of `cargo xtask test`.
+//! `cargo xtask proof`: all that the emulated firmware must show, as a step of `cargo xtask test`.
 
 use anyhow::{Context, Result, ensure};
 
@@ -10,12 +10,12 @@ use crate::qemu::comparison::Comparison;
 use crate::qemu::emulator;
 use crate::{drill, rivals, talk};
 
-/// Most instructions that one tick of the model may take.
+/// Most instructions that one tick of the model may need.
 const MOST_INSTRUCTIONS: u32 = 150;
-/// Runs that must be the host's, bit for bit.
+/// Scripts whose codes and estimates must be the host's, bit for bit.
 const RUNS: [&str; 3] = ["stair", "random 1", "random 20261121"];
 
-/// Everything; each line of the result on stderr.
+/// Runs every check at both opt-levels and prints a line for each to stderr.
 pub(crate) fn run() -> Result<()> {
     for opt in Opt::ALL {
         let elf = build::image(Board::Mps2, opt)?;
@@ -43,7 +43,7 @@ fn bit_for_bit(elf: &std::path::Path, script: &str) -> Result<()> {
     let [min, mean, max] = comparison.instructions;
     ensure!(max <= MOST_INSTRUCTIONS, "{max} instructions in a tick, expected at most {MOST_INSTRUCTIONS}");
     eprintln!(
-        "{script}: {} ticks in {:.1} s, none missed, {:016x} as on the host, {min} to {max} instructions a tick, mean {mean}",
+        "{script}: {} ticks in {:.1} s, none missed, {:016x} as on the host, {min} to {max} instructions per tick, mean {mean}",
         comparison.ticks,
         run.took.as_secs_f64(),
         comparison.target_digest,

@@ -1,4 +1,5 @@
-//! Instructions a tick, beside what one could run instead: counted in one run by `firmware/examples/rivals.rs`.
+//! `cargo xtask emulate --rivals`: instructions per tick, compared with other controllers. One run of
+//! `firmware/examples/rivals.rs` counts them.
 
 use anyhow::{Result, ensure};
 use serde_json::{Value, json};
@@ -6,7 +7,7 @@ use xtask::build::Opt;
 
 use crate::qemu::emulator::{self, Run};
 
-/// The first is this controller; names as in the example.
+/// Name in the example and description of each controller. The first is this project's.
 const CONTENDERS: [(&str, &str); 5] = [
     ("tick", "this controller, the whole tick"),
     ("tick_f64", "the whole tick in f64"),
@@ -14,7 +15,7 @@ const CONTENDERS: [(&str, &str); 5] = [
     ("pid", "pid, f32: PI only"),
     ("discrete_pid", "discrete_pid, f32: PI only"),
 ];
-/// Where all must arrive, and how close, in mV: single precision is no better.
+/// Voltage that every controller must reach, in mV, and its tolerance, which single precision needs.
 const END_MV: i32 = 300_000;
 const TOLERANCE_MV: i32 = 100;
 
@@ -27,7 +28,7 @@ pub(crate) struct Row {
     max: u32,
 }
 
-/// `cargo xtask emulate --rivals`.
+/// Counts and prints the table.
 pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
     let rows = count(opt)?;
     if as_json {
@@ -38,7 +39,7 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
     Ok(())
 }
 
-/// Every contender, this controller first.
+/// Counts the instructions of every controller. A controller that does not reach the voltage is an error.
 pub(crate) fn count(opt: Opt) -> Result<Vec<Row>> {
     let run = emulator::count("rivals", "mps2-an386", opt)?;
     CONTENDERS.iter().map(|(name, what)| row(name, what, &run)).collect()
@@ -51,13 +52,13 @@ fn row(name: &'static str, what: &'static str, run: &Run) -> Result<Row> {
     Ok(Row { name, what, min: values.get("min")?, mean: values.get("mean")?, max: values.get("max")? })
 }
 
-/// By the mean.
+/// Ratio of the mean number of instructions to that of the first row.
 fn to_ours(row: &Row, rows: &[Row]) -> f64 {
     f64::from(row.mean) / f64::from(rows[0].mean)
 }
 
 pub(crate) fn table(opt: Opt, rows: &[Row]) -> String {
-    let head = format!("instructions a tick, opt-level {}", opt.name());
+    let head = format!("instructions per tick, opt-level {}", opt.name());
     let mut text = format!("{head:<36}{:>7}{:>7}{:>7}{:>10}\n", "min", "mean", "max", "to ours");
     for row @ Row { what, min, mean, max, .. } in rows {
         text += &format!("{what:<36}{min:>7}{mean:>7}{max:>7}{:>10.2}\n", to_ours(row, rows));

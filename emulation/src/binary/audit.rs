@@ -1,9 +1,9 @@
-//! What must not be in an image, looked up in the image itself.
+//! Checks of an image's machine code:
 //!
-//! - From the control tick no call leads to a panic, directly or through others, and none goes to an unknown place; nothing
-//!   in it is an undefined instruction.
-//! - No float in it: neither a call of the compiler's own arithmetic nor an instruction of the float unit.
-//! - No allocator.
+//! - No call from the control tick leads to a panic, directly or through other functions, and none has an unknown target. The
+//!   tick contains no undefined instruction.
+//! - The tick uses no floats: it calls no float arithmetic of the compiler's and has no instruction of the float unit.
+//! - The image has no allocator.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,16 +12,16 @@ use anyhow::{Context, Result, bail, ensure};
 use super::elf::{self, Function};
 use super::thumb::Code;
 
-/// The function that must not panic, as its demangled name begins and ends.
+/// Beginning and end of the demangled name of the function that must not panic.
 const TICK: (&str, &str) = ("firmware::control::Control", "tick");
 
-/// All checks; returns how many functions the tick consists of.
+/// Runs all checks. Returns the number of functions that the tick consists of, its callees included.
 pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
     let functions = elf::functions(bytes)?;
     if let Some(found) = functions.iter().find(|f| is_heap(&f.name)) {
         bail!("`{}` is an allocator's", found.name);
     }
-    // A search that finds nothing because names look different would pass everything.
+    // Otherwise a change of names would make every check pass.
     ensure!(functions.iter().any(|f| is_panic(&f.name)), "the image has no panic at all: have names changed?");
     ensure!(functions.iter().any(|f| is_float(&f.name)), "the image has no float at all: have names changed?");
     let code = Code::new(bytes)?;
@@ -41,7 +41,7 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
         let shape = code.shape(function).with_context(|| format!("in {}", function.name))?;
         ensure!(!shape.floats, "a float's instruction in {path}");
         ensure!(!shape.traps, "an undefined instruction in {path}");
-        ensure!(!shape.calls_by_register, "{path} calls through a register: that may lead anywhere");
+        ensure!(!shape.calls_by_register, "{path} calls through a register, whose target is unknown");
         for target in shape.calls {
             let callee = by_address.get(&target).with_context(|| format!("{path} calls {target:#x}, no function"))?;
             open.push((callee, format!("{path} -> {}", callee.name)));
@@ -50,7 +50,7 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
     Ok(seen.len())
 }
 
-/// The control tick, as often as it was compiled.
+/// Every compiled instance of the control tick. None is an error.
 pub(crate) fn ticks(functions: &[Function]) -> Result<Vec<&Function>> {
     let is_tick =
         |f: &&Function| f.name.trim_start_matches('<').starts_with(TICK.0) && plain(&f.name).ends_with(TICK.1);
@@ -59,7 +59,7 @@ pub(crate) fn ticks(functions: &[Function]) -> Result<Vec<&Function>> {
     Ok(ticks)
 }
 
-/// Without generic arguments at the end.
+/// A function's name without generic arguments at its end.
 fn plain(name: &str) -> &str {
     name.split_once("::<").map_or(name, |(name, _)| name)
 }
@@ -76,7 +76,7 @@ fn is_heap(name: &str) -> bool {
         .any(|start| name.starts_with(start))
 }
 
-/// Of the arithmetic that the compiler brings along: by its own name, or by that of ARM's run-time interface.
+/// Whether a function is float arithmetic of the compiler's, by its own name or by its name in ARM's run-time ABI.
 fn is_float(name: &str) -> bool {
     ["compiler_builtins::float", "compiler_builtins::math", "libm::"].iter().any(|part| name.contains(part))
         || name
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn floats_are_told_by_name() {
+    fn float_arithmetic_is_recognised_by_name() {
         for name in
             ["__aeabi_dmul", "__aeabi_fadd", "__aeabi_ui2d", "__aeabi_d2iz", "compiler_builtins::float::mul::__muldf3"]
         {

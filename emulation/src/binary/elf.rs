@@ -1,4 +1,4 @@
-//! What an image is made of.
+//! Symbols and sections of an image.
 
 use anyhow::{Context, Result};
 use object::elf::{FileHeader32, SHF_ALLOC};
@@ -7,7 +7,7 @@ use object::{Endianness, Object, ObjectSection, ObjectSymbol};
 
 type Header = FileHeader32<Endianness>;
 
-/// Bytes of static memory.
+/// Bytes of static variables in RAM.
 pub(crate) fn ram(elf: &[u8]) -> Result<u32> {
     let header = Header::parse(elf)?;
     let endian = header.endian()?;
@@ -21,14 +21,14 @@ pub(crate) fn ram(elf: &[u8]) -> Result<u32> {
     Ok(total)
 }
 
-/// A function of the image.
+/// A function of the image: demangled name, address, size in bytes.
 pub(crate) struct Function {
     pub(crate) name: String,
     pub(crate) address: u32,
     pub(crate) size: u32,
 }
 
-/// Every function, sorted by address; names as rustc shows them, without the hash.
+/// Every function, sorted by address. Names are demangled and have no hash.
 pub(crate) fn functions(elf: &[u8]) -> Result<Vec<Function>> {
     let file = object::File::parse(elf)?;
     let mut functions: Vec<Function> = file
@@ -44,21 +44,21 @@ pub(crate) fn functions(elf: &[u8]) -> Result<Vec<Function>> {
     Ok(functions)
 }
 
-/// The value of a symbol.
+/// The address of a symbol. A missing one is an error.
 pub(crate) fn symbol(elf: &[u8], name: &str) -> Result<u32> {
     let file = object::File::parse(elf)?;
     let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
     Ok(symbol.with_context(|| format!("no symbol {name}"))?.address() as u32)
 }
 
-/// First address of a section and the one behind its last.
+/// The address of a section's first byte and that behind its last. A missing section is an error.
 pub(crate) fn range(elf: &[u8], name: &str) -> Result<(u32, u32)> {
     let file = object::File::parse(elf)?;
     let section = file.section_by_name(name).with_context(|| format!("no section {name}"))?;
     Ok((section.address() as u32, (section.address() + section.size()) as u32))
 }
 
-/// Where data (true) and code begin within the code, sorted: ARM's mapping symbols.
+/// Addresses at which data (true) or code (false) begins, sorted: ARM's mapping symbols `$d` and `$t`.
 pub(crate) fn marks(elf: &[u8]) -> Result<Vec<(u32, bool)>> {
     let file = object::File::parse(elf)?;
     let mut marks: Vec<(u32, bool)> = file

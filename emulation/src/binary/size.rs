@@ -1,4 +1,4 @@
-//! How large the images are, and how deep their stack gets.
+//! `cargo xtask size`: flash, RAM and greatest stack depth of each image, with bounds for all three.
 
 use std::fmt;
 
@@ -11,14 +11,14 @@ use xtask::variant::{Controller, Variant};
 
 use super::{elf, stack};
 
-/// Bytes of flash that an image may take, of 512 KB.
+/// Most bytes of flash that an image may use, of the 512 KB on the chip.
 const fn most_flash(controller: Controller) -> u32 {
     match controller {
         Controller::Paper => 64 << 10,
         Controller::Fast => 96 << 10,
     }
 }
-/// Bytes of RAM that any may take, stack included.
+/// Most bytes of RAM that any image may use, stack included.
 const MOST_RAM: u32 = 16 << 10;
 
 /// Options of `cargo xtask size`.
@@ -29,12 +29,12 @@ pub(crate) struct Args {
     json: bool,
     #[command(flatten)]
     variant: Variant,
-    /// Of images with a stiffness sensor in the loop, for which the bounds are the same
+    /// Measure images with a stiffness sensor in the loop; the bounds are the same
     #[arg(long)]
     feedback: bool,
 }
 
-/// One image.
+/// Sizes of one image, in bytes.
 pub(crate) struct Size {
     board: Board,
     flash: u32,
@@ -44,7 +44,7 @@ pub(crate) struct Size {
     worst: u32,
 }
 
-/// `cargo xtask size`.
+/// Measures the image of each board and prints the table. An image above a bound is an error.
 pub(crate) fn run(args: &Args) -> Result<()> {
     let features: &[&str] = if args.feedback { &["feedback"] } else { &[] };
     let sizes =
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     sizes.iter().try_for_each(Size::check)
 }
 
-/// Builds and measures one image with these features of the firmware's, beside those that it needs.
+/// Builds and measures the image of a variant on one board, with further features of the package `firmware`.
 pub(crate) fn measure(variant: Variant, features: &[&str], board: Board) -> Result<Size> {
     let path = build::image_with(&[&variant.features(), features].concat(), board, Opt::S)?;
     let bytes = build::read(&path)?;
@@ -74,7 +74,7 @@ pub(crate) fn measure(variant: Variant, features: &[&str], board: Board) -> Resu
 }
 
 impl Size {
-    /// An error that names the bound that is not kept.
+    /// An error that names the first bound that is exceeded.
     pub(crate) fn check(&self) -> Result<()> {
         let Self { board, flash, most_flash, statics, stack, worst } = self;
         let (name, ram) = (board.name(), statics + stack);

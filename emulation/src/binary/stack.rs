@@ -1,12 +1,12 @@
-//! How deep the stack can get, from the image itself: the frame of every function, and the deepest chain of calls.
+//! The greatest depth of the stack, computed from the machine code: the frame of every function and the deepest chain of calls.
 //!
-//! Interrupts nest, so the deepest handler of each level comes on top of the thread, each with the registers that the
-//! processor saves. A call through a register may lead to any function that nobody calls by name: from a handler's own
-//! code (an executor's) to a task, from anywhere else (a waker, a formatter) to anything but a task. That is an
-//! assumption, as is that such a call is not followed by another one of its kind; the rest is counted.
+//! Interrupts nest, so the deepest handler of each level is added to the thread, each with the registers that the processor saves.
+//! A call through a register may reach any function that no other function calls directly: from a handler's own code (an
+//! executor) a task, from anywhere else (a waker, a formatter) any function but a task. This is an assumption, and so is that
+//! such a call is not followed by another one of its kind.
 //!
-//! Who stops the program turns interrupts off first: nothing nests above that, so it is counted once for all levels, and
-//! once more for a panic meanwhile.
+//! The function that stops the program disables interrupts first, so nothing nests above it: it is counted once for all levels,
+//! and once more for a panic inside it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,24 +15,24 @@ use anyhow::{Context, Result, bail};
 use super::elf::{self, Function};
 use super::thumb::{Code, Shape};
 
-/// Bytes at the lower end that must not be touched, see the firmware's `stack_guard`.
+/// Size of the guard region at the stack's lower end, in bytes: see the firmware's `stack_guard`.
 pub(crate) const GUARD: u32 = 256;
-/// A task, as its executor calls it.
+/// Part of the name of the function through which an executor calls a task.
 const POLL: &str = "TaskStorage<F>::poll";
-/// What the processor saves at an interrupt, float registers and alignment included.
+/// Bytes that the processor saves at an interrupt, float registers and alignment included.
 const SAVED: u32 = 104 + 4;
-/// Recursive on purpose: the drill that uses the stack up.
+/// Name of the function that recurses on purpose, in the drill of a stack overflow.
 const DRILL: &str = "deeper";
-/// What every panic goes through.
+/// Path of the functions that every panic passes through.
 const PANIC: &str = "core::panicking";
-/// Turns interrupts off, says why, resets.
+/// The function that disables interrupts, logs the cause and resets.
 const STOP: &str = "firmware::stop::stop";
-/// Starts again from the stack's top.
+/// The function that continues at the top of the stack.
 const FRESH: &str = "firmware::stop::on_fresh_stack";
 /// Interrupt levels that can nest, deepest handlers first: SysTick, alarm, control, line, tasks below, NMI.
 const LEVELS: usize = 6;
 
-/// The most that thread and handlers take together.
+/// The greatest depth of the stack of thread and nested handlers together, in bytes. Unexpected recursion is an error.
 pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
     let code = Code::new(elf)?;
     let functions = elf::functions(elf)?;
@@ -40,7 +40,7 @@ pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
         functions.iter().map(|f| Ok((f.address, code.shape(f)?))).collect::<Result<_>>()?;
     let called: BTreeSet<u32> = shapes.values().flat_map(|shape| shape.calls.iter().copied()).collect();
     let vectors = vectors(elf, &code)?;
-    // What can stand behind a register: nobody calls it by name, and the processor does not start it.
+    // Possible targets of calls through a register: not called directly, and not in the vector table.
     let free: Vec<u32> = functions
         .iter()
         .map(|f| f.address)
@@ -78,7 +78,7 @@ pub(crate) fn worst(elf: &[u8]) -> Result<u32> {
     Ok(nested.max(depth_of(FRESH)?) + stopping)
 }
 
-/// Everything that the processor may start.
+/// The addresses in the vector table: the functions that the processor starts.
 fn vectors(elf: &[u8], code: &Code) -> Result<BTreeSet<u32>> {
     let (start, end) = elf::range(elf, ".vector_table")?;
     (start + 4..end).step_by(4).map(|at| Ok(code.word(at)? & !1)).collect()
@@ -92,14 +92,14 @@ struct Depths<'a> {
 
 impl Depths<'_> {
     fn of(&self, address: u32, path: &mut Vec<u32>) -> Result<u32> {
-        // Not a function with a size: a few lines of assembly without a frame.
+        // Assembly without a size in the symbol table: it has no frame.
         let Some(shape) = self.shapes.get(&address) else { return Ok(0) };
         if [FRESH, STOP].contains(&self.name(address)) && !path.is_empty() {
             return Ok(0);
         }
         if path.contains(&address) {
             let name = self.name(address);
-            // A panic while panicking: `worst` counts it, and it only resets.
+            // A panic inside a panic only resets, and `worst` adds it.
             let panicking = path.iter().any(|address| self.name(*address).contains(PANIC));
             if name.contains(DRILL) || panicking {
                 return Ok(0);

@@ -1,4 +1,4 @@
-//! As much of the Thumb instructions as it takes to see where a function calls, and how much stack it takes.
+//! Decodes those Thumb instructions that show which functions a function calls and how much stack it uses.
 
 use anyhow::{Context, Result};
 
@@ -9,22 +9,22 @@ use super::elf::{self, Function};
 /// The code of an image.
 pub(crate) struct Code {
     flash: Flash,
-    /// Address and whether data begins there; the rest is code.
+    /// Address, and whether data or code begins there: see [`elf::marks`].
     marks: Vec<(u32, bool)>,
 }
 
-/// What a function does outside of itself.
+/// Calls and stack use of one function.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Shape {
-    /// Addresses that it calls or jumps to.
+    /// Addresses outside of the function that it calls or jumps to.
     pub(crate) calls: Vec<u32>,
-    /// A call whose target is not in the code.
+    /// Whether it calls through a register, so that the target is unknown.
     pub(crate) calls_by_register: bool,
-    /// An instruction of the float unit.
+    /// Whether it contains an instruction of the float unit.
     pub(crate) floats: bool,
-    /// An instruction that is undefined for ever.
+    /// Whether it contains a permanently undefined instruction (UDF).
     pub(crate) traps: bool,
-    /// Bytes of stack: everything that is ever taken, as if all at once.
+    /// Bytes of stack: the sum of all reservations in the function, an upper bound.
     pub(crate) frame: u32,
 }
 
@@ -41,7 +41,7 @@ impl Code {
         half().with_context(|| format!("code at {address:#x} outside of the flash"))
     }
 
-    /// The word at an address of the flash.
+    /// The 32-bit word at an address of the flash. An address outside of it is an error.
     pub(crate) fn word(&self, address: u32) -> Result<u32> {
         Ok(u32::from(self.read(address)?) | u32::from(self.read(address + 2)?) << 16)
     }
@@ -51,7 +51,7 @@ impl Code {
         next > 0 && self.marks[next - 1].1
     }
 
-    /// Reads a function.
+    /// Decodes all instructions of a function.
     pub(crate) fn shape(&self, function: &Function) -> Result<Shape> {
         let mut shape = Shape::default();
         let mut at = function.address;
@@ -129,7 +129,8 @@ impl Shape {
     }
 }
 
-/// A modified immediate: a byte, or a byte with its first bit set and rotated.
+/// The value of a modified immediate constant (ARMv7-M manual, A5.3.2): a repeated byte, or a byte with its first bit set,
+/// rotated.
 fn modified(immediate: u32) -> u32 {
     let byte = immediate & 0xff;
     match immediate >> 8 {
@@ -141,7 +142,7 @@ fn modified(immediate: u32) -> u32 {
     }
 }
 
-/// The lower `bits` bits as a signed number.
+/// Sign-extends the lower `bits` bits.
 fn sign(value: u32, bits: u32) -> i32 {
     (value << (32 - bits)) as i32 >> (32 - bits)
 }
@@ -157,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn calls_and_jumps_are_read_as_the_processor_does() {
+    fn targets_of_calls_and_jumps_are_decoded() {
         // bl .+4+0x10; bl .+4-0x20; bx lr
         assert_eq!(shape(&[0xf000, 0xf808, 0xf7ff, 0xfff0, 0x4770]).calls, [0x114, 0xe8]);
         // b.w .+4+0x100; a short jump within
@@ -167,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn floats_and_traps_are_seen() {
+    fn float_and_undefined_instructions_are_found() {
         // vmul.f32 s0, s0, s1; vldr d0, [r0]; vmov r0, s0; vcvt.f32.s32 s0, s0
         for float in [[0xee20, 0x0a20], [0xed90, 0x0b00], [0xee10, 0x0a10], [0xeeb8, 0x0ac0]] {
             assert!(shape(&float).floats, "{float:x?}");
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_add_up() {
+    fn frame_is_the_sum_of_all_stack_reservations() {
         // push {r4, r5, r7, lr}; sub sp, #8
         assert_eq!(shape(&[0xb5b0, 0xb082]).frame, 24);
         // push.w {r4-r11, lr}; vpush {d8, d9}; sub.w sp, sp, #1024; str r11, [sp, #-4]!

@@ -1,7 +1,7 @@
-//! The host at the line of the flashable image: what it sends and when, and what must come of it.
+//! The run with a host at the serial line: what it sends and when, and the codes and answers that must follow.
 //!
-//! Which tick took an order is told by the answer alone: it leaves right after that tick. From there on the host's own
-//! model says every code.
+//! The time of an answer shows which tick followed a request: the answer leaves right after that tick. From there on the code on
+//! the host predicts every DAC code.
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::control::{Control, Orders, Senses, Untimed};
@@ -16,12 +16,12 @@ use xtask::variant::Variant;
 use super::events::{Event, Events};
 use crate::variant;
 
-/// A byte at 115 200 bit/s, in us.
+/// Duration of a byte at 115 200 bit/s, in us.
 const BYTE_US: f64 = 1e7 / 115_200.0;
-/// Two targets, in V; under the time-optimal controller the voltage is back inside its range before the second.
+/// Two targets, in V. Under the time-optimal controller the voltage leaves the amplifier's limit before the second.
 const TARGETS_V: [f64; 2] = [100.0, 60.0];
 
-/// What is sent, and when, in us. After the last one the host is silent.
+/// Time in us and request of each frame. After the last one the host is silent.
 fn schedule() -> Vec<(u32, Request)> {
     let set = |volts| Request::Set(Desired::ScaledVolts(volts));
     vec![
@@ -37,14 +37,14 @@ fn schedule() -> Vec<(u32, Request)> {
     ]
 }
 
-/// The schedule as frames in hex, each under its place in the schedule as its number.
+/// The schedule as JSON: time in us and frame in hex. A frame's sequence number is its index.
 pub(super) fn frames() -> Value {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     let frame = |(number, (us, request))| json!([us, hex(Frame::new(Sequence(number), &request).as_bytes())]);
     (0..).zip(schedule()).map(frame).collect()
 }
 
-/// Every answer is the expected one, and every code of every tick the host's for `variant`. Says what was seen.
+/// An error unless every answer is the expected one and every DAC code is the host's for `variant`. Returns a line for the report.
 pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     let (_, ticking) = events.split("watchdog started")?;
     let written = written(&ticking)?;
@@ -57,7 +57,7 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
         ensure!(sequence.0 == number, "answer {} to request {number}", sequence.0);
         let next = written.iter().position(|(at, ..)| at > us).context("no tick after an answer")?;
         let tick = match request {
-            // Carried out before it is answered; all else is answered at once, and the next tick hears of it.
+            // Followed before it is answered. All other requests are answered first, and the next tick processes them.
             Request::Arm | Request::Set(_) => next - 1,
             _ => next,
         };
@@ -81,7 +81,7 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     }
     let driven = on_host.iter().filter(|(code, enabled)| *enabled && *code > 0).count();
     ensure!(driven > 1000, "{driven} ticks with voltage show little");
-    // A run that is all limit, or the same in every image, would show nothing of this one.
+    // Codes at the limit, or the same in every image, would not distinguish this image.
     let highest = (1u16 << variant::settings(variant).amplifier.dac_bits) - 1;
     let inside = on_host.iter().filter(|(code, enabled)| *enabled && (1..highest).contains(code)).count();
     ensure!(inside > 500, "{inside} codes inside of the range show little");
@@ -101,7 +101,7 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     ))
 }
 
-/// Code and enable of every tick, as this machine has them for `variant`.
+/// Code and enable of every tick, computed on the host for `variant`.
 fn drives(variant: Variant, orders: &[Orders]) -> Result<Vec<(u16, bool)>> {
     let mut control = Control::new(&variant::settings(variant), &SUPERVISION, None)?;
     let senses = Senses { interlock_closed: true, ..Senses::default() };
@@ -109,7 +109,7 @@ fn drives(variant: Variant, orders: &[Orders]) -> Result<Vec<(u16, bool)>> {
     Ok(orders.iter().map(drive).map(|drive| (drive.code().0, drive.enabled())).collect())
 }
 
-/// What the MCU says after `request`.
+/// An error unless `reply` is the right answer to `request`.
 fn expect(number: u16, request: &Request, reply: &Reply, variant: Variant) -> Result<()> {
     let target = |volts: f64| Reply::Ack { state: State::Armed, target: WireVolts::from_f64(volts) };
     let good = match (request, reply) {
@@ -129,7 +129,7 @@ fn expect(number: u16, request: &Request, reply: &Reply, variant: Variant) -> Re
     Ok(())
 }
 
-/// Time, code and enable of every tick: the enable is on before the code where it goes off, after it where it goes on.
+/// Time, code and enable of every tick. The enable is switched off before the code is written, and on after it.
 fn written(ticking: &Events) -> Result<Vec<(f64, u16, bool)>> {
     let mut written: Vec<(f64, u16, bool)> = Vec::new();
     let mut enabled = false;
@@ -148,7 +148,7 @@ fn written(ticking: &Events) -> Result<Vec<(f64, u16, bool)>> {
     Ok(written)
 }
 
-/// When each answer began to leave, its number and what it says.
+/// The time at which each answer began to leave, in us, its sequence number and its content.
 fn answers(ticking: &Events) -> Result<Vec<(f64, Sequence, Reply)>> {
     let mut receiver = Receiver::new();
     let mut answers = Vec::new();

@@ -10,25 +10,27 @@ use xtask::build::Opt;
 
 use super::emulator::{Run, SAFE, Written};
 
-/// A run on the target beside the same on the host.
+/// Results of a run on the emulated board and of the same script on the host.
 pub(crate) struct Comparison {
     pub(crate) ticks: u32,
     pub(crate) missed: u32,
     pub(crate) host_digest: u64,
     pub(crate) target_digest: u64,
-    /// What left on the wire is what the host computed, tick by tick.
+    /// Index of the first write to the DAC that is not the host's.
     pub(crate) first_difference: Option<usize>,
+    /// Smallest, mean and largest number of instructions per tick.
     pub(crate) instructions: [u32; 3],
+    /// The emulator's exit code.
     pub(crate) exit: i32,
 }
 
 impl Comparison {
-    /// Rehearses `name` on this machine.
+    /// Runs the script `name` on the host, without a stored model and without a sensor.
     pub(crate) fn new(name: &str, run: &Run) -> Result<Self> {
         Self::with(name, None, |_| None, run)
     }
 
-    /// As [`Comparison::new`], with a model that was found, and what the sensor told the board before each tick.
+    /// Runs the script `name` on the host with the stored model `found`; `measured` returns the sensor's reading before each tick.
     pub(crate) fn with(
         name: &str,
         found: Option<&WireModel>,
@@ -55,14 +57,14 @@ impl Comparison {
         })
     }
 
-    /// An error that says what differs.
+    /// An error unless digests and codes agree, no tick was missed and the exit code is 0.
     pub(crate) fn check(&self) -> Result<()> {
         let Self { host_digest, target_digest, .. } = self;
         if host_digest != target_digest {
             bail!("target and host differ: digest {target_digest:016x} on the target, {host_digest:016x} on the host");
         }
         if let Some(index) = self.first_difference {
-            bail!("what left on the DAC's wire differs from the host's from write {index} on");
+            bail!("the codes on the DAC's wire differ from the host's from write {index} on");
         }
         if self.missed != 0 || self.exit != 0 {
             bail!("{} ticks missed, the emulator's exit code is {}", self.missed, self.exit);
@@ -70,6 +72,7 @@ impl Comparison {
         Ok(())
     }
 
+    /// The JSON of `cargo xtask emulate`.
     pub(crate) fn report(&self, opt: Opt, run: &Run) -> Value {
         let [min, mean, max] = self.instructions;
         json!({
@@ -79,6 +82,7 @@ impl Comparison {
         })
     }
 
+    /// The last line of `cargo xtask emulate`.
     pub(crate) fn summary(&self, run: &Run) -> String {
         let [min, mean, max] = self.instructions;
         format!(

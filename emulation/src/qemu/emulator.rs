@@ -1,8 +1,8 @@
-//! Runs an image under QEMU, its log decoded as it comes, and every code that it wrote to its DAC.
+//! Starts QEMU on an image, decodes its log line by line and collects every code that it writes to its DAC.
 //!
 //! Under `-icount shift=6,sleep=off` an instruction takes 64 ns of the board's time: runs are repeatable, slower than the
-//! real chip on the board's clock and much faster than real time on ours. 64 ns is also more than the 40 ns that the
-//! board's SysTick counts, so that SysTick tells instructions apart one by one; at shift 3, 8 ns, it sees every fifth.
+//! real chip on the board's clock and much faster than real time on the host's. 64 ns is also more than the 40 ns period of the
+//! board's SysTick, so that SysTick counts single instructions; at shift 3, 8 ns, it would count every fifth.
 
 use std::fs;
 use std::io::{ErrorKind, Read};
@@ -21,14 +21,14 @@ use xtask::build::{self, Opt};
 use xtask::setup::QEMU;
 use xtask::shell;
 
-/// See the module.
+/// QEMU's `-icount shift`: an instruction takes 2^6 ns of the board's time.
 pub(crate) const SHIFT: u32 = 6;
-/// Name of the run that a host commands.
+/// Name of the script in which a host commands the board.
 const LINK: &str = "link";
-/// No run takes longer on a slow machine.
+/// Longest time of a run on the host's clock; after it the emulator is stopped.
 const TIMEOUT: Duration = Duration::from_secs(120);
 
-/// A code on the DAC's wire.
+/// A code on the DAC's wire, and whether the amplifier is enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Written {
     pub(crate) code: u16,
@@ -40,18 +40,18 @@ pub(crate) const SAFE: Written = Written { code: 0, enabled: false };
 
 /// A finished run.
 pub(crate) struct Run {
-    /// Of the emulator.
+    /// The emulator's exit code.
     pub(crate) exit: i32,
-    /// Decoded.
+    /// The decoded log.
     pub(crate) log: Vec<Line>,
-    /// What left.
+    /// Every write to the DAC.
     pub(crate) dac: Vec<Written>,
-    /// Of our time.
+    /// Duration on the host's clock.
     pub(crate) took: Duration,
 }
 
 impl Run {
-    /// What the last line of a script says.
+    /// The last line of a script's log: counts and digest. An error if the log ends otherwise.
     pub(crate) fn done(&self) -> Result<&Done> {
         match self.log.last() {
             Some(Line { event: Event::Done(done), .. }) => Ok(done),
@@ -59,38 +59,39 @@ impl Run {
         }
     }
 
-    /// What follows `start` in the line that begins with it.
+    /// The values in the first line of the log that begins with `start`.
     pub(crate) fn values(&self, start: &str) -> Result<Values<'_>> {
         let line = self.log.iter().find_map(|line| line.message.strip_prefix(start));
         Ok(Values(line.with_context(|| format!("no line of the log begins with `{start}`"))?))
     }
 }
 
-/// Words `key=value` in a line of the log.
+/// The words `key=value` in a line of the log.
 pub(crate) struct Values<'a>(&'a str);
 
 impl Values<'_> {
-    /// The value of `key`.
+    /// The value of `key`. A missing or malformed one is an error.
     pub(crate) fn get<T: FromStr>(&self, key: &str) -> Result<T> {
         let value = self.0.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('=')?.parse().ok());
         value.with_context(|| format!("no {key} in `{}`", self.0))
     }
 }
 
-/// Plays one of the firmware's examples that count instructions, built with these features, to its end.
+/// Builds an example of the package `firmware` that counts instructions and runs it to its end.
 pub(crate) fn count(example: &str, features: &str, opt: Opt) -> Result<Run> {
     let run = play(&build::example(example, features, opt)?, example, SHIFT, |_| {})?;
     ensure!(run.exit == 0, "the emulator's exit code is {}", run.exit);
     Ok(run)
 }
 
-/// Level and message of a line, without its time.
+/// Formats level and message of a line, without its time.
 pub(crate) fn text(line: &Line) -> String {
     let level = line.level.map_or("-".into(), |level| level.to_string().to_lowercase());
     format!("{level:<5} {}", line.message)
 }
 
-/// QEMU on an image, in `folder`: `host` is the chardev of the host's line, `clock` the rest of `-icount`.
+/// Starts QEMU with an image and a script, in `folder`. `host` is the QEMU character device of the serial line to a host, `wire`
+/// the file for the DAC's bytes, `clock` the value of `-icount`.
 fn start(folder: &Path, elf: &Path, script: &str, host: &str, wire: &Path, clock: &str) -> Result<Child> {
     shell::command(QEMU)
         .current_dir(folder)
@@ -109,9 +110,10 @@ fn start(folder: &Path, elf: &Path, script: &str, host: &str, wire: &Path, clock
         })
 }
 
-/// Lets a host command the board over the unix socket `socket` while `work` runs; `show` hears of every line of the log.
-/// Here the board is held back to our clock, because a host keeps to it. An instruction takes 64 ns as ever, so that a slow
-/// machine makes the board late, but makes it miss nothing.
+/// Runs the board while `work` commands it over the unix socket `socket`. `show` is called with every line of the log.
+///
+/// The board's clock is slowed down to the host's, because `work` depends on real time. An instruction takes 64 ns of the board's
+/// time here too, so that on a slow machine the board is late but misses no tick.
 pub(crate) fn obey<T>(
     elf: &Path,
     socket: &Path,
@@ -121,7 +123,7 @@ pub(crate) fn obey<T>(
     obey_in(shell::root(), elf, socket, show, work)
 }
 
-/// As [`obey`], with the board's files in `folder`.
+/// Does what [`obey`] does, with the board's files in `folder`.
 pub(crate) fn obey_in<T>(
     folder: &Path,
     elf: &Path,
@@ -145,12 +147,12 @@ pub(crate) fn obey_in<T>(
     child.wait()?;
     let dac = fs::read(&wire)?;
     let _ = fs::remove_file(socket);
-    // Ended by us: it has no exit code of its own. When it cannot keep up with our clock it says so in the midst of the log,
-    // which costs a line.
+    // It was killed and has no exit code. When it falls behind the host's clock it prints a warning into the log, which damages
+    // a line.
     Ok((result?, Run { exit: 0, log: log.lines, dac: written(&dac), took: begin.elapsed() }))
 }
 
-/// As [`obey`], until the emulator ends, and with every line of the log.
+/// Runs the board on the unix socket `socket` until the emulator ends. `show` is called with every line of the log.
 pub(crate) fn serve(elf: &Path, socket: &Path, show: impl FnMut(&str)) -> Result<()> {
     let formats = Formats::parse(&build::read(elf)?)?;
     let host = format!("unix:{},server=on,wait=off", socket.display());
@@ -161,12 +163,12 @@ pub(crate) fn serve(elf: &Path, socket: &Path, show: impl FnMut(&str)) -> Result
     ended.map(|_| ())
 }
 
-/// Plays `script`; `show` hears of every line of the log as it comes.
+/// Runs `script` to its end, or for two minutes at most. `show` is called with every line of the log.
 pub(crate) fn play(elf: &Path, script: &str, shift: u32, show: impl FnMut(&str) + Send) -> Result<Run> {
     play_in(shell::root(), elf, script, shift, show)
 }
 
-/// As [`play`], with the board's files in `folder`.
+/// Does what [`play`] does, with the board's files in `folder`.
 pub(crate) fn play_in(
     folder: &Path,
     elf: &Path,
@@ -204,15 +206,15 @@ pub(crate) fn play_in(
     Ok(Run { exit: status.code().unwrap_or(-1), log: log.whole()?, dac: written(&dac), took })
 }
 
-/// What came of a log.
+/// A decoded log.
 pub(crate) struct Log {
     lines: Vec<Line>,
-    /// The first stretch that is no frame.
+    /// Description of the first bytes that are not a frame.
     damage: Option<String>,
 }
 
 impl Log {
-    /// The lines, if nothing is damaged.
+    /// The lines. Damaged bytes are an error.
     pub(crate) fn whole(self) -> Result<Vec<Line>> {
         match self.damage {
             None => Ok(self.lines),
@@ -221,7 +223,8 @@ impl Log {
     }
 }
 
-/// Bytes to lines; `show` hears of each as `vsj log` prints it. What the end cuts off was being written when it came.
+/// Decodes a log up to its end and calls `show` with each line as `vsj log` prints it. An incomplete frame at the end is
+/// dropped: it was being written when the emulator stopped.
 pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Log> {
     let mut decoder = Decoder::new(formats);
     let mut log = Log { lines: Vec::new(), damage: None };
@@ -242,7 +245,8 @@ pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl Fn
     }
 }
 
-/// The wire's bytes as codes, see the firmware's `mps2::dac`. A first byte without its second was cut off by a stop.
+/// Decodes the bytes on the DAC's wire: see the firmware's `mps2::dac`. A first byte without its second, which a stop cut off, is
+/// dropped.
 fn written(bytes: &[u8]) -> Vec<Written> {
     let is_pair = |pair: &&[u8]| pair[0] & 0x80 != 0 && pair[1] & 0x80 == 0;
     let code = |pair: &[u8]| Written {
@@ -257,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_code_that_was_cut_off_is_left_out() {
+    fn an_incomplete_code_is_dropped() {
         let wire = [0x80, 0x00, 0xdb, 0x1b, 0xc1, 0x80, 0x00];
         assert_eq!(written(&wire), [SAFE, Written { code: 0x1b << 6 | 0x1b, enabled: true }, SAFE]);
     }

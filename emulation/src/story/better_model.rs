@@ -1,4 +1,4 @@
-//! The board is sent a better model: run, diagnose, extend, run again.
+//! The demonstration with a better model: run, diagnose, send the extended model, run again.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,44 +20,53 @@ use super::stage::{EVERY, Errors, Stage, name};
 use crate::qemu::emulator;
 use crate::talk;
 
-/// From the beginning of a tick to its reading, in s: just before the voltage may change again.
+/// Time from the beginning of a tick to its reading, in s: just before the voltage can change again.
 const READ_S: f64 = 0.999 * TICK_S;
 
-/// What came of one effect.
+/// Result for one effect.
 #[derive(Serialize)]
-pub(super) struct Told {
+pub(super) struct Outcome {
+    /// Name of the hidden effect.
     pub(super) effect: &'static str,
+    /// Verdict of the diagnosis.
     pub(super) verdict: String,
+    /// Causes that the diagnosis found.
     pub(super) named: Vec<String>,
+    /// Whether the first cause is the hidden one.
     pub(super) right: bool,
+    /// Errors with the paper's model.
     pub(super) before: Errors,
-    /// None where there was nothing to send.
+    /// Errors with the extended model; `None` if there was none to send.
     pub(super) after: Option<Errors>,
+    /// Reason why there is no second run; empty if there is one.
     pub(super) remark: String,
+    /// Duration on the host's clock, in s.
     pub(super) wall_s: f64,
 }
 
-/// The stage, and `vsj`.
-pub(super) struct Teller {
+/// The image and the program `vsj`.
+pub(super) struct Demonstration {
     stage: Stage,
     vsj: PathBuf,
 }
 
-impl Teller {
+impl Demonstration {
+    /// Builds both.
     pub(super) fn new(controller: Controller) -> Result<Self> {
         let stage = Stage::new(controller, &[])?;
         shell::run(shell::cargo().args(["build", "--quiet", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
         Ok(Self { stage, vsj: shell::target_directory()?.join("release/vsj") })
     }
 
-    pub(super) fn tell(&self, cause: Option<Cause>, seed: u64) -> Result<Told> {
+    /// Runs the demonstration for one effect, or for a spring without any.
+    pub(super) fn run(&self, cause: Option<Cause>, seed: u64) -> Result<Outcome> {
         let begin = Instant::now();
         let folder = self.stage.folder(cause)?;
-        let lead = |found: Option<&WireModel>| {
-            let way = self.stage.lead(self.stage.run, &folder, self.stage.spring(cause, seed), NEVER, found)?;
-            anyhow::Ok(way.moments)
+        let drive = |found: Option<&WireModel>| {
+            let pass = self.stage.drive(self.stage.run, &folder, self.stage.spring(cause, seed), NEVER, found)?;
+            anyhow::Ok(pass.moments)
         };
-        let first = lead(None)?;
+        let first = drive(None)?;
         let report = self.diagnose(&folder, &first)?;
         let named: Vec<String> = report["findings"]
             .as_array()
@@ -70,11 +79,11 @@ impl Teller {
             None => None,
             Some(model) => {
                 self.send(&folder, model)?;
-                Some(Errors::of(&lead(Some(model))?))
+                Some(Errors::of(&drive(Some(model))?))
             }
         };
         let right = named.first().map(String::as_str) == cause.map(|cause| cause.name());
-        Ok(Told {
+        Ok(Outcome {
             effect: name(cause),
             verdict: report["verdict"].as_str().unwrap_or_default().to_owned(),
             right,
@@ -91,7 +100,7 @@ impl Teller {
         let mut last_v = f64::NAN;
         for (tick, moment) in moments.iter().enumerate() {
             let from_s = tick as f64 * TICK_S;
-            // The controller may turn within a few ticks: each change of the voltage is a row, though without a reading.
+            // The controller may change its direction within a few ticks: each change of voltage is a row, without a reading.
             if moment.commanded_v != last_v {
                 text += &format!("{from_s:.6},{},-\n", moment.commanded_v);
                 last_v = moment.commanded_v;
@@ -107,7 +116,7 @@ impl Teller {
         shell::json(&mut vsj)
     }
 
-    /// What the diagnosis made of the spring, if it is another one than the paper's.
+    /// The model that the diagnosis exported, unless it is the paper's.
     fn model(&self, folder: &Path) -> Result<Option<WireModel>> {
         let path = folder.join("diagnosis/plant.toml");
         if !path.exists() {
@@ -118,9 +127,9 @@ impl Teller {
         Ok((model != paper).then_some(model))
     }
 
-    /// Over the link, as a user does. The board restarts, and says that it runs this very model.
+    /// Sends the model over the link with `vsj link`. The board restarts. An error unless it reports this model afterwards.
     fn send(&self, folder: &Path, model: &WireModel) -> Result<()> {
-        // The path of a socket has to be short, and is this thread's alone.
+        // A socket's path has to be short. Each thread has its own.
         let thread = rayon::current_thread_index().unwrap_or_default();
         let socket = self.stage.elf.with_file_name(format!("story-{}-{thread}", std::process::id()));
         let port = format!("unix:{}", socket.display());
@@ -147,13 +156,13 @@ impl Teller {
     }
 }
 
-/// Why there is no better second run.
+/// The reason why there is no second run, for the table.
 fn remark(cause: Option<Cause>, named: &[String], sent: bool) -> &'static str {
     match cause {
         _ if sent => "",
         None => "nothing is wrong",
         _ if named.is_empty() => "nothing was found",
-        Some(cause) if cause.block() == Block::Reading => "the readings' fault: nothing to correct",
-        Some(_) => "found, but not run by the tick: nothing to send",
+        Some(cause) if cause.block() == Block::Reading => "an effect on the readings: nothing to correct",
+        Some(_) => "found, but no block of the tick: nothing to send",
     }
 }

@@ -1,7 +1,7 @@
-//! The emulated board and a hidden spring at its amplifier port, in lock step: see the firmware's `mps2::dac`.
+//! Runs the emulated board with a hidden spring at its amplifier port, in lock step: see the firmware's `mps2::dac`.
 //!
-//! The board waits in a semihosting call, between two instructions, until the spring has answered. So none of its time
-//! passes, and a run is the same each time, however busy the machine is.
+//! The board waits in a semihosting call, between two instructions, until the spring has answered. No time of the board's passes
+//! meanwhile, so that a run is repeatable on a busy machine.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
@@ -18,30 +18,31 @@ use xtask::shell;
 
 use crate::qemu::emulator::{self, Run};
 
-/// From the board, and to it.
+/// Names of the pipes from the board and to it.
 const PIPES: [&str; 2] = ["to-spring", "from-spring"];
-/// On the way to the board.
+/// Word to the board in place of a reading when the sensor is silent.
 const NO_READING: i32 = i32::MIN;
-/// Between two ticks, in s.
+/// Period of the control tick, in s.
 pub(super) const TICK_S: f64 = 1.0 / SETTINGS.rate_hz;
 
-/// Of a sensor that always answers.
+/// No silent ticks.
 pub(super) const NEVER: Range<usize> = 0..0;
 
-/// A tick, as the spring saw it.
+/// One tick at the spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
-    /// What the amplifier was told, in V.
+    /// Commanded voltage, in V.
     pub(super) commanded_v: f64,
-    /// What the spring's stiffness really was, in V.
+    /// True stiffness, expressed as the equivalent static voltage, in V.
     pub(super) stiffness_v: f64,
-    /// What its sensor made of it, in V.
+    /// The sensor's reading of the stiffness, in V.
     pub(super) read_v: f64,
-    /// What the board was told of that.
-    pub(super) heard: Option<Volts>,
+    /// The reading that the board received; `None` from a silent sensor.
+    pub(super) received: Option<Volts>,
 }
 
-/// Runs the way up and down of this name in `folder`, the sensor silent in some ticks; the run, and every tick of the spring.
+/// Runs the script `name` in `folder`, with a sensor that is silent in the ticks `silent`. Returns the run and every tick at the
+/// spring.
 pub(super) fn run(
     elf: &Path,
     name: &str,
@@ -56,12 +57,12 @@ pub(super) fn run(
         };
     }
     thread::scope(|scope| {
-        let beside = scope.spawn(|| serve(folder, spring, silent));
+        let server = scope.spawn(|| serve(folder, spring, silent));
         let run = emulator::play_in(folder, elf, name, emulator::SHIFT, |_| {});
-        // If the board never came, whoever waits for it to open a pipe does so no longer, and reads the end of the first.
+        // If the board did not start, this ends the server's wait for it to open a pipe.
         let [to, _from] = PIPES.map(|pipe| OpenOptions::new().read(true).write(true).open(folder.join(pipe)));
         drop(to);
-        let moments = beside.join().map_err(|_| anyhow!("the spring's thread stopped"))?;
+        let moments = server.join().map_err(|_| anyhow!("the spring's thread stopped"))?;
         Ok((run?, moments?))
     })
 }
@@ -83,9 +84,9 @@ fn serve(folder: &Path, mut spring: Live, silent: Range<usize>) -> Result<Vec<Mo
         let commanded_v = f64::from(code) * SETTINGS.amplifier.volts_per_code();
         let (stiffness_v, reading) = spring.hold(commanded_v, TICK_S);
         let bits = Some((reading.read * f64::from(1 << 20)) as i32);
-        let heard = bits.filter(|bits| *bits != NO_READING && !silent.contains(&moments.len()));
-        from.write_all(&heard.unwrap_or(NO_READING).to_le_bytes())?;
-        let heard = heard.map(|bits| Volts(Signal::from_bits(bits)));
-        moments.push(Moment { commanded_v, stiffness_v, read_v: reading.read, heard });
+        let received = bits.filter(|bits| *bits != NO_READING && !silent.contains(&moments.len()));
+        from.write_all(&received.unwrap_or(NO_READING).to_le_bytes())?;
+        let received = received.map(|bits| Volts(Signal::from_bits(bits)));
+        moments.push(Moment { commanded_v, stiffness_v, read_v: reading.read, received });
     }
 }

@@ -1,14 +1,14 @@
-//! The whole story in one run, for each effect that a spring may hide:
+//! `cargo xtask story`: the end-to-end demonstration. For each effect that a spring may hide:
 //!
-//! 1. The emulated board leads the hidden spring up and down a stair, with the paper's model of it.
+//! 1. The emulated board drives the hidden spring up and down a stair, with the paper's model of it.
 //! 2. `vsj diagnose` reads the record and names the cause.
 //! 3. `vsj link` sends the extended model to the board, which checks it, stores it and restarts.
-//! 4. The board, started anew, leads the same spring up and down again.
+//! 4. The restarted board drives the same spring up and down again.
 //!
-//! Or another one: the board keeps its wrong model, and hears the spring's sensor instead.
+//! With `--feedback` the board keeps its wrong model and reads the spring's sensor instead.
 //!
-//! What counts is the true stiffness beside the desired one, from the hidden spring itself. Every run is held against
-//! the same code on this machine, code by code.
+//! The result is the error of the true stiffness, which the hidden spring reports, relative to the desired one. Every run is
+//! compared with the same code on the host, code by code.
 
 mod better_model;
 mod lock_step;
@@ -25,28 +25,28 @@ use rayon::prelude::*;
 use xtask::setup;
 use xtask::variant::Controller;
 
-use better_model::Teller;
+use better_model::Demonstration;
 use stage::name;
 
-/// Told in every test: one of each block that a model can be extended by.
+/// The effects in `cargo xtask test`: one for each block that a model can be extended by.
 const IN_TEST: [Cause; 3] = [Cause::Hysteresis, Cause::TimeConstant, Cause::ChargeLeakage];
 
 /// Options of `cargo xtask story`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Hide this effect, or several; three of them without
+    /// Hide this effect, or several of them in turn; three effects by default
     #[arg(long, value_name = "NAME", num_args = 1.., value_parser = named)]
     effect: Vec<Cause>,
     /// Hide each effect in turn, and none
     #[arg(long, conflicts_with = "effect")]
     all: bool,
-    /// Who leads the spring
+    /// Controller of the image
     #[arg(long, value_enum, default_value = "paper")]
     controller: Controller,
-    /// Let the board hear the spring's sensor instead of sending it a model: without, with, and with one that falls silent
+    /// Let the board read the spring's sensor instead of sending it a model: without, with, and with a sensor that falls silent
     #[arg(long)]
     feedback: bool,
-    /// Where the effects' sizes and the noise come from
+    /// Seed of the effects' sizes and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the table as JSON
@@ -65,7 +65,7 @@ fn named(name: &str) -> Result<Cause, String> {
     Cause::named(name).ok_or_else(|| format!("expected one of {}", names.join(", ")))
 }
 
-/// `cargo xtask story`.
+/// Runs the demonstration for each effect and prints the table.
 pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
     if args.check {
@@ -78,28 +78,28 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     if args.feedback {
         let stage = sensor::stage(args.controller)?;
-        let heard = each(&effects, |effect| sensor::hear(&stage, effect, args.seed), sensor::line)?;
+        let outcomes = each(&effects, |effect| sensor::run(&stage, effect, args.seed), sensor::line)?;
         if args.json {
-            println!("{}", serde_json::to_string(&heard)?);
+            println!("{}", serde_json::to_string(&outcomes)?);
         } else {
-            print!("{}", sensor::table(&heard));
+            print!("{}", sensor::table(&outcomes));
         }
         return Ok(());
     }
-    let teller = Teller::new(args.controller)?;
-    let told = each(&effects, |effect| teller.tell(effect, args.seed), |told| table::line(told, 2))?;
+    let demonstration = Demonstration::new(args.controller)?;
+    let outcomes = each(&effects, |effect| demonstration.run(effect, args.seed), |outcome| table::line(outcome, 2))?;
     if args.bless {
-        table::bless(&told)?;
+        table::bless(&outcomes)?;
     }
     if args.json {
-        println!("{}", serde_json::to_string(&told)?);
+        println!("{}", serde_json::to_string(&outcomes)?);
     } else {
-        print!("{}", table::table(&told, 2));
+        print!("{}", table::table(&outcomes, 2));
     }
     Ok(())
 }
 
-/// One board and one spring for each effect, all at once; each is shown as soon as it is there.
+/// Runs `work` for each effect in parallel, each with a board and a spring of its own. Prints each `line` as soon as it is known.
 fn each<T: Send>(
     effects: &[Option<Cause>],
     work: impl Fn(Option<Cause>) -> Result<T> + Sync,
@@ -113,13 +113,13 @@ fn each<T: Send>(
     effects.par_iter().map(one).collect()
 }
 
-/// As a step of `cargo xtask test`: three effects, the summary as approved; a sensor that falls silent.
+/// The step of `cargo xtask test`: three effects, whose summary must be the approved one, and a sensor that falls silent.
 fn check() -> Result<()> {
     let begin = Instant::now();
-    let teller = Teller::new(Controller::Paper)?;
-    let told = each(&IN_TEST.map(Some), |effect| teller.tell(effect, 1), |told| table::line(told, 2))?;
-    table::compare(&told)?;
-    eprintln!("the story of three effects in {:.0} s, as approved", begin.elapsed().as_secs_f64());
+    let demonstration = Demonstration::new(Controller::Paper)?;
+    let outcomes = each(&IN_TEST.map(Some), |effect| demonstration.run(effect, 1), |outcome| table::line(outcome, 2))?;
+    table::compare(&outcomes)?;
+    eprintln!("end-to-end demonstration of three effects in {:.0} s, as approved", begin.elapsed().as_secs_f64());
     let begin = Instant::now();
     sensor::check().context("with a sensor that falls silent")?;
     eprintln!("a sensor in the loop that falls silent, in {:.0} s", begin.elapsed().as_secs_f64());

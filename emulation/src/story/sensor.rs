@@ -1,5 +1,5 @@
-//! The board hears the spring's sensor: with the paper's model of a spring that is another one, without the sensor, with it,
-//! and with one that falls silent while the voltage rests at the top.
+//! The demonstration with a sensor: the board keeps the paper's model of a spring that differs from it, and drives it without the
+//! sensor, with it, and with a sensor that falls silent while the voltage is constant at the top.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -12,75 +12,76 @@ use xtask::build;
 use xtask::variant::Controller;
 
 use super::lock_step::{Moment, NEVER};
-use super::stage::{Errors, Stage, Way, name};
+use super::stage::{Errors, Pass, Stage, name};
 use crate::binary::audit;
 
-/// The sensor's silence, in ticks: from the midst of the time at 500 V over the next step.
+/// Ticks without a reading: from the middle of the plateau at 500 V past the next step.
 const SILENT: Range<usize> = 50_000..60_000;
-/// Where a change of voltage has no other cause: until the next step.
+/// Ticks in which only the silence can change the voltage: until the next step.
 const AT_REST: Range<usize> = 49_999..55_000;
-/// Of the log, in the table; JSON has all.
+/// Most lines of the log in the table. JSON has all of them.
 const MOST_LINES: usize = 6;
-/// At most that of a tick, in V: a few codes.
+/// Largest change of voltage in a tick that is accepted when the sensor falls silent, in V.
 const MOST_BUMP_V: f64 = 1.0;
 
-/// What came of one effect.
+/// Result for one effect.
 #[derive(Serialize)]
-pub(super) struct Heard {
+pub(super) struct Outcome {
     effect: &'static str,
-    without: Led,
-    with: Led,
-    silent: Led,
+    without: Tracking,
+    with: Tracking,
+    silent: Tracking,
 }
 
-/// One way up and down.
+/// Result of one pass up and down.
 #[derive(Serialize)]
-struct Led {
+struct Tracking {
     #[serde(flatten)]
     errors: Errors,
-    /// The largest change of voltage from tick to tick at 500 V, where the silence begins, in V.
+    /// Largest change of voltage from tick to tick on the plateau at 500 V, where the silence begins, in V.
     bump_v: f64,
-    /// In a tick of the model.
+    /// Most instructions in a tick of the model.
     most_instructions: u32,
-    /// What the board's log said of its sensor.
+    /// The board's log lines about the sensor.
     log: Vec<String>,
 }
 
-impl Led {
-    fn of(way: Way) -> Self {
-        let Way { moments, sensor, most_instructions } = way;
+impl Tracking {
+    fn of(pass: Pass) -> Self {
+        let Pass { moments, sensor, most_instructions } = pass;
         let change = |pair: &[Moment]| (pair[1].commanded_v - pair[0].commanded_v).abs();
         let bump_v = moments[AT_REST].windows(2).map(change).fold(0.0, f64::max);
         Self { errors: Errors::of(&moments), bump_v, most_instructions, log: sensor }
     }
 }
 
-/// With the sensor in the image.
+/// Builds the image with the sensor.
 pub(super) fn stage(controller: Controller) -> Result<Stage> {
     Stage::new(controller, &["feedback"])
 }
 
-/// The three ways.
-pub(super) fn hear(stage: &Stage, cause: Option<Cause>, seed: u64) -> Result<Heard> {
+/// Drives a spring that hides `cause` without the sensor, with it, and with a sensor that falls silent.
+pub(super) fn run(stage: &Stage, cause: Option<Cause>, seed: u64) -> Result<Outcome> {
     let folder = stage.folder(cause)?;
     let sensing = sensing(stage);
-    let lead = |run, silent| anyhow::Ok(Led::of(stage.lead(run, &folder, stage.spring(cause, seed), silent, None)?));
-    Ok(Heard {
+    let drive =
+        |run, silent| anyhow::Ok(Tracking::of(stage.drive(run, &folder, stage.spring(cause, seed), silent, None)?));
+    Ok(Outcome {
         effect: name(cause),
-        without: lead(stage.run, NEVER)?,
-        with: lead(&sensing, NEVER)?,
-        silent: lead(&sensing, SILENT)?,
+        without: drive(stage.run, NEVER)?,
+        with: drive(&sensing, NEVER)?,
+        silent: drive(&sensing, SILENT)?,
     })
 }
 
-/// For `cargo xtask test`: the board trusts its sensor, loses it, and trusts it again, without a bump and without a way into
-/// a panic.
+/// The check in `cargo xtask test`: the board trusts the sensor, loses it and trusts it again, without a bump, and its tick cannot
+/// panic.
 pub(super) fn check() -> Result<()> {
     let stage = stage(Controller::Paper)?;
     audit::run(&build::read(&stage.elf)?)?;
     let cause = Some(Cause::GainError);
-    let way = stage.lead(&sensing(&stage), &stage.folder(cause)?, stage.spring(cause, 1), SILENT, None)?;
-    let Led { bump_v, log, .. } = Led::of(way);
+    let pass = stage.drive(&sensing(&stage), &stage.folder(cause)?, stage.spring(cause, 1), SILENT, None)?;
+    let Tracking { bump_v, log, .. } = Tracking::of(pass);
     let said: Vec<_> = log.iter().filter_map(|line| line.split(' ').next()).collect();
     ensure!(said == ["absent", "trusted", "absent", "trusted"], "the log says of the sensor: {log:?}");
     ensure!(bump_v < MOST_BUMP_V, "the voltage changed by {bump_v} V in a tick when the sensor fell silent");
@@ -91,18 +92,18 @@ fn sensing(stage: &Stage) -> String {
     format!("{} sensor", stage.run)
 }
 
-/// One effect.
-pub(super) fn line(heard: &Heard) -> String {
-    let Heard { effect, without, with, silent } = heard;
+/// The line of one effect.
+pub(super) fn line(outcome: &Outcome) -> String {
+    let Outcome { effect, without, with, silent } = outcome;
     let mut text = format!("{effect:<31}");
-    for led in [without, with, silent] {
-        let _ = write!(text, "{:>8.2}", led.errors.rms_v);
+    for tracking in [without, with, silent] {
+        let _ = write!(text, "{:>8.2}", tracking.errors.rms_v);
     }
-    for led in [without, with, silent] {
-        let _ = write!(text, "{:>8.2}", led.errors.worst_plateau_v);
+    for tracking in [without, with, silent] {
+        let _ = write!(text, "{:>8.2}", tracking.errors.worst_plateau_v);
     }
-    for led in [with, silent] {
-        let _ = write!(text, "{:>8.2}", led.bump_v);
+    for tracking in [with, silent] {
+        let _ = write!(text, "{:>8.2}", tracking.bump_v);
     }
     let shown = silent.log.len().min(MOST_LINES);
     text += &format!("  {}", silent.log[..shown].join(", "));
@@ -112,8 +113,8 @@ pub(super) fn line(heard: &Heard) -> String {
     }
 }
 
-/// All of them.
-pub(super) fn table(heard: &[Heard]) -> String {
+/// The table of all effects.
+pub(super) fn table(outcomes: &[Outcome]) -> String {
     let mut text = format!("{:<31}{:>24}{:>24}{:>16}\n", "", "RMS error [V]", "worst step [V]", "bump [V]");
     let _ = writeln!(
         text,
@@ -130,9 +131,9 @@ pub(super) fn table(heard: &[Heard]) -> String {
         SILENT.start / RATE_HZ as usize,
         SILENT.end / RATE_HZ as usize,
     );
-    heard.iter().for_each(|one| text += &(line(one) + "\n"));
-    let most = |led: fn(&Heard) -> &Led| heard.iter().map(|one| led(one).most_instructions).max().unwrap_or(0);
+    outcomes.iter().for_each(|one| text += &(line(one) + "\n"));
+    let most = |of: fn(&Outcome) -> &Tracking| outcomes.iter().map(|one| of(one).most_instructions).max().unwrap_or(0);
     let (without, with) = (most(|one| &one.without), most(|one| &one.with).max(most(|one| &one.silent)));
-    let _ = writeln!(text, "instructions of a tick, at most: {without} without the sensor, {with} with it");
+    let _ = writeln!(text, "instructions per tick, at most: {without} without the sensor, {with} with it");
     text
 }

@@ -1,4 +1,4 @@
-//! What every story needs: the image, the spring to hide effects in, and a way up and down.
+//! What both demonstrations need: the image, a spring that hides an effect, and one pass up and down the stair.
 
 use std::fs;
 use std::ops::Range;
@@ -23,55 +23,57 @@ use crate::qemu::comparison::Comparison;
 
 /// Ticks between two rows of a record.
 pub(super) const EVERY: usize = 50;
-/// White noise on the readings, in percent of 500 V.
+/// Standard deviation of the white noise on the readings, in percent of 500 V.
 const NOISE_PERCENT: f64 = 0.2;
-/// The part of each step that counts as settled, in ticks before its end.
+/// Length of the settled part at the end of each step, in ticks.
 const SETTLED: usize = 2 * RATE_HZ as usize;
 
-/// True stiffness less target, in V.
+/// Errors of the true stiffness relative to the target, in V.
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct Errors {
     /// Root mean square over the run.
     pub(super) rms_v: f64,
-    /// The largest mean of the settled part of a step, without its sign.
+    /// Largest absolute mean over the settled part of a step.
     pub(super) worst_plateau_v: f64,
 }
 
 impl Errors {
+    /// Errors over a pass.
     pub(super) fn of(moments: &[Moment]) -> Self {
         let errors: Vec<f64> = (0..).zip(moments).map(|(tick, m)| m.stiffness_v - f64::from(up_down_v(tick))).collect();
         let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
         let squares: Vec<f64> = errors.iter().map(|error| error * error).collect();
-        // Each step lasts 10 s, from 5 s on.
+        // Each step lasts 10 s, the first one 5 s.
         let steps = 5_000..=errors.len();
         let ends = steps.step_by(10_000).map(|end| mean(&errors[end - SETTLED..end]).abs());
         Self { rms_v: mean(&squares).sqrt(), worst_plateau_v: ends.fold(0.0, f64::max) }
     }
 }
 
-/// One way up and down.
-pub(super) struct Way {
-    /// Tick by tick.
+/// Result of one pass up and down.
+pub(super) struct Pass {
+    /// Every tick at the spring.
     pub(super) moments: Vec<Moment>,
-    /// What the board's log said of its sensor.
+    /// The board's log lines about the sensor.
     pub(super) sensor: Vec<String>,
-    /// In a tick of the model.
+    /// Most instructions in a tick of the model.
     pub(super) most_instructions: u32,
 }
 
-/// The image, and where it is played.
+/// The image, and the folder that it runs in.
 pub(super) struct Stage {
-    /// Name of the way up and down on the model alone.
+    /// Script of the pass without a sensor.
     pub(super) run: &'static str,
+    /// Path of the image.
     pub(super) elf: PathBuf,
     folder: PathBuf,
-    /// The paper's spring on the way up and down: the schedule that the effects' sizes are drawn for, and its stiffness.
+    /// Voltage over time on the paper's spring, which the effects' sizes are drawn for, and its largest stiffness, in V.
     schedule: Schedule,
     top_v: f64,
 }
 
 impl Stage {
-    /// With these features of the firmware, beside those that the controller needs.
+    /// Builds the image with further features of the package `firmware`.
     pub(super) fn new(controller: Controller, features: &[&str]) -> Result<Self> {
         let run = match controller {
             Controller::Paper => "up-down",
@@ -92,7 +94,7 @@ impl Stage {
         Ok(Self { run, elf, folder, schedule: Schedule { time_s, voltage_v }, top_v })
     }
 
-    /// An empty folder for the board's files, no model in its flash.
+    /// Makes an empty folder for the board's files, with no model in its flash.
     pub(super) fn folder(&self, cause: Option<Cause>) -> Result<PathBuf> {
         let folder = self.folder.join(name(cause));
         let _ = fs::remove_dir_all(&folder);
@@ -101,7 +103,7 @@ impl Stage {
         Ok(folder)
     }
 
-    /// The spring that hides `cause`, its size and its sensor's noise from `seed`.
+    /// A spring that hides `cause`. The effect's size and the sensor's noise are drawn with `seed`.
     pub(super) fn spring(&self, cause: Option<Cause>, seed: u64) -> Live {
         let noise = Noise::white(NOISE_PERCENT);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -110,29 +112,29 @@ impl Stage {
         Live::new(&effects, noise, seed, self.top_v, UP_DOWN_TICKS as usize)
     }
 
-    /// One way up and down on the board, held against this machine.
-    pub(super) fn lead(
+    /// Runs one pass on the board and compares it with the host. A difference is an error.
+    pub(super) fn drive(
         &self,
         run: &str,
         folder: &Path,
         spring: Live,
         silent: Range<usize>,
         found: Option<&WireModel>,
-    ) -> Result<Way> {
+    ) -> Result<Pass> {
         let (played, moments) = lock_step::run(&self.elf, run, folder, spring, silent)?;
         ensure!(moments.len() == UP_DOWN_TICKS as usize, "{} ticks at the spring", moments.len());
-        // A tick hears what was read after the one before.
-        let heard = |tick: u32| moments.get(tick.checked_sub(1)? as usize)?.heard;
-        let comparison = Comparison::with(run, found, heard, &played)?;
+        // A tick receives the reading at the end of the one before.
+        let received = |tick: u32| moments.get(tick.checked_sub(1)? as usize)?.received;
+        let comparison = Comparison::with(run, found, received, &played)?;
         comparison.check()?;
         let said = played.log.iter().filter_map(|line| line.message.strip_prefix("sensor "));
         let sensor = said.map(str::to_owned).collect();
         let [.., most_instructions] = comparison.instructions;
-        Ok(Way { moments, sensor, most_instructions })
+        Ok(Pass { moments, sensor, most_instructions })
     }
 }
 
-/// Of what is hidden.
+/// Name of the hidden effect.
 pub(super) fn name(effect: Option<Cause>) -> &'static str {
     effect.map_or("none", |cause| cause.name())
 }

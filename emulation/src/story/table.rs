@@ -1,4 +1,4 @@
-//! The stories beside each other, and the approved summary of three of them.
+//! The table of the demonstrations with a better model, and the approved summary of three of them.
 
 use std::fmt::Write;
 use std::fs;
@@ -7,15 +7,15 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use xtask::shell;
 
-use super::better_model::Told;
+use super::better_model::Outcome;
 use super::stage::Errors;
 
-/// A better diagnosis is not to need a new approval for a tenth of a volt.
+/// Decimals of the approved errors, few enough that a slightly better diagnosis needs no new approval.
 const APPROVED_DECIMALS: usize = 0;
 
-/// One story, its errors with so many decimals.
-pub(super) fn line(told: &Told, decimals: usize) -> String {
-    let Told { effect, named, right, before, after, remark, .. } = told;
+/// The line of one effect, with this number of decimals.
+pub(super) fn line(outcome: &Outcome, decimals: usize) -> String {
+    let Outcome { effect, named, right, before, after, remark, .. } = outcome;
     let named = if named.is_empty() { "nothing".to_owned() } else { named.join(" + ") };
     let right = if *right { "right" } else { "WRONG" };
     let volts = |errors: Option<&Errors>, which: fn(&Errors) -> f64| {
@@ -33,16 +33,16 @@ pub(super) fn line(told: &Told, decimals: usize) -> String {
     )
 }
 
-/// All of them.
-pub(super) fn table(told: &[Told], decimals: usize) -> String {
+/// The table of all effects, with this number of decimals.
+pub(super) fn table(outcomes: &[Outcome], decimals: usize) -> String {
     let mut text = format!("{:<31} {:<5} {:>15}{:>17}\n", "", "", "RMS error [V]", "worst step [V]");
     let _ = writeln!(
         text,
         "{:<31} {:<5} {:>7}{:>8}{:>9}{:>8}  named",
         "hidden effect", "", "before", "after", "before", "after"
     );
-    for told in told {
-        let _ = writeln!(text, "{}", line(told, decimals));
+    for outcome in outcomes {
+        let _ = writeln!(text, "{}", line(outcome, decimals));
     }
     text
 }
@@ -51,20 +51,20 @@ fn approved() -> PathBuf {
     shell::root().join("emulation/golden/story.txt")
 }
 
-/// The summary becomes the approved one.
-pub(super) fn bless(told: &[Told]) -> Result<()> {
+/// Writes the summary as the approved one.
+pub(super) fn bless(outcomes: &[Outcome]) -> Result<()> {
     let path = approved();
     fs::create_dir_all(path.parent().context("a file without folder")?)?;
-    fs::write(&path, table(told, APPROVED_DECIMALS)).with_context(|| format!("cannot write {}", path.display()))
+    fs::write(&path, table(outcomes, APPROVED_DECIMALS)).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// An error unless the summary is the approved one.
-pub(super) fn compare(told: &[Told]) -> Result<()> {
+pub(super) fn compare(outcomes: &[Outcome]) -> Result<()> {
     let path = approved();
     let before = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let now = table(told, APPROVED_DECIMALS);
+    let now = table(outcomes, APPROVED_DECIMALS);
     if before != now {
-        bail!("the story is not the approved one.\n--- {}\n{before}--- now\n{now}", path.display());
+        bail!("the summary is not the approved one.\n--- {}\n{before}--- now\n{now}", path.display());
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Frames that must not be followed: damaged, late, foreign, or nothing but noise.
+//! Frames that the board must not follow: damaged, late, of another version, or noise.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use link::{Desired, Frame, Reply, Request, Sequence, State, WireVolts};
 /// Number of frames in a run.
 pub(super) const HOSTILE: u32 = 10_000;
 
-/// A xorshift generator (Marsaglia, 13-17-5): the same frames in each run.
+/// A xorshift generator (Marsaglia, 13-17-5), so that every run has the same frames.
 pub(super) struct Dice(u32);
 
 impl Dice {
@@ -23,7 +23,7 @@ impl Dice {
     }
 }
 
-/// The frame of a request that would be followed, were it sound and on time: another target, or arming.
+/// A request that the board would follow in a valid frame: another target, or arming.
 fn tempting(dice: &mut Dice) -> Request {
     match dice.draw(0..4) {
         0 => Request::Arm,
@@ -31,13 +31,13 @@ fn tempting(dice: &mut Dice) -> Request {
     }
 }
 
-/// A frame that must not be followed; `next` is the number that would be.
+/// The frame of this index, which the board must not follow. `next` is the sequence number that it would accept.
 pub(super) fn hostile(dice: &mut Dice, index: u32, next: Sequence) -> Vec<u8> {
     let request = tempting(dice);
     let sound = Frame::new(next, &request).as_bytes().to_vec();
     let inside = 1..sound.len() - 1;
     match index % 8 {
-        // Noise, some of it longer than any frame.
+        // Noise, partly longer than any frame.
         0 | 1 => {
             let length = dice.draw(1..200);
             let noise = (0..length).map(|_| dice.draw(1..256) as u8);
@@ -56,7 +56,7 @@ pub(super) fn hostile(dice: &mut Dice, index: u32, next: Sequence) -> Vec<u8> {
             }
             frame
         }
-        // Something is missing.
+        // Bytes are missing.
         4 => {
             let mut frame = sound;
             let from = dice.draw(inside.clone());
@@ -64,14 +64,14 @@ pub(super) fn hostile(dice: &mut Dice, index: u32, next: Sequence) -> Vec<u8> {
             frame.drain(from..to);
             frame
         }
-        // Another version; not the next number, because it is answered, and that would look like the next one's answer.
+        // Another version. The board answers it, so its number must not be the next one, whose answer it would look like.
         5 => {
             let version = link::VERSION.wrapping_add(dice.draw(1..255) as u8);
             Frame::with_version(version, Sequence(next.0.wrapping_add(100)), &request).as_bytes().into()
         }
-        // Late.
+        // An old sequence number.
         6 => Frame::new(Sequence(next.0.wrapping_sub(dice.draw(2..30_000) as u16)), &request).as_bytes().into(),
-        // An echo.
+        // An echo of a reply.
         _ => {
             let target = WireVolts::from_f64(dice.draw(0..700) as f64);
             Frame::new(next, &Reply::Ack { state: State::Armed, target }).as_bytes().into()
@@ -85,7 +85,7 @@ mod tests {
     use link::Receiver;
 
     #[test]
-    fn no_hostile_frame_is_a_sound_one() {
+    fn no_hostile_frame_is_a_valid_request() {
         let mut dice = Dice(7);
         for index in 0..HOSTILE {
             let next = Sequence(index as u16);

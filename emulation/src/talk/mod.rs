@@ -1,4 +1,5 @@
-//! The emulated firmware and a host: it obeys what is meant for it, and nothing else, without missing a tick.
+//! `cargo xtask talk`: a host commands the emulated firmware. Valid requests are followed, hostile frames are not, and no tick is
+//! missed.
 
 mod hostile;
 
@@ -17,26 +18,26 @@ use xtask::setup;
 use crate::qemu::emulator::{self, SAFE, Written};
 use hostile::{Dice, HOSTILE, hostile};
 
-/// Time for them. A minute is usual: the emulated line hands over a byte at a time.
+/// Longest time for all hostile frames. They usually need a minute, because the emulated line transfers single bytes.
 const TIME: Duration = Duration::from_secs(300);
-/// Hostile frames between two good ones, one of each kind: the host must be heard in time, on a busy machine too.
+/// Hostile frames between two valid ones, one of each kind. The valid ones keep the host's time-out from expiring.
 const BATCH: u32 = 8;
-/// Most times that the board may take for an answer.
+/// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The board may take a host for silent after 0.5 s: on a machine so busy that it and the emulator wait this long for each
-/// other, that is no fault of the board.
+/// Time since the last valid frame after which the host's time-out of 0.5 s may have expired on a busy machine. It is no error of
+/// the board then.
 const LATE: Duration = Duration::from_millis(400);
-/// The target that must stay, in V.
+/// The target that hostile frames must not change, in V.
 const TARGET_V: f64 = 300.0;
 
-/// `cargo xtask talk`.
+/// Builds the image, talks to it and prints the result.
 pub(crate) fn command() -> Result<()> {
     setup::emulator()?;
     println!("{}", run(&build::image(Board::Mps2, Opt::S)?)?);
     Ok(())
 }
 
-/// Starts the board, talks to it, and says what came of it.
+/// Starts the board, talks to it and returns the result in one line.
 pub(crate) fn run(elf: &Path) -> Result<String> {
     let socket = elf.with_file_name(format!("link-{}", std::process::id()));
     let name = format!("unix:{}", socket.display());
@@ -61,7 +62,8 @@ pub(crate) fn run(elf: &Path) -> Result<String> {
     Ok(format!("{said}; {} ticks on the wire, {driven} with voltage, {missed} missed", run.dac.len()))
 }
 
-/// What left: nothing before arming, nothing at the end, and voltage as often as the board was armed.
+/// The number of writes with voltage on the DAC's wire. An error unless the wire begins and ends with zero and the amplifier was
+/// enabled `armed` times.
 fn wire(dac: &[Written], armed: usize) -> Result<usize> {
     ensure!(dac.first() == Some(&SAFE) && dac.last() == Some(&SAFE), "the wire does not begin and end with zero");
     let parts = dac.chunk_by(|a, b| a.enabled == b.enabled).filter(|part| part[0].enabled).count();
@@ -70,7 +72,7 @@ fn wire(dac: &[Written], armed: usize) -> Result<usize> {
     Ok(dac.iter().filter(|written| written.enabled).count())
 }
 
-/// Through the host's library, as `vsj link` does.
+/// Valid requests through the host's library, which `vsj link` uses.
 fn courtesy(name: &str) -> Result<String> {
     let (mut client, status) = Client::greet(open(name)?, Patience::of(PATIENCE))?;
     expect(&status, State::Disarmed, 0.0)?;
@@ -95,7 +97,7 @@ fn courtesy(name: &str) -> Result<String> {
     ensure!(client.order(Request::Disarm)?.0 == State::Disarmed, "disarm is followed");
     expect(&client.status()?, State::Disarmed, 0.0)?;
 
-    // Armed again, and silent: the voltage goes away of itself, after 0.5 s and a ramp of 300 V at 700 V/s.
+    // Armed again, then silent: the board disarms after 0.5 s and a ramp of 300 V at 700 V/s.
     client.order(Request::Arm)?;
     client.order(set(TARGET_V))?;
     thread::sleep(Duration::from_millis(1500));
@@ -105,10 +107,10 @@ fn courtesy(name: &str) -> Result<String> {
     Ok(format!("armed, {TARGET_V} V set, {} samples, disarmed; disarmed by silence", samples.len()))
 }
 
-/// Armed at a target, among frames that must not be followed; and how often it was armed.
+/// Hostile frames while the board is armed at a target. Returns the result and how often the board was armed.
 fn hostility(name: &str) -> Result<(String, usize)> {
     let mut line = Line { port: open(name)?, receiver: Receiver::new(), next: Sequence(1000) };
-    // As a restart of the host: its numbers start anew.
+    // A hello restarts the sequence numbers, as after a restart of the host.
     line.ask(&Request::Hello)?;
     let before = line.status()?;
     expect(&before, State::Disarmed, 0.0)?;
@@ -142,10 +144,10 @@ fn hostility(name: &str) -> Result<(String, usize)> {
     let after = line.status()?;
     expect(&after, State::Armed, TARGET_V)?;
     let (old, new) = (before.counters, after.counters);
-    // The status itself is one more.
+    // The status request is accepted as well.
     let accepted = new.accepted - old.accepted;
     ensure!(accepted == asked + 1, "{accepted} requests accepted, {} made: {new:?}", asked + 1);
-    ensure!(new.repeated == old.repeated, "a frame was taken for a repeated one: {new:?}");
+    ensure!(new.repeated == old.repeated, "a frame was counted as a repeated one: {new:?}");
     ensure!(after.overruns == 0, "{} ticks missed", after.overruns);
     let kinds = [
         new.damaged - old.damaged,
@@ -157,7 +159,7 @@ fn hostility(name: &str) -> Result<(String, usize)> {
     ensure!(kinds.iter().all(|count| *count > 50), "not every kind arrived: {new:?}");
     let answer = line.ask(&Request::Disarm)?;
     ensure!(matches!(answer, Reply::Ack { state: State::Disarmed, .. }), "{answer:?}");
-    // A second for the log's own count.
+    // The log prints its counters every second.
     thread::sleep(Duration::from_millis(1200));
     let [damaged, oversize, version, order, unknown] = kinds;
     let said = format!(
@@ -169,7 +171,7 @@ fn hostility(name: &str) -> Result<(String, usize)> {
     Ok((said, armed))
 }
 
-/// Opens the board's line, as soon as the emulator has it.
+/// Opens the serial line to the board. Tries again for two seconds while the emulator is starting.
 pub(crate) fn open(name: &str) -> Result<Port> {
     let begin = Instant::now();
     loop {
@@ -197,12 +199,12 @@ fn refused<T: std::fmt::Debug>(result: Result<T, Failure>, why: impl Fn(&Reason)
     }
 }
 
-/// The answer of a board that is armed and has the target.
+/// The answer of a board that is armed at the target.
 fn at_target() -> Reply {
     Reply::Ack { state: State::Armed, target: WireVolts::from_f64(TARGET_V) }
 }
 
-/// A line without the library's manners: every request goes out once.
+/// A serial line that sends every request once, unlike the host's library, which repeats.
 struct Line {
     port: Port,
     receiver: Receiver,
@@ -233,7 +235,7 @@ impl Line {
         bail!("no answer to {request:?}, number {}", number.0)
     }
 
-    /// Arms and sets the target: two requests.
+    /// Arms the board and sets the target, in two requests.
     fn arm(&mut self) -> Result<()> {
         self.ask(&Request::Arm)?;
         let answer = self.ask(&Request::Set(Desired::ScaledVolts(TARGET_V)))?;
