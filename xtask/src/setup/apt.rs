@@ -35,10 +35,12 @@ fn apt_get(is_root: bool, args: &[&str]) -> Command {
 ///
 /// apt-get can wait for dpkg's locks itself (`DPkg::Lock::Timeout`), but not for those of the package lists and of the archive.
 fn patiently(command: impl Fn() -> Command, patience: Duration, pause: Duration) -> Result<()> {
+    let line = shell::line(&command());
+    eprintln!("$ {line}");
     let begin = Instant::now();
     let mut waiting_for = None;
     loop {
-        match attempt(&mut command())? {
+        match attempt(&mut command(), &line)? {
             Attempt::Done => return Ok(()),
             Attempt::Locked(lock) if begin.elapsed() < patience => {
                 if waiting_for.as_ref() != Some(&lock) {
@@ -59,9 +61,7 @@ enum Attempt {
 }
 
 /// Runs the command once. Its output goes to stderr, except for messages about locks.
-fn attempt(command: &mut Command) -> Result<Attempt> {
-    let line = shell::line(command);
-    eprintln!("$ {line}");
+fn attempt(command: &mut Command, line: &str) -> Result<Attempt> {
     let mut child = command
         .stdout(Stdio::from(std::io::stderr()))
         .stderr(Stdio::piped())
