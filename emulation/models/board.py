@@ -1,8 +1,8 @@
-"""The STM32G474 as far as the controller's image can see it: the image's own instructions on models of the registers.
+"""Model of the STM32G474: executes the image's instructions on models of the registers that it uses.
 
 Registers and bits are those that the hardware library uses, as far as the image does; exceptions are ARMv7-M's. Every
 instruction takes one cycle of 170 MHz, a sleeping core skips to the next interrupt; a started clock, a calibration and
-a conversion are ready at once. No MPU, no flash wait states, no analogue; the core itself stays in thread mode.
+a conversion are ready immediately. No MPU, no flash wait states, no analogue; the core itself stays in thread mode.
 """
 
 import random
@@ -25,21 +25,21 @@ FLOATS = tuple(UC_ARM_REG_S0 + i for i in range(16))
 FLASH_ECCR, FLASH_OPTR = 0x4002_2018, 0x4002_2020
 RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0800, 0x5000_0000
 GPIO = 0x4800_0000
-TIM15, TIM15_IRQ = 0x4001_4000, 24  # The time driver's.
+TIM15, TIM15_IRQ = 0x4001_4000, 24  # Used by the time driver.
 LPUART1_IRQ = 91
 SCS = 0xE000_E000
 SYSTICK_IRQ = -1  # Exception 15.
 NMI_IRQ = -14  # Exception 2.
-BAUD = 115_200  # The host's.
+BAUD = 115_200  # Baud rate of the host.
 MONITOR_SCALE = 1000  # Volts of the amplifier at the ADC's full range.
 ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
 
 
 class Board:
-    """One chip with the image in its flash. `log` gets (time in us, what, value) of everything that matters outside."""
+    """One chip with the image in its flash. `log` receives (time in us, name, value) of every event outside."""
 
     def __init__(self, image, rtt, host, full_scale):
-        """`host` sends (time in us of the first bit, frame); the amplifier makes `full_scale` volts of the highest code."""
+        """`host` lists (time of the first bit in us, frame). `full_scale` is the voltage at the highest code."""
         self.image, self.rtt, self.log = image, rtt, []
         byte = self.byte_of_host = 10 * HZ // BAUD
         self.incoming = [
@@ -69,7 +69,7 @@ class Board:
     # --- Reset and run ---
 
     def reset(self, cause):
-        """`cause` is the flag in RCC_CSR. The memory keeps what it holds."""
+        """Resets the chip. `cause` is the flag in RCC_CSR. The memory keeps its content."""
         # Two banks of flash, as the chip is delivered: FLASH_OPTR.DBANK.
         self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF, FLASH_OPTR: 1 << 22}
         self.timer = Timer()
@@ -95,7 +95,7 @@ class Board:
         self._settle()
 
     def run(self, until_us):
-        """Until then, or a reset: returns its cause, the flags of RCC_CSR."""
+        """Runs until the given time or a reset. Returns the cause of the reset, flags of RCC_CSR."""
         self.end = until_us * HZ // 1_000_000
         while self.now < self.end:
             self.stopped = self.fault = None
@@ -130,11 +130,11 @@ class Board:
         return None
 
     def tear(self, at):
-        """A word of the flash has two wrong bits from now on."""
+        """From now on a word of the flash has two wrong bits."""
         self.uc.hook_add(UC_HOOK_MEM_READ, lambda *_: self.two_wrong_bits(), begin=at, end=at + 7)
 
     def two_wrong_bits(self):
-        """Were read: FLASH_ECCR.ECCD, and the interrupt that nothing masks."""
+        """Called when such a word is read: sets FLASH_ECCR.ECCD and raises the non-maskable interrupt."""
         self.regs[FLASH_ECCR] = 1 << 31
         self.pending.add(NMI_IRQ)
         self._choose()
@@ -166,7 +166,7 @@ class Board:
             count = self.sizes[at, size] = self._instructions(at, size)
         self.now += count
         if size == 2 and uc.mem_read(at, 2) == b"\xfe\xe7":
-            self.sleeping = True  # A branch to itself: nothing but an interrupt or a reset ends it.
+            self.sleeping = True  # A branch to itself: only an interrupt or a reset ends it.
             self._stop(at)
 
     def _wfi(self, uc, at, size, _):
@@ -184,14 +184,14 @@ class Board:
     # --- Exceptions ---
 
     def _ready(self):
-        """An interrupt can be taken now. Within an IT block it waits for its end."""
+        """Whether an interrupt can be taken now. Within an IT block it is taken after the block."""
         if self.candidate is None:
             return False
         masked = self.uc.reg_read(UC_ARM_REG_PRIMASK) & 1 and self.candidate[0] >= 0
         return not masked and not self.uc.reg_read(UC_ARM_REG_XPSR) & 0x0600_FC00
 
     def _choose(self):
-        """The most urgent pending interrupt that may interrupt what is active."""
+        """The pending interrupt of highest priority that may preempt the active exception."""
         ready = [(self.priority.get(irq, 0), irq) for irq in self.pending & self.enabled]
         best = min(ready, default=None)
         running = min((priority for _, priority in self.active), default=IDLE)
@@ -200,7 +200,7 @@ class Board:
     def _exception_entry(self, number, priority):
         uc = self.uc
         sp, xpsr = uc.reg_read(UC_ARM_REG_SP), uc.reg_read(UC_ARM_REG_XPSR) & 0xFF00_FC00
-        floats = uc.reg_read(UC_ARM_REG_CONTROL) & 4  # Saved at once, not lazily.
+        floats = uc.reg_read(UC_ARM_REG_CONTROL) & 4  # Saved immediately, not lazily.
         free = sp - (104 if floats else 32)
         sp = free & ~7
         xpsr |= 1 << 24 | (0 if free == sp else 1 << 9) | (self.active[-1][0] if self.active else 0)
@@ -245,7 +245,7 @@ class Board:
     # --- Time ---
 
     def _advance(self):
-        """Brings timer and interrupts to `now`."""
+        """Advances timers and interrupts to `now`."""
         self.timer.run(self.now)
         self.uart.run(self.now)
         if self.systick.run(self.now):
@@ -280,7 +280,7 @@ class Board:
             value = self.uart.get(at - LPUART1)
             self._settle()
             return value
-        if at == RCC:  # Ready as soon as on: HSI, HSE, PLL.
+        if at == RCC:  # HSI, HSE and PLL are ready as soon as they are enabled.
             return value | (value & 1 << 8) << 2 | (value & (1 << 16 | 1 << 24)) << 1
         if at == RCC + 0x08:
             return value | (value & 3) << 2
@@ -293,14 +293,14 @@ class Board:
         if at == ADC1:
             return 0xF
         if at == ADC1 + 0x40:
-            # Channel 1 sees what the amplifier makes of the DAC, channel 2 no current; `monitors` says otherwise.
+            # Channel 1 measures the amplifier's voltage, channel 2 no current, unless `monitors` overrides them.
             channel = self.regs.get(ADC1 + 0x30, 0) >> 6 & 0x1F
             volts = self.regs.get(DAC1 + 0x08, 0) * self.full_scale / 4095
             voltage = min(round(volts * 4096 / MONITOR_SCALE), 4095)
             return self.monitors.get(channel, voltage if channel == 1 else 2048)
         if at & ~0x1FFF == GPIO and at & 0x3FF == 0x10:
             port, pin = INTERLOCK
-            # A broken wire reads as the pin's own pull has it, low with the pull-down only.
+            # A broken wire reads as the pin's pull resistor sets it: low with the pull-down only.
             pull = self.regs.get((at & ~0x3FF) + 0x0C, 0) >> 2 * pin & 3
             high = at - GPIO >> 10 == port and (self.closed or pull != 2)
             return self.regs.get(at + 4, 0) | high << pin
@@ -351,13 +351,13 @@ class Board:
             return
         clock = 16 if at & ~0x3FF == DAC1 & ~0x3FF else at - GPIO >> 10 if GPIO <= at < GPIO + 0x1C00 else None
         if clock is not None and not self.regs.get(RCC + 0x4C, 0) >> clock & 1:
-            return  # Lost: its clock is not on yet.
+            return  # The write is lost: the peripheral's clock is not enabled yet.
         if at == RCC + 0x94 and value & 1 << 23:
             value &= 0xFF
         elif at == FLASH_ECCR:
             value = self.regs.get(at, 0) & ~(value & 0xC000_0000)  # Written ones clear.
         elif at == ADC1 + 0x08:
-            value &= ~(1 << 31 | 0x1E)  # Calibration and conversion are over at once.
+            value &= ~(1 << 31 | 0x1E)  # Calibration and conversion end immediately.
         elif at == IWDG:
             return self._watchdog(value)
         elif GPIO <= at < GPIO + 0x2000 and at & 0x3FF in (0x18, 0x28):
@@ -370,7 +370,7 @@ class Board:
         self._look_outside()
 
     def _watchdog(self, key):
-        """LSI at 32 kHz over 4 << PR, RLR + 1 counts."""
+        """Time-out of the watchdog: RLR + 1 counts of LSI (32 kHz) divided by 4 << PR."""
         if key == 0xCCCC or key == 0xAAAA and self.watchdog is not None:
             counts = (self.regs.get(IWDG + 8, 0xFFF) + 1) * (4 << self.regs.get(IWDG + 4, 0))
             self.watchdog = self.now + counts * HZ // 32_000
@@ -378,7 +378,7 @@ class Board:
             self._settle()
 
     def _look_outside(self):
-        """What the enable's wire says: high only if the pin is an output and its bit is set. How the DAC drives its own."""
+        """Logs changes of the enable pin, high only if it is an output whose bit is set, and of the DAC's mode."""
         port = GPIO + 0x400 * ENABLE[0]
         driven = self.regs.get(port, 0) >> 2 * ENABLE[1] & 3 == 1
         high = driven and bool(self.regs.get(port + 0x14, 0) >> ENABLE[1] & 1)
@@ -394,7 +394,7 @@ class Board:
     # --- Log ---
 
     def _logged(self, uc, access, at, size, write, _):
-        """The ring's write index is about to move: takes the new bytes, as a debugger would."""
+        """Called before the ring's write index moves: reads the new bytes as a debugger would."""
         _, buffer, length = struct.unpack("<3I", uc.mem_read(self.rtt + 24, 12))
         start, self.read_to = self.read_to, write
         if start != write:

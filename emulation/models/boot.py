@@ -1,4 +1,4 @@
-"""Boots an image and does it harm: boot.py IMAGE TICK PANIC RTT VOLTS HOST prints what happened outside of the chip, as JSON.
+"""Boots an image and injects faults: boot.py IMAGE TICK PANIC RTT VOLTS HOST prints the events outside as JSON.
 
 TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's. VOLTS is the full
 scale of its amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each.
@@ -13,12 +13,12 @@ from unicorn.arm_const import UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, 
 from board import BUTTON, FLASH, HZ, POWER_ON, RAM, Board
 
 MISHAP_TICK = 300
-STORE = [FLASH + 0x7F000 + page * 0x800 for page in range(2)]  # The first word of each page, torn by a power cut.
+STORE = [FLASH + 0x7F000 + page * 0x800 for page in range(2)]  # First word of each page, half written at a power cut.
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 
 def panic(board):
-    """A call of `panic("injected")` at `injected.rs:7`, its words at the stack's very end."""
+    """Calls `panic("injected")` at `injected.rs:7`, its arguments at the end of the stack."""
     text = b"injected.rs\0injected"
     board.uc.mem_write(RAM + 0x40, text)
     board.uc.mem_write(RAM + 0x20, struct.pack("<4I", RAM + 0x40, 11, 7, 1))
@@ -28,7 +28,7 @@ def panic(board):
 
 
 def broken(code):
-    """The tick's first instruction turns into another one."""
+    """Replaces the tick's first instruction."""
 
     def mishap(board):
         board.uc.mem_write(TICK, code)
@@ -48,7 +48,7 @@ def dip(board):
 
 
 def pressed(board):
-    """Somebody answers a fault with the reset button."""
+    """The reset button is pressed after a fault."""
     opened(board)
     board.cut = board.now + 20 * HZ // 1000, BUTTON
 
@@ -59,35 +59,35 @@ def opened(board):
 
 
 def shorted(board):
-    """The voltage monitor sees none."""
+    """The voltage monitor measures 0 V."""
     board.monitors[1] = 0
 
 
 def mistaken(board):
-    """The amplifier is one of 1000 V."""
+    """The amplifier reaches 1000 V."""
     board.full_scale = 1000
 
 
 def arcing(board):
-    """The current monitor sees 3 mA, at 5 mA for half its range."""
+    """The current monitor measures 3 mA; half its range is 5 mA."""
     board.monitors[2] = 2048 + 3 * 2048 // 5
 
 
 def stalled(board):
-    """A debugger that has taken the log on, in its blocking mode, and reads no more: the ring is full for ever."""
+    """A debugger that switched the log to blocking mode and stopped reading: the ring stays full."""
     write, = struct.unpack("<I", board.uc.mem_read(RTT + 36, 4))
     length, = struct.unpack("<I", board.uc.mem_read(RTT + 32, 4))
     board.uc.mem_write(RTT + 40, struct.pack("<2I", (write + 1) % length, 2))
 
 
 def deaf(board):
-    """Hangs with interrupts off."""
+    """Hangs with interrupts disabled."""
     board.uc.reg_write(UC_ARM_REG_PRIMASK, 1)
     broken(HANG)(board)
 
 
 def play(host, mishap, until_us, torn=()):
-    """After the reset the flash is sound again, the memory as it was."""
+    """After the reset the flash is correct again; the memory keeps its content."""
     board = Board(IMAGE, RTT, host, FULL_SCALE)
     for at in torn:
         board.tear(at)

@@ -1,4 +1,4 @@
-"""Peripherals with a life of their own. Times in cycles of the core."""
+"""Models of the peripherals that raise interrupts. Times are in cycles of the core."""
 
 
 class Timer:
@@ -11,7 +11,7 @@ class Timer:
         return self.regs.get(offset, 0xFFFF if offset == 0x2C else 0)
 
     def run(self, now):
-        """Moves the counter to `now` and sets the flags of what it passed."""
+        """Advances the counter to `now` and sets the flags of the events on the way."""
         ticks, self.fraction = divmod(now - self.at + self.fraction, self.get(0x28) + 1)
         self.at = now
         if not self.get(0x00) & 1 or ticks == 0:
@@ -25,7 +25,7 @@ class Timer:
         self.regs[0x24] = (count + ticks) % span
 
     def next(self):
-        """Cycles from the last `run` to the next flag that interrupts."""
+        """Cycles from the last `run` to the next flag that raises an interrupt."""
         if not self.get(0x00) & 1:
             return None
         count, span, enabled = self.get(0x24), self.get(0x2C) + 1, self.get(0x0C)
@@ -50,7 +50,7 @@ class SysTick:
         self.regs, self.zero_at = {}, None
 
     def run(self, now):
-        """True if it passed zero, and interrupts."""
+        """Whether it passed zero with its interrupt enabled."""
         if self.zero_at is None or now < self.zero_at:
             return False
         period = self.regs.get(0x14, 0) + 1
@@ -81,7 +81,7 @@ class Uart:
         self.idle_at = self.left_at = None
 
     def byte_time(self):
-        """Cycles; BRR is in 256ths of one."""
+        """Cycles per bit. BRR counts 256ths of a cycle."""
         return 10 * self.regs.get(0x0C, 0) // 256
 
     def status(self):
@@ -90,7 +90,7 @@ class Uart:
         return flags | (self.TXE if len(self.to_send) <= self.FIFO else 0)
 
     def interrupts(self):
-        """An enable bit of CR1 stands where its flag does."""
+        """Whether an interrupt is pending. An enable bit in CR1 has the same position as its flag."""
         return bool(self.status() & self.regs.get(0x00, 0) & 0xF0)
 
     def run(self, now):
@@ -112,7 +112,7 @@ class Uart:
             self.flags |= 0 if self.to_send else self.TC
 
     def next(self):
-        """When something happens of itself."""
+        """Time of the next event that no register access causes."""
         times = [self.incoming[0][0]] if self.incoming else []
         return min(times + [at for at in (self.idle_at, self.left_at) if at], default=None)
 

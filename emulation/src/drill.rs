@@ -1,7 +1,8 @@
 //! `cargo xtask drill`: injects each fault under QEMU and compares the decoded log with the approved one.
 //!
-//! That the voltage goes away is checked on the DAC's wire, not in the log. The approved logs are in `firmware/drills/`; values
-//! that depend on the build (revision, line numbers, lateness, digest, counts) are replaced by `_`.
+//! That the voltage goes away is checked on the DAC's wire, not in the log. The approved logs are in
+//! `firmware/drills/`; values that depend on the build (revision, line numbers, lateness, digest, counts) are replaced
+//! by `_`.
 
 use std::fmt::Write;
 use std::fs;
@@ -81,7 +82,8 @@ fn grace(mishap: Mishap) -> usize {
     }
 }
 
-/// Longest time that a task may hang before the fault, in us. The wire cannot show it, because nothing is written meanwhile.
+/// Longest time that a task may hang before the fault, in us. The wire cannot show it, because nothing is written
+/// meanwhile.
 fn patience_us(mishap: Mishap) -> Option<u64> {
     match mishap {
         Mishap::Hang => Some(u64::from(LONGEST_HANG_MS) * 1000),
@@ -91,7 +93,8 @@ fn patience_us(mishap: Mishap) -> Option<u64> {
     }
 }
 
-/// An error unless the fault is logged within `limit_us` after its injection, whose time is counted from the tick that armed.
+/// An error unless the fault is logged within `limit_us` after its injection, whose time is counted from the tick that
+/// armed.
 fn found_within(log: &[Line], limit_us: u64) -> Result<()> {
     let time = |is: fn(&Event) -> bool| log.iter().find(|line| is(&line.event)).and_then(|line| line.time_us);
     let armed = time(|event| matches!(event, Event::State { to, .. } if to == "armed")).context("never armed")?;
@@ -103,8 +106,8 @@ fn found_within(log: &[Line], limit_us: u64) -> Result<()> {
     Ok(())
 }
 
-/// An error unless the output is zero before arming, carries voltage until the fault, is zero after it, and carries voltage again
-/// only in the drills that arm a second time.
+/// An error unless the output is zero before arming, carries voltage until the fault, is zero after it, and carries
+/// voltage again only in the drills that arm a second time.
 fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
     // One zero is written before the first tick.
     let (armed, mishap_at) = (1 + ARM_TICK as usize, 1 + MISHAP_TICK as usize);

@@ -1,4 +1,5 @@
-//! `cargo xtask emulate`: the stair under QEMU compared with the same code on the host, or a board that a host commands.
+//! `cargo xtask emulate`: the stair under QEMU compared with the same code on the host, or a board that a host
+//! commands.
 
 use std::path::PathBuf;
 

@@ -1,6 +1,7 @@
 //! Verification of the firmware's images, started by `cargo xtask`.
 //!
-//! In: images that [`xtask::build`] makes. Out: tables and JSON on stdout, an exit code of 1 if an image is not as it must be.
+//! In: images that [`xtask::build`] makes. Out: tables and JSON on stdout, an exit code of 1 if an image is not as it
+//! must be.
 //!
 //! - [`binary`] reads an image's machine code: panics, floats, stack, size.
 //! - [`qemu`] runs an image under QEMU and compares the run with the same code on the host: [`emulate`], [`rivals`],
@@ -54,8 +55,8 @@ Examples:
     Emulate(emulate::Args),
     /// Everything that the emulated firmware must show
     ///
-    /// Bit for bit the host's on the stair and on random commands at opt-levels s and 3, instructions per tick, no panic
-    /// in the tick, no heap, every fault drill. A part of `test`.
+    /// Bit for bit the host's on the stair and on random commands at opt-levels s and 3, instructions per tick, no
+    /// panic in the tick, no heap, every fault drill. A part of `test`.
     Proof,
     /// Run the fault drills under QEMU
     ///
@@ -70,9 +71,10 @@ Examples:
     Talk,
     /// End-to-end demonstration: run, diagnose, extend, run again
     ///
-    /// The emulated board drives a spring with a hidden effect up and down a stair, in lock step; `vsj diagnose` names the
-    /// cause; the extended model goes over the link, is checked, stored and run after a restart. Prints the true stiffness
-    /// error before and after. With --feedback the board reads the spring's sensor instead, which then falls silent.
+    /// The emulated board drives a spring with a hidden effect up and down a stair, in lock step; `vsj diagnose` names
+    /// the cause; the extended model goes over the link, is checked, stored and run after a restart. Prints the true
+    /// stiffness error before and after. With --feedback the board reads the spring's sensor instead, which then falls
+    /// silent.
     #[command(after_help = "\
 Examples:
   cargo xtask story                                three effects, as in `test`
@@ -83,8 +85,8 @@ Examples:
     Story(story::Args),
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 64 KB (96 KB with the time-optimal controller), RAM below 16 KB and the stack
-    /// within its region.
+    /// Exits with 1 unless flash stays below 64 KB (96 KB with the time-optimal controller), RAM below 16 KB and the
+    /// stack within its region.
     #[command(after_help = "\
 Examples:
   cargo xtask size --json
@@ -94,10 +96,11 @@ Examples:
     Size(size::Args),
     /// Run the image that is flashed on models of the STM32G474's registers
     ///
-    /// Checks that it fits and that its tick cannot panic. Runs boot and 1.2 s without a host; a host that arms it over LPUART1
-    /// and sets targets, where every code must be the host model's for this controller and amplifier, and many must differ
-    /// from any other image's; then a panic, a hard fault and two hangs while voltage is out. Exits with 1 unless the output
-    /// is as it must be each time; says what this cannot show. Installs Unicorn into a venv under the target directory.
+    /// Checks that it fits and that its tick cannot panic. Runs boot and 1.2 s without a host; a host that arms it over
+    /// LPUART1 and sets targets, where every code must be the host model's for this controller and amplifier, and many
+    /// must differ from any other image's; then a panic, a hard fault and two hangs while voltage is out. Exits with 1
+    /// unless the output is as it must be each time; says what this cannot show. Installs Unicorn into a venv under the
+    /// target directory.
     #[command(after_help = "\
 Examples:
   cargo xtask boot

@@ -59,8 +59,8 @@ impl Board {
     }
 }
 
-/// Builds the default image of a board, with the paper's controller and the amplifier of 700 V. Returns the path of its ELF
-/// file.
+/// Builds the default image of a board, with the paper's controller and the amplifier of 700 V. Returns the path of its
+/// ELF file.
 pub fn image(board: Board, opt: Opt) -> Result<PathBuf> {
     image_with(&[], board, opt)
 }
@@ -71,7 +71,8 @@ pub fn image_with(features: &[&str], board: Board, opt: Opt) -> Result<PathBuf> 
     compile(&features.join(","), opt, ["--bin", board.name()], board.name(), &features.join("-"))
 }
 
-/// Builds an example of the package `firmware` with a comma-separated list of features. Returns the path of its ELF file.
+/// Builds an example of the package `firmware` with a comma-separated list of features. Returns the path of its ELF
+/// file.
 pub fn example(name: &str, features: &str, opt: Opt) -> Result<PathBuf> {
     compile(features, opt, ["--example", name], &format!("examples/{name}"), name)
 }

@@ -1,5 +1,5 @@
-//! Starts the package `emulation`, which verifies the firmware's images. It parses its arguments and prints its help itself,
-//! so that `cargo xtask` compiles without the crates of the product.
+//! Starts the package `emulation`, which verifies the firmware's images. It parses its arguments and prints its help
+//! itself, so that `cargo xtask` compiles without the crates of the product.
 
 use std::convert::Infallible;
 use std::ffi::OsString;
@@ -30,7 +30,8 @@ pub(crate) fn run(args: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// Replaces this process by the emulation, so that signals and the exit code are the emulation's own. Returns on failure only.
+/// Replaces this process by the emulation, so that signals and the exit code are the emulation's own. Returns on
+/// failure only.
 pub(crate) fn replace(args: &[OsString]) -> Result<Infallible> {
     Err(command().args(args).exec()).context("cannot start cargo")
 }

@@ -1,5 +1,5 @@
-//! `cargo xtask`: the project's commands. What runs or reads the firmware's images is in the package `emulation`, which this
-//! binary starts.
+//! `cargo xtask`: the project's commands. What runs or reads the firmware's images is in the package `emulation`, which
+//! this binary starts.
 
 mod bench;
 mod check;
@@ -48,8 +48,8 @@ struct Cli {
 enum Command {
     /// Install what a fresh machine lacks
     ///
-    /// Reads rust-toolchain.toml and has rustup add a missing toolchain, component or target; installs QEMU with apt-get,
-    /// and waits while another apt-get runs.
+    /// Reads rust-toolchain.toml and has rustup add a missing toolchain, component or target; installs QEMU with
+    /// apt-get, and waits while another apt-get runs.
     ///
     /// Harmless when repeated; needs the network only if something is missing.
     #[command(verbatim_doc_comment)]
@@ -70,8 +70,8 @@ enum Command {
     Story(Forwarded),
     /// Write the image to the real board and show its log (probe-rs)
     ///
-    /// The log's first line names the controller, a second one an amplifier of 1000 V. A stored model stays; a model that
-    /// the controller cannot run is a fault until it is acknowledged.
+    /// The log's first line names the controller, a second one an amplifier of 1000 V. A stored model stays; a model
+    /// that the controller cannot run is a fault until it is acknowledged.
     #[command(
         verbatim_doc_comment,
         after_help = "\
@@ -96,8 +96,8 @@ Examples:
     Boot(Forwarded),
     /// Compare the host's speed with Python's
     ///
-    /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Marks a time of Rust's above its
-    /// bound, a multiple of numba's time.
+    /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Marks a time of Rust's above
+    /// its bound, a multiple of numba's time.
     #[command(
         verbatim_doc_comment,
         after_help = "Example:\n  cargo xtask bench --json | jq '.rows[] | {name, to_numba, met}'"
@@ -126,7 +126,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// The arguments of this process, `help COMMAND` written as `COMMAND --help`, so that the emulation's commands print their own.
+/// The arguments of this process, `help COMMAND` written as `COMMAND --help`, so that the emulation's commands print
+/// their own.
 fn arguments() -> Vec<OsString> {
     let mut args: Vec<OsString> = std::env::args_os().collect();
     if args.len() == 3 && args[1] == "help" {

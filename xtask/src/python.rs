@@ -7,8 +7,9 @@ use anyhow::{Context, Result};
 
 use crate::shell;
 
-/// The Python interpreter of a virtual environment under `target` that has the packages of `requirements`, a file relative to
-/// the root of the workspace. Creates the environment, named after `command`, or renews it when the file has changed.
+/// The Python interpreter of a virtual environment under `target` that has the packages of `requirements`, a file
+/// relative to the root of the workspace. Creates the environment, named after `command`, or renews it when the file
+/// has changed.
 pub fn environment(target: &Path, command: &str, requirements: &str) -> Result<PathBuf> {
     let venv = target.join(format!("{command}-venv"));
     let python = venv.join("bin/python");

@@ -15,8 +15,8 @@ const PT_LOAD: u32 = 1;
 /// Largest image that is accepted, in bytes: twice the flash of the MCU.
 const MOST: usize = 1 << 20;
 
-/// Joins the loadable segments of a 32-bit little-endian ELF file at their load addresses. Gaps are filled with 0xff, which
-/// erased flash holds. Other files, overlapping segments and images above 1 MB are errors.
+/// Joins the loadable segments of a 32-bit little-endian ELF file at their load addresses. Gaps are filled with 0xff,
+/// which erased flash holds. Other files, overlapping segments and images above 1 MB are errors.
 pub fn flash(elf: &[u8]) -> Result<Flash> {
     ensure!(elf.starts_with(b"\x7fELF\x01\x01"), "not a 32-bit little-endian ELF file");
     let headers = word(elf, 0x1c)? as usize;

@@ -28,8 +28,8 @@ pub fn cargo() -> Command {
     command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Prints `command` to stderr and runs it to its end. Its stdout goes to stderr, because stdout is reserved for results. An exit
-/// code other than 0 is an error.
+/// Prints `command` to stderr and runs it to its end. Its stdout goes to stderr, because stdout is reserved for
+/// results. An exit code other than 0 is an error.
 pub fn run(command: &mut Command) -> Result<()> {
     let line = line(command);
     eprintln!("$ {line}");

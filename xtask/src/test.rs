@@ -6,8 +6,9 @@ use xtask::{setup, shell};
 use crate::emulation;
 use crate::steps::{self, Progress, Step};
 
-/// Calls of cargo, the quick ones first. Without a board the firmware's library is an ordinary one. Each image is linted for
-/// its board alone, with and without the optional features, because an image with a feature hides what is left out without it.
+/// Calls of cargo, the quick ones first. Without a board the firmware's library is an ordinary one. Each image is
+/// linted for its board alone, with and without the optional features, because an image with a feature hides what is
+/// left out without it.
 const STEPS: &[Step] = &[
     Step::new("format", &["fmt", "--all", "--check"]),
     Step::new("lint host", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),

@@ -16,13 +16,14 @@ Clones the last commit into a temporary folder, with a target directory of its o
   xtask          cargo xtask --help, nothing compiled before
   check          cargo xtask check, after a first run and a changed line in a library
   test           with --test: cargo xtask test, nothing compiled before
-Changes that are not committed are not measured. Downloads are not timed. CPU time depends less than wall time on what else the
-machine does. A time above its bound is marked and is no error.
+Changes that are not committed are not measured. Downloads are not timed. CPU time depends less than wall time on
+what else the machine does. A time above its bound is marked and is no error.
 
 Examples:
   cargo xtask times
   cargo xtask times --against HEAD~20       the same in an earlier revision, in turns, and the ratios
-  cargo xtask times --test --json";
+  cargo xtask times --test --json
+  cargo xtask times --only xtask";
 
 /// The library that one line is changed in; the second one in revisions without the first.
 const EDITED: [&str; 2] = ["identify/src/lib.rs", "host-sim/src/lib.rs"];
@@ -36,9 +37,21 @@ pub(crate) struct Args {
     /// Measure `cargo xtask test` too
     #[arg(long)]
     test: bool,
+    /// Measure this command alone
+    #[arg(long, value_name = "NAME", conflicts_with = "test", value_parser = ["first result", "xtask", "check", "test"])]
+    only: Option<String>,
     /// Print the table as JSON
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    fn measures(&self, task: &Task) -> bool {
+        match &self.only {
+            Some(name) => name == task.name,
+            None => self.test || task.name != TEST,
+        }
+    }
 }
 
 /// A command that is timed.
@@ -58,12 +71,14 @@ enum Before {
     Edit,
 }
 
-const TASKS: [Task; 3] = [
+const TASKS: [Task; 4] = [
     Task { name: "first result", args: &["run", "--release"], bound_s: 120.0, before: Before::Clean },
     Task { name: "xtask", args: &["xtask", "--help"], bound_s: 30.0, before: Before::Clean },
     Task { name: "check", args: &["xtask", "check"], bound_s: 90.0, before: Before::Edit },
+    Task { name: TEST, args: &["xtask", "test"], bound_s: 720.0, before: Before::Clean },
 ];
-const TEST: Task = Task { name: "test", args: &["xtask", "test"], bound_s: 720.0, before: Before::Clean };
+/// The task that is measured on request only.
+const TEST: &str = "test";
 
 /// Time of one command, in s.
 #[derive(Clone, Copy)]
@@ -87,7 +102,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let head = Clone::new(&folder, "HEAD")?;
     let other = args.against.as_deref().map(|revision| Clone::new(&folder, revision)).transpose()?;
     let mut rows = Vec::new();
-    for task in TASKS.iter().chain(args.test.then_some(&TEST)) {
+    for task in TASKS.iter().filter(|task| args.measures(task)) {
         let time = head.time(task)?;
         let against = other.as_ref().and_then(|other| {
             let time = other.time(task);
@@ -182,8 +197,8 @@ fn remove(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// User and system time of all children that have ended, with their children, in s: fields 16 and 17 of `/proc/self/stat`, in
-/// units of 10 ms.
+/// User and system time of all children that have ended, with their children, in s: fields 16 and 17 of
+/// `/proc/self/stat`, in units of 10 ms.
 fn children_cpu_s() -> Result<f64> {
     let stat = fs::read_to_string("/proc/self/stat").context("CPU times need Linux")?;
     // The second field is the program's name in parentheses and may contain blanks.
@@ -250,6 +265,15 @@ mod tests {
         let json = report(2, ("abc", Some("def")), &rows);
         assert_eq!((&json["rows"][0]["against"]["wall_ratio"], &json["rows"][1]["met"]), (&json!(0.4), &json!(false)));
         assert_eq!(json["rows"][1]["against"], Value::Null);
+    }
+
+    #[test]
+    fn the_whole_test_is_measured_on_request_only() {
+        let count = |test, only: Option<&str>| {
+            let args = Args { against: None, test, only: only.map(str::to_owned), json: false };
+            TASKS.iter().filter(|task| args.measures(task)).count()
+        };
+        assert_eq!((count(false, None), count(true, None), count(false, Some("check"))), (3, 4, 1));
     }
 
     #[test]

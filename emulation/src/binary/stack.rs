@@ -1,12 +1,13 @@
-//! The greatest depth of the stack, computed from the machine code: the frame of every function and the deepest chain of calls.
+//! The greatest depth of the stack, computed from the machine code: the frame of every function and the deepest chain
+//! of calls.
 //!
-//! Interrupts nest, so the deepest handler of each level is added to the thread, each with the registers that the processor saves.
-//! A call through a register may reach any function that no other function calls directly: from a handler's own code (an
-//! executor) a task, from anywhere else (a waker, a formatter) any function but a task. This is an assumption, and so is that
-//! such a call is not followed by another one of its kind.
+//! Interrupts nest, so the deepest handler of each level is added to the thread, each with the registers that the
+//! processor saves. A call through a register may reach any function that no other function calls directly: from a
+//! handler's own code (an executor) a task, from anywhere else (a waker, a formatter) any function but a task. This is
+//! an assumption, and so is that such a call is not followed by another one of its kind.
 //!
-//! The function that stops the program disables interrupts first, so nothing nests above it: it is counted once for all levels,
-//! and once more for a panic inside it.
+//! The function that stops the program disables interrupts first, so nothing nests above it: it is counted once for all
+//! levels, and once more for a panic inside it.
 
 use std::collections::{BTreeMap, BTreeSet};
 

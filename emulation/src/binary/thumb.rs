@@ -129,8 +129,8 @@ impl Shape {
     }
 }
 
-/// The value of a modified immediate constant (ARMv7-M manual, A5.3.2): a repeated byte, or a byte with its first bit set,
-/// rotated.
+/// The value of a modified immediate constant (ARMv7-M manual, A5.3.2): a repeated byte, or a byte with its first bit
+/// set, rotated.
 fn modified(immediate: u32) -> u32 {
     let byte = immediate & 0xff;
     match immediate >> 8 {

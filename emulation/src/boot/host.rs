@@ -1,7 +1,7 @@
 //! The run with a host at the serial line: what it sends and when, and the codes and answers that must follow.
 //!
-//! The time of an answer shows which tick followed a request: the answer leaves right after that tick. From there on the code on
-//! the host predicts every DAC code.
+//! The time of an answer shows which tick followed a request: the answer leaves right after that tick. From there on
+//! the code on the host predicts every DAC code.
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::control::{Control, Orders, Senses, Untimed};
@@ -44,7 +44,8 @@ pub(super) fn frames() -> Value {
     (0..).zip(schedule()).map(frame).collect()
 }
 
-/// An error unless every answer is the expected one and every DAC code is the host's for `variant`. Returns a line for the report.
+/// An error unless every answer is the expected one and every DAC code is the host's for `variant`. Returns a line for
+/// the report.
 pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     let (_, ticking) = events.split("watchdog started")?;
     let written = written(&ticking)?;

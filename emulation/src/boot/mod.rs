@@ -1,8 +1,8 @@
 //! Runs the image that is flashed to the STM32G474 on models of the chip's registers, which are in `emulation/models/`.
 //!
-//! In: a variant of the image. Out: one line for each run, or an error that names what left the chip wrongly. The checks read
-//! the DAC's register, the enable's pin and the log's bytes ([`events`]), with a host at the line ([`host`]) and with faults
-//! ([`runs`]).
+//! In: a variant of the image. Out: one line for each run, or an error that names what left the chip wrongly. The
+//! checks read the DAC's register, the enable's pin and the log's bytes ([`events`]), with a host at the line
+//! ([`host`]) and with faults ([`runs`]).
 
 mod events;
 mod host;

@@ -10,8 +10,8 @@ use crate::variant;
 
 /// Period of the control tick, in us.
 pub(super) const PERIOD_US: f64 = 1000.0;
-/// Largest difference between the earliest and the latest tick relative to their grid, in us: the logger disables interrupts
-/// briefly.
+/// Largest difference between the earliest and the latest tick relative to their grid, in us: the logger disables
+/// interrupts briefly.
 pub(super) const JITTER_US: f64 = 20.0;
 /// Timeout of the watchdog, in us.
 const WATCHDOG_US: f64 = 100_000.0;
@@ -20,8 +20,8 @@ pub(super) const MONITOR_US: f64 = 1e6 * SUPERVISION.monitor_time_s + PERIOD_US;
 /// Longest time from a panic or fault to zero volts, in us. An instruction takes 1/170 us.
 pub(super) const KILL_US: f64 = 5.0;
 
-/// A run without a host and without a fault: it boots, its output stays zero and disabled, its ticks keep their period, and
-/// the watchdog is fed.
+/// A run without a host and without a fault: it boots, its output stays zero and disabled, its ticks keep their period,
+/// and the watchdog is fed.
 pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<String> {
     events.safe()?;
     let log = events.log(image)?;
@@ -63,8 +63,8 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
     ))
 }
 
-/// A run with a panic, fault or hang: the output is zero and disabled within `within_us` and before the first byte of the log,
-/// then a reset follows that logs its cause and keeps the output safe.
+/// A run with a panic, fault or hang: the output is zero and disabled within `within_us` and before the first byte of
+/// the log, then a reset follows that logs its cause and keeps the output safe.
 pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<String> {
     let (_, after) = mishap(events)?;
     let (dying, reborn) = after.split("reset")?;
@@ -78,8 +78,8 @@ pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str)
     Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
 }
 
-/// A run with a fault that the supervisor detects: the output is zero and disabled within `within_us`, and the ticks go on
-/// without voltage whatever the host sends.
+/// A run with a fault that the supervisor detects: the output is zero and disabled within `within_us`, and the ticks go
+/// on without voltage whatever the host sends.
 pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, fault: &str) -> Result<String> {
     let (_, after) = mishap(events)?;
     let last = after.0.iter().rposition(Event::drives).context("the voltage had gone before")?;

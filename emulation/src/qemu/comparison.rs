@@ -30,7 +30,8 @@ impl Comparison {
         Self::with(name, None, |_| None, run)
     }
 
-    /// Runs the script `name` on the host with the stored model `found`; `measured` returns the sensor's reading before each tick.
+    /// Runs the script `name` on the host with the stored model `found`; `measured` returns the sensor's reading before
+    /// each tick.
     pub(crate) fn with(
         name: &str,
         found: Option<&WireModel>,

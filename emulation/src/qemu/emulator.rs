@@ -1,8 +1,9 @@
 //! Starts QEMU on an image, decodes its log line by line and collects every code that it writes to its DAC.
 //!
-//! Under `-icount shift=6,sleep=off` an instruction takes 64 ns of the board's time: runs are repeatable, slower than the
-//! real chip on the board's clock and much faster than real time on the host's. 64 ns is also more than the 40 ns period of the
-//! board's SysTick, so that SysTick counts single instructions; at shift 3, 8 ns, it would count every fifth.
+//! Under `-icount shift=6,sleep=off` an instruction takes 64 ns of the board's time: runs are repeatable, slower than
+//! the real chip on the board's clock and much faster than real time on the host's. 64 ns is also more than the 40 ns
+//! period of the board's SysTick, so that SysTick counts single instructions; at shift 3, 8 ns, it would count every
+//! fifth.
 
 use std::fs;
 use std::io::{ErrorKind, Read};
@@ -90,8 +91,8 @@ pub(crate) fn text(line: &Line) -> String {
     format!("{level:<5} {}", line.message)
 }
 
-/// Starts QEMU with an image and a script, in `folder`. `host` is the QEMU character device of the serial line to a host, `wire`
-/// the file for the DAC's bytes, `clock` the value of `-icount`.
+/// Starts QEMU with an image and a script, in `folder`. `host` is the QEMU character device of the serial line to a
+/// host, `wire` the file for the DAC's bytes, `clock` the value of `-icount`.
 fn start(folder: &Path, elf: &Path, script: &str, host: &str, wire: &Path, clock: &str) -> Result<Child> {
     shell::command(QEMU)
         .current_dir(folder)
@@ -112,8 +113,8 @@ fn start(folder: &Path, elf: &Path, script: &str, host: &str, wire: &Path, clock
 
 /// Runs the board while `work` commands it over the unix socket `socket`. `show` is called with every line of the log.
 ///
-/// The board's clock is slowed down to the host's, because `work` depends on real time. An instruction takes 64 ns of the board's
-/// time here too, so that on a slow machine the board is late but misses no tick.
+/// The board's clock is slowed down to the host's, because `work` depends on real time. An instruction takes 64 ns of
+/// the board's time here too, so that on a slow machine the board is late but misses no tick.
 pub(crate) fn obey<T>(
     elf: &Path,
     socket: &Path,
@@ -147,8 +148,8 @@ pub(crate) fn obey_in<T>(
     child.wait()?;
     let dac = fs::read(&wire)?;
     let _ = fs::remove_file(socket);
-    // It was killed and has no exit code. When it falls behind the host's clock it prints a warning into the log, which damages
-    // a line.
+    // It was killed and has no exit code. When it falls behind the host's clock it prints a warning into the log, which
+    // damages a line.
     Ok((result?, Run { exit: 0, log: log.lines, dac: written(&dac), took: begin.elapsed() }))
 }
 
@@ -223,8 +224,8 @@ impl Log {
     }
 }
 
-/// Decodes a log up to its end and calls `show` with each line as `vsj log` prints it. An incomplete frame at the end is
-/// dropped: it was being written when the emulator stopped.
+/// Decodes a log up to its end and calls `show` with each line as `vsj log` prints it. An incomplete frame at the end
+/// is dropped: it was being written when the emulator stopped.
 pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Log> {
     let mut decoder = Decoder::new(formats);
     let mut log = Log { lines: Vec::new(), damage: None };
@@ -245,8 +246,8 @@ pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl Fn
     }
 }
 
-/// Decodes the bytes on the DAC's wire: see the firmware's `mps2::dac`. A first byte without its second, which a stop cut off, is
-/// dropped.
+/// Decodes the bytes on the DAC's wire: see the firmware's `mps2::dac`. A first byte without its second, which a stop
+/// cut off, is dropped.
 fn written(bytes: &[u8]) -> Vec<Written> {
     let is_pair = |pair: &&[u8]| pair[0] & 0x80 != 0 && pair[1] & 0x80 == 0;
     let code = |pair: &[u8]| Written {

@@ -100,7 +100,8 @@ impl Demonstration {
         let mut last_v = f64::NAN;
         for (tick, moment) in moments.iter().enumerate() {
             let from_s = tick as f64 * TICK_S;
-            // The controller may change its direction within a few ticks: each change of voltage is a row, without a reading.
+            // The controller may change its direction within a few ticks: each change of voltage is a row, without a
+            // reading.
             if moment.commanded_v != last_v {
                 text += &format!("{from_s:.6},{},-\n", moment.commanded_v);
                 last_v = moment.commanded_v;
@@ -127,7 +128,8 @@ impl Demonstration {
         Ok((model != paper).then_some(model))
     }
 
-    /// Sends the model over the link with `vsj link`. The board restarts. An error unless it reports this model afterwards.
+    /// Sends the model over the link with `vsj link`. The board restarts. An error unless it reports this model
+    /// afterwards.
     fn send(&self, folder: &Path, model: &WireModel) -> Result<()> {
         // A socket's path has to be short. Each thread has its own.
         let thread = rayon::current_thread_index().unwrap_or_default();

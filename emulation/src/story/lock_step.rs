@@ -1,7 +1,7 @@
 //! Runs the emulated board with a hidden spring at its amplifier port, in lock step: see the firmware's `mps2::dac`.
 //!
-//! The board waits in a semihosting call, between two instructions, until the spring has answered. No time of the board's passes
-//! meanwhile, so that a run is repeatable on a busy machine.
+//! The board waits in a semihosting call, between two instructions, until the spring has answered. No time of the
+//! board's passes meanwhile, so that a run is repeatable on a busy machine.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
@@ -41,8 +41,8 @@ pub(super) struct Moment {
     pub(super) received: Option<Volts>,
 }
 
-/// Runs the script `name` in `folder`, with a sensor that is silent in the ticks `silent`. Returns the run and every tick at the
-/// spring.
+/// Runs the script `name` in `folder`, with a sensor that is silent in the ticks `silent`. Returns the run and every
+/// tick at the spring.
 pub(super) fn run(
     elf: &Path,
     name: &str,

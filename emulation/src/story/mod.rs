@@ -7,8 +7,8 @@
 //!
 //! With `--feedback` the board keeps its wrong model and reads the spring's sensor instead.
 //!
-//! The result is the error of the true stiffness, which the hidden spring reports, relative to the desired one. Every run is
-//! compared with the same code on the host, code by code.
+//! The result is the error of the true stiffness, which the hidden spring reports, relative to the desired one. Every
+//! run is compared with the same code on the host, code by code.
 
 mod better_model;
 mod lock_step;
@@ -43,7 +43,8 @@ pub(crate) struct Args {
     /// Controller of the image
     #[arg(long, value_enum, default_value = "paper")]
     controller: Controller,
-    /// Let the board read the spring's sensor instead of sending it a model: without, with, and with a sensor that falls silent
+    /// Let the board read the spring's sensor instead of sending it a model: without, with, and with a sensor that
+    /// falls silent
     #[arg(long)]
     feedback: bool,
     /// Seed of the effects' sizes and of the noise
@@ -99,7 +100,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// Runs `work` for each effect in parallel, each with a board and a spring of its own. Prints each `line` as soon as it is known.
+/// Runs `work` for each effect in parallel, each with a board and a spring of its own. Prints each `line` as soon as it
+/// is known.
 fn each<T: Send>(
     effects: &[Option<Cause>],
     work: impl Fn(Option<Cause>) -> Result<T> + Sync,
@@ -113,7 +115,8 @@ fn each<T: Send>(
     effects.par_iter().map(one).collect()
 }
 
-/// The step of `cargo xtask test`: three effects, whose summary must be the approved one, and a sensor that falls silent.
+/// The step of `cargo xtask test`: three effects, whose summary must be the approved one, and a sensor that falls
+/// silent.
 fn check() -> Result<()> {
     let begin = Instant::now();
     let demonstration = Demonstration::new(Controller::Paper)?;

@@ -1,5 +1,5 @@
-//! The demonstration with a sensor: the board keeps the paper's model of a spring that differs from it, and drives it without the
-//! sensor, with it, and with a sensor that falls silent while the voltage is constant at the top.
+//! The demonstration with a sensor: the board keeps the paper's model of a spring that differs from it, and drives it
+//! without the sensor, with it, and with a sensor that falls silent while the voltage is constant at the top.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -74,8 +74,8 @@ pub(super) fn run(stage: &Stage, cause: Option<Cause>, seed: u64) -> Result<Outc
     })
 }
 
-/// The check in `cargo xtask test`: the board trusts the sensor, loses it and trusts it again, without a bump, and its tick cannot
-/// panic.
+/// The check in `cargo xtask test`: the board trusts the sensor, loses it and trusts it again, without a bump, and its
+/// tick cannot panic.
 pub(super) fn check() -> Result<()> {
     let stage = stage(Controller::Paper)?;
     audit::run(&build::read(&stage.elf)?)?;

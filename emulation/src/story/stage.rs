@@ -67,7 +67,8 @@ pub(super) struct Stage {
     /// Path of the image.
     pub(super) elf: PathBuf,
     folder: PathBuf,
-    /// Voltage over time on the paper's spring, which the effects' sizes are drawn for, and its largest stiffness, in V.
+    /// Voltage over time on the paper's spring, which the effects' sizes are drawn for, and its largest stiffness, in
+    /// V.
     schedule: Schedule,
     top_v: f64,
 }

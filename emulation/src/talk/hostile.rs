@@ -64,7 +64,8 @@ pub(super) fn hostile(dice: &mut Dice, index: u32, next: Sequence) -> Vec<u8> {
             frame.drain(from..to);
             frame
         }
-        // Another version. The board answers it, so its number must not be the next one, whose answer it would look like.
+        // Another version. The board answers it, so its number must not be the next one, whose answer it would look
+        // like.
         5 => {
             let version = link::VERSION.wrapping_add(dice.draw(1..255) as u8);
             Frame::with_version(version, Sequence(next.0.wrapping_add(100)), &request).as_bytes().into()

@@ -1,5 +1,5 @@
-//! `cargo xtask talk`: a host commands the emulated firmware. Valid requests are followed, hostile frames are not, and no tick is
-//! missed.
+//! `cargo xtask talk`: a host commands the emulated firmware. Valid requests are followed, hostile frames are not, and
+//! no tick is missed.
 
 mod hostile;
 
@@ -24,8 +24,8 @@ const TIME: Duration = Duration::from_secs(300);
 const BATCH: u32 = 8;
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Time since the last valid frame after which the host's time-out of 0.5 s may have expired on a busy machine. It is no error of
-/// the board then.
+/// Time since the last valid frame after which the host's time-out of 0.5 s may have expired on a busy machine. It is
+/// no error of the board then.
 const LATE: Duration = Duration::from_millis(400);
 /// The target that hostile frames must not change, in V.
 const TARGET_V: f64 = 300.0;
@@ -62,8 +62,8 @@ pub(crate) fn run(elf: &Path) -> Result<String> {
     Ok(format!("{said}; {} ticks on the wire, {driven} with voltage, {missed} missed", run.dac.len()))
 }
 
-/// The number of writes with voltage on the DAC's wire. An error unless the wire begins and ends with zero and the amplifier was
-/// enabled `armed` times.
+/// The number of writes with voltage on the DAC's wire. An error unless the wire begins and ends with zero and the
+/// amplifier was enabled `armed` times.
 fn wire(dac: &[Written], armed: usize) -> Result<usize> {
     ensure!(dac.first() == Some(&SAFE) && dac.last() == Some(&SAFE), "the wire does not begin and end with zero");
     let parts = dac.chunk_by(|a, b| a.enabled == b.enabled).filter(|part| part[0].enabled).count();

@@ -23,7 +23,8 @@ pub(super) fn install(package: &str) -> Result<()> {
     Ok(())
 }
 
-/// The command for root, or through sudo for anybody else. sudo drops the caller's environment, so `env` sets it behind sudo.
+/// The command for root, or through sudo for anybody else. sudo drops the caller's environment, so `env` sets it behind
+/// sudo.
 fn apt_get(is_root: bool, args: &[&str]) -> Command {
     let words: &[&str] = if is_root { &["env"] } else { &["sudo", "--non-interactive", "env"] };
     let mut command = shell::command(words[0]);
@@ -31,9 +32,11 @@ fn apt_get(is_root: bool, args: &[&str]) -> Command {
     command
 }
 
-/// Runs a command again, up to `patience` after the first attempt, as long as it fails because another process holds a lock.
+/// Runs a command again, up to `patience` after the first attempt, as long as it fails because another process holds a
+/// lock.
 ///
-/// apt-get can wait for dpkg's locks itself (`DPkg::Lock::Timeout`), but not for those of the package lists and of the archive.
+/// apt-get can wait for dpkg's locks itself (`DPkg::Lock::Timeout`), but not for those of the package lists and of the
+/// archive.
 fn patiently(command: impl Fn() -> Command, patience: Duration, pause: Duration) -> Result<()> {
     let line = shell::line(&command());
     eprintln!("$ {line}");

@@ -1,7 +1,7 @@
 //! `cargo xtask setup`: installs what a fresh machine lacks.
 //!
-//! In: the toolchain file and what rustup, the path and apt-get find installed. Out: an installed toolchain with its components
-//! and targets, and QEMU. What is there already is left as it is.
+//! In: the toolchain file and what rustup, the path and apt-get find installed. Out: an installed toolchain with its
+//! components and targets, and QEMU. What is there already is left as it is.
 
 mod apt;
 mod toolchain;

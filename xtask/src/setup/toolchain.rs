@@ -52,8 +52,9 @@ impl Wanted {
         Ok(Self { channel: channel.to_owned(), components: names("components"), targets: names("targets") })
     }
 
-    /// The rustup commands that add what is not `installed`, one for the components and one for the targets. `installed` is the
-    /// output of `rustup component list --installed`, in which a component's name ends with the `host` triple.
+    /// The rustup commands that add what is not `installed`, one for the components and one for the targets.
+    /// `installed` is the output of `rustup component list --installed`, in which a component's name ends with the
+    /// `host` triple.
     fn missing(&self, installed: &str, host: &str) -> Vec<Vec<String>> {
         let is_there = |name: &str| installed.lines().any(|line| line.trim() == name);
         let add = |what: &str, names: &[String], is_there: &dyn Fn(&str) -> bool| {
@@ -70,7 +71,8 @@ impl Wanted {
     }
 }
 
-/// The host triple of the installed toolchain `channel`, from the output of `rustup toolchain list`; `None` if it is not installed.
+/// The host triple of the installed toolchain `channel`, from the output of `rustup toolchain list`; `None` if it is
+/// not installed.
 fn host<'a>(toolchains: &'a str, channel: &str) -> Option<&'a str> {
     toolchains.lines().find_map(|line| line.split_whitespace().next()?.strip_prefix(channel)?.strip_prefix('-'))
 }
@@ -89,8 +91,12 @@ mod tests {
     const HOST: &str = "x86_64-unknown-linux-gnu";
 
     fn wanted() -> Wanted {
-        Wanted::parse("[toolchain]\nchannel = \"1.95.0\"\ncomponents = [\"rustfmt\", \"clippy\"]\ntargets = [\"thumbv7em-none-eabihf\"]")
-            .unwrap()
+        let list = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        Wanted {
+            channel: "1.95.0".to_owned(),
+            components: list(&["rustfmt", "clippy"]),
+            targets: list(&["thumbv7em-none-eabihf"]),
+        }
     }
 
     #[test]
