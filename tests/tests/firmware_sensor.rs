@@ -2,8 +2,6 @@
 //!
 //! `cargo xtask story --feedback` holds the emulated image against the same code.
 
-use validation::closed_loop::stair;
-use validation::hidden::{Cause, Effect, Live, Noise};
 use firmware::control::{Control, Sensors, Untimed};
 use firmware::settings::{SETTINGS, SUPERVISION};
 use link::Command;
@@ -12,6 +10,8 @@ use model::{Feedback, Sensor, Settings, Volts, supervisor};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use validation::closed_loop::stair;
+use validation::closed_loop::stair;
+use validation::hidden::{Cause, Effect, Live, Noise};
 use validation::hidden::{Cause, Effect, Live, Noise};
 
 /// Armed at once with 300 V; so long.

@@ -1,7 +1,7 @@
-"""Times the report's closed loop in Python: the rivals of `cargo xtask bench`.
+"""Times the report's closed loop in Python, for `cargo xtask bench`.
 
-Prints one JSON object, ns per sample of each rival. Ends with an error if two of them disagree on the stiffness by more
-than TOLERANCE_V: a rival that computes something else is no rival.
+Prints one JSON object, ns per sample of each implementation. Ends with an error if the stiffness of two of them
+differs by more than TOLERANCE_V.
 
 Spring       w' = (u - w) / 5.5             y = u/11 + 10 w/11
 Controller   z' = 1.35 (r - y)              u = 4 (r - y) + z
@@ -53,7 +53,7 @@ def between_samples(a, b):
     term = np.eye(n + 2)
     block = np.zeros((n + 2, n + 2))
     block[:n, :n], block[:n, n : n + 1], block[n, n + 1] = a * h, b * h, 1
-    for i in range(1, 12):  # block is of size 1e-3 but for one 1: the terms vanish far earlier
+    for i in range(1, 12):  # but for one 1 its entries are about 1e-3: the terms vanish far earlier
         term = term @ block / i
         series = series + term
     later = series[:n, n + 1]
@@ -94,7 +94,7 @@ def main():
     stiffness = signal.StateSpace(a, b, c[:1], d[:1])
 
     discrete = signal.cont2discrete((a, b, c[:1], d[:1]), 1 / RATE_HZ, method="foh")[:4]
-    # Rounded to 1e-16, these coefficients alone put lfilter up to 5e-7 V beside the others: both poles are close to 1.
+    # Rounded to 1e-16, these coefficients alone change lfilter's result by up to 5e-7 V: both poles are close to 1.
     numerator, denominator = signal.ss2tf(*discrete)
     numerator = numerator[0]
 
@@ -108,7 +108,7 @@ def main():
         "numba": (lambda: loop(r, phi, now, later, cy, dy, y, u), 101),
     }
 
-    # The first calls compile and are compared, none is timed.
+    # The first calls compile and are compared, but not timed.
     rivals["numba"][0]()
     both = signal.lsim(signal.StateSpace(a, b, c, d), r, t)[1]
     apart = {
@@ -121,7 +121,7 @@ def main():
         if not volts <= TOLERANCE_V:
             sys.exit(f"rivals.py: {name} does not compute the same loop: {volts} V from lsim, allowed {TOLERANCE_V}")
 
-    # Turn by turn, and the best group each: what a disturbed machine adds must not count against a rival.
+    # In turns, and the best group of each: disturbances of the machine must not count against one of them.
     groups = {name: [] for name in rivals}
     for _ in range(5):
         for name, (call, repeats) in rivals.items():

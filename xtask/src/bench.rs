@@ -1,4 +1,4 @@
-//! ns per sample of the closed loop, beside what Python users have.
+//! `cargo xtask bench`: ns per sample of the closed loop, compared with Python.
 
 use std::fs;
 use std::path::Path;
@@ -6,12 +6,11 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
-
-use crate::{python, shell};
+use xtask::{python, shell};
 
 /// Samples in one run of a contender: 70 s at 1 kHz and the one at 0 s, as in `rivals.py` and the Rust bench.
 const SAMPLES: u32 = 70_001;
-/// Rivals and Rust take turns, because a machine's speed changes within minutes.
+/// Python and Rust are measured in turns, because a machine's speed changes within minutes.
 const ROUNDS: usize = 3;
 const BENCH: &str = "closed_loop";
 
@@ -20,7 +19,7 @@ struct Contender {
     name: &'static str,
     what: &'static str,
     rust: bool,
-    /// Aimed at, as a multiple of numba's time.
+    /// Highest time that is accepted, as a multiple of numba's.
     bound: Option<f64>,
 }
 
@@ -54,18 +53,18 @@ impl Row {
     }
 }
 
-/// `cargo xtask bench`.
+/// Measures every contender and prints the table. A time above its bound is marked and is no error.
 pub(crate) fn run(args: &Args) -> Result<()> {
     let metadata = shell::metadata()?;
     find_bench(&metadata)?;
-    let target = Path::new(metadata["target_directory"].as_str().context("cargo metadata names no target directory")?);
-    let python = python::with(target, "bench")?;
+    let target = shell::target_directory()?;
+    let python = python::environment(&target, "bench", "xtask/bench/requirements.txt")?;
     shell::run(cargo_bench().arg("--no-run"))?;
 
     let mut rounds = Vec::new();
     for round in 1..=ROUNDS {
         eprintln!("round {round} of {ROUNDS}");
-        rounds.push(measure(&python, target)?);
+        rounds.push(measure(&python, &target)?);
     }
     let rows = rows(&rounds);
     if args.json {
@@ -76,12 +75,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// One round: ns per sample of each contender, in their order.
+/// One round: ns per sample of each contender, in the order of [`CONTENDERS`].
 fn measure(python: &Path, target: &Path) -> Result<[f64; CONTENDERS.len()]> {
     let rivals = shell::json(shell::command(python).arg("xtask/bench/rivals.py"))?;
     let criterion = target.join("criterion").join(BENCH);
     let estimates = |name: &str| criterion.join(name).join("new/estimates.json");
-    // What an earlier run left must not be taken for this one's.
+    // Otherwise results of an earlier run could be read as this one's.
     for contender in CONTENDERS.iter().filter(|c| c.rust) {
         let _ = fs::remove_file(estimates(contender.name));
     }
@@ -105,7 +104,7 @@ fn measure(python: &Path, target: &Path) -> Result<[f64; CONTENDERS.len()]> {
     Ok(times)
 }
 
-/// Median over the rounds, of the times and of the ratios. A ratio is taken within its round: both saw the same machine.
+/// Medians over the rounds. Each ratio is computed within one round, in which the machine's speed changes little.
 fn rows(rounds: &[[f64; CONTENDERS.len()]]) -> Vec<Row> {
     let numba = CONTENDERS.iter().position(|c| c.name == NUMBA).expect("numba is in the list");
     let row = |(i, contender)| Row {
@@ -144,11 +143,11 @@ fn report(rows: &[Row]) -> Value {
 
 fn cargo_bench() -> Command {
     let mut command = shell::cargo();
-    command.args(["bench", "-p", "host-sim", "--bench", BENCH]);
+    command.args(["bench", "--profile", "dist", "-p", "host-sim", "--bench", BENCH]);
     command
 }
 
-/// An error before minutes are spent on Python, if the Rust side is missing.
+/// An error if the Rust bench is missing, before minutes are spent on Python.
 fn find_bench(metadata: &Value) -> Result<()> {
     let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
     let packages = list(&metadata["packages"]).into_iter().filter(|package| package["name"] == "host-sim");

@@ -1,17 +1,17 @@
-//! Writes the real board's image to its flash and shows its log.
+//! `cargo xtask flash`: writes the image to the board's flash and shows its log.
 
 use anyhow::{Context, Result};
 
-use crate::image::{self, Board, Opt};
-use crate::shell;
-use crate::variant::Variant;
+use xtask::build::{self, Board, Opt};
+use xtask::shell;
+use xtask::variant::Variant;
 
-/// As probe-rs names it.
+/// The MCU's name in probe-rs.
 const CHIP: &str = "STM32G474RETx";
 
-/// `cargo xtask flash`.
+/// Builds the board's image and hands it to `probe-rs run`.
 pub(crate) fn run(variant: Variant) -> Result<()> {
-    let elf = image::build_with(&variant.features(), Board::Nucleo, Opt::S)?;
+    let elf = build::image_with(&variant.features(), Board::Nucleo, Opt::S)?;
     shell::run(shell::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
         .context("probe-rs flashes the board (cargo install probe-rs-tools --locked)")
 }

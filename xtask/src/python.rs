@@ -1,4 +1,4 @@
-//! Python with packages of its own.
+//! Virtual environments for the Python scripts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,22 +7,24 @@ use anyhow::{Context, Result};
 
 use crate::shell;
 
-/// Python with what `xtask/<chore>/requirements.txt` asks for, in a venv of its own under the target directory.
-pub(crate) fn with(target: &Path, chore: &str) -> Result<PathBuf> {
-    let venv = target.join(format!("{chore}-venv"));
+/// The Python interpreter of a virtual environment under `target` that has the packages of `requirements`, a file
+/// relative to the root of the workspace. Creates the environment, named after `command`, or renews it when the file
+/// has changed.
+pub fn environment(target: &Path, command: &str, requirements: &str) -> Result<PathBuf> {
+    let venv = target.join(format!("{command}-venv"));
     let python = venv.join("bin/python");
-    let requirements = shell::root().join("xtask").join(chore).join("requirements.txt");
+    let path = shell::root().join(requirements);
     let installed = venv.join("requirements.txt");
-    let wanted = fs::read(&requirements).with_context(|| format!("cannot read {}", requirements.display()))?;
+    let wanted = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     if python.exists() && fs::read(&installed).is_ok_and(|there| there == wanted) {
-        eprintln!("{chore}: {} is up to date", venv.display());
+        eprintln!("{command}: {} is up to date", venv.display());
         return Ok(python);
     }
-    eprintln!("{chore}: installing xtask/{chore}/requirements.txt into {}", venv.display());
+    eprintln!("{command}: installing {requirements} into {}", venv.display());
     shell::run(shell::command("python3").args(["-m", "venv", "--clear"]).arg(&venv))
         .context("python3 with its module venv is needed (Debian, Ubuntu: apt-get install python3-venv)")?;
-    shell::run(shell::command(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&requirements))?;
-    // Last: its presence says that the rest succeeded.
+    shell::run(shell::command(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&path))?;
+    // Written last: its presence shows that the installation succeeded.
     fs::write(&installed, wanted).with_context(|| format!("cannot write {}", installed.display()))?;
     Ok(python)
 }

@@ -1,35 +1,36 @@
-//! Other programs: shown before they run, and an error that names them if they fail.
+//! Starts other programs: prints the command line first, and returns an error that names the program when it fails.
 
 use std::ffi::OsStr;
 use std::io::{self, ErrorKind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, anyhow, bail};
 use serde_json::Value;
 
-/// The MCU's target triple.
-pub(crate) const MCU: &str = "thumbv7em-none-eabihf";
+/// Target triple of the MCU.
+pub const MCU: &str = "thumbv7em-none-eabihf";
 
-/// The top of the work tree.
-pub(crate) fn root() -> &'static Path {
+/// The root folder of the workspace.
+pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask is a folder of the workspace")
 }
 
-/// A command that runs at the top of the work tree.
-pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
+/// A command whose working directory is [`root`].
+pub fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
     command
 }
 
-/// The cargo that runs xtask.
-pub(crate) fn cargo() -> Command {
+/// A command of the cargo that started `cargo xtask`, with [`root`] as its working directory.
+pub fn cargo() -> Command {
     command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Prints and runs `command`. Its stdout goes to stderr: stdout is for results.
-pub(crate) fn run(command: &mut Command) -> Result<()> {
+/// Prints `command` to stderr and runs it to its end. Its stdout goes to stderr, because stdout is reserved for
+/// results. An exit code other than 0 is an error.
+pub fn run(command: &mut Command) -> Result<()> {
     let line = line(command);
     eprintln!("$ {line}");
     let status = command.stdout(Stdio::from(io::stderr())).status().map_err(|e| not_started(command, e))?;
@@ -39,24 +40,30 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs `command` and returns its stdout.
-pub(crate) fn output(command: &mut Command) -> Result<String> {
+/// Runs `command` to its end and returns its stdout. An exit code other than 0 is an error.
+pub fn output(command: &mut Command) -> Result<String> {
     let output = command.stderr(Stdio::inherit()).output().map_err(|e| not_started(command, e))?;
     if !output.status.success() {
         bail!("`{}` failed ({})", line(command), output.status);
     }
-    String::from_utf8(output.stdout).with_context(|| format!("`{}` printed something else than text", line(command)))
+    String::from_utf8(output.stdout).with_context(|| format!("`{}` printed bytes that are not UTF-8", line(command)))
 }
 
-/// As [`output`], parsed.
-pub(crate) fn json(command: &mut Command) -> Result<Value> {
+/// Runs `command` to its end and parses its stdout as JSON.
+pub fn json(command: &mut Command) -> Result<Value> {
     let text = output(command)?;
     serde_json::from_str(&text).with_context(|| format!("`{}` did not print JSON", line(command)))
 }
 
-/// What cargo knows about the workspace.
-pub(crate) fn metadata() -> Result<Value> {
+/// The output of `cargo metadata` for the packages of the workspace.
+pub fn metadata() -> Result<Value> {
     json(cargo().args(["metadata", "--no-deps", "--format-version=1"]))
+}
+
+/// The folder that cargo builds in, absolute.
+pub fn target_directory() -> Result<PathBuf> {
+    let metadata = metadata()?;
+    Ok(metadata["target_directory"].as_str().context("cargo metadata names no target directory")?.into())
 }
 
 fn not_started(command: &Command, error: io::Error) -> anyhow::Error {
@@ -67,8 +74,8 @@ fn not_started(command: &Command, error: io::Error) -> anyhow::Error {
     }
 }
 
-/// The command as a person would type it.
-fn line(command: &Command) -> String {
+/// The command line as a person would type it.
+pub(crate) fn line(command: &Command) -> String {
     let program = Path::new(command.get_program());
     let program = program.file_name().unwrap_or(program.as_os_str());
     let set = command.get_envs().filter_map(|(key, value)| Some(format!("{}={}", key.display(), value?.display())));

@@ -1,32 +1,36 @@
-//! Every check and test, in order.
-
-use std::fmt::Write;
-use std::time::Instant;
+//! `cargo xtask test`: every check and test, in order.
 
 use anyhow::Result;
+use xtask::{setup, shell};
 
-use crate::variant::Variant;
-use crate::{boot, proof, setup, shell, story};
+use crate::emulation;
+use crate::steps::{self, Progress, Step};
 
-/// One call of cargo.
-struct Step {
-    name: &'static str,
-    args: &'static [&'static str],
-    env: Option<(&'static str, &'static str)>,
-}
-
-/// Quick checks first. Without a board the firmware's library is an ordinary one; each image is for its board alone, and
-/// what its features leave out is not seen in one that has them.
+/// Calls of cargo, the quick ones first. Without a board the firmware's library is an ordinary one. Each image is
+/// linted for its board alone, with and without the optional features, because an image with a feature hides what is
+/// left out without it.
 const STEPS: &[Step] = &[
-    Step { name: "format", args: &["fmt", "--all", "--check"], env: None },
-    Step { name: "lint host", args: &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"], env: None },
-    Step { name: "lint nucleo", args: &lint("-pfirmware", "nucleo-g474re"), env: None },
-    Step { name: "all nucleo", args: &lint("-pfirmware", "nucleo-g474re,fast,feedback,kilovolt"), env: None },
-    Step { name: "lint mps2", args: &lint("-ptest-bench", "mps2-an386"), env: None },
-    Step { name: "all mps2", args: &lint("-ptest-bench", "mps2-an386,fast,feedback,kilovolt"), env: None },
+    Step::new("format", &["fmt", "--all", "--check"]),
+    Step::new("lint host", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),
+    Step::new("lint nucleo", &lint("-pfirmware", "nucleo-g474re")),
+    Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,feedback,kilovolt")),
+    Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
+    Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,feedback,kilovolt")),
     Step { name: "document", args: &["doc", "--no-deps", "--workspace"], env: Some(("RUSTDOCFLAGS", "-Dwarnings")) },
-    Step { name: "test", args: &["test", "--workspace"], env: None },
-    Step { name: "build vsj", args: &["build", "--release", "-p", "host-sim", "--bin", "vsj"], env: None },
+    Step::new("test", &["test", "--workspace"]),
+    Step::new("build vsj", &["build", "--release", "-p", "host-sim", "--bin", "vsj"]),
+];
+
+/// Command lines of the emulation, each with its name and its line in `--help`. The two variants of `boot` cover every
+/// controller and every amplifier.
+const EMULATION: &[(&str, &str, &[&[&str]])] = &[
+    ("firmware", "cargo xtask proof", &[&["proof"]]),
+    (
+        "boot",
+        "cargo xtask boot; --controller fast --limit-v 1000",
+        &[&["boot"], &["boot", "--controller", "fast", "--limit-v", "1000"]],
+    ),
+    ("story", "cargo xtask story --check", &[&["story", "--check"]]),
 ];
 
 #[rustfmt::skip]
@@ -35,35 +39,26 @@ const fn lint(package: &'static str, features: &'static str) -> [&'static str; 1
      "--features", features, "--", "-Dwarnings"]
 }
 
-/// The steps, for `--help`.
+/// The steps for `--help`.
 pub(crate) fn help() -> String {
-    let mut help = String::from("Steps, stopping at the first that fails:\n  setup      cargo xtask setup\n");
-    for Step { name, args, env } in STEPS {
-        let env = env.map(|(key, value)| format!("{key}={value} ")).unwrap_or_default();
-        let _ = writeln!(help, "  {name:<10} {env}cargo {}", args.join(" "));
-    }
-    help + "  firmware   cargo xtask proof\n  boot       cargo xtask boot; --controller fast --limit-v 1000\n  story      cargo xtask story, as approved; a sensor that falls silent\n"
+    let emulation: String = EMULATION.iter().map(|(name, line, _)| format!("  {name:<10} {line}\n")).collect();
+    let setup = "  setup      cargo xtask setup\n";
+    format!("Steps, stopping at the first that fails:\n{setup}{}{emulation}", steps::help(STEPS))
 }
 
-/// `cargo xtask test`.
+/// Runs every step; an error names the first that fails.
 pub(crate) fn run() -> Result<()> {
-    let start = Instant::now();
-    let total = STEPS.len() + 4;
-    let begin = |number: usize, name| eprintln!("[{number}/{total}] {name}, after {} s", start.elapsed().as_secs());
-    begin(1, "setup");
+    let mut progress = Progress::of(1 + STEPS.len() + EMULATION.len());
+    progress.begin("setup");
     setup::run()?;
-    for (number, Step { name, args, env }) in (2..).zip(STEPS) {
-        begin(number, name);
-        shell::run(shell::cargo().args(*args).envs(*env))?;
+    for step in STEPS {
+        progress.begin(step.name);
+        step.run()?;
     }
-    begin(total - 2, "firmware");
-    proof::run()?;
-    begin(total - 1, "boot");
-    for variant in Variant::BOOTED {
-        boot::run(variant)?;
+    for (name, _, commands) in EMULATION {
+        progress.begin(name);
+        commands.iter().try_for_each(|args| emulation::run(args))?;
     }
-    begin(total, "story");
-    story::check()?;
-    eprintln!("all {total} steps passed in {} s", start.elapsed().as_secs());
+    progress.end();
     Ok(())
 }

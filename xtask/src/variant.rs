@@ -1,11 +1,8 @@
-//! Which image: who leads the spring, behind which amplifier; each has a name of its own.
+//! The variants of an image: one for each controller and each amplifier.
 
-use firmware::settings::{self, KILOVOLT};
-use model::{Amplifier, Settings};
-
-/// Who leads the spring.
+/// The controller that an image runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Controller {
+pub enum Controller {
     /// The paper's
     Paper,
     /// The time-optimal one, in an image of its own
@@ -13,10 +10,11 @@ pub(crate) enum Controller {
 }
 
 impl Controller {
-    pub(crate) const ALL: [Self; 2] = [Self::Paper, Self::Fast];
+    /// Every controller.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Fast];
 
-    /// Of the firmware's, that it needs.
-    pub(crate) const fn features(self) -> &'static [&'static str] {
+    /// Features of the package `firmware` that the controller needs.
+    pub const fn features(self) -> &'static [&'static str] {
         match self {
             Self::Paper => &[],
             Self::Fast => &["fast"],
@@ -24,9 +22,9 @@ impl Controller {
     }
 }
 
-/// How far the amplifier goes.
+/// The amplifier's highest voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Limit {
+pub enum Limit {
     /// The report's range
     #[value(name = "700")]
     Paper,
@@ -36,7 +34,8 @@ pub(crate) enum Limit {
 }
 
 impl Limit {
-    const ALL: [Self; 2] = [Self::Paper, Self::Kilovolt];
+    /// Every amplifier.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Kilovolt];
 
     const fn features(self) -> &'static [&'static str] {
         match self {
@@ -44,59 +43,38 @@ impl Limit {
             Self::Kilovolt => &["kilovolt"],
         }
     }
-
-    const fn amplifier(self) -> Amplifier {
-        match self {
-            Self::Paper => Amplifier::PAPER,
-            Self::Kilovolt => KILOVOLT,
-        }
-    }
 }
 
-/// One of the images; as the options of commands that are for one of them.
+/// One variant of an image, as command line options.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::Args)]
-pub(crate) struct Variant {
-    /// Who leads the spring
+pub struct Variant {
+    /// Controller of the image
     #[arg(long, value_enum, default_value = "paper")]
-    pub(crate) controller: Controller,
+    pub controller: Controller,
     /// Highest voltage of the amplifier, in V
     #[arg(long, value_enum, default_value = "700", value_name = "V")]
-    limit_v: Limit,
+    pub limit_v: Limit,
 }
 
 impl Variant {
-    /// Two that between them have every controller and every amplifier.
-    pub(crate) const BOOTED: [Self; 2] =
+    /// Two variants that together cover every controller and every amplifier.
+    pub const BOOTED: [Self; 2] =
         [Self::of(Controller::Paper), Self { controller: Controller::Fast, limit_v: Limit::Kilovolt }];
 
-    /// With the report's amplifier.
-    pub(crate) const fn of(controller: Controller) -> Self {
+    /// The variant with this controller and the report's amplifier of 700 V.
+    pub const fn of(controller: Controller) -> Self {
         Self { controller, limit_v: Limit::Paper }
     }
 
-    /// All that are not this one.
-    pub(crate) fn others(self) -> impl Iterator<Item = Self> {
+    /// Every variant but this one.
+    pub fn others(self) -> impl Iterator<Item = Self> {
         let each = |controller| Limit::ALL.map(|limit_v| Self { controller, limit_v });
         Controller::ALL.into_iter().flat_map(each).filter(move |other| *other != self)
     }
 
-    /// Of the firmware's, that it needs.
-    pub(crate) fn features(self) -> Vec<&'static str> {
+    /// Features of the package `firmware` that the variant needs.
+    pub fn features(self) -> Vec<&'static str> {
         [self.controller.features(), self.limit_v.features()].concat()
-    }
-
-    /// What such an image runs.
-    pub(crate) const fn settings(self) -> Settings {
-        let amplifier = self.limit_v.amplifier();
-        match self.controller {
-            Controller::Paper => settings::paper(amplifier),
-            Controller::Fast => settings::fast(amplifier),
-        }
-    }
-
-    /// The controller, as logs and the link name it.
-    pub(crate) const fn leader(self) -> link::Controller {
-        link::Controller::of(&self.settings().compensation)
     }
 }
 
@@ -111,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn options_lead_to_features() {
+    fn options_select_features() {
         for (line, features) in [
             ("", &[][..]),
             ("--limit-v 700", &[]),
@@ -125,31 +103,9 @@ mod tests {
     }
 
     #[test]
-    fn no_choice_is_left_unbooted() {
+    fn booted_variants_cover_every_controller_and_amplifier() {
         let booted = |choice: &dyn Fn(Variant) -> bool| Variant::BOOTED.into_iter().any(choice);
         assert!(Controller::ALL.into_iter().all(|controller| booted(&|it| it.controller == controller)));
         assert!(Limit::ALL.into_iter().all(|limit_v| booted(&|it| it.limit_v == limit_v)));
-    }
-
-    /// An image that is named for another amplifier and drives the same would be taken for it.
-    #[test]
-    fn each_image_answers_a_target_with_codes_of_its_own() {
-        let codes = |variant: Variant| {
-            let config = variant.settings().validate().unwrap().quantize();
-            let (lowest, highest) = config.range();
-            let mut state = model::State::default();
-            let target = model::Volts::new(200.0).unwrap();
-            assert!(lowest < target && target < highest);
-            let tick = |_| config.tick(&mut state, model::Input { target, measured: None }).code.0;
-            (0..1000).map(tick).collect::<Vec<_>>()
-        };
-        let variant = Variant::of(Controller::Paper);
-        let all: Vec<_> = [variant].into_iter().chain(variant.others()).collect();
-        assert_eq!(all.len(), 4);
-        for one in all {
-            for other in one.others() {
-                assert_ne!(codes(one), codes(other), "{one:?}, {other:?}");
-            }
-        }
     }
 }

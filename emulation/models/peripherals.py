@@ -1,0 +1,134 @@
+"""Models of the peripherals that raise interrupts. Times are in cycles of the core."""
+
+
+class Timer:
+    """Counts up at the core's clock over PSC + 1; update and compare 1 to 4 set flags."""
+
+    def __init__(self):
+        self.regs, self.at, self.fraction = {}, 0, 0
+
+    def get(self, offset):
+        return self.regs.get(offset, 0xFFFF if offset == 0x2C else 0)
+
+    def run(self, now):
+        """Advances the counter to `now` and sets the flags of the events on the way."""
+        ticks, self.fraction = divmod(now - self.at + self.fraction, self.get(0x28) + 1)
+        self.at = now
+        if not self.get(0x00) & 1 or ticks == 0:
+            return
+        count, span = self.get(0x24), self.get(0x2C) + 1
+        flags = int(count + ticks >= span)
+        for i in range(4):
+            if 0 < (self.get(0x34 + 4 * i) - count - 1) % span + 1 <= ticks:
+                flags |= 2 << i
+        self.regs[0x10] = self.get(0x10) | flags
+        self.regs[0x24] = (count + ticks) % span
+
+    def next(self):
+        """Cycles from the last `run` to the next flag that raises an interrupt."""
+        if not self.get(0x00) & 1:
+            return None
+        count, span, enabled = self.get(0x24), self.get(0x2C) + 1, self.get(0x0C)
+        goals = [0] if enabled & 1 else []
+        goals += [self.get(0x34 + 4 * i) for i in range(4) if enabled & 2 << i]
+        ticks = [(goal - count - 1) % span + 1 for goal in goals]
+        return min(ticks) * (self.get(0x28) + 1) - self.fraction if ticks else None
+
+    def write(self, offset, value):
+        if offset == 0x10:
+            self.regs[0x10] = self.get(0x10) & value  # Written zeros clear.
+        elif offset != 0x14:
+            self.regs[offset] = value
+            if offset == 0x24:
+                self.fraction = 0
+
+
+class SysTick:
+    """Counts down at the core's clock and interrupts at zero."""
+
+    def __init__(self):
+        self.regs, self.zero_at = {}, None
+
+    def run(self, now):
+        """Whether it passed zero with its interrupt enabled."""
+        if self.zero_at is None or now < self.zero_at:
+            return False
+        period = self.regs.get(0x14, 0) + 1
+        self.zero_at += ((now - self.zero_at) // period + 1) * period
+        return bool(self.regs[0x10] & 2)
+
+    def write(self, offset, value, now):
+        self.regs[offset] = value
+        running = self.regs.get(0x10, 0) & 1
+        if offset in (0x10, 0x18):
+            self.zero_at = now + self.regs.get(0x14, 0) + 1 if running else None
+
+
+class Uart:
+    """LPUART1 as the driver uses it: eight bytes of FIFO each way, ten bits a byte.
+
+    `incoming` are (cycle, byte) that the host sends, `host` the cycles that a byte of its takes; `sent(byte)` hears of
+    every byte that has left.
+    """
+
+    FIFO = 8
+    ORE, IDLE, RXNE, TC, TXE, READY = 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7, 3 << 21
+
+    def __init__(self, incoming, host, sent):
+        self.incoming, self.host, self.sent = incoming, host, sent
+        self.regs, self.flags = {}, self.TC
+        self.received, self.to_send = [], []
+        self.idle_at = self.left_at = None
+
+    def byte_time(self):
+        """Cycles per bit. BRR counts 256ths of a cycle."""
+        return 10 * self.regs.get(0x0C, 0) // 256
+
+    def status(self):
+        flags = self.flags | self.READY
+        flags |= self.RXNE if self.received else 0
+        return flags | (self.TXE if len(self.to_send) <= self.FIFO else 0)
+
+    def interrupts(self):
+        """Whether an interrupt is pending. An enable bit in CR1 has the same position as its flag."""
+        return bool(self.status() & self.regs.get(0x00, 0) & 0xF0)
+
+    def run(self, now):
+        while self.incoming and self.incoming[0][0] <= now:
+            at, byte = self.incoming.pop(0)
+            if self.regs.get(0x00, 0) & 0b101 != 0b101 or abs(self.byte_time() / self.host - 1) > 0.02:
+                continue  # Not enabled, or at another speed.
+            if len(self.received) < self.FIFO:
+                self.received.append(byte)
+            else:
+                self.flags |= self.ORE
+            self.idle_at = at + self.byte_time()
+        if self.idle_at and self.idle_at <= now:
+            self.flags |= self.IDLE
+            self.idle_at = None
+        while self.left_at and self.left_at <= now:
+            self.sent(self.to_send.pop(0))
+            self.left_at = self.left_at + self.byte_time() if self.to_send else None
+            self.flags |= 0 if self.to_send else self.TC
+
+    def next(self):
+        """Time of the next event that no register access causes."""
+        times = [self.incoming[0][0]] if self.incoming else []
+        return min(times + [at for at in (self.idle_at, self.left_at) if at], default=None)
+
+    def get(self, offset):
+        if offset == 0x1C:
+            return self.status()
+        if offset == 0x24:
+            return self.received.pop(0) if self.received else 0
+        return self.regs.get(offset, 0)
+
+    def write(self, offset, value, now):
+        if offset == 0x20:
+            self.flags &= ~value
+        elif offset == 0x28:
+            self.flags &= ~self.TC
+            self.to_send.append(value & 0xFF)
+            self.left_at = self.left_at or now + self.byte_time()
+        else:
+            self.regs[offset] = value

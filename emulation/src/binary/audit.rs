@@ -1,0 +1,102 @@
+//! Checks of an image's machine code:
+//!
+//! - No call from the control tick leads to a panic, directly or through other functions, and none has an unknown
+//!   target. The tick contains no undefined instruction.
+//! - The tick uses no floats: it calls no float arithmetic of the compiler's and has no instruction of the float unit.
+//! - The image has no allocator.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use super::elf::{self, Function};
+use super::thumb::Code;
+
+/// Beginning and end of the demangled name of the function that must not panic.
+const TICK: (&str, &str) = ("firmware::control::Control", "tick");
+
+/// Runs all checks. Returns the number of functions that the tick consists of, its callees included.
+pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
+    let functions = elf::functions(bytes)?;
+    if let Some(found) = functions.iter().find(|f| is_heap(&f.name)) {
+        bail!("`{}` is an allocator's", found.name);
+    }
+    // Otherwise a change of names would make every check pass.
+    ensure!(functions.iter().any(|f| is_panic(&f.name)), "the image has no panic at all: have names changed?");
+    ensure!(functions.iter().any(|f| is_float(&f.name)), "the image has no float at all: have names changed?");
+    let code = Code::new(bytes)?;
+    let by_address: BTreeMap<u32, &Function> = functions.iter().map(|f| (f.address, f)).collect();
+    let ticks = ticks(&functions)?;
+
+    let mut seen = BTreeSet::new();
+    let mut open: Vec<(&Function, String)> = ticks.iter().map(|f| (*f, f.name.clone())).collect();
+    while let Some((function, path)) = open.pop() {
+        if !seen.insert(function.address) {
+            continue;
+        }
+        if is_panic(&function.name) {
+            bail!("a way into a panic: {path}");
+        }
+        ensure!(!is_float(&function.name), "a float: {path}");
+        let shape = code.shape(function).with_context(|| format!("in {}", function.name))?;
+        ensure!(!shape.floats, "a float's instruction in {path}");
+        ensure!(!shape.traps, "an undefined instruction in {path}");
+        ensure!(!shape.calls_by_register, "{path} calls through a register, whose target is unknown");
+        for target in shape.calls {
+            let callee = by_address.get(&target).with_context(|| format!("{path} calls {target:#x}, no function"))?;
+            open.push((callee, format!("{path} -> {}", callee.name)));
+        }
+    }
+    Ok(seen.len())
+}
+
+/// Every compiled instance of the control tick. None is an error.
+pub(crate) fn ticks(functions: &[Function]) -> Result<Vec<&Function>> {
+    let is_tick =
+        |f: &&Function| f.name.trim_start_matches('<').starts_with(TICK.0) && plain(&f.name).ends_with(TICK.1);
+    let ticks: Vec<&Function> = functions.iter().filter(is_tick).collect();
+    ensure!(!ticks.is_empty(), "no function `{}::{}` in the image", TICK.0, TICK.1);
+    Ok(ticks)
+}
+
+/// A function's name without generic arguments at its end.
+fn plain(name: &str) -> &str {
+    name.split_once("::<").map_or(name, |(name, _)| name)
+}
+
+fn is_panic(name: &str) -> bool {
+    ["core::panicking", "panic_fmt", "rust_begin_unwind", "unwrap_failed", "expect_failed", "slice_index_fail"]
+        .iter()
+        .any(|part| name.contains(part))
+}
+
+fn is_heap(name: &str) -> bool {
+    ["__rust_alloc", "__rustc::__rust_alloc", "__rg_alloc", "malloc", "realloc", "alloc::alloc::"]
+        .iter()
+        .any(|start| name.starts_with(start))
+}
+
+/// Whether a function is float arithmetic of the compiler's, by its own name or by its name in ARM's run-time ABI.
+fn is_float(name: &str) -> bool {
+    ["compiler_builtins::float", "compiler_builtins::math", "libm::"].iter().any(|part| name.contains(part))
+        || name
+            .strip_prefix("__aeabi_")
+            .is_some_and(|rest| rest.starts_with(['d', 'f']) || rest.contains("2d") || rest.contains("2f"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn float_arithmetic_is_recognised_by_name() {
+        for name in
+            ["__aeabi_dmul", "__aeabi_fadd", "__aeabi_ui2d", "__aeabi_d2iz", "compiler_builtins::float::mul::__muldf3"]
+        {
+            assert!(is_float(name), "{name}");
+        }
+        for name in ["__aeabi_memcpy", "__aeabi_uldivmod", "__aeabi_lmul", "model::controller::Config<E>::tick"] {
+            assert!(!is_float(name), "{name}");
+        }
+    }
+}

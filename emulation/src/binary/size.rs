@@ -1,0 +1,115 @@
+//! `cargo xtask size`: flash, RAM and greatest stack depth of each image, with bounds for all three.
+
+use std::fmt;
+
+use anyhow::{Context, Result, ensure};
+use serde_json::{Value, json};
+
+use xtask::build::{self, Board, Opt};
+use xtask::segments;
+use xtask::variant::{Controller, Variant};
+
+use super::{elf, stack};
+
+/// Most bytes of flash that an image may use, of the 512 KB on the chip.
+const fn most_flash(controller: Controller) -> u32 {
+    match controller {
+        Controller::Paper => 64 << 10,
+        Controller::Fast => 96 << 10,
+    }
+}
+/// Most bytes of RAM that any image may use, stack included.
+const MOST_RAM: u32 = 16 << 10;
+
+/// Options of `cargo xtask size`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Print the table as JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    variant: Variant,
+    /// Measure images with a stiffness sensor in the loop; the bounds are the same
+    #[arg(long)]
+    feedback: bool,
+}
+
+/// Sizes of one image, in bytes.
+pub(crate) struct Size {
+    board: Board,
+    flash: u32,
+    most_flash: u32,
+    statics: u32,
+    stack: u32,
+    worst: u32,
+}
+
+/// Measures the image of each board and prints the table. An image above a bound is an error.
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let features: &[&str] = if args.feedback { &["feedback"] } else { &[] };
+    let sizes =
+        Board::ALL.into_iter().map(|board| measure(args.variant, features, board)).collect::<Result<Vec<_>>>()?;
+    if args.json {
+        println!("{}", Value::from(sizes.iter().map(report).collect::<Vec<_>>()));
+    } else {
+        print!("{}", table(&sizes));
+    }
+    sizes.iter().try_for_each(Size::check)
+}
+
+/// Builds and measures the image of a variant on one board, with further features of the package `firmware`.
+pub(crate) fn measure(variant: Variant, features: &[&str], board: Board) -> Result<Size> {
+    let path = build::image_with(&[&variant.features(), features].concat(), board, Opt::S)?;
+    let bytes = build::read(&path)?;
+    let bottom = elf::symbol(&bytes, "_stack_end")?;
+    let top = elf::symbol(&bytes, "_stack_start")?;
+    Ok(Size {
+        board,
+        flash: segments::flash(&bytes)?.bytes.len() as u32,
+        most_flash: most_flash(variant.controller),
+        statics: elf::ram(&bytes)?,
+        stack: top - bottom,
+        worst: stack::worst(&bytes).context("the stack's depth")?,
+    })
+}
+
+impl Size {
+    /// An error that names the first bound that is exceeded.
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self { board, flash, most_flash, statics, stack, worst } = self;
+        let (name, ram) = (board.name(), statics + stack);
+        ensure!(flash <= most_flash, "{name}: {flash} bytes of flash, expected at most {most_flash}");
+        ensure!(ram <= MOST_RAM, "{name}: {ram} bytes of RAM, expected at most {MOST_RAM}");
+        let left = stack - stack::GUARD;
+        ensure!(
+            *worst <= left,
+            "{name}: the stack may need {worst} bytes, {stack} less a guard of {} are there",
+            stack::GUARD
+        );
+        Ok(())
+    }
+}
+
+impl fmt::Display for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { flash, most_flash, statics, stack, worst, .. } = self;
+        let ram = statics + stack;
+        write!(
+            f,
+            "{flash} of {most_flash} bytes of flash, {ram} of {MOST_RAM} of RAM, a stack of {stack} that needs {worst}"
+        )
+    }
+}
+
+fn report(size: &Size) -> Value {
+    let Size { board, flash, statics, stack, worst, .. } = size;
+    json!({"image": board.name(), "flash": flash, "statics": statics, "stack": stack, "worst_stack": worst})
+}
+
+fn table(sizes: &[Size]) -> String {
+    let mut text = format!("{:<16}{:>8}{:>9}{:>8}{:>13}\n", "bytes", "flash", "statics", "stack", "worst stack");
+    for Size { board, flash, statics, stack, worst, .. } in sizes {
+        text += &format!("{:<16}{flash:>8}{statics:>9}{stack:>8}{worst:>13}\n", board.name());
+    }
+    text
+}

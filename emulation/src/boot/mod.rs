@@ -1,0 +1,98 @@
+//! Runs the image that is flashed to the STM32G474 on models of the chip's registers, which are in `emulation/models/`.
+//!
+//! In: a variant of the image. Out: one line for each run, or an error that names what left the chip wrongly. The
+//! checks read the DAC's register, the enable's pin and the log's bytes ([`events`]), with a host at the line
+//! ([`host`]) and with faults ([`runs`]).
+
+mod events;
+mod host;
+mod runs;
+
+use std::fs;
+
+use anyhow::{Context, Result, ensure};
+use model::Settings;
+use serde::Deserialize;
+use xtask::build::{self, Board, Opt};
+use xtask::variant::Variant;
+use xtask::{python, segments, shell};
+
+use crate::binary::{audit, elf, size};
+use crate::variant;
+use events::Events;
+use runs::{JITTER_US, KILL_US, MONITOR_US, PERIOD_US};
+
+/// Limits of this verification, printed after every run.
+const CANNOT_SHOW: &str = "\
+not shown: real time (an instruction is one cycle here; no wait states, no conversion times), analogue behaviour (DAC, monitors,
+  the amplifier's pull-down), the memory protection unit, silicon errata, a chip that differs from its manual";
+
+/// Builds the image, runs it once for each case, and prints what each run showed.
+pub(crate) fn run(variant: Variant) -> Result<()> {
+    let Settings { amplifier, .. } = variant::settings(variant);
+    println!(
+        "image of the {} controller, {} to {} V",
+        variant::controller(variant).name(),
+        amplifier.min_v,
+        amplifier.max_v
+    );
+    let elf = build::image_with(&variant.features(), Board::Nucleo, Opt::S)?;
+    let bytes = build::read(&elf)?;
+    let flash = segments::flash(&bytes)?;
+    ensure!(flash.address == 0x0800_0000, "the image begins at {:#x}", flash.address);
+    let size = size::measure(variant, &[], Board::Nucleo)?;
+    size.check()?;
+    println!(
+        "size: {size}; no way into a panic from the control tick ({} functions), no float in it, no heap",
+        audit::run(&bytes)?
+    );
+    let bin = elf.with_extension("boot.bin");
+    fs::write(&bin, &flash.bytes).with_context(|| format!("cannot write {}", bin.display()))?;
+
+    let functions = elf::functions(&bytes)?;
+    let ticks = audit::ticks(&functions)?;
+    ensure!(ticks.len() == 1, "{} control ticks in the image", ticks.len());
+    let panic = functions.iter().find(|f| f.name == "core::panicking::panic").context("no `panic` in the image")?;
+    let rtt = elf::symbol(&bytes, "_SEGGER_RTT")?;
+    let python = python::environment(&shell::target_directory()?, "boot", "emulation/models/requirements.txt")?;
+    let output = shell::json(
+        shell::command(python)
+            .args(["-B", "emulation/models/boot.py"])
+            .arg(&bin)
+            .args([ticks[0].address, panic.address, rtt].map(|address| format!("{address:#x}")))
+            .arg(amplifier.full_scale_v.to_string())
+            .arg(host::frames().to_string()),
+    )?;
+    let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
+
+    println!("{}", runs::quiet(&events("quiet")?, &bytes, variant).context("without a mishap")?);
+    println!("host: {}", host::check(&events("host")?, variant).context("with a host")?);
+    let hang_us = f64::from(firmware::LONGEST_HANG_MS) * 1e3;
+    for (name, within_us, log) in [
+        ("panic", KILL_US, "panic at injected.rs:7"),
+        ("hard fault", KILL_US, "name=hard-fault"),
+        ("two wrong bits", KILL_US, "name=hard-fault"),
+        ("hang", hang_us + KILL_US, "name=watchdog"),
+    ] {
+        println!("{name}: {}", runs::stopped(&events(name)?, &bytes, within_us, log).context(name)?);
+    }
+    for (name, within_us, fault) in [
+        ("interlock", PERIOD_US + JITTER_US, "name=interlock"),
+        ("no voltage", MONITOR_US + JITTER_US, "name=monitor"),
+        ("current", MONITOR_US + JITTER_US, "name=monitor"),
+        ("other amplifier", MONITOR_US + JITTER_US, "name=monitor"),
+    ] {
+        // An amplifier below the image's limit has no such run: it is no danger.
+        if output[name].is_null() {
+            continue;
+        }
+        println!("{name}: {}", runs::faulted(&events(name)?, &bytes, within_us, fault).context(name)?);
+    }
+    println!("torn store: {}", runs::torn(&events("torn")?, &bytes).context("torn")?);
+    for (name, cause) in [("dip", "reset=brown-out last_fault=8"), ("button", "reset=pin last_fault=4")] {
+        println!("{name}: {}", runs::cut(&events(name)?, &bytes, cause).context(name)?);
+    }
+    println!("hang with interrupts off: {}", runs::deaf(&events("deaf")?, &bytes).context("deaf")?);
+    println!("{CANNOT_SHOW}");
+    Ok(())
+}

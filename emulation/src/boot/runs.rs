@@ -1,0 +1,169 @@
+//! What each run without a host, or with a fault, must show. Every check returns a line for the report, or an error.
+
+use anyhow::{Context, Result, ensure};
+use firmware::settings::SUPERVISION;
+use model::Amplifier;
+use xtask::variant::Variant;
+
+use super::events::{Event, Events};
+use crate::variant;
+
+/// Period of the control tick, in us.
+pub(super) const PERIOD_US: f64 = 1000.0;
+/// Largest difference between the earliest and the latest tick relative to their grid, in us: the logger disables
+/// interrupts briefly.
+pub(super) const JITTER_US: f64 = 20.0;
+/// Timeout of the watchdog, in us.
+const WATCHDOG_US: f64 = 100_000.0;
+/// Longest time that the amplifier's monitors may disagree with the command, plus the tick that detects it, in us.
+pub(super) const MONITOR_US: f64 = 1e6 * SUPERVISION.monitor_time_s + PERIOD_US;
+/// Longest time from a panic or fault to zero volts, in us. An instruction takes 1/170 us.
+pub(super) const KILL_US: f64 = 5.0;
+
+/// A run without a host and without a fault: it boots, its output stays zero and disabled, its ticks keep their period,
+/// and the watchdog is fed.
+pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<String> {
+    events.safe()?;
+    let log = events.log(image)?;
+    let said = format!("controller={}", variant::controller(variant).name());
+    for part in ["reset=power-on last_fault=0", &said] {
+        ensure!(log.first().is_some_and(|line| line.contains(part)), "no `{part}` where the log begins, {log:?}");
+    }
+    // The report's amplifier is not logged.
+    let limit_v = log.iter().find_map(|line| line.strip_prefix("amplifier limit_v=")?.parse().ok());
+    let limit_v: f64 = limit_v.unwrap_or(Amplifier::PAPER.max_v);
+    ensure!(
+        limit_v == variant::settings(variant).amplifier.max_v,
+        "an amplifier of {limit_v} V, says the log, {log:?}"
+    );
+    ensure!(log.iter().any(|line| line.contains("summary tick=1000 overruns=0")), "no summary in {log:?}");
+    ensure!(events.times("reset").len() == 1, "it was reset");
+    // Start-up writes zero once, before the first tick.
+    let (setup, ticking) = events.split("watchdog started")?;
+    let ticks = ticking.times("dac");
+    ensure!(ticks.len() > 1190, "{} ticks in 1.2 s", ticks.len());
+    // The lateness of each tick on a grid from the first one on, so that drift and missing ticks show.
+    let late: Vec<f64> =
+        ticks.iter().zip(0u32..).map(|(us, tick)| us - ticks[0] - f64::from(tick) * PERIOD_US).collect();
+    let jitter = late.iter().copied().fold(0.0, f64::max) - late.iter().copied().fold(0.0, f64::min);
+    ensure!(jitter < JITTER_US, "writes to the DAC are up to {jitter:.2} us off their grid of {PERIOD_US} us");
+    ensure!(setup.0.iter().any(|Event(_, what, value)| what == "enable" && value == "off"), "the enable floats");
+    let outputs: Vec<&Event> = setup.0.iter().filter(|event| event.1 == "output").collect();
+    ensure!(outputs.last().is_some_and(|event| event.2 == "unbuffered"), "a buffer holds zero off zero: {outputs:?}");
+    let fed = events.times("fed");
+    ensure!(fed.len() > 10, "the watchdog is not fed");
+    let longest = fed.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    ensure!(longest < WATCHDOG_US / 2.0, "{longest:.0} us without food for the watchdog");
+    Ok(format!(
+        "boot: {} ticks, DAC zero and enable off throughout, written every 1000 us, {jitter:.2} us of jitter; \
+         watchdog of {:.0} ms started, fed at least every {:.1} ms",
+        ticks.len(),
+        WATCHDOG_US / 1e3,
+        longest / 1e3
+    ))
+}
+
+/// A run with a panic, fault or hang: the output is zero and disabled within `within_us` and before the first byte of
+/// the log, then a reset follows that logs its cause and keeps the output safe.
+pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<String> {
+    let (_, after) = mishap(events)?;
+    let (dying, reborn) = after.split("reset")?;
+    let (silent, _) = dying.split("log")?;
+    let gone = gone(&silent)?;
+    ensure!(gone <= within_us, "the voltage goes after {gone:.2} us");
+    let log = dying.log(image)?;
+    ensure!(log.iter().any(|said| said.contains(line)), "no `{line}` in {log:?}");
+    let boot = reborn_safe(&reborn, image, "reset=software")?;
+    let gone = if gone < 1e3 { format!("{gone:.2} us") } else { format!("{:.1} ms", gone / 1e3) };
+    Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
+}
+
+/// A run with a fault that the supervisor detects: the output is zero and disabled within `within_us`, and the ticks go
+/// on without voltage whatever the host sends.
+pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, fault: &str) -> Result<String> {
+    let (_, after) = mishap(events)?;
+    let last = after.0.iter().rposition(Event::drives).context("the voltage had gone before")?;
+    let without = Events(after.0[last + 1..].to_vec());
+    let us = gone(&without)? + without.0[0].0 - after.0[0].0;
+    ensure!(us <= within_us, "the voltage goes after {us:.0} us");
+    ensure!(without.times("dac").len() > 50 && without.times("reset").is_empty(), "it does not go on");
+    let log = after.log(image)?;
+    let line = log.iter().find(|line| line.contains(fault)).with_context(|| format!("no `{fault}` in {log:?}"))?;
+    Ok(format!("DAC zero and enable off {:.1} ms later; `{line}`", us / 1e3))
+}
+
+/// A run with words of the store that a power cut left half written: uncorrectable errors there are accepted.
+pub(super) fn torn(events: &Events, image: &[u8]) -> Result<String> {
+    let boot = reborn_safe(events, image, "reset=power-on last_fault=0")?;
+    Ok(format!("words with two wrong bits are forgiven there alone; `{boot}`"))
+}
+
+/// A run with a reset from outside: a dip of the supply is a fault of its own, and an earlier fault still has to be
+/// acknowledged after the reset.
+pub(super) fn cut(events: &Events, image: &[u8], cause: &str) -> Result<String> {
+    let (_, after) = mishap(events)?;
+    let (_, reborn) = after.split("reset")?;
+    Ok(format!("no voltage until it is acknowledged; `{}`", reborn_safe(&reborn, image, cause)?))
+}
+
+/// A run that hangs with interrupts disabled: the watchdog resets the chip in time.
+pub(super) fn deaf(events: &Events, image: &[u8]) -> Result<String> {
+    let (_, after) = mishap(events)?;
+    let (_, reborn) = after.split("reset")?;
+    let us = reborn.0[0].0 - after.0[0].0;
+    ensure!(us <= WATCHDOG_US, "the watchdog waits for {us:.0} us");
+    let boot = reborn_safe(&reborn, image, "reset=watchdog")?;
+    Ok(format!("the voltage stays until the watchdog resets the chip {:.0} ms later; `{boot}`", us / 1e3))
+}
+
+/// The events before the injected fault and those from it on. An error if there was no voltage before it.
+fn mishap(events: &Events) -> Result<(Events, Events)> {
+    let (before, after) = events.split("mishap")?;
+    ensure!(before.safe().is_err(), "no voltage before the mishap, so that it shows nothing");
+    Ok((before, after))
+}
+
+/// The time from the first event until the output was both zero and disabled, in us.
+fn gone(events: &Events) -> Result<f64> {
+    events.safe()?;
+    let when = |what: &str, is: serde_json::Value| {
+        let event = events.0.iter().find(|Event(_, name, value)| name == what && *value == is);
+        event.map(|event| event.0).with_context(|| format!("no {what} {is} before the log"))
+    };
+    Ok(when("dac", 0.into())?.max(when("enable", "off".into())?) - events.0[0].0)
+}
+
+/// An error unless the output stays safe for at least 50 ticks after the reset. Returns the boot line from `cause` on.
+fn reborn_safe(events: &Events, image: &[u8], cause: &str) -> Result<String> {
+    events.safe()?;
+    ensure!(events.times("reset").len() == 1, "it is reset again");
+    ensure!(events.times("dac").len() > 50, "it does not tick again");
+    let log = events.log(image)?;
+    let line = log.iter().find_map(|line| line.find(cause).map(|at| line[at..].to_owned()));
+    line.with_context(|| format!("no `{cause}` in {log:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn events(list: &[(&str, serde_json::Value)]) -> Events {
+        Events(
+            list.iter()
+                .zip(0u32..)
+                .map(|((what, value), us)| Event(us.into(), (*what).into(), value.clone()))
+                .collect(),
+        )
+    }
+
+    #[test]
+    fn a_log_line_before_the_output_is_safe_is_an_error() {
+        let dying = |list: &[(&str, serde_json::Value)]| gone(&events(list).split("log").unwrap().0);
+        let (mishap, log) = (("mishap", 300.into()), ("log", "00".into()));
+        let (zero, off) = (("dac", 0.into()), ("enable", "off".into()));
+        assert_eq!(dying(&[mishap.clone(), off.clone(), zero.clone(), log.clone()]).unwrap(), 2.0);
+        assert!(dying(&[mishap.clone(), off.clone(), log.clone(), zero.clone()]).is_err());
+        assert!(dying(&[mishap.clone(), zero.clone(), log.clone(), off.clone()]).is_err());
+        assert!(dying(&[mishap, ("dac", 1755.into()), off, zero, log]).is_err());
+    }
+}

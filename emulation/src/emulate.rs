@@ -1,0 +1,62 @@
+//! `cargo xtask emulate`: the stair under QEMU compared with the same code on the host, or a board that a host
+//! commands.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use xtask::build::{self, Board, Opt};
+use xtask::setup;
+use xtask::variant::Variant;
+
+use crate::qemu::comparison::Comparison;
+use crate::qemu::emulator;
+use crate::{blocks, rivals};
+
+/// Options of `cargo xtask emulate`.
+#[derive(clap::Args)]
+#[command(mut_group("Variant", |group| group.requires("link")))]
+pub(crate) struct Args {
+    /// Print the result as JSON; the log goes to stderr
+    #[arg(long)]
+    json: bool,
+    /// Run no script: wait for `vsj link unix:PATH` on this socket until Ctrl-C
+    #[arg(long, value_name = "PATH", conflicts_with = "json")]
+    link: Option<PathBuf>,
+    #[command(flatten)]
+    variant: Variant,
+    /// Count instructions per tick of this controller, of other crates and of double precision
+    #[arg(long, conflicts_with = "link")]
+    rivals: bool,
+    /// Count instructions per tick for each kind of spring under each controller
+    #[arg(long, conflicts_with_all = ["link", "rivals"])]
+    blocks: bool,
+    /// Goal of the optimiser
+    #[arg(long, value_enum, default_value = "s")]
+    opt: Opt,
+}
+
+/// Runs the stair, a count of instructions or a board for a host, and prints the result.
+pub(crate) fn run(args: &Args) -> Result<()> {
+    setup::emulator()?;
+    if args.rivals {
+        return rivals::run(args.opt, args.json);
+    }
+    if args.blocks {
+        return blocks::run(args.opt, args.json);
+    }
+    let elf = build::image_with(&args.variant.features(), Board::Mps2, args.opt)?;
+    if let Some(socket) = &args.link {
+        let socket = std::path::absolute(socket)?;
+        eprintln!("talk to it with: vsj link unix:{} status", socket.display());
+        return emulator::serve(&elf, &socket, |line| println!("{line}"));
+    }
+    let show = |line: &str| if args.json { eprintln!("{line}") } else { println!("{line}") };
+    let run = emulator::play(&elf, "stair", emulator::SHIFT, show)?;
+    let comparison = Comparison::new("stair", &run)?;
+    if args.json {
+        println!("{}", comparison.report(args.opt, &run));
+    } else {
+        println!("{}", comparison.summary(&run));
+    }
+    comparison.check()
+}

@@ -1,0 +1,140 @@
+//! Verification of the firmware's images, started by `cargo xtask`.
+//!
+//! In: images that [`xtask::build`] makes. Out: tables and JSON on stdout, an exit code of 1 if an image is not as it
+//! must be.
+//!
+//! - [`binary`] reads an image's machine code: panics, floats, stack, size.
+//! - [`qemu`] runs an image under QEMU and compares the run with the same code on the host: [`emulate`], [`rivals`],
+//!   [`blocks`], [`drill`], [`talk`], [`story`].
+//! - [`boot`] runs the image that is flashed on models of the chip's registers.
+//! - [`proof`] is what all of `cargo xtask test` asks of the emulated board.
+
+mod binary;
+mod blocks;
+mod boot;
+mod drill;
+mod emulate;
+mod proof;
+mod qemu;
+mod rivals;
+mod story;
+mod talk;
+mod variant;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use xtask::setup;
+use xtask::variant::Variant;
+
+use binary::size;
+
+/// Verification of the firmware's images.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run the firmware on the report's stair under QEMU
+    ///
+    /// 70 s at 1 kHz, in seconds. Shows the decoded log, and exits with 1 unless every DAC code and every estimate is
+    /// the host's, bit for bit, and no tick was missed.
+    ///
+    /// With --link it plays no script and obeys `vsj link`, in real time, its interlock closed. With --rivals it counts
+    /// the instructions that a tick of other controllers needs, and exits with 1 unless each reaches the target.
+    #[command(after_help = "\
+Examples:
+  cargo xtask emulate --json | jq .instructions_per_tick
+  cargo xtask emulate --rivals                         instructions per tick, compared with other controllers
+  cargo xtask emulate --blocks                         instructions per tick, by spring and controller
+  cargo xtask emulate --link /tmp/mcu.sock             then: vsj link unix:/tmp/mcu.sock status")]
+    Emulate(emulate::Args),
+    /// Everything that the emulated firmware must show
+    ///
+    /// Bit for bit the host's on the stair and on random commands at opt-levels s and 3, instructions per tick, no
+    /// panic in the tick, no heap, every fault drill. A part of `test`.
+    Proof,
+    /// Run the fault drills under QEMU
+    ///
+    /// Panic, hard fault, stack overflow, the same with floats in use, stalled task, hanging control, the same with
+    /// interrupts off, overrun, interlock, silent host. Exits with 1 unless the voltage goes away on the DAC's wire and
+    /// the log is the approved one.
+    Drill(drill::Args),
+    /// Let a host talk to the emulated firmware
+    ///
+    /// Arms it, sets a stiffness, falls silent; then 10 000 damaged, random, late and foreign frames while armed,
+    /// in about a minute. Exits with 1 if one of them is followed or a tick is missed. A part of `test`.
+    Talk,
+    /// End-to-end demonstration: run, diagnose, extend, run again
+    ///
+    /// The emulated board drives a spring with a hidden effect up and down a stair, in lock step; `vsj diagnose` names
+    /// the cause; the extended model goes over the link, is checked, stored and run after a restart. Prints the true
+    /// stiffness error before and after. With --feedback the board reads the spring's sensor instead, which then falls
+    /// silent.
+    #[command(after_help = "\
+Examples:
+  cargo xtask story                                three effects, as in `test`
+  cargo xtask story --effect hysteresis gain-error
+  cargo xtask story --controller fast
+  cargo xtask story --feedback                     the paper's model, without the sensor and with it
+  cargo xtask story --all --json")]
+    Story(story::Args),
+    /// Flash, RAM and worst stack of each image
+    ///
+    /// Exits with 1 unless flash stays below 64 KB (96 KB with the time-optimal controller), RAM below 16 KB and the
+    /// stack within its region.
+    #[command(after_help = "\
+Examples:
+  cargo xtask size --json
+  cargo xtask size --controller fast                   with the time-optimal controller
+  cargo xtask size --controller fast --limit-v 1000    the same for an amplifier of 1000 V
+  cargo xtask size --feedback                          with a stiffness sensor")]
+    Size(size::Args),
+    /// Run the image that is flashed on models of the STM32G474's registers
+    ///
+    /// Checks that it fits and that its tick cannot panic. Runs boot and 1.2 s without a host; a host that arms it over
+    /// LPUART1 and sets targets, where every code must be the host model's for this controller and amplifier, and many
+    /// must differ from any other image's; then a panic, a hard fault and two hangs while voltage is out. Exits with 1
+    /// unless the output is as it must be each time; says what this cannot show. Installs Unicorn into a venv under the
+    /// target directory.
+    #[command(after_help = "\
+Examples:
+  cargo xtask boot
+  cargo xtask boot --controller fast                   the image of the time-optimal controller
+  cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V")]
+    Boot(Variant),
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Emulate(args) => emulate::run(&args),
+        Command::Proof => setup::emulator().and_then(|()| proof::run()),
+        Command::Drill(args) => drill::run(&args),
+        Command::Talk => talk::command(),
+        Command::Story(args) => story::run(&args),
+        Command::Size(args) => size::run(&args),
+        Command::Boot(variant) => boot::run(variant),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_defined_without_contradictions() {
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,52 @@
+//! `cargo xtask proof`: all that the emulated firmware must show, as a step of `cargo xtask test`.
+
+use anyhow::{Context, Result, ensure};
+
+use xtask::build::{self, Board, Opt};
+use xtask::variant::{Controller, Variant};
+
+use crate::binary::{audit, size};
+use crate::qemu::comparison::Comparison;
+use crate::qemu::emulator;
+use crate::{drill, rivals, talk};
+
+/// Most instructions that one tick of the model may need.
+const MOST_INSTRUCTIONS: u32 = 150;
+/// Scripts whose codes and estimates must be the host's, bit for bit.
+const RUNS: [&str; 3] = ["stair", "random 1", "random 20261121"];
+
+/// Runs every check at both opt-levels and prints a line for each to stderr.
+pub(crate) fn run() -> Result<()> {
+    for opt in Opt::ALL {
+        let elf = build::image(Board::Mps2, opt)?;
+        let name = opt.name();
+        let functions = audit::run(&build::read(&elf)?)?;
+        eprintln!(
+            "opt-level {name}: no way into a panic from the control tick ({functions} functions), no float in it, no heap"
+        );
+        for script in RUNS {
+            bit_for_bit(&elf, script).with_context(|| format!("opt-level {name}, {script}"))?;
+        }
+        if opt == Opt::S {
+            eprint!("{}", rivals::table(opt, &rivals::count(opt)?));
+            drill::all(&elf, false)?;
+            eprintln!("link: {}", talk::run(&elf).context("the host's link")?);
+        }
+    }
+    size::measure(Variant::of(Controller::Paper), &[], Board::Mps2)?.check()
+}
+
+fn bit_for_bit(elf: &std::path::Path, script: &str) -> Result<()> {
+    let run = emulator::play(elf, script, emulator::SHIFT, |_| {})?;
+    let comparison = Comparison::new(script, &run)?;
+    comparison.check()?;
+    let [min, mean, max] = comparison.instructions;
+    ensure!(max <= MOST_INSTRUCTIONS, "{max} instructions in a tick, expected at most {MOST_INSTRUCTIONS}");
+    eprintln!(
+        "{script}: {} ticks in {:.1} s, none missed, {:016x} as on the host, {min} to {max} instructions per tick, mean {mean}",
+        comparison.ticks,
+        run.took.as_secs_f64(),
+        comparison.target_digest,
+    );
+    Ok(())
+}

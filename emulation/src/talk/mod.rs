@@ -1,0 +1,252 @@
+//! `cargo xtask talk`: a host commands the emulated firmware. Valid requests are followed, hostile frames are not, and
+//! no tick is missed.
+
+mod hostile;
+
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use host_sim::link::{Client, Failure, Patience, Port};
+use host_sim::log::{Item, Level, Summary};
+use link::{Desired, Fault, Frame, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts};
+
+use xtask::build::{self, Board, Opt};
+use xtask::setup;
+
+use crate::qemu::emulator::{self, SAFE, Written};
+use hostile::{Dice, HOSTILE, hostile};
+
+/// Longest time for all hostile frames. They usually need a minute, because the emulated line transfers single bytes.
+const TIME: Duration = Duration::from_secs(300);
+/// Hostile frames between two valid ones, one of each kind. The valid ones keep the host's time-out from expiring.
+const BATCH: u32 = 8;
+/// Longest wait for an answer.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Time since the last valid frame after which the host's time-out of 0.5 s may have expired on a busy machine. It is
+/// no error of the board then.
+const LATE: Duration = Duration::from_millis(400);
+/// The target that hostile frames must not change, in V.
+const TARGET_V: f64 = 300.0;
+
+/// Builds the image, talks to it and prints the result.
+pub(crate) fn command() -> Result<()> {
+    setup::emulator()?;
+    println!("{}", run(&build::image(Board::Mps2, Opt::S)?)?);
+    Ok(())
+}
+
+/// Starts the board, talks to it and returns the result in one line.
+pub(crate) fn run(elf: &Path) -> Result<String> {
+    let socket = elf.with_file_name(format!("link-{}", std::process::id()));
+    let name = format!("unix:{}", socket.display());
+    let ((said, armed), run) = emulator::obey(
+        elf,
+        &socket,
+        |_| {},
+        || {
+            let polite = courtesy(&name)?;
+            let (hostile, armed) = hostility(&name)?;
+            Ok((format!("{polite}; {hostile}"), 2 + armed))
+        },
+    )?;
+    let mut summary = Summary::default();
+    for line in run.log {
+        ensure!(line.level < Some(Level::Error), "the log says {:?}", line.message);
+        summary.add(&Item::Line(line));
+    }
+    let missed = summary.overruns.context("the log has no summary")?;
+    ensure!(missed == 0, "{missed} ticks missed, says the log");
+    let driven = wire(&run.dac, armed)?;
+    Ok(format!("{said}; {} ticks on the wire, {driven} with voltage, {missed} missed", run.dac.len()))
+}
+
+/// The number of writes with voltage on the DAC's wire. An error unless the wire begins and ends with zero and the
+/// amplifier was enabled `armed` times.
+fn wire(dac: &[Written], armed: usize) -> Result<usize> {
+    ensure!(dac.first() == Some(&SAFE) && dac.last() == Some(&SAFE), "the wire does not begin and end with zero");
+    let parts = dac.chunk_by(|a, b| a.enabled == b.enabled).filter(|part| part[0].enabled).count();
+    ensure!(parts == armed, "the board was armed {armed} times, its amplifier enabled {parts} times");
+    ensure!(dac.iter().all(|written| written.enabled || *written == SAFE), "a voltage without enable");
+    Ok(dac.iter().filter(|written| written.enabled).count())
+}
+
+/// Valid requests through the host's library, which `vsj link` uses.
+fn courtesy(name: &str) -> Result<String> {
+    let (mut client, status) = Client::greet(open(name)?, Patience::of(PATIENCE))?;
+    expect(&status, State::Disarmed, 0.0)?;
+    ensure!(status.rate_hz == 1000 && status.last_fault == Fault::NONE, "{status:?}");
+
+    let set = |volts| Request::Set(Desired::ScaledVolts(volts));
+    refused(client.order(set(TARGET_V)), |reason| matches!(reason, Reason::NotArmed))?;
+    ensure!(client.order(Request::Arm)? == (State::Armed, WireVolts(0)), "arming starts at zero");
+    ensure!(
+        client.order(set(TARGET_V))? == (State::Armed, WireVolts::from_f64(TARGET_V)),
+        "the target is not followed"
+    );
+    refused(client.order(set(900.0)), |reason| matches!(reason, Reason::OutOfRange { .. }))?;
+    client.order(Request::Stream { every_ticks: 10 })?;
+    let samples: Vec<_> = client.samples(Duration::from_millis(300))?.collect();
+    ensure!(samples.len() >= 10, "{} samples in 0.3 s", samples.len());
+    ensure!(samples.is_sorted_by(|a, b| a.tick < b.tick), "samples come out of order");
+    let (first, last) = samples.first().zip(samples.last()).context("no sample")?;
+    let periods = (last.tick - first.tick) / 10;
+    ensure!(samples.len() as u64 <= periods + 2, "{} samples in {periods} periods", samples.len());
+    ensure!(last.state == State::Armed && last.code > 0 && last.target.to_f64() == TARGET_V, "{last:?}");
+    ensure!(client.order(Request::Disarm)?.0 == State::Disarmed, "disarm is followed");
+    expect(&client.status()?, State::Disarmed, 0.0)?;
+
+    // Armed again, then silent: the board disarms after 0.5 s and a ramp of 300 V at 700 V/s.
+    client.order(Request::Arm)?;
+    client.order(set(TARGET_V))?;
+    thread::sleep(Duration::from_millis(1500));
+    let status = client.status()?;
+    expect(&status, State::Disarmed, 0.0)?;
+    ensure!(status.sample.code == 0, "{status:?}");
+    Ok(format!("armed, {TARGET_V} V set, {} samples, disarmed; disarmed by silence", samples.len()))
+}
+
+/// Hostile frames while the board is armed at a target. Returns the result and how often the board was armed.
+fn hostility(name: &str) -> Result<(String, usize)> {
+    let mut line = Line { port: open(name)?, receiver: Receiver::new(), next: Sequence(1000) };
+    // A hello restarts the sequence numbers, as after a restart of the host.
+    line.ask(&Request::Hello)?;
+    let before = line.status()?;
+    expect(&before, State::Disarmed, 0.0)?;
+    line.arm()?;
+
+    let mut dice = Dice::new(20_261_121);
+    let (begin, mut sent, mut asked, mut armed) = (Instant::now(), 0, 2, 1);
+    let mut heard = Instant::now();
+    let mut bytes = 0;
+    while sent < HOSTILE && begin.elapsed() < TIME {
+        for _ in 0..BATCH {
+            let frame = hostile(&mut dice, sent, line.next);
+            bytes += frame.len();
+            line.port.write(&frame)?;
+            sent += 1;
+        }
+        asked += 1;
+        let answer = line.ask(&Request::Heartbeat)?;
+        if answer != at_target() {
+            let gone = matches!(answer, Reply::Ack { state: State::Ramping | State::Disarmed, .. });
+            ensure!(gone && heard.elapsed() > LATE, "after {sent} hostile frames: {answer:?}");
+            line.ask(&Request::Disarm)?;
+            line.arm()?;
+            (asked, armed) = (asked + 3, armed + 1);
+        }
+        heard = Instant::now();
+    }
+    let took = begin.elapsed().as_secs_f64();
+    ensure!(sent >= HOSTILE, "only {sent} of {HOSTILE} frames in {took:.1} s");
+
+    let after = line.status()?;
+    expect(&after, State::Armed, TARGET_V)?;
+    let (old, new) = (before.counters, after.counters);
+    // The status request is accepted as well.
+    let accepted = new.accepted - old.accepted;
+    ensure!(accepted == asked + 1, "{accepted} requests accepted, {} made: {new:?}", asked + 1);
+    ensure!(new.repeated == old.repeated, "a frame was counted as a repeated one: {new:?}");
+    ensure!(after.overruns == 0, "{} ticks missed", after.overruns);
+    let kinds = [
+        new.damaged - old.damaged,
+        new.oversize - old.oversize,
+        new.bad_version - old.bad_version,
+        new.out_of_order - old.out_of_order,
+        new.unknown - old.unknown,
+    ];
+    ensure!(kinds.iter().all(|count| *count > 50), "not every kind arrived: {new:?}");
+    let answer = line.ask(&Request::Disarm)?;
+    ensure!(matches!(answer, Reply::Ack { state: State::Disarmed, .. }), "{answer:?}");
+    // The log prints its counters every second.
+    thread::sleep(Duration::from_millis(1200));
+    let [damaged, oversize, version, order, unknown] = kinds;
+    let said = format!(
+        "{sent} hostile frames ({bytes} bytes) in {took:.1} s while armed: none followed ({damaged} damaged, {oversize} \
+         oversize, {version} of another version, {order} out of order, {unknown} unknown), {accepted} good ones all \
+         followed, {} overruns, armed {armed} times",
+        after.overruns
+    );
+    Ok((said, armed))
+}
+
+/// Opens the serial line to the board. Tries again for two seconds while the emulator is starting.
+pub(crate) fn open(name: &str) -> Result<Port> {
+    let begin = Instant::now();
+    loop {
+        match Port::open(name, 115_200) {
+            Ok(port) => return Ok(port),
+            // The emulator is still starting.
+            Err(error) if begin.elapsed() > PATIENCE => return Err(error),
+            Err(_) => thread::sleep(Duration::from_millis(20)),
+        }
+    }
+}
+
+fn expect(status: &Status, state: State, target_v: f64) -> Result<()> {
+    let sample = &status.sample;
+    let as_expected = sample.state == state && sample.target.to_f64() == target_v && status.overruns == 0;
+    ensure!(as_expected && status.fault == Fault::NONE, "expected {state}, {target_v} V, no overruns: {status:?}");
+    Ok(())
+}
+
+fn refused<T: std::fmt::Debug>(result: Result<T, Failure>, why: impl Fn(&Reason) -> bool) -> Result<()> {
+    match result {
+        Err(Failure::Refused(reason)) if why(&reason) => Ok(()),
+        Err(failure) => Err(anyhow!(failure)),
+        Ok(done) => bail!("not refused but {done:?}"),
+    }
+}
+
+/// The answer of a board that is armed at the target.
+fn at_target() -> Reply {
+    Reply::Ack { state: State::Armed, target: WireVolts::from_f64(TARGET_V) }
+}
+
+/// A serial line that sends every request once, unlike the host's library, which repeats.
+struct Line {
+    port: Port,
+    receiver: Receiver,
+    next: Sequence,
+}
+
+impl Line {
+    fn ask(&mut self, request: &Request) -> Result<Reply> {
+        let number = self.next;
+        self.next = number.next();
+        self.port.write(Frame::new(number, request).as_bytes())?;
+        let begin = Instant::now();
+        while begin.elapsed() < PATIENCE {
+            let mut buffer = [0; 1024];
+            let count = self.port.read(&mut buffer)?;
+            let mut found = None;
+            for byte in &buffer[..count] {
+                if let Some(packet) = self.receiver.on_byte(*byte)
+                    && packet.sequence == number
+                {
+                    found = Some(packet.read::<Reply>().map_err(|error| anyhow!("{error:?}"))?);
+                }
+            }
+            if let Some(reply) = found {
+                return Ok(reply);
+            }
+        }
+        bail!("no answer to {request:?}, number {}", number.0)
+    }
+
+    /// Arms the board and sets the target, in two requests.
+    fn arm(&mut self) -> Result<()> {
+        self.ask(&Request::Arm)?;
+        let answer = self.ask(&Request::Set(Desired::ScaledVolts(TARGET_V)))?;
+        ensure!(answer == at_target(), "{answer:?}");
+        Ok(())
+    }
+
+    fn status(&mut self) -> Result<Status> {
+        match self.ask(&Request::Status)? {
+            Reply::Status(status) => Ok(status),
+            other => bail!("{other:?} instead of a status"),
+        }
+    }
+}

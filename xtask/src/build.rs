@@ -1,0 +1,115 @@
+//! Builds the MCU's images with cargo and keeps each under a name of its own.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::shell;
+
+/// Goal of the optimiser.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Opt {
+    /// Size, as it is flashed
+    S,
+    /// Speed
+    #[value(name = "3")]
+    Three,
+}
+
+impl Opt {
+    /// Every goal.
+    pub const ALL: [Self; 2] = [Self::S, Self::Three];
+
+    /// The compiler's `opt-level` for the control tick.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::S => "s",
+            Self::Three => "3",
+        }
+    }
+
+    const fn profile(self) -> &'static str {
+        match self {
+            Self::S => "firmware",
+            Self::Three => "firmware-3",
+        }
+    }
+}
+
+/// A board that the firmware runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Board {
+    /// NUCLEO-G474RE with an STM32G474RE, which is flashed.
+    Nucleo,
+    /// MPS2 with image AN386, a Cortex-M4 that QEMU emulates.
+    Mps2,
+}
+
+impl Board {
+    /// Every board.
+    pub const ALL: [Self; 2] = [Self::Nucleo, Self::Mps2];
+
+    /// Name of the board, of its binary and of its feature.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nucleo => "nucleo-g474re",
+            Self::Mps2 => "mps2-an386",
+        }
+    }
+
+    /// Package with the binary of the board.
+    const fn package(self) -> &'static str {
+        match self {
+            Self::Nucleo => "firmware",
+            Self::Mps2 => "test-bench",
+        }
+    }
+}
+
+/// Builds the default image of a board, with the paper's controller and the amplifier of 700 V. Returns the path of its
+/// ELF file.
+pub fn image(board: Board, opt: Opt) -> Result<PathBuf> {
+    image_with(&[], board, opt)
+}
+
+/// Builds the image of a board with further features. Returns the path of its ELF file.
+pub fn image_with(features: &[&str], board: Board, opt: Opt) -> Result<PathBuf> {
+    let features = [&[board.name()], features].concat();
+    compile(board.package(), &features.join(","), opt, ["--bin", board.name()], board.name(), &features.join("-"))
+}
+
+/// Builds an example of the package `test-bench` with a comma-separated list of features. Returns the path of its ELF
+/// file.
+pub fn example(name: &str, features: &str, opt: Opt) -> Result<PathBuf> {
+    compile(Board::Mps2.package(), features, opt, ["--example", name], &format!("examples/{name}"), name)
+}
+
+/// Copies what cargo built to `image/NAME`: cargo itself uses one file name for every set of features.
+fn compile(package: &str, features: &str, opt: Opt, what: [&str; 2], file: &str, name: &str) -> Result<PathBuf> {
+    let folder = shell::target_directory()?.join(shell::MCU).join(opt.profile());
+    let images = folder.join("image");
+    fs::create_dir_all(&images).with_context(|| format!("cannot make {}", images.display()))?;
+    // No other build may take place between building and copying.
+    let turn = fs::File::create(folder.join("turn.lock")).context("cannot make a lock")?;
+    turn.lock().context("cannot wait for a lock")?;
+    shell::run(shell::cargo().args(["build", "--quiet", "--package", package]).args(what).args([
+        "--features",
+        features,
+        "--profile",
+        opt.profile(),
+        "--target",
+        shell::MCU,
+    ]))?;
+    let (built, own) = (folder.join(file), images.join(name));
+    // Replaces the old file instead of overwriting it: an emulator may be running it.
+    let new = own.with_extension("new");
+    fs::copy(&built, &new).with_context(|| format!("cannot copy {}", built.display()))?;
+    fs::rename(&new, &own).with_context(|| format!("cannot write {}", own.display()))?;
+    Ok(own)
+}
+
+/// Reads a file. The error names it.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
