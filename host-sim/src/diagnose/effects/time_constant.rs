@@ -16,7 +16,7 @@ impl Effect for TimeConstant {
     }
 
     fn meaning(&self) -> &'static str {
-        "the relaxation takes another time"
+        "the time constant of the relaxation differs"
     }
 
     fn experiment(&self) -> &'static str {
