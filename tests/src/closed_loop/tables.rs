@@ -70,10 +70,10 @@ pub fn failures(consequences: &[Consequence]) -> String {
         "readings",
         "from [s]",
         "fault",
-        "seen after [ms]",
+        "detected after [ms]",
         "moved the stiffness by [V]",
         "largest change of voltage in a tick [V]",
-        "with a good sensor",
+        "with a healthy sensor",
         "trusted again after [ms]",
     ];
     table(&header, consequences.iter().map(row))
