@@ -13,13 +13,13 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the repository")
 }
 
-/// All Markdown files below a folder, without what builds and runs leave there.
+/// All Markdown files below a folder, except build and run output and templates among sources, whose links start elsewhere.
 fn markdown_files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if path.is_dir() && !name.starts_with('.') && !["target", "out"].contains(&name.as_str()) {
+        if path.is_dir() && !name.starts_with('.') && !["target", "out", "src"].contains(&name.as_str()) {
             files.extend(markdown_files(&path));
         } else if path.extension().is_some_and(|extension| extension == "md") {
             files.push(path);

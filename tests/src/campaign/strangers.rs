@@ -128,7 +128,7 @@ fn order(forms: &[Form], answers: &[Answer]) -> String {
     let behind = |answer: &Answer| answer.found.iter().any(|name| form(answer).is_named(name));
     let all_true = |answer: &Answer| answer.found.iter().all(|name| form(answer).is_true(name));
     format!(
-        "\nOf the {} wrong ones, {} have a right name further back, {} of these with nothing untrue beside it;\n\
+        "\nOf the {} wrong ones, {} have a right name further back, {} of these without a false one;\n\
          {} are `ambiguous` with the truth among the alternatives.\n",
         wrong.len(),
         count(&behind),
