@@ -76,7 +76,7 @@ impl Report {
     }
 
     fn write_page(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(out, "# The source report, recomputed\n")?;
+        writeln!(out, "# What of the source report comes out again\n")?;
         writeln!(
             out,
             "The source report: X. Liu, *Modeling of a Piezoelectric Beam Spring*, BSc report 030RAM2016, University of \
@@ -86,18 +86,18 @@ impl Report {
         writeln!(out, "{}", self.summary())?;
         writeln!(
             out,
-            "A number agrees if the computed one equals it to its last printed digit. Whether digits were rounded or \
-             truncated is counted, table by table; truncated: {}. A claim such as \"more than\" agrees if it holds. A \
-             measured number agrees if it lies where the other measurements predict it (false-alarm rate 5 % per table).\n",
+            "A number agrees if it comes out to its last printed digit. Whether digits were rounded or cut off is counted, \
+             table by table; cut off: {}. A claim such as \"more than\" agrees if it holds. A measured number agrees if it \
+             lies where the other measurements put it (5 % false alarms a table).\n",
             if self.truncated_groups.is_empty() { "none".to_owned() } else { self.truncated_groups.join(", ") }
         )?;
-        writeln!(out, "| | numbers | do not agree |\n| --- | ---: | ---: |")?;
+        writeln!(out, "| | numbers | do not come out |\n| --- | ---: | ---: |")?;
         for bears_on in [BearsOn::Conclusion, BearsOn::Model, BearsOn::Result, BearsOn::Detail] {
             let of_kind = || self.items.iter().filter(|item| item.bears_on == bears_on);
             let wrong = of_kind().filter(|item| !item.agrees).count();
             writeln!(out, "| {} | {} | {wrong} |", heading(bears_on), of_kind().count())?;
         }
-        writeln!(out, "\n## Disagreements, most important first\n")?;
+        writeln!(out, "\n## What does not come out, most important first\n")?;
         let mut last = None;
         for (index, item) in by_importance(self).into_iter().enumerate() {
             if last != Some(item.bears_on) {
@@ -118,7 +118,7 @@ impl Report {
             )?;
         }
         writeln!(out, "\n## Every number\n")?;
-        writeln!(out, "| where | printed | computed | unit | agrees |\n| --- | ---: | ---: | --- | --- |")?;
+        writeln!(out, "| where | printed | comes out | unit | agrees |\n| --- | ---: | ---: | --- | --- |")?;
         for item in &self.items {
             let agrees = if item.agrees { "yes" } else { "**no**" };
             writeln!(out, "| {} | {} | {} | {} | {agrees} |", item.place, item.text, computed(item), item.unit)?;

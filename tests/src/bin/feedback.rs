@@ -51,7 +51,7 @@ fn run(cli: &Cli) -> Result<bool> {
         write!(text, "### Its sensor fails for {} s\n\n{}\n", failing::FAILS_S, tables::failures(&consequences))?;
         aims.extend(tables::aims(name, &outcomes, feedback.noise_v));
     }
-    text.push_str("## Requirements\n\n");
+    text.push_str("## Asked for\n\n");
     aims.iter().try_for_each(|aim| writeln!(text, "- {aim}"))?;
     print!("{text}");
     if let Some(path) = &cli.docs {

@@ -46,7 +46,7 @@ impl Display for Aim {
             (true, false) => format!("at least {low}"),
             _ => format!("at most {high}"),
         };
-        write!(f, "{what}: {found:.3}, required {aim}: {}", if self.is_met() { "met" } else { "NOT MET" })
+        write!(f, "{what}: {found:.3}, asked for {aim}: {}", if self.is_met() { "met" } else { "NOT MET" })
     }
 }
 
@@ -75,7 +75,7 @@ pub fn singles(outcomes: &[Outcome]) -> Vec<Aim> {
         Aim::at_least("first finding is the hidden cause", 0.99, summary.first),
         Aim::at_least("no other finding", 0.99, summary.nothing_extra),
         Aim::at_least("verdict explained or ambiguous", 0.99, summary.verdict_right),
-        Aim { what: "95 % intervals contain the true value".into(), low: 0.9, high: 0.99, found: mean(&covered) },
+        Aim { what: "95 % bounds hold the truth".into(), low: 0.9, high: 0.99, found: mean(&covered) },
         Aim::at_most("held-out error over what the true spring leaves, median", 1.1, or_nan(summary.held_out_ratio)),
     ];
     let error = |a: &super::summary::Accuracy| {
@@ -139,6 +139,6 @@ mod tests {
     fn nothing_found_meets_no_aim_but_that_of_the_nulls() {
         assert!(singles(&[]).iter().all(|aim| !aim.is_met()));
         let aim = Aim::at_most("x", 1.1, f64::NAN);
-        assert!(!aim.is_met() && aim.to_string().ends_with("required at most 1.1: NOT MET"));
+        assert!(!aim.is_met() && aim.to_string().ends_with("asked for at most 1.1: NOT MET"));
     }
 }

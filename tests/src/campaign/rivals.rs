@@ -111,8 +111,8 @@ fn last_part(hidden: &Hidden, foretold: &[f64]) -> f64 {
 /// As Markdown; in bold what is at the floor.
 pub fn table(rows: &[Row]) -> String {
     let mut text = "\
-Root mean square error in V over the last 40 % of a record, free run of the model identified on the first 60 %, and its
-CPU time. Bold: at most 1.1 times the floor, the error of the true spring. `-`: the free run diverged.
+Root mean square error in V over the last 40 % of a record, run freely by what was learnt from the first 60 %, and the
+processor time for it. Bold: at most 1.1 times the floor, which is what the true spring leaves. `-`: the free run left all bounds.
 
 | hidden | floor | paper's plant | PySINDy | SysIdentPy | vsj | vsj named | time in s: PySINDy | SysIdentPy | vsj |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -142,9 +142,9 @@ fn at_floor(rmse: f64, floor: f64) -> bool {
 fn counts(rows: &[Row]) -> String {
     let mut text = format!(
         "\
-Where the paper's plant is at the floor, the last 40 % do not show the hidden effect, or no model could predict it.
+Where the paper's plant is at the floor, the last 40 % do not show what is hidden, or no model could foretell it.
 
-| of {} records | at the floor | worse than the paper's plant by 10 % | diverged | median time in s |
+| of {} records | at the floor | worse than the paper's plant by 10 % | left all bounds | median time in s |
 | --- | --- | --- | --- | --- |
 ",
         rows.len()

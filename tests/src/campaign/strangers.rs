@@ -91,16 +91,16 @@ pub fn run(jobs: &[(Form, u64)], diagnose: &Diagnose<'_>, progress: &ProgressBar
 pub fn page(forms: &[Form], answers: &[Answer]) -> String {
     let mut text = format!(
         "\
-One effect in each record, by a law that `vsj diagnose` was not made with; plain sizes, {} V of white noise. The causes that are
-right for a form were written down before the first diagnosis: in brackets those that are equally right as first finding, after
-\"and\" those that are also true. *right*: the first finding is right and all others are true. *more*: the first is right, another
-one is not true. *silent*: no finding. *wrong*: the first finding is another cause, even if it is one of those that are also true.
-`unexplained` with a right first finding counts as right.
+One effect in each record, by a law that `vsj diagnose` was not made with; plain sizes, {} V of white noise. The names that are
+right for a form were written down before the first diagnosis: in brackets those that are as right in the first place, after
+\"and\" those that are true beside it. *right*: first finding right and all others true. *more*: first right, beside it a name
+that is not true. *silent*: no finding. *wrong*: the first finding is another name, be it one that is true beside a right one.
+`unexplained` beside a right first name counts as right.
 
-At the first printing 107 of 245 were right, 69 said more, 7 were silent, 62 wrong. The results led to three rules (a resonance
-has a damping ratio of at most 0.5, spikes that coincide with the command are not outliers, a second cause in the same stage of
-the chain has a higher penalty), to two forms of amplifier-slew (two rates, output resistance) and to two of second-relaxation
-(by decades, spread). So the laws are no longer unseen, and those two amplifiers are no longer out of the model.
+At the first printing 107 of 245 were right, 69 said more, 7 were silent, 62 wrong. What it showed has led to three rules (a
+resonance is damped by half at most, spikes in time with the command are no outliers, a second cause in the same stage of
+the chain has to be worth more), to two forms of amplifier-slew (two rates, output resistance) and to two of
+second-relaxation (by decades, spread). So the laws are no longer unseen, and those two amplifiers are no strangers.
 
 ",
         Noise::white(0.2).sigma_v
@@ -112,7 +112,7 @@ the chain has a higher penalty), to two forms of amplifier-slew (two rates, outp
     last.extend([verdicts(&all), String::new(), String::new()]);
     rows.push(last);
     let header =
-        ["hidden", "form", "records", "right", "more", "silent", "wrong", "verdicts", "not true, how often", "judged"];
+        ["hidden", "form", "records", "right", "more", "silent", "wrong", "verdicts", "not true, times said", "judged"];
     text += &table(&header, rows);
     text += &order(forms, answers);
     let laws = forms.iter().map(|form| [form.name, form.law, form.source].map(str::to_owned).to_vec());
@@ -128,7 +128,7 @@ fn order(forms: &[Form], answers: &[Answer]) -> String {
     let behind = |answer: &Answer| answer.found.iter().any(|name| form(answer).is_named(name));
     let all_true = |answer: &Answer| answer.found.iter().all(|name| form(answer).is_true(name));
     format!(
-        "\nOf the {} wrong ones, {} have a right name further back, {} of these without a false one;\n\
+        "\nOf the {} wrong ones, {} have a right name further back, {} of these with nothing untrue beside it;\n\
          {} are `ambiguous` with the truth among the alternatives.\n",
         wrong.len(),
         count(&behind),

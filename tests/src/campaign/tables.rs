@@ -96,12 +96,12 @@ pub fn speed(jobs: &[Job], outcomes: &[Outcome]) -> String {
         "records",
         "mean [s]",
         "worst [s]",
-        "hidden effect",
+        "hidden in it",
         "grows as rows^",
         "first right",
         "nothing extra",
     ];
-    "CPU time in seconds.\n\n".to_owned() + &table(&header, groups.map(row))
+    "Seconds of one processor.\n\n".to_owned() + &table(&header, groups.map(row))
 }
 
 /// How near the parameters come and how often their bounds hold.
@@ -113,7 +113,7 @@ pub fn accuracy(outcomes: &[Outcome]) -> String {
     };
     let summary = Summary::of("all", &outcomes.iter().collect::<Vec<_>>());
     table(
-        &["cause", "parameter", "estimates", "median error", "at best", "95 % interval contains it"],
+        &["cause", "parameter", "estimates", "median error", "at best", "95 % bounds hold"],
         summary.parameters.into_iter().map(row),
     )
 }
@@ -139,7 +139,7 @@ pub fn confusion(outcomes: &[Outcome]) -> String {
 /// How often each cause is named at the rungs of the ladder.
 pub fn ladder(climbs: &[Climb]) -> String {
     let rungs: Vec<String> = RUNGS.iter().map(|rung| format!("x {rung}")).collect();
-    let mut header = vec!["cause", "records", "detectable", "isolated from"];
+    let mut header = vec!["cause", "records", "detectable", "told apart from"];
     header.extend(rungs.iter().map(String::as_str));
     header.push("named from");
     let row = |climb: &Climb| {

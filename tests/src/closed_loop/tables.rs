@@ -70,10 +70,10 @@ pub fn failures(consequences: &[Consequence]) -> String {
         "readings",
         "from [s]",
         "fault",
-        "detected after [ms]",
+        "seen after [ms]",
         "moved the stiffness by [V]",
         "largest change of voltage in a tick [V]",
-        "with a healthy sensor",
+        "with a good sensor",
         "trusted again after [ms]",
     ];
     table(&header, consequences.iter().map(row))

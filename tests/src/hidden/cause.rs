@@ -83,8 +83,8 @@ macro_rules! facts {
 /// In the order of [`Cause::ALL`].
 static FACTS: [Facts; 18] = facts! {
     "gain-error" Static ["gain"], ["gain"], 0 * 1.0 "of 1", false, 1;
-    "instantaneous-share" Relaxation ["share"], ["share"], 0 * 1.0 "off 1/11", true, 1;
-    "time-constant" Relaxation ["tau_s"], ["tau"], 0 * 1.0 "s off 5.5 s", false, 1;
+    "instantaneous-share" Relaxation ["share"], ["share"], 0 * 1.0 "beside 1/11", true, 1;
+    "time-constant" Relaxation ["tau_s"], ["tau"], 0 * 1.0 "s beside 5.5 s", false, 1;
     "second-relaxation" Relaxation ["share", "tau_s"], ["from the relaxing part", "from everything"],
         0 * 1.0 "share", false, 2;
     "voltage-dependent-time-constant" Relaxation ["tau_low_s", "tau_high_s"], ["linear", "exponential"],

@@ -20,7 +20,7 @@ impl Effect for AmplifierLimit {
     }
 
     fn experiment(&self) -> &'static str {
-        "a stair in small steps up to the full voltage: above the limit nothing changes any more, not even the instantaneous part"
+        "a stair in small steps up to the full voltage: above the limit nothing moves any more, not even at once"
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {

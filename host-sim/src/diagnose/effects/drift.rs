@@ -28,7 +28,7 @@ impl Effect for Drift {
     }
 
     fn meaning(&self) -> &'static str {
-        "the response changes with time, not with the voltage"
+        "the response changes with the clock, not with the voltage"
     }
 
     fn experiment(&self) -> &'static str {

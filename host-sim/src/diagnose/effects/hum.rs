@@ -25,7 +25,7 @@ impl Effect for Hum {
     }
 
     fn meaning(&self) -> &'static str {
-        "a periodic disturbance is added to the readings"
+        "a periodic disturbance rides on the readings"
     }
 
     fn experiment(&self) -> &'static str {

@@ -59,11 +59,11 @@ impl Effect for Hysteresis {
     }
 
     fn meaning(&self) -> &'static str {
-        "the rising and falling branches differ, however slowly the voltage changes"
+        "the branches up and down differ, however slowly they are run"
     }
 
     fn experiment(&self) -> &'static str {
-        "a slow stair up and down again: only with hysteresis do the branches stay apart, however long each step is held"
+        "a slow stair up and down again: only under hysteresis the branches stay apart, however long each step is held"
     }
 
     fn forms(&self) -> usize {

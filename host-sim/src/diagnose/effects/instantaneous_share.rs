@@ -16,7 +16,7 @@ impl Effect for InstantaneousShare {
     }
 
     fn meaning(&self) -> &'static str {
-        "the instantaneous part of a step (feedthrough) differs"
+        "the part of a step that comes at once is another"
     }
 
     fn experiment(&self) -> &'static str {

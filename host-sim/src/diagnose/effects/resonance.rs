@@ -47,7 +47,7 @@ impl Effect for Resonance {
     }
 
     fn meaning(&self) -> &'static str {
-        "underdamped oscillation after a change"
+        "it swings after a change"
     }
 
     fn experiment(&self) -> &'static str {

@@ -16,7 +16,7 @@ impl Effect for TimeConstant {
     }
 
     fn meaning(&self) -> &'static str {
-        "the time constant of the relaxation differs"
+        "the relaxation takes another time"
     }
 
     fn experiment(&self) -> &'static str {

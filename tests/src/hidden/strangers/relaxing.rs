@@ -14,7 +14,7 @@ pub const FORMS: [Form; 10] = [
         name: "fast mode",
         or: &[],
         beside: &[],
-        law: "in addition to the paper's share another one, with a time constant of 0.15 to 0.35 rows",
+        law: "beside the paper's share another, with a time constant of 0.15 to 0.35 rows",
         source: "Ferry, Viscoelastic Properties of Polymers, 1980: the glassy end of the spectrum",
         build: fast_mode,
     },
