@@ -120,7 +120,7 @@ fn every_page_is_whole_and_no_page_is_left_over() {
             &format!("]({cause}.svg)"),
             "```text\n",
             "## In a record\n",
-            "## Taken for\n",
+            "## Commonly confused with\n",
             "## Parameters\n",
             "## Source\n",
         ] {

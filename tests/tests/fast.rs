@@ -40,17 +40,17 @@ fn every_step_is_as_fast_as_the_amplifier_allows() {
     }
 }
 
-/// The README shows what the command prints today.
+/// docs/fast-controller.md shows what the command prints today.
 #[test]
-fn the_readme_shows_the_comparison() {
+fn the_documentation_shows_the_comparison() {
     let folder = tempdir().unwrap();
     let output = run(folder.path(), &["compare"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let readme = fs::read_to_string(docs().join("../README.md")).unwrap();
+    let page = fs::read_to_string(docs().join("fast-controller.md")).unwrap();
     let stdout = text(&output.stdout);
     assert_eq!(stdout.lines().filter(|line| line.contains(" -> ")).count(), 30);
     for line in stdout.lines() {
-        assert!(readme.contains(line), "the README lacks: {line}");
+        assert!(page.contains(line), "docs/fast-controller.md lacks: {line}");
     }
     let report = json(folder.path(), &["compare", "--limit-v", "800", "--json"]);
     assert_eq!(report["limits"].as_array().expect("limits").len(), 1);

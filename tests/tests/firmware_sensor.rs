@@ -10,8 +10,6 @@ use model::{Feedback, Sensor, Settings, Volts, supervisor};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use validation::closed_loop::stair;
-use validation::closed_loop::stair;
-use validation::hidden::{Cause, Effect, Live, Noise};
 use validation::hidden::{Cause, Effect, Live, Noise};
 
 /// Armed at once with 300 V; so long.

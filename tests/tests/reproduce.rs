@@ -123,10 +123,11 @@ fn the_page_is_the_one_in_the_documentation() {
     // Claims come before side remarks.
     assert!(made.find("### Claims").unwrap() < made.find("### Side remarks").unwrap());
 
-    let readme = fs::read_to_string(root.join("README.md")).unwrap();
     let summary = text(&output.stdout).lines().find(|line| line.contains("printed numbers agree")).unwrap().to_owned();
     let first = summary.split(". ").next().unwrap();
-    assert!(readme.contains(first), "the README lacks: {first}");
+    for page in ["README.md", "docs/report.md"] {
+        assert!(fs::read_to_string(root.join(page)).unwrap().contains(first), "{page} lacks: {first}");
+    }
 }
 
 #[test]

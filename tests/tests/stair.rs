@@ -240,7 +240,7 @@ fn help_shows_examples() {
     assert!(run(folder.path(), &["--version"]).status.success());
 }
 
-/// The pictures and figures that the README shows are those of today.
+/// The pictures and figures of docs/stair and docs/stair.md are those that the command makes today.
 #[test]
 fn the_documentation_shows_what_the_command_prints() {
     let folder = tempdir().unwrap();
@@ -254,12 +254,12 @@ fn the_documentation_shows_what_the_command_prints() {
             "docs/stair/{name} is old: cargo run --release -- stair --out docs/stair --every 0.1"
         );
     }
-    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let page = fs::read_to_string(root.join("docs/stair.md")).unwrap();
     let stdout = text(&output.stdout);
     let shown = stdout
         .lines()
         .filter(|line| line.contains(" -> ") || line.contains("agree to the last digit") || line.contains("stays"));
     for line in shown {
-        assert!(readme.contains(line), "the README lacks: {line}");
+        assert!(page.contains(line), "docs/stair.md lacks: {line}");
     }
 }
