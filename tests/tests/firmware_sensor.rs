@@ -10,7 +10,7 @@ use model::{Feedback, Sensor, Settings, Volts};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use validation::closed_loop::stair;
-use validation::hidden::{Cause, Effect, Live, Noise};
+use validation::ground_truth::{Cause, Effect, Live, Noise};
 
 /// Armed at once with 300 V; so long.
 const TICKS: usize = 40_000;

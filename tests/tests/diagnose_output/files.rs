@@ -6,8 +6,8 @@ use std::path::Path;
 
 use end_to_end::vsj::{json, run, text};
 use serde_json::Value;
-use validation::hidden::Cause;
-use validation::hidden::record::Recipe;
+use validation::ground_truth::Cause;
+use validation::ground_truth::record::Recipe;
 
 use super::{FILES, folder, names, papers, refused};
 

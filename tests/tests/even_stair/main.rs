@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use tempfile::tempdir;
-use validation::hidden::noise::Noise;
+use validation::ground_truth::noise::Noise;
 
 mod forms;
 mod margins;

@@ -11,7 +11,7 @@ use model::Plant;
 use serde::Serialize;
 use serde_json::Value;
 use simulation::plant_file;
-use validation::hidden::{Block, Cause};
+use validation::ground_truth::{Block, Cause};
 
 use super::lock_step::{Moment, NEVER, TICK_S};
 use super::stage::{EVERY, Errors, Stage, name};

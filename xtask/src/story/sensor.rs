@@ -7,7 +7,7 @@ use std::ops::Range;
 use anyhow::{Result, ensure};
 use firmware::RATE_HZ;
 use serde::Serialize;
-use validation::hidden::Cause;
+use validation::ground_truth::Cause;
 
 use super::lock_step::{Moment, NEVER};
 use super::stage::{Errors, Stage, Way, name};

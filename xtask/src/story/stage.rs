@@ -12,8 +12,8 @@ use link::WireModel;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
-use validation::hidden::live::Live;
-use validation::hidden::{Cause, Effect, Noise, Schedule};
+use validation::ground_truth::live::Live;
+use validation::ground_truth::{Cause, Effect, Noise, Schedule};
 
 use super::lock_step::{self, Moment};
 use crate::emulate::Comparison;
