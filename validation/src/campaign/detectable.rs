@@ -1,15 +1,21 @@
 //! The smallest effect that an oracle detector, a likelihood-ratio test with known structure, can detect.
 //!
-//! The test knows the paper's plant, the noise (white, Gaussian) and the cause; it estimates the effect's k unknown values.
-//! At the 5 % level it detects the effect in 95 % of the records if the noncentrality, the sum of squares of the change of the
-//! expected readings over the variance of the noise, is [`NONCENTRALITY`] (noncentral chi-square, k degrees of freedom).
+//! The test knows the paper's plant, the noise (white, Gaussian) and the cause; it estimates the effect's k unknown
+//! values.
+//! At the 5 % level it detects the effect in 95 % of the records if the noncentrality, the sum of squares of the change
+//! of the
+//! expected readings over the variance of the noise, is [`NONCENTRALITY`] (noncentral chi-square, k degrees of
+//! freedom).
 //!
 //! Where an effect does not shift the expected readings, an equivalent test is used:
-//! - Quantisation: a test of the residual's variance, which rounding increases by step^2/12. The quantisation grid itself
+//! - Quantisation: a test of the residual's variance, which rounding increases by step^2/12. The quantisation grid
+//! itself
 //!   could be found at any step size, but is not visible below this one in the noise.
 //! - Outliers: the likelihood ratio of the true [`mixture`](super::mixture).
-//! - Saturation: the shift by which the limit clips the expected readings; that clipped readings are identical is not used.
-//! - Delay and slew: compared with the smallest one (see [`Effect::least`](crate::ground_truth::Effect::least)), not with none.
+//! - Saturation: the shift by which the limit clips the expected readings; that clipped readings are identical is not
+//! used.
+//! - Delay and slew: compared with the smallest one (see [`Effect::least`](crate::ground_truth::Effect::least)), not
+//! with none.
 
 use super::mixture::Mixture;
 use super::statistics::NORMAL_95;
@@ -67,7 +73,8 @@ mod tests {
     use crate::ground_truth::noise::Noise;
     use crate::ground_truth::record::Recipe;
 
-    /// Runs the test on noisy readings: the estimate of a gain is linear in them, so that its statistic has a closed form.
+    /// Runs the test on noisy readings: the estimate of a gain is linear in them, so that its statistic has a closed
+    /// form.
     #[test]
     fn a_gain_of_the_detectable_size_is_detected_in_95_percent() {
         let hidden = Recipe::of(&[Cause::GainError]).draw(5);

@@ -20,7 +20,8 @@ pub fn diagnose(hidden: &LabelledRecord) -> Result<Value> {
     Ok(serde_json::to_value(identify::examine::diagnose(&hidden.record(), &Options::default())?)?)
 }
 
-/// Prediction of a whole record, in V, from its voltages alone by the model identified on its first `rows` rows, and the
+/// Prediction of a whole record, in V, from its voltages alone by the model identified on its first `rows` rows, and
+/// the
 /// causes that were named.
 ///
 /// # Errors

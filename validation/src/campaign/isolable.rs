@@ -1,13 +1,19 @@
-//! The smallest effect that can be isolated, that is, distinguished from every other cause. A smaller effect may be detected,
+//! The smallest effect that can be isolated, that is, distinguished from every other cause. A smaller effect may be
+//! detected,
 //! but no diagnosis can name it reliably.
 //!
-//! A small effect changes the expected readings along a direction d, a small effect of another cause along e. The part of d
-//! that e cannot reproduce is |d| sin(d, e). A test that chooses between these two known structures picks the correct one in
+//! A small effect changes the expected readings along a direction d, a small effect of another cause along e. The part
+//! of d
+//! that e cannot reproduce is |d| sin(d, e). A test that chooses between these two known structures picks the correct
+//! one in
 //! 95 % of the records if that part is at least 2 x 1.645 standard deviations of the noise.
 //!
-//! This is a lower bound: e has only the few shapes (time constants, frequencies, segments) that are drawn, and more than one
-//! other cause may be present. It holds for small effects only: a delay and a slew of less than a row are identical on equal
-//! steps, but differ when they last longer. Quantisation, outliers and saturation do not shift the expected readings along a
+//! This is a lower bound: e has only the few shapes (time constants, frequencies, segments) that are drawn, and more
+//! than one
+//! other cause may be present. It holds for small effects only: a delay and a slew of less than a row are identical on
+//! equal
+//! steps, but differ when they last longer. Quantisation, outliers and saturation do not shift the expected readings
+//! along a
 //! direction and are not confused with other causes. Outliers may be confused with heavy-tailed noise.
 
 use rand::SeedableRng;
@@ -25,7 +31,8 @@ const SMALL: f64 = 0.01;
 /// Number of random shapes of each other cause.
 const SHAPES: u64 = 2;
 
-/// Smallest size of the record's effect that can be distinguished from every other cause, relative to its detectable size
+/// Smallest size of the record's effect that can be distinguished from every other cause, relative to its detectable
+/// size
 /// `size`; at least 1.
 ///
 /// # Panics

@@ -1,6 +1,7 @@
 //! The outlier size that can be detected in Gaussian noise, and that can be distinguished from heavy-tailed noise.
 //!
-//! The log-likelihood ratio of the true mixture over another distribution is a sum over rows and approximately normal: with
+//! The log-likelihood ratio of the true mixture over another distribution is a sum over rows and approximately normal:
+//! with
 //! mean `m` and standard deviation `s` of one row it has mean `rows m` and standard deviation `sqrt(rows) s`.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
@@ -24,7 +25,8 @@ impl Mixture {
         Self::new(outliers.full_size[0], size * outliers.full_size[1] / sigma_v)
     }
 
-    /// Normal noise of standard deviation 1; a `fraction` of the readings is off by 0.5 to 1.5 times `far`, to either side.
+    /// Normal noise of standard deviation 1; a `fraction` of the readings is off by 0.5 to 1.5 times `far`, to either
+    /// side.
     fn new(fraction: f64, far: f64) -> Self {
         let below = |x: f64| 0.5 * libm::erfc(-x * FRAC_1_SQRT_2);
         let one_side = |x: f64| below(x - 0.5 * far) - below(x - 1.5 * far);
@@ -37,14 +39,16 @@ impl Mixture {
         Self { cells: cells.map(|cell| STEP * (f64::from(cell) + 0.5)).map(|x| (x, density(x))).collect() }
     }
 
-    /// Excess of the ratio over normal noise above what a test at the 5 % level with 95 % power needs; negative if undetectable.
+    /// Excess of the ratio over normal noise above what a test at the 5 % level with 95 % power needs; negative if
+    /// undetectable.
     pub fn excess_over_noise(&self, rows: f64) -> f64 {
         let (mixed, mixed_scatter) = self.ratio(normal, |_, mixture| mixture);
         let (null, null_scatter) = self.ratio(normal, |x, _| normal(x));
         rows.sqrt() * (mixed - null) - NORMAL_95 * (null_scatter + mixed_scatter)
     }
 
-    /// Excess of the ratio over the most likely Student's t above what makes the mixture more likely in 95 % of the records.
+    /// Excess of the ratio over the most likely Student's t above what makes the mixture more likely in 95 % of the
+    /// records.
     pub fn excess_over_heavy_tail(&self, rows: f64) -> f64 {
         let scales = || (0..40).map(|part| 0.6 + 0.02 * f64::from(part));
         let tails = TAILS.into_iter().flat_map(|freedom| scales().map(move |scale| student(freedom, scale)));
@@ -53,7 +57,8 @@ impl Mixture {
         rows.sqrt() * mean - NORMAL_95 * scatter
     }
 
-    /// Mean and standard deviation, per row, of the log-likelihood ratio of the mixture over `other` for readings of density `density`.
+    /// Mean and standard deviation, per row, of the log-likelihood ratio of the mixture over `other` for readings of
+    /// density `density`.
     fn ratio(&self, other: impl Fn(f64) -> f64, density: impl Fn(f64, f64) -> f64) -> (f64, f64) {
         let (mut mean, mut square) = (0.0, 0.0);
         for &(x, mixture) in &self.cells {

@@ -73,7 +73,8 @@ pub fn pairs(first: u64, count: usize) -> Vec<Job> {
     numbered(first, 4, jobs)
 }
 
-/// `count` records of 20 000 rows of every pair of causes of different blocks, with white and coloured noise (both kinds) in turn.
+/// `count` records of 20 000 rows of every pair of causes of different blocks, with white and coloured noise (both
+/// kinds) in turn.
 pub fn long(first: u64, count: usize) -> Vec<Job> {
     let kinds = [Kind::White, Kind::Coloured, Kind::OneOverF].into_iter().cycle();
     let longer = |(job, kind): (Job, Kind)| {
@@ -123,7 +124,8 @@ pub fn stress(first: u64, count: usize) -> Vec<Job> {
     numbered(first, 6, jobs)
 }
 
-/// `count` records of each cause of 2401 to 100 000 rows, with white and coloured noise (both kinds). Records of every length
+/// `count` records of each cause of 2401 to 100 000 rows, with white and coloured noise (both kinds). Records of every
+/// length
 /// have the same schedules and values.
 pub fn speed(first: u64, count: usize) -> Vec<Job> {
     let of = |kind, rows| {

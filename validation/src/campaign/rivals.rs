@@ -1,8 +1,11 @@
-//! Comparison of PySINDy, SysIdentPy and `vsj diagnose`: identification on the first 60 % of a record, free-run simulation over
+//! Comparison of PySINDy, SysIdentPy and `vsj diagnose`: identification on the first 60 % of a record, free-run
+//! simulation over
 //! the last 40 %.
 //!
-//! The input of the other two tools is described in `validation/bench/identification.py`; they may start from the readings
-//! before the last part. The extended model of `vsj diagnose` runs from the record's first row and uses the voltages alone. For
+//! The input of the other two tools is described in `validation/bench/identification.py`; they may start from the
+//! readings
+//! before the last part. The extended model of `vsj diagnose` runs from the record's first row and uses the voltages
+//! alone. For
 //! comparison: the paper's plant, unchanged, and the floor, which is the error of the true spring.
 
 use std::fs;
@@ -171,7 +174,8 @@ fn bench() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("bench")
 }
 
-/// Python of a virtual environment below the target folder, with the packages of `validation/bench/requirements.txt`, which are
+/// Python of a virtual environment below the target folder, with the packages of `validation/bench/requirements.txt`,
+/// which are
 /// installed when the file has changed.
 fn python() -> Result<PathBuf> {
     // The program is TARGET/PROFILE/campaign.

@@ -28,7 +28,8 @@ pub struct Sensitivity {
     pub records: usize,
     /// Median of the detectable size, in the unit of the cause.
     pub detectable: f64,
-    /// Size from which 95 % of the records can be distinguished from every other cause, relative to the detectable size.
+    /// Size from which 95 % of the records can be distinguished from every other cause, relative to the detectable
+    /// size.
     #[serde(rename = "told_apart")]
     pub isolable: f64,
     /// Fraction of the records that were named at each of [`SIZES`], up to the first that reaches 95 %.

@@ -1,6 +1,8 @@
-//! The fixed-point controller of `model` in closed loop with a ground-truth spring, with a stiffness sensor and without.
+//! The fixed-point controller of `model` in closed loop with a ground-truth spring, with a stiffness sensor and
+//! without.
 //!
-//! In: controller settings, causes, seeds. Out: steady errors, settling times, overshoots and the response to sensor failures,
+//! In: controller settings, causes, seeds. Out: steady errors, settling times, overshoots and the response to sensor
+//! failures,
 //! as values and as Markdown.
 //!
 //! | module | contents |

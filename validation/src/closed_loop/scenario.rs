@@ -49,7 +49,8 @@ impl Scenario {
         Self { effects: Vec::new(), noise: Noise::white(0.2), seed }
     }
 
-    /// Runs the stair from rest. `sense(k, reading)` maps the sensor's reading in tick `k`, in V, to the controller's input.
+    /// Runs the stair from rest. `sense(k, reading)` maps the sensor's reading in tick `k`, in V, to the controller's
+    /// input.
     ///
     /// # Errors
     /// The model rejects the settings.

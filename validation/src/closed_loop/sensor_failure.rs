@@ -88,7 +88,8 @@ pub struct FailureResponse {
     pub bump_v: f64,
     /// Largest change of voltage between two ticks in the same window with a good sensor, in V.
     pub healthy_bump_v: f64,
-    /// Time from the first good reading until the sensor is trusted again, in s; `None` if the failure was not detected.
+    /// Time from the first good reading until the sensor is trusted again, in s; `None` if the failure was not
+    /// detected.
     pub trusted_again_s: Option<f64>,
 }
 

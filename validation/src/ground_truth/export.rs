@@ -1,4 +1,5 @@
-//! Records for other tools: the CSV that `vsj diagnose` reads, the true values as JSON, and the host tools' record type.
+//! Records for other tools: the CSV that `vsj diagnose` reads, the true values as JSON, and the host tools' record
+//! type.
 
 use std::fmt::Write;
 use std::fs;

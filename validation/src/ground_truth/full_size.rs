@@ -21,7 +21,8 @@
 //! | reading offset | 5 to 20 V over 5 to 25 % of the record |
 //! | outliers | 0.5 to 3 % of the readings, 15 to 60 standard deviations of the noise off |
 //!
-//! Frequencies stay below half of the sampling rate and time constants below the record's length, so that each can be identified.
+//! Frequencies stay below half of the sampling rate and time constants below the record's length, so that each can be
+//! identified.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -2,7 +2,8 @@
 
 use super::physics::FULL_V;
 
-/// Hysteresis operator from voltage u to effective voltage v, with its state. The slope of every form tends to 1, so that its width is nearly the same at every level.
+/// Hysteresis operator from voltage u to effective voltage v, with its state. The slope of every form tends to 1, so
+/// that its width is nearly the same at every level.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Hysteresis {
     /// No hysteresis: v = u.
@@ -74,7 +75,8 @@ impl Hysteresis {
         }
     }
 
-    /// Largest distance along the voltage axis between the branches of a full slow loop from 0 to 500 V, in V, found by simulating the loop.
+    /// Largest distance along the voltage axis between the branches of a full slow loop from 0 to 500 V, in V, found by
+    /// simulating the loop.
     pub fn width_v(&self) -> f64 {
         const STEPS: u32 = 4000;
         let mut hysteresis = self.clone();

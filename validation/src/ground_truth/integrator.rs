@@ -43,7 +43,8 @@ impl Integrator {
         self.arrive();
     }
 
-    /// Integrates until `until_s` in steps of at most `step_s`, both in s. Delayed commands that arrive in between split a step.
+    /// Integrates until `until_s` in steps of at most `step_s`, both in s. Delayed commands that arrive in between
+    /// split a step.
     pub fn go_to(&mut self, until_s: f64, step_s: f64) {
         while let Some(&(arrival, _)) = self.on_the_way.front()
             && arrival <= until_s

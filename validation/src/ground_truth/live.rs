@@ -25,7 +25,8 @@ pub struct Live {
 impl Live {
     /// A spring at rest at 0 s and 0 V.
     ///
-    /// `top_v` is the largest stiffness that the sensor will see, in V; the limit of a saturating sensor is a fraction of it.
+    /// `top_v` is the largest stiffness that the sensor will see, in V; the limit of a saturating sensor is a fraction
+    /// of it.
     /// The noise is drawn for `readings` readings and repeats after them.
     pub fn new(effects: &[Effect], noise: Noise, seed: u64, top_v: f64, readings: usize) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -66,7 +67,8 @@ impl Live {
         self.moving.go_to(until, STEP_S);
     }
 
-    /// Commands a voltage, in V, and holds it for `dt_s`, in s; returns true stiffness and reading just after the command.
+    /// Commands a voltage, in V, and holds it for `dt_s`, in s; returns true stiffness and reading just after the
+    /// command.
     pub fn hold(&mut self, voltage_v: f64, dt_s: f64) -> (f64, Reading) {
         self.command(voltage_v);
         let now = (self.stiffness(), self.read());

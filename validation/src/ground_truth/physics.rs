@@ -38,7 +38,8 @@ impl Law {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(missing_docs, reason = "the variants' docs say it")]
 pub enum Tau {
-    /// Linear from `low_s` at 0 V to `high_s` at 500 V and beyond, but at least half of the shorter one, so that it stays
+    /// Linear from `low_s` at 0 V to `high_s` at 500 V and beyond, but at least half of the shorter one, so that it
+    /// stays
     /// positive up to 1000 V.
     Linear { low_s: f64, high_s: f64 },
     /// Geometric: low_s (high_s/low_s)^(u/500 V).
@@ -62,7 +63,8 @@ pub struct Creep {
     pub share: f64,
     /// Slower time constant, in s.
     pub tau_s: f64,
-    /// True: the share is taken from the whole response, y = (1 - c) y_paper + c w2. False: from the relaxing part only.
+    /// True: the share is taken from the whole response, y = (1 - c) y_paper + c w2. False: from the relaxing part
+    /// only.
     pub from_everything: bool,
 }
 
