@@ -1,8 +1,7 @@
 //! The firmware's control tick with its supervisor gives the same codes as the host simulator, tick by tick.
 //!
 //! `cargo xtask proof` compares the emulated image with the same code, so that simulator, firmware on the host and
-//! firmware on
-//! the MCU agree to the bit.
+//! firmware on the MCU agree to the bit.
 
 use firmware::rehearsal::rehearse;
 use firmware::script::{STAIR_TICKS, Script};

@@ -1,6 +1,5 @@
 //! The part of `cargo campaign` that every change has to pass: fewer records, other seeds, the campaign's criteria
-//! where a few
-//! records can decide them, and looser bounds where chance would fail them.
+//! where a few records can decide them, and looser bounds where chance would fail them.
 
 use indicatif::ProgressBar;
 use rayon::prelude::*;

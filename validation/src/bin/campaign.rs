@@ -23,8 +23,7 @@ use validation::ground_truth::{self, Cause, LabelledRecord};
 /// Diagnose simulated records with known effects and count the causes that `vsj diagnose` names.
 ///
 /// The simulator shares no code with the diagnosis. Every record is drawn from a seed; the same seeds give the same
-/// records, to
-/// the bit.
+/// records, to the bit.
 #[derive(Parser)]
 #[command(
     name = "cargo campaign",
@@ -46,8 +45,7 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
-    /// long), or in
-    /// total (nulls, triples)
+    /// long), or in total (nulls, triples)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records

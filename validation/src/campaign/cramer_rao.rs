@@ -3,8 +3,7 @@
 //!
 //! The covariance is sigma^2 (J^T J)^-1, where J holds the derivatives of the expected readings by the effect's values.
 //! Quantisation, outliers, saturation, the ends of a segment and the curve of a static nonlinearity have no such
-//! derivative
-//! and no bound here.
+//! derivative and no bound here.
 
 use crate::ground_truth::{Cause, LabelledRecord};
 

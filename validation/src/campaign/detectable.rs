@@ -1,11 +1,9 @@
 //! The smallest effect that an oracle detector, a likelihood-ratio test with known structure, can detect.
 //!
 //! The test knows the paper's plant, the noise (white, Gaussian) and the cause; it estimates the effect's k unknown
-//! values.
-//! At the 5 % level it detects the effect in 95 % of the records if the noncentrality, the sum of squares of the change
-//! of the
-//! expected readings over the variance of the noise, is [`NONCENTRALITY`] (noncentral chi-square, k degrees of
-//! freedom).
+//! values. At the 5 % level it detects the effect in 95 % of the records if the noncentrality, the sum of squares of
+//! the change of the expected readings over the variance of the noise, is [`NONCENTRALITY`] (noncentral chi-square, k
+//! degrees of freedom).
 //!
 //! Where an effect does not shift the expected readings, an equivalent test is used:
 //! - Quantisation: a test of the residual's variance, which rounding increases by step^2/12. The quantisation grid

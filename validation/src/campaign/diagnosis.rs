@@ -21,8 +21,7 @@ pub fn diagnose(hidden: &LabelledRecord) -> Result<Value> {
 }
 
 /// Prediction of a whole record, in V, from its voltages alone by the model identified on its first `rows` rows, and
-/// the
-/// causes that were named.
+/// the causes that were named.
 ///
 /// # Errors
 /// As [`diagnose`].

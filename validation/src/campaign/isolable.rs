@@ -1,20 +1,15 @@
 //! The smallest effect that can be isolated, that is, distinguished from every other cause. A smaller effect may be
-//! detected,
-//! but no diagnosis can name it reliably.
+//! detected, but no diagnosis can name it reliably.
 //!
 //! A small effect changes the expected readings along a direction d, a small effect of another cause along e. The part
-//! of d
-//! that e cannot reproduce is |d| sin(d, e). A test that chooses between these two known structures picks the correct
-//! one in
-//! 95 % of the records if that part is at least 2 x 1.645 standard deviations of the noise.
+//! of d that e cannot reproduce is |d| sin(d, e). A test that chooses between these two known structures picks the
+//! correct one in 95 % of the records if that part is at least 2 x 1.645 standard deviations of the noise.
 //!
 //! This is a lower bound: e has only the few shapes (time constants, frequencies, segments) that are drawn, and more
-//! than one
-//! other cause may be present. It holds for small effects only: a delay and a slew of less than a row are identical on
-//! equal
-//! steps, but differ when they last longer. Quantisation, outliers and saturation do not shift the expected readings
-//! along a
-//! direction and are not confused with other causes. Outliers may be confused with heavy-tailed noise.
+//! than one other cause may be present. It holds for small effects only: a delay and a slew of less than a row are
+//! identical on equal steps, but differ when they last longer. Quantisation, outliers and saturation do not shift the
+//! expected readings along a direction and are not confused with other causes. Outliers may be confused with
+//! heavy-tailed noise.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,7 @@
 //! The outlier size that can be detected in Gaussian noise, and that can be distinguished from heavy-tailed noise.
 //!
 //! The log-likelihood ratio of the true mixture over another distribution is a sum over rows and approximately normal:
-//! with
-//! mean `m` and standard deviation `s` of one row it has mean `rows m` and standard deviation `sqrt(rows) s`.
+//! with mean `m` and standard deviation `s` of one row it has mean `rows m` and standard deviation `sqrt(rows) s`.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 

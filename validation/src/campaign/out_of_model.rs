@@ -1,10 +1,8 @@
 //! Diagnoses of the out-of-model test set, graded by the names that each form accepts.
 //!
 //! The first finding decides: a name that the form does not accept there is wrong. A record without a finding is a
-//! miss, which
-//! the verdict `unexplained` reports. `unexplained` with a correct first name is correct too, because the law is
-//! outside the
-//! catalogue.
+//! miss, which the verdict `unexplained` reports. `unexplained` with a correct first name is correct too, because the
+//! law is outside the catalogue.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

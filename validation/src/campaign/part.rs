@@ -125,8 +125,7 @@ pub fn stress(first: u64, count: usize) -> Vec<Job> {
 }
 
 /// `count` records of each cause of 2401 to 100 000 rows, with white and coloured noise (both kinds). Records of every
-/// length
-/// have the same schedules and values.
+/// length have the same schedules and values.
 pub fn speed(first: u64, count: usize) -> Vec<Job> {
     let of = |kind, rows| {
         let change = move |recipe| Recipe { noise: Noise::white(0.2).of(kind), rows, ..recipe };

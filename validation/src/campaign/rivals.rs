@@ -1,12 +1,9 @@
 //! Comparison of PySINDy, SysIdentPy and `vsj diagnose`: identification on the first 60 % of a record, free-run
-//! simulation over
-//! the last 40 %.
+//! simulation over the last 40 %.
 //!
 //! The input of the other two tools is described in `validation/bench/identification.py`; they may start from the
-//! readings
-//! before the last part. The extended model of `vsj diagnose` runs from the record's first row and uses the voltages
-//! alone. For
-//! comparison: the paper's plant, unchanged, and the floor, which is the error of the true spring.
+//! readings before the last part. The extended model of `vsj diagnose` runs from the record's first row and uses the
+//! voltages alone. For comparison: the paper's plant, unchanged, and the floor, which is the error of the true spring.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -175,8 +172,7 @@ fn bench() -> PathBuf {
 }
 
 /// Python of a virtual environment below the target folder, with the packages of `validation/bench/requirements.txt`,
-/// which are
-/// installed when the file has changed.
+/// which are installed when the file has changed.
 fn python() -> Result<PathBuf> {
     // The program is TARGET/PROFILE/campaign.
     let program = std::env::current_exe()?;

@@ -2,8 +2,7 @@
 //! without.
 //!
 //! In: controller settings, causes, seeds. Out: steady errors, settling times, overshoots and the response to sensor
-//! failures,
-//! as values and as Markdown.
+//! failures, as values and as Markdown.
 //!
 //! | module | contents |
 //! | --- | --- |

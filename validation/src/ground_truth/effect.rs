@@ -34,8 +34,7 @@ impl Effect {
     /// The cause's parameters and what else its form needs, at this size.
     ///
     /// Two differ from the parameters of a finding: the slew is in s/V, which is 0 without the effect, and the limit of
-    /// the
-    /// sensor is a fraction of the record's largest stiffness.
+    /// the sensor is a fraction of the record's largest stiffness.
     ///
     /// | cause | values after its parameters |
     /// | --- | --- |

@@ -26,8 +26,7 @@ impl Live {
     /// A spring at rest at 0 s and 0 V.
     ///
     /// `top_v` is the largest stiffness that the sensor will see, in V; the limit of a saturating sensor is a fraction
-    /// of it.
-    /// The noise is drawn for `readings` readings and repeats after them.
+    /// of it. The noise is drawn for `readings` readings and repeats after them.
     pub fn new(effects: &[Effect], noise: Noise, seed: u64, top_v: f64, readings: usize) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         // Random streams of their own: the noise does not depend on the effects.

@@ -1,15 +1,12 @@
 //! Ground-truth simulators: records of a spring with known effects in them.
 //!
 //! In: causes, a noise and a seed. Out: a [`LabelledRecord`], which holds the commanded voltages, the noisy readings
-//! and the
-//! true values of every effect, or a [`Live`] spring that a controller can be run against. The same seed gives the same
-//! record, to the bit.
+//! and the true values of every effect, or a [`Live`] spring that a controller can be run against. The same seed gives
+//! the same record, to the bit.
 //!
 //! Nothing here shares code with the crate `identify`. The numerical method differs too (small time steps instead of
-//! exact
-//! exponentials), and most causes have several physical forms, so that a diagnosis is tested on the cause and not on
-//! one way
-//! of writing it.
+//! exact exponentials), and most causes have several physical forms, so that a diagnosis is tested on the cause and not
+//! on one way of writing it.
 //!
 //! | module | contents |
 //! | --- | --- |

@@ -39,8 +39,7 @@ impl Law {
 #[expect(missing_docs, reason = "the variants' docs say it")]
 pub enum Tau {
     /// Linear from `low_s` at 0 V to `high_s` at 500 V and beyond, but at least half of the shorter one, so that it
-    /// stays
-    /// positive up to 1000 V.
+    /// stays positive up to 1000 V.
     Linear { low_s: f64, high_s: f64 },
     /// Geometric: low_s (high_s/low_s)^(u/500 V).
     Exponential { low_s: f64, high_s: f64 },

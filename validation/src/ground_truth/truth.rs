@@ -49,8 +49,7 @@ impl LabelledRecord {
     /// True value of a finding's parameter, and the scale of its relative error; `None` if the record does not have it.
     ///
     /// The scale is the absolute value itself; for the ends of a segment it is the segment's length. A parameter of a
-    /// static
-    /// nonlinearity is the curve at the voltage in its name, such as `at_100_v`.
+    /// static nonlinearity is the curve at the voltage in its name, such as `at_100_v`.
     pub fn true_value(&self, cause: Cause, parameter: &str) -> Option<(f64, f64)> {
         let index = self.effects.iter().position(|effect| effect.cause == cause)?;
         if let Some(law) = self.effects[index].law() {

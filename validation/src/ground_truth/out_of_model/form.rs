@@ -85,8 +85,7 @@ impl Form {
     }
 
     /// A record with this law alone in it and 0.2 % white noise. Its list of effects is empty, because effects have
-    /// other
-    /// forms; its `expected` readings are those before the sensor.
+    /// other forms; its `expected` readings are those before the sensor.
     pub fn draw(&self, seed: u64) -> LabelledRecord {
         self.record(seed, Some(self.build), STEPS)
     }

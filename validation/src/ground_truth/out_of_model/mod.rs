@@ -1,12 +1,10 @@
 //! The out-of-model test set: laws that the diagnosis does not model, from the literature on piezoelectric and
-//! electroactive
-//! actuators, amplifiers and converters.
+//! electroactive actuators, amplifiers and converters.
 //!
 //! In: a form and a seed. Out: a [`LabelledRecord`](super::LabelledRecord) with that law in it. Before any diagnosis,
-//! each form states the names that are
-//! correct for it: its cause, causes that are equally correct in its place ([`Form::or`]), and causes that are true in
-//! addition ([`Form::also`]). Sizes are those of [`full_size`](super::full_size); schedules and noise are those of the
-//! other parts of the campaign.
+//! each form states the names that are correct for it: its cause, causes that are equally correct in its place
+//! ([`Form::or`]), and causes that are true in addition ([`Form::also`]). Sizes are those of
+//! [`full_size`](super::full_size); schedules and noise are those of the other parts of the campaign.
 //!
 //! | module | contents |
 //! | --- | --- |
