@@ -1,20 +1,20 @@
-//! A firmware that only logs: its ELF file and its frames, made on the host, as its linker and defmt would make them.
+//! A synthetic firmware that only logs: its ELF file and its log frames, as the linker and defmt would write them.
 
 use object::write::{Object, Symbol, SymbolSection};
 use object::{Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
 use serde_json::json;
 
-/// The format strings of a firmware, each with its tag, such as `info`; their places count from 1.
+/// The format strings of a firmware; their addresses start at 1.
 pub struct Firmware {
-    /// `raw` or `rzcobs`.
+    /// Encoding of the frames, `raw` or `rzcobs`.
     pub encoding: &'static str,
-    /// Tag and text.
+    /// Tag, such as `info`, and text of each format string.
     pub strings: Vec<(&'static str, &'static str)>,
 }
 
-/// An argument of a line.
+/// An argument of a log line.
 #[derive(Clone, Copy, Debug)]
-#[expect(missing_docs, reason = "the types say it")]
+#[expect(missing_docs, reason = "the variants are named as their types")]
 pub enum Value<'a> {
     U8(u8),
     U16(u16),
@@ -25,7 +25,7 @@ pub enum Value<'a> {
 }
 
 impl Firmware {
-    /// What the linker would make of the strings, without any code.
+    /// ELF file with the format strings and without code.
     pub fn elf(&self) -> Vec<u8> {
         let mut elf = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
         let section = elf.add_section(Vec::new(), b".defmt".to_vec(), SectionKind::Metadata);
@@ -53,7 +53,7 @@ impl Firmware {
         elf.write().expect("the ELF file is small")
     }
 
-    /// A line as it leaves the MCU.
+    /// Frame of a log line, as the MCU sends it.
     pub fn frame(&self, text: &str, time_us: u64, values: &[Value<'_>]) -> Vec<u8> {
         let mut frame = self.place(text).to_le_bytes().to_vec();
         frame.extend(time_us.to_le_bytes());
@@ -77,7 +77,7 @@ impl Firmware {
         frame
     }
 
-    /// Where the linker put a string.
+    /// Address of a format string.
     pub fn place(&self, text: &str) -> u16 {
         let index = self.strings.iter().position(|(_, string)| *string == text);
         index.unwrap_or_else(|| panic!("no string `{text}`")) as u16 + 1

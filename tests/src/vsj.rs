@@ -6,13 +6,14 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-/// `vsj` as its users call it, in the tests' folder. Built when first asked for: cargo builds no binary of another package.
+/// The command `vsj`, to be run in this package's folder. Built at the first call, because cargo does not build
+/// binaries of other packages for a test.
 pub fn vsj() -> Command {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
     let program = BUILT.get_or_init(|| {
-        // TARGET/PROFILE/deps/this-test
+        // The test is TARGET/PROFILE/deps/NAME.
         let test = std::env::current_exe().expect("a test has a path");
-        let target = test.ancestors().nth(3).expect("a test lies below the target folder");
+        let target = test.ancestors().nth(3).expect("a test is below the target folder");
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let built = Command::new(cargo)
             .args(["build", "--quiet", "--release", "--package", "host-sim", "--bin", "vsj", "--target-dir"])
@@ -27,19 +28,19 @@ pub fn vsj() -> Command {
     command
 }
 
-/// Runs it with `arguments` in a folder of its own.
+/// Runs `vsj` with `arguments` in `folder`.
 pub fn run(folder: &Path, arguments: &[&str]) -> Output {
     vsj().args(arguments).current_dir(folder).output().expect("vsj starts")
 }
 
-/// What it then prints as JSON, nothing else being on stdout.
+/// Runs `vsj` successfully with `arguments` in `folder` and parses its stdout as one JSON object.
 pub fn json(folder: &Path, arguments: &[&str]) -> Value {
     let output = run(folder, arguments);
     assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
     serde_json::from_slice(&output.stdout).expect("one JSON object on stdout")
 }
 
-/// Bytes as text.
+/// Converts UTF-8 bytes to text.
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
@@ -54,7 +55,7 @@ pub fn golden(name: &str, found: &str) {
     let expected = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     assert!(
         found == expected,
-        "{} is not what came out; with GOLDEN=write it is replaced. Came out:\n{found}",
+        "{} differs from the output; GOLDEN=write replaces it. Output:\n{found}",
         path.display()
     );
 }

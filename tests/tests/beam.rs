@@ -76,14 +76,14 @@ fn layers_that_slip() {
 }
 
 #[test]
-fn layers_and_readings_of_the_users() {
+fn user_defined_layers_and_readings_are_evaluated() {
     let folder = tempdir().unwrap();
     fs::write(
         folder.path().join("l.csv"),
         "material,youngs_modulus_gpa,length_mm,width_mm,thickness_um,count\nsteel,200,50,10,100,2\nPVdF,2,50,10,50,1\n",
     )
     .unwrap();
-    // Between layers that slide, 8 N/mm by hand, and bonded ones, 62 N/mm.
+    // Between sliding layers, 8 N/mm, and bonded layers, 62 N/mm, by the closed formula.
     let readings = "displacement_mm,force_un_0v,force_un_100v\n1,20000,25000\n2,40001,50001\n3,59999,74999\n";
     fs::write(folder.path().join("r.csv"), readings).unwrap();
     let arguments = ["beam", "--json", "--layers", "l.csv", "--stack", "steel,PVdF,steel", "--experiment", "r.csv"];
@@ -102,7 +102,7 @@ fn layers_and_readings_of_the_users() {
 }
 
 #[test]
-fn the_joint_against_the_requirement() {
+fn the_joint_is_compared_with_the_requirement() {
     let folder = tempdir().unwrap();
     let found =
         json(folder.path(), &["joint", "--json", "--springs", "8", "--inner-radius-mm", "20", "--length-mm", "60"]);
@@ -110,7 +110,7 @@ fn the_joint_against_the_requirement() {
     assert!((number(&found, "/reach_n_m_per_rad/0") - 8.0 * soft * 0.0064).abs() < 1e-9);
     assert!((number(&found, "/reach_ratio") - stiff / soft).abs() < 1e-9);
     assert!((number(&found, "/required_ratio") - 948.0 / 0.7).abs() < 1e-6);
-    // By hand: 12 times as thick and twice as wide a spring of the same material.
+    // A spring of the same material, 12 times as thick and twice as wide: 2 x 12^3 times the stiffness.
     let thick = json(folder.path(), &["joint", "--json", "--thickness-um", "2280", "--width-mm", "39.6"]);
     let usual = json(folder.path(), &["joint", "--json"]);
     for path in ["/springs_n_per_m/0", "/springs_n_per_m/1", "/reach_n_m_per_rad/1"] {
@@ -128,9 +128,9 @@ fn the_joint_against_the_requirement() {
     assert!((found - ratio).abs() < 1e-9, "{found} {ratio}");
 }
 
-/// Each is one line that names what is wrong, exit code 2, and no file.
+/// Each error is one line with the fault, exit code 2, and no file is written.
 #[test]
-fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
+fn bad_input_gives_one_error_line_and_writes_no_file() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("one.csv"), "displacement_mm,force_un_0v\n1,1\n2,2\n3,3\n").unwrap();
     fs::write(folder.path().join("rest.csv"), "displacement_mm,force_un_0v,force_un_9v\n0,1,2\n0,2,1\n").unwrap();
@@ -187,9 +187,9 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
     }
 }
 
-/// The figures and texts in the documentation are those of today.
+/// The committed figures and texts are up to date.
 #[test]
-fn the_documentation_shows_what_the_commands_make() {
+fn the_documentation_equals_the_output_of_the_commands() {
     let folder = tempdir().unwrap();
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     for (arguments, names) in [
@@ -201,7 +201,11 @@ fn the_documentation_shows_what_the_commands_make() {
         for name in names {
             let made = fs::read(folder.path().join(name)).unwrap();
             let committed = fs::read(docs.join(name)).unwrap_or_default();
-            assert!(committed == made, "docs/{name} is old: cargo run --release -- {0} --out docs/{0}", arguments[0]);
+            assert!(
+                committed == made,
+                "docs/{name} is out of date: cargo run --release -- {0} --out docs/{0}",
+                arguments[0]
+            );
         }
     }
 }

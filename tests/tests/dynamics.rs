@@ -1,4 +1,4 @@
-//! The dynamic models, end to end.
+//! `vsj dynamics`: the report's dynamic models.
 
 use std::fs;
 use std::path::Path;
@@ -15,13 +15,13 @@ fn dynamics(arguments: &[&str]) -> Value {
     json(tempdir().unwrap().path(), &[&["dynamics", "--json"], arguments].concat())
 }
 
-/// The last row at or before a moment.
+/// Last row at or before `time_s`.
 fn at(report: &Value, time_s: f64) -> &Value {
     let rows = report["rows"].as_array().expect("rows");
     rows.iter().rfind(|row| number(row, "/time_s") <= time_s + 1e-9).expect("a row")
 }
 
-/// Section 8.2.1: D = 10, F = 10, K = 1, 4, 7, 1; by hand, e = F/K (1 - exp(-K t / D)) at first.
+/// Section 8.2.1: D = 10, F = 10, K = 1, 4, 7, 1; initially e = F/K (1 - exp(-K t / D)).
 #[test]
 fn the_simplified_model_with_the_report_s_input() {
     let report = dynamics(&["spring-damper", "--every", "1"]);
@@ -34,13 +34,13 @@ fn the_simplified_model_with_the_report_s_input() {
 }
 
 #[test]
-fn the_circuit_is_the_zener_model() {
+fn the_analogue_circuit_agrees_with_the_zener_model() {
     for changes in ["k1", "k2", "both"] {
         let arguments = ["--changes", changes, "--every", "1"];
         let springs = dynamics(&[&["zener"], &arguments[..]].concat());
         let circuit = dynamics(&[&["analogue"], &arguments[..]].concat());
         assert!(number(&circuit, "/analogue_difference") < 1e-5, "{changes}");
-        assert!(number(&circuit, "/analogue_difference") > 0.0, "they are two solutions");
+        assert!(number(&circuit, "/analogue_difference") > 0.0, "the two are computed independently");
         for (one, other) in springs["rows"].as_array().unwrap().iter().zip(circuit["rows"].as_array().unwrap()) {
             let difference = number(one, "/elongation_m") - number(other, "/elongation_m");
             assert!(difference.abs() < 1e-4, "{changes}: {one} {other}");
@@ -48,9 +48,9 @@ fn the_circuit_is_the_zener_model() {
     }
 }
 
-/// Kp = K2/K1 and tau = D/K2, both ways, and the plant's own column of Table 3.
+/// Kp = K2/K1 and tau = D/K2 in both directions, and the plant's column of Table 3.
 #[test]
-fn the_plant_and_its_zener_model() {
+fn the_plant_and_its_zener_model_convert_into_each_other() {
     let zener = dynamics(&["zener", "--k1", "20", "--k2", "2", "--damper", "11"]);
     assert!((number(&zener, "/plant/proportional") - 0.1).abs() < 1e-12);
     assert!((number(&zener, "/plant/integral_per_s") - 0.2).abs() < 1e-12);
@@ -61,16 +61,17 @@ fn the_plant_and_its_zener_model() {
         let found = number(at(&plant, time), "/stiffness");
         assert!((0.0..0.01).contains(&(found - printed)), "{time}: {found}");
     }
-    // The plant has one time constant, the model that of its stiffness: they part as the change grows.
+    // The plant has a constant time constant, that of the model depends on its stiffness: they deviate with larger
+    // changes.
     let stand_in = &plant["stand_in"];
     assert!(number(stand_in, "/ratio_at_1_percent") < number(stand_in, "/ratio_at_5_percent"));
     assert!(number(stand_in, "/ratio_at_5_percent") < number(stand_in, "/material_ratio"));
     assert!(number(stand_in, "/material_up_percent") > 5.0);
 }
 
-/// A week at a row an hour: what is drawn must not be finer than what a model can follow.
+/// A week with one row per hour: the drawn curve must not be finer than the model's time step.
 #[test]
-fn a_long_input() {
+fn an_input_of_a_week_is_simulated() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("week.csv"), "time_s,voltage_v\n0,100\n604800,100\n").unwrap();
     let arguments = ["dynamics", "pi-plant", "--json", "--input", "week.csv", "--every", "3600", "--out", "made"];
@@ -80,7 +81,7 @@ fn a_long_input() {
 }
 
 #[test]
-fn files_and_documentation() {
+fn files_are_written_and_the_documentation_is_up_to_date() {
     let folder = tempdir().unwrap();
     let output = run(folder.path(), &["dynamics", "analogue", "--changes", "both", "--out", "made"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -90,12 +91,15 @@ fn files_and_documentation() {
     for name in ["response.csv", "response.svg"] {
         let made = fs::read(folder.path().join("made").join(name)).unwrap();
         let command = "cargo run --release -- dynamics analogue --changes both --out docs/dynamics";
-        assert!(fs::read(docs.join(name)).unwrap_or_default() == made, "docs/dynamics/{name} is old: {command}");
+        assert!(
+            fs::read(docs.join(name)).unwrap_or_default() == made,
+            "docs/dynamics/{name} is out of date: {command}"
+        );
     }
 }
 
 #[test]
-fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
+fn bad_input_gives_one_error_line_and_writes_no_file() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("zero.csv"), "time_s,voltage_v\n0,1\n1,0\n2,0\n").unwrap();
     for (arguments, expected) in [

@@ -1,4 +1,4 @@
-//! The fast controller, the comparison and the tuning, end to end.
+//! The fast controller, `vsj compare` and `vsj tune`.
 
 use std::fs;
 use std::path::Path;

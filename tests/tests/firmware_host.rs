@@ -1,7 +1,7 @@
-//! The firmware's control tick, supervisor and all, is the host simulator's loop, tick by tick.
+//! The firmware's control tick with its supervisor gives the same codes as the host simulator, tick by tick.
 //!
-//! `cargo xtask proof` holds the emulated image against the same code, so that simulator, firmware on the host and
-//! firmware on the MCU are one chain of equal bits.
+//! `cargo xtask proof` compares the emulated image with the same code, so that simulator, firmware on the host and
+//! firmware on the MCU agree to the bit.
 
 use firmware::settings::SETTINGS;
 use simulation::experiment::Experiment;
@@ -10,7 +10,7 @@ use test_bench::script::{STAIR_TICKS, Script};
 use test_bench::simulation::simulate;
 
 #[test]
-fn every_code_and_estimate_of_the_stair_is_the_simulators() {
+fn codes_and_estimates_of_the_stair_equal_the_simulators() {
     let experiment = Experiment { name: "the stair".into(), schedule: Schedule::stair(), settings: SETTINGS };
     let run = experiment.run(|_, _| {}).unwrap();
     let mut tick = 0;

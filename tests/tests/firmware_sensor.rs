@@ -1,6 +1,6 @@
-//! The firmware's control tick around a spring that is not the one it thinks, with a stiffness sensor on its board.
+//! The firmware's control tick in closed loop with a spring that differs from its model, with a stiffness sensor.
 //!
-//! `cargo xtask story --feedback` holds the emulated image against the same code.
+//! `cargo xtask story --feedback` compares the emulated image with the same code.
 
 use firmware::control::{Control, Sensors, Untimed};
 use firmware::settings::{SETTINGS, SUPERVISION};
@@ -10,14 +10,14 @@ use model::{Feedback, Sensor, Settings, Volts, supervisor};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use validation::closed_loop::stair;
-use validation::hidden::{Cause, Effect, Live, Noise};
+use validation::ground_truth::{Cause, Effect, Live, Noise};
 
-/// Armed at once with 300 V; so long.
+/// Length of a run, in ticks; the controller is armed in the first tick with a target of 300 V.
 const TICKS: usize = 40_000;
-/// When the sensor fails.
+/// Tick in which the sensor fails.
 const FAILS: usize = 20_000;
 
-/// A tick.
+/// Values of one tick.
 #[derive(Clone, Copy, Debug)]
 struct Moment {
     truth_v: f64,
@@ -25,15 +25,15 @@ struct Moment {
     sensor: Option<Sensor>,
 }
 
-/// What the board makes of a reading in this tick.
+/// Distortion of a reading, in V, by the tick number; `None` for a missing reading.
 type Sense = fn(usize, f64) -> Option<f64>;
 
 fn good(_: usize, read: f64) -> Option<f64> {
     Some(read)
 }
 
-/// The control tick around a spring that hides `cause`.
-fn lead(feedback: Option<Feedback>, cause: Cause, sense: Sense) -> Vec<Moment> {
+/// Runs the control tick in closed loop with a spring with the effect `cause`.
+fn run_loop(feedback: Option<Feedback>, cause: Cause, sense: Sense) -> Vec<Moment> {
     let noise = Noise::white(0.2);
     let effect = Effect::draw(&mut ChaCha8Rng::seed_from_u64(1), cause, 0, &stair::schedule(), noise.sigma_v);
     let mut spring = Live::new(&[effect], noise, 1, 500.0, TICKS);
@@ -52,36 +52,37 @@ fn lead(feedback: Option<Feedback>, cause: Cause, sense: Sense) -> Vec<Moment> {
     (0..TICKS).map(tick).collect()
 }
 
-/// Mean of the true stiffness in a second, less the target.
+/// Mean of true stiffness less target over the second before the tick `until`, in V.
 fn error_v(moments: &[Moment], until: usize) -> f64 {
     moments[until - 1000..until].iter().map(|moment| moment.truth_v - 300.0).sum::<f64>() / 1000.0
 }
 
 #[test]
-fn readings_lead_a_wrong_spring_to_its_target() {
+fn a_sensor_corrects_the_steady_error_of_a_wrong_model() {
     for cause in [Cause::GainError, Cause::StaticNonlinearity, Cause::ChargeLeakage] {
-        let errors = [None, Some(Feedback::TYPICAL)].map(|feedback| error_v(&lead(feedback, cause, good), TICKS).abs());
+        let errors =
+            [None, Some(Feedback::TYPICAL)].map(|feedback| error_v(&run_loop(feedback, cause, good), TICKS).abs());
         assert!(errors[0] > 5.0 && errors[1] < 0.5, "{cause}: {errors:?} V without and with the sensor");
     }
 }
 
-/// Whatever it says instead: seen in time, no bump, and in the end the stiffness that the model alone comes to.
+/// A failed sensor is detected in time and without a voltage bump; the stiffness then settles as without a sensor.
 #[test]
-fn without_its_sensor_it_is_the_loop_without_one() {
-    let alone = lead(None, Cause::GainError, good);
+fn after_a_sensor_failure_the_loop_settles_as_without_a_sensor() {
+    let alone = run_loop(None, Cause::GainError, good);
     let cases: [(Fault, Sense); 3] = [
         (Fault::Absent, |k, read| (k < FAILS).then_some(read)),
         (Fault::Jumping, |k, read| Some(if k < FAILS { read } else { read + 30.0 })),
         (Fault::OutOfRange, |k, read| Some(if k < FAILS { read } else { 1500.0 })),
     ];
     for (fault, sense) in cases {
-        let run = lead(Some(Feedback::TYPICAL), Cause::GainError, sense);
+        let run = run_loop(Some(Feedback::TYPICAL), Cause::GainError, sense);
         let before = error_v(&run, FAILS);
         assert!(before.abs() < 0.5, "{fault:?}: {before} V before");
         assert_eq!(run[FAILS].sensor, Some(Sensor::Trusted));
-        // Ten fading times later; a jump is forgiven after that.
+        // After ten time constants of the decay; a jump is accepted later.
         let after = error_v(&run, FAILS + 16_000) - error_v(&alone, FAILS + 16_000);
-        assert!(after.abs() < 0.5, "{fault:?}: {after} V beside the loop without a sensor");
+        assert!(after.abs() < 0.5, "{fault:?}: {after} V from the loop without a sensor");
         let seen = run[FAILS..].iter().position(|moment| moment.sensor == Some(Sensor::Failed(fault)));
         assert!(seen.is_some_and(|ticks| ticks < 20), "{fault:?}: seen after {seen:?} ticks");
         let change = |pair: &[Moment]| (pair[1].applied_v - pair[0].applied_v).abs();
@@ -90,22 +91,21 @@ fn without_its_sensor_it_is_the_loop_without_one() {
     }
 }
 
-/// One that is never heard changes nothing; one that is stuck is believed until the model has moved by its noise.
+/// A sensor without readings has no influence; a stuck one is trusted until the model has moved by its noise.
 #[test]
-fn a_dead_sensor_changes_nothing() {
-    let alone = lead(None, Cause::GainError, good);
+fn a_sensor_that_never_works_changes_the_stiffness_by_at_most_1_v() {
+    let alone = run_loop(None, Cause::GainError, good);
     let dead: [(Fault, Sense, f64); 2] = [(Fault::Absent, |_, _| None, 0.0), (Fault::Stuck, |_, _| Some(0.0), 1.0)];
     for (fault, sense, most_v) in dead {
-        let run = lead(Some(Feedback::TYPICAL), Cause::GainError, sense);
+        let run = run_loop(Some(Feedback::TYPICAL), Cause::GainError, sense);
         assert!(run[1000..].iter().all(|moment| moment.sensor == Some(Sensor::Failed(fault))));
         let apart = run.iter().zip(&alone).map(|(one, other)| (one.truth_v - other.truth_v).abs()).fold(0.0, f64::max);
-        assert!(apart <= most_v, "{fault:?}: the stiffness is up to {apart} V apart");
+        assert!(apart <= most_v, "{fault:?}: the stiffness differs by up to {apart} V");
     }
 }
 
-/// Trust is there before the first voltage leaves.
 #[test]
-fn it_is_heard_while_disarmed() {
+fn a_sensor_is_rated_while_the_output_is_disabled() {
     let settings = Settings { feedback: Some(Feedback::TYPICAL), ..SETTINGS };
     let mut control = Control::new(&settings, &SUPERVISION, None).unwrap();
     let mut hear =

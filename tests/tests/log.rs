@@ -1,4 +1,4 @@
-//! `vsj log`: what is read, what is kept of a damaged log, and how it ends.
+//! `vsj log`: decoding, what is kept of a damaged log, and exit codes.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -20,7 +20,7 @@ const SUMMARY: &str = "summary tick={=u32} overruns={=u32} worst_lateness_us={=u
 const DONE: &str = "done ticks={=u32} missed={=u32} digest={=u64:x} min={=u32} mean={=u32} max={=u32}";
 const NOTE: &str = "link says \"{=str}\", {}";
 const SAY: &str = "{=str}";
-/// Stand for arguments of other lines: elements without bytes, something that nests without end, an enum.
+/// Formats of nested arguments: elements without bytes, unlimited nesting, an enum.
 const SLICE: &str = "{=[?]}";
 const NOTHING: &str = "Nothing";
 const NESTING: &str = "Nesting({=?})";
@@ -114,7 +114,7 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).expect("vsj prints text")
 }
 
-/// The exit code, and that stderr has one line unless all went well.
+/// Exit code; asserts that stderr has one line on failure and none on success.
 fn code(output: &Output) -> i32 {
     let code = output.status.code().expect("vsj ends by itself");
     let lines = text(&output.stderr).lines().count();
@@ -123,7 +123,7 @@ fn code(output: &Output) -> i32 {
 }
 
 #[test]
-fn a_whole_log_as_table_csv_and_json() {
+fn a_complete_log_is_printed_as_table_csv_and_json() {
     for encoding in ["rzcobs", "raw"] {
         let folder = folder(encoding, &log(encoding));
         for (option, name) in [("", "whole.txt"), ("--csv", "whole.csv"), ("--json", "whole.json")] {
@@ -150,7 +150,7 @@ fn csv_has_one_row_a_line_and_json_is_one_object() {
 }
 
 #[test]
-fn damage_in_the_middle_costs_only_what_is_damaged() {
+fn damage_in_the_middle_loses_only_the_damaged_frames() {
     let mut frames = frames("rzcobs");
     frames[3] = vec![0xff, 0x12, 0x34, 0];
     frames[6].remove(2);
@@ -167,7 +167,7 @@ fn damage_in_the_middle_costs_only_what_is_damaged() {
 }
 
 #[test]
-fn a_raw_log_is_read_up_to_its_damage() {
+fn a_raw_log_is_decoded_up_to_the_damage() {
     let mut frames = frames("raw");
     frames[4][1] = 0xff;
     let folder = folder("raw", &frames.concat());
@@ -177,7 +177,7 @@ fn a_raw_log_is_read_up_to_its_damage() {
 }
 
 #[test]
-fn marks_in_a_row_are_no_frames() {
+fn repeated_frame_delimiters_are_not_frames() {
     // Each start of the firmware sends one first.
     let fw = firmware("rzcobs");
     let mut bytes = vec![0, 0, 0];
@@ -189,7 +189,7 @@ fn marks_in_a_row_are_no_frames() {
 }
 
 #[test]
-fn cut_at_every_byte_the_lines_before_are_kept() {
+fn a_log_cut_at_any_byte_keeps_the_lines_before() {
     for encoding in ["rzcobs", "raw"] {
         let frames = frames(encoding);
         let whole = log(encoding);
@@ -214,7 +214,7 @@ fn cut_at_every_byte_the_lines_before_are_kept() {
 }
 
 #[test]
-fn cut_the_program_exits_with_1_and_prints_the_lines_before() {
+fn a_cut_log_exits_with_1_and_prints_the_lines_before() {
     let whole = log("rzcobs");
     let folder = folder("rzcobs", &whole[..whole.len() - 3]);
     let output = run(&folder, &["fw.elf", "log.bin"]);
@@ -224,7 +224,7 @@ fn cut_the_program_exits_with_1_and_prints_the_lines_before() {
 }
 
 #[test]
-fn pieces_of_any_size_give_the_same() {
+fn decoding_is_independent_of_the_chunk_size() {
     for encoding in ["rzcobs", "raw"] {
         let mut bytes = log(encoding);
         bytes.truncate(bytes.len() - 2);
@@ -239,7 +239,7 @@ fn pieces_of_any_size_give_the_same() {
 }
 
 #[test]
-fn one_wrong_byte_costs_at_most_two_lines() {
+fn one_wrong_byte_loses_at_most_two_lines() {
     let bytes = log("rzcobs");
     let all = lines(&decode("rzcobs", &bytes));
     for place in 0..bytes.len() {
@@ -255,7 +255,7 @@ fn one_wrong_byte_costs_at_most_two_lines() {
 }
 
 #[test]
-fn a_frame_that_claims_too_much_is_damaged() {
+fn a_frame_with_an_impossible_length_or_nesting_is_damaged() {
     let fw = firmware("raw");
     let nesting = U16(fw.place(NESTING));
     let slice = U16(fw.place(SLICE));
@@ -285,25 +285,25 @@ fn a_frame_that_claims_too_much_is_damaged() {
 
 proptest! {
     #[test]
-    fn garbage_does_no_harm(bytes in proptest::collection::vec(any::<u8>(), 1..4000), size in 1..4000usize) {
+    fn random_bytes_are_decoded_without_panic(bytes in proptest::collection::vec(any::<u8>(), 1..4000), size in 1..4000usize) {
         for encoding in ["rzcobs", "raw"] {
             let mut decoder = Decoder::new(formats(encoding));
             let mut items: Vec<Item> = bytes.chunks(size).flat_map(|piece| decoder.feed(piece)).collect();
             items.extend(decoder.finish());
-            // Nothing is read twice: lines and damage together are no longer than the garbage.
+            // No byte counts twice: lines and damage together do not exceed the input.
             let Summary { damaged_bytes, cut_off_bytes, lines, .. } = summary(&items);
             prop_assert!(damaged_bytes + cut_off_bytes + lines <= bytes.len() as u64);
         }
     }
 
     #[test]
-    fn garbage_between_frames_is_skipped(
+    fn random_bytes_between_frames_are_skipped(
         garbage in proptest::collection::vec(any::<u8>(), 0..300), place in 0..15usize,
     ) {
         let mut frames = frames("rzcobs");
         let count = frames.len();
         let place = place.min(count);
-        // The mark keeps it apart from the frame behind.
+        // The delimiter separates it from the next frame.
         frames.insert(place, [garbage, vec![0]].concat());
         let found = lines(&decode("rzcobs", &frames.concat()));
         let all = lines(&decode("rzcobs", &log("rzcobs")));
@@ -312,7 +312,7 @@ proptest! {
     }
 
     #[test]
-    fn arguments_of_any_bytes_do_no_harm(bytes in proptest::collection::vec(any::<u8>(), 0..200), string in 1..13u16) {
+    fn random_arguments_are_decoded_without_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200), string in 1..13u16) {
         for encoding in ["rzcobs", "raw"] {
             let mut frame = string.to_le_bytes().to_vec();
             frame.extend(&bytes);
@@ -325,7 +325,7 @@ proptest! {
     }
 
     #[test]
-    fn an_elf_file_of_any_bytes_is_refused(bytes in proptest::collection::vec(any::<u8>(), 0..300), keep in 0..2000usize) {
+    fn an_elf_file_of_random_bytes_is_rejected(bytes in proptest::collection::vec(any::<u8>(), 0..300), keep in 0..2000usize) {
         prop_assert!(Formats::parse(&bytes).is_err());
         let mut elf = firmware("raw").elf();
         elf.truncate(keep);
@@ -336,7 +336,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_not_this_firmwares_is_refused_in_one_line() {
+fn files_of_another_firmware_are_rejected_in_one_line() {
     let folder = folder("rzcobs", &log("rzcobs"));
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).expect("there is room");
     let other = Firmware { encoding: "rzcobs", strings: vec![("info", "{=bool}")] };
@@ -373,7 +373,7 @@ fn plain_elf() -> Vec<u8> {
 }
 
 #[test]
-fn bytes_behind_the_last_argument_make_a_frame_damaged() {
+fn bytes_after_the_last_argument_make_a_frame_damaged() {
     let raw = firmware("raw").frame(LIMIT, 1, &[U8(1), U32(2)]);
     let read = |behind: &[u8]| {
         let mut frame = rzcobs::encode(&[&raw, behind].concat());
@@ -388,7 +388,7 @@ fn bytes_behind_the_last_argument_make_a_frame_damaged() {
 }
 
 #[test]
-fn a_run_of_damage_takes_two_lines() {
+fn consecutive_damaged_frames_are_summarised_in_two_lines() {
     let frames = frames("rzcobs");
     let folder = folder("rzcobs", &[&frames[..2], &vec![vec![0xff, 0]; 500], &frames[2..4]].concat().concat());
     let output = run(&folder, &["fw.elf", "log.bin"]);
@@ -399,7 +399,7 @@ fn a_run_of_damage_takes_two_lines() {
 }
 
 #[test]
-fn live_lines_come_before_the_end() {
+fn lines_of_a_live_log_are_printed_immediately() {
     let folder = folder("rzcobs", b"");
     let mut child = vsj()
         .current_dir(&folder)
@@ -435,7 +435,7 @@ fn live_lines_come_before_the_end() {
 }
 
 #[test]
-fn a_reader_that_stops_is_no_failure() {
+fn a_closed_stdout_is_not_a_failure() {
     let folder = folder("rzcobs", &log("rzcobs").repeat(2000));
     let mut child = vsj()
         .current_dir(&folder)
@@ -450,7 +450,7 @@ fn a_reader_that_stops_is_no_failure() {
 }
 
 #[test]
-fn counts_go_on_where_a_start_was_not_seen() {
+fn counts_continue_when_a_boot_line_is_missing() {
     let mut frames = frames("rzcobs");
     // The second start's boot line.
     frames.remove(9);
@@ -460,7 +460,7 @@ fn counts_go_on_where_a_start_was_not_seen() {
 }
 
 #[test]
-fn time_in_limits_needs_the_rate() {
+fn the_time_in_limits_requires_the_tick_rate() {
     let frames = frames("rzcobs");
     let seen = summary(&decode("rzcobs", &frames.concat()));
     assert_eq!(seen.limited_s, Some(0.031));
@@ -471,7 +471,7 @@ fn time_in_limits_needs_the_rate() {
 }
 
 #[test]
-fn a_fault_counts_once_however_often_it_is_told() {
+fn a_fault_that_is_reported_repeatedly_counts_once() {
     let frames = frames("rzcobs");
     let faults = |frames: &[Vec<u8>]| {
         let faults = summary(&decode("rzcobs", &frames.concat())).faults;

@@ -1,4 +1,4 @@
-//! The stair experiment, end to end: what it must show beside the report's Table 3.
+//! `vsj stair`: the stair experiment compared with the report's Table 3.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ fn rows(report: &Value) -> &Vec<Value> {
     report["rows"].as_array().expect("rows")
 }
 
-/// The reference gives every printed number to its last digit, two excepted: each says why.
+/// The reference agrees with every printed number to its last digit except two, each of which has a note.
 #[test]
 fn the_reference_reproduces_the_simulated_columns_of_table_3() {
     let report = json(tempdir().unwrap().path(), &["stair", "--json"]);
@@ -38,20 +38,20 @@ fn the_reference_reproduces_the_simulated_columns_of_table_3() {
 }
 
 #[test]
-fn fixed_point_stays_beside_the_reference() {
+fn the_fixed_point_loop_stays_within_50_mv_of_the_reference() {
     for rate in ["1000", "10000"] {
         for (input, limit) in [("stair", "700"), ("stair", "1000"), ("step", "700"), ("step", "1000")] {
             let arguments = ["stair", "--json", "--rate-hz", rate, "--input", input, "--limit-v", limit];
             let report = json(tempdir().unwrap().path(), &arguments);
             let error = number(&report, "max_fixed_point_error");
             assert!(error < 0.05, "{rate} Hz, {input}: {error} V");
-            // Better than the rounding of the DAC allows would mean that the reference is not independent.
+            // An error below the rounding of the DAC would mean that the reference is not independent.
             assert!(error > 0.005, "{rate} Hz, {input}: {error} V");
         }
     }
 }
 
-/// The report's gains need 3.5 s for 97 %; the shortest possible times are computed by hand.
+/// The report's gains need 3.5 s for 97 %; the lower bounds are computed by the closed formula.
 #[test]
 fn steps_are_measured_from_the_start_of_the_ramp() {
     let report = json(tempdir().unwrap().path(), &["stair", "--json"]);
@@ -75,7 +75,7 @@ fn steps_are_measured_from_the_start_of_the_ramp() {
 }
 
 #[test]
-fn without_a_command_it_writes_the_experiment_and_says_where() {
+fn without_a_command_it_writes_the_stair_experiment_and_prints_the_paths() {
     let folder = tempdir().unwrap();
     let output = run(folder.path(), &[]);
     assert!(output.status.success());
@@ -105,7 +105,7 @@ fn without_a_command_it_writes_the_experiment_and_says_where() {
 }
 
 #[test]
-fn a_schedule_and_a_plant_of_the_users() {
+fn user_defined_schedules_and_plants_are_simulated() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("s.csv"), "# up and down\ntime_s,voltage_v\n5,0\n6,200\n20,200\n21,50\n40,50\n")
         .unwrap();
@@ -114,7 +114,7 @@ fn a_schedule_and_a_plant_of_the_users() {
         json(folder.path(), &["stair", "--input", "s.csv", "--plant", "p.toml", "--controller", "none", "--json"]);
     let steps = report["steps"].as_array().expect("steps");
     assert_eq!(steps.len(), 2, "held between rows: {steps:?}");
-    // Alone, the spring makes `part` of a step after tau ln(0.6 / (1 - part)).
+    // Without a controller the spring reaches `part` of a step after tau ln(0.6 / (1 - part)).
     assert!((number(&steps[0], "t90_s") - 2.0 * 6.0f64.ln()).abs() < 2e-3, "{}", steps[0]);
     assert!((number(&steps[1], "to_v") - 50.0).abs() < 1e-9);
     assert_eq!(rows(&report).len(), 5);
@@ -123,12 +123,12 @@ fn a_schedule_and_a_plant_of_the_users() {
 
     let straight = ["stair", "--input", "s.csv", "--between", "linear", "--json"];
     let report = json(folder.path(), &straight);
-    assert_eq!(report["steps"].as_array().expect("steps").len(), 1, "the first ramp starts on no plateau");
+    assert_eq!(report["steps"].as_array().expect("steps").len(), 1, "the first ramp does not start on a plateau");
 }
 
-/// Limits that act are told, and the reference knows of them between the rows too.
+/// Active limits are reported, and the reference has them between the rows too.
 #[test]
-fn limits_that_act_are_reported() {
+fn active_limits_are_counted() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("s.csv"), "time_s,voltage_v\n0,100\n10,100\n").unwrap();
     let swinging = ["stair", "--json", "--kp", "1", "--ki", "5", "--input", "s.csv"];
@@ -143,9 +143,9 @@ fn limits_that_act_are_reported() {
     assert!((number(&rows(&report)[1], "with") - number(&rows(&report)[1], "with_fixed")).abs() < 0.05);
 }
 
-/// Each is one line that names what is wrong and what is expected, exit code 2, and no file.
+/// Each error is one line with the fault and the expectation, exit code 2, and no file is written.
 #[test]
-fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
+fn bad_input_gives_one_error_line_and_writes_no_file() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("bad.csv"), "time_s,voltage_v\n0,1\n1,much\n").unwrap();
     fs::write(folder.path().join("high.csv"), "time_s,voltage_v\n0,0\n5,900\n10,900\n").unwrap();
@@ -204,16 +204,16 @@ fn bad_input_is_one_clear_line_and_leaves_nothing_behind() {
         assert!(stderr.contains(expected), "{arguments:?}: {stderr}");
         assert_eq!(stderr.trim_end().lines().count(), 1, "{arguments:?}: {stderr}");
         assert!(output.stdout.is_empty(), "{arguments:?}");
-        assert!(!folder.path().join("result").exists(), "{arguments:?} left something behind");
+        assert!(!folder.path().join("result").exists(), "{arguments:?} wrote a file");
     }
 }
 
 #[test]
-fn an_earlier_result_survives_a_failure() {
+fn a_failed_run_does_not_change_an_earlier_result() {
     let folder = tempdir().unwrap();
     assert!(run(folder.path(), &["stair", "--out", "result", "--every", "1"]).status.success());
     let before = fs::read(folder.path().join("result/stair.csv")).unwrap();
-    // A folder in the place of the last file: moving it there must fail.
+    // A folder with the name of the last file: moving the file there fails.
     fs::remove_file(folder.path().join("result/voltage.svg")).unwrap();
     fs::create_dir_all(folder.path().join("result/voltage.svg/in the way")).unwrap();
     let output = run(folder.path(), &["stair", "--out", "result", "--every", "1", "--kp", "5"]);
@@ -223,9 +223,8 @@ fn an_earlier_result_survives_a_failure() {
     assert_eq!(fs::read_dir(folder.path().join("result")).unwrap().count(), 3, "temporary files were left behind");
 }
 
-/// What one command writes, the other reads.
 #[test]
-fn its_csv_can_be_diagnosed() {
+fn vsj_diagnose_reads_the_csv_of_vsj_stair() {
     let folder = tempdir().unwrap();
     assert!(run(folder.path(), &["stair", "--out", "result", "--every", "0.5"]).status.success());
     let found = json(folder.path(), &["diagnose", "result/stair.csv", "--json"]);
@@ -233,7 +232,7 @@ fn its_csv_can_be_diagnosed() {
 }
 
 #[test]
-fn help_shows_examples() {
+fn the_help_has_examples() {
     let folder = tempdir().unwrap();
     let help = run(folder.path(), &["stair", "--help"]);
     assert!(help.status.success() && text(&help.stdout).contains("Examples:"));
@@ -242,7 +241,7 @@ fn help_shows_examples() {
 
 /// The pictures and figures of docs/stair and docs/stair.md are those that the command makes today.
 #[test]
-fn the_documentation_shows_what_the_command_prints() {
+fn the_documentation_equals_the_output_of_the_command() {
     let folder = tempdir().unwrap();
     let output = run(folder.path(), &["stair", "--out", "stair", "--every", "0.1"]);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -251,7 +250,7 @@ fn the_documentation_shows_what_the_command_prints() {
         let made = fs::read(folder.path().join("stair").join(name)).unwrap();
         assert!(
             committed == made,
-            "docs/stair/{name} is old: cargo run --release -- stair --out docs/stair --every 0.1"
+            "docs/stair/{name} is out of date: cargo run --release -- stair --out docs/stair --every 0.1"
         );
     }
     let page = fs::read_to_string(root.join("docs/stair.md")).unwrap();

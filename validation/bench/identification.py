@@ -1,22 +1,22 @@
-"""What PySINDy and SysIdentPy learn from records of the spring: the rivals of `cargo campaign rivals`.
+"""Identification of the spring with PySINDy and SysIdentPy, for comparison with `vsj diagnose` in `cargo campaign rivals`.
 
     identification.py FOLDER
 
-Each CSV of the folder (time_s, voltage_v, stiffness; even rows) is split: the first 60 % to learn from, the last 40 % to run
-freely, from the split's state and the voltages alone. Prints one JSON object: for each file and tool the root mean square
-error of the free run, the processor time for everything, and the settings that won.
+Each CSV of the folder (time_s, voltage_v, stiffness; even rows) is split: the first 60 % for identification, the last 40 % for
+a free run from the state at the split and the voltages alone. Prints one JSON object: for each file and tool the root mean
+square error of the free run, the CPU time, and the best settings.
 
-Both tools get what a competent user would give them: several libraries and lags, tried on the first three quarters of the
-learning part; the settings with the smallest free-run error on its last quarter learn again from all of it.
+Both tools get what a competent user would provide: several libraries and lags are tried on the first three quarters of the
+identification part; the settings with the smallest free-run error on its last quarter are identified again on all of it.
 
-PySINDy learns dw/dt = f(w, u), polynomials up to degree 3, thresholded least squares. It is given the paper's split of the
-response, w = (y - u/11) 11/10: y itself jumps with the voltage and has no derivative. Tried as derivative: the difference to
-the next row, exact for a voltage that is held (then the free run goes by the same differences), and Savitzky-Golay filters of
-several windows (then by Runge-Kutta). Voltages are in units of 500 V, columns normalised.
+PySINDy identifies dw/dt = f(w, u), polynomials up to degree 3, by thresholded least squares. It is given the paper's split of
+the response, w = (y - u/11) 11/10, because y itself jumps with the voltage and has no derivative. Derivatives tried: the
+difference to the next row, exact for a held voltage (the free run then uses the same differences), and Savitzky-Golay filters
+of several windows (the free run then uses Runge-Kutta). Voltages are in units of 500 V, columns normalised.
 
-SysIdentPy learns a polynomial NARX model by forward regression (FROLS) with BIC; least squares, and extended least squares
-against the bias that noise gives to the lags of y. Its input is moved by one row: its lags begin at 1, and the spring answers
-in the same row.
+SysIdentPy identifies a polynomial NARX model by forward regression (FROLS) with BIC, by least squares and by extended least
+squares against the bias of noisy lags of y. Its input is shifted by one row, because its lags begin at 1 and the spring
+responds in the same row.
 """
 
 import contextlib
@@ -38,8 +38,8 @@ from sysidentpy.parameter_estimation import LeastSquares
 SHARE = 1 / 11
 FULL_V = 500.0
 LEARN = 0.6
-TRY = 0.75  # of the learning part
-LARGEST = 1e3  # in units of 500 V: a free run beyond has left the rails
+TRY = 0.75  # of the identification part
+LARGEST = 1e3  # in units of 500 V: a free run beyond has diverged
 
 
 def read(path):
@@ -81,13 +81,13 @@ class Sindy:
         self.terms = [
             (float(c), int(i), int(j)) for c, (i, j) in zip(model.coefficients()[0], library.powers_) if c != 0
         ]
-        # Where the free run starts: a line through the last rows, one row on.
+        # Start of the free run: a line through the last rows, extrapolated by one row.
         last = 11
         self.start = float(np.polyval(np.polyfit(np.arange(last), w[-last:], 1), last))
         return self
 
     def run(self, u):
-        """Free run, the voltage of every row held."""
+        """Free run with the voltage of every row held."""
 
         def rate(w, volts):
             return sum(c * w**i * volts**j for c, i, j in self.terms)
@@ -146,7 +146,7 @@ class Narx:
 
 
 def learn(tool, t, u, y):
-    """Free-run error, in units of 500 V, of the settings that win, and these."""
+    """Free-run error, in units of 500 V, of the best settings, and these settings."""
     split = int(LEARN * len(y))
     tried = int(TRY * split)
     errors = []
@@ -169,7 +169,7 @@ def main():
         answers[path.stem] = {}
         for name, tool in (("pysindy", Sindy), ("sysidentpy", Narx)):
             start = time.process_time()
-            # Both print while they work.
+            # Both tools print progress to stdout.
             with contextlib.redirect_stdout(io.StringIO()):
                 error, settings = learn(tool, t, u / FULL_V, y / FULL_V)
             answer = {"rmse": FULL_V * error if math.isfinite(error) else None, "settings": settings}

@@ -1,7 +1,7 @@
-//! Draws what each cause looks like, for docs/causes: one record of the hidden spring, beside the paper's simulation.
+//! Draws the pictures of docs/causes: one record with each cause, compared with the paper's simulation.
 //!
 //! ```sh
-//! cargo run --release -p end-to-end --example cause_plots -- docs/causes
+//! cargo run --release -p validation --example cause_plots -- docs/causes
 //! ```
 
 use std::path::PathBuf;
@@ -12,9 +12,9 @@ use identify::effects::model::Model;
 use identify::fit::simulator::Simulator;
 use identify::record::data::Data;
 use identify::{Input, Options};
-use validation::hidden::{Cause, Effect, Hidden, Noise, Schedule};
+use validation::ground_truth::{Cause, Effect, LabelledRecord, Noise, Schedule};
 
-/// What is hidden, in the order of [`Effect::values`], and the schedule that shows it.
+/// Values of the effect, in the order of [`Effect::values`], and a schedule in which it is visible.
 fn shown(cause: Cause) -> (Vec<f64>, Schedule) {
     match cause {
         Cause::GainError => (vec![1.1], slow()),
@@ -38,12 +38,12 @@ fn shown(cause: Cause) -> (Vec<f64>, Schedule) {
     }
 }
 
-/// A stair up and down and one full step, 15 s each, ten rows a second.
+/// A stair up and down and one full step, 15 s each, ten rows per second.
 fn slow() -> Schedule {
     schedule(&[0.0, 125.0, 250.0, 375.0, 500.0, 375.0, 250.0, 125.0, 0.0, 500.0, 500.0, 0.0, 0.0], 15.0, 0.1)
 }
 
-/// Steps of different heights, 2 s each, a hundred rows a second.
+/// Steps of different heights, 2 s each, a hundred rows per second.
 fn fast() -> Schedule {
     schedule(&[0.0, 100.0, 500.0, 300.0, 0.0], 2.0, 0.01)
 }
@@ -61,9 +61,9 @@ fn main() -> anyhow::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).context("expected a folder to write to")?);
     for cause in Cause::ALL {
         let (values, schedule) = shown(cause);
-        let effect = Effect { cause, form: 0, plain: values.clone(), neutral: values, size: 1.0 };
-        let hidden = Hidden::new(schedule, vec![effect], Noise::white(0.1), 1);
-        let data = Data::new(&hidden.record(), Input::Hold);
+        let effect = Effect { cause, form: 0, full_size: values.clone(), neutral: values, size: 1.0 };
+        let record = LabelledRecord::new(schedule, vec![effect], Noise::white(0.1), 1);
+        let data = Data::new(&record.record(), Input::Hold);
         let mut simulation = Vec::new();
         Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulation);
         let path = folder.join(format!("{cause}.svg"));

@@ -1,6 +1,16 @@
-//! Helpers of the end-to-end tests, the campaign that hides effects in records and asks for their names, and the loop that
-//! a controller closes around a spring with a hidden effect.
+//! Validation of the diagnosis and of the controller by simulated records and springs with known effects.
+//!
+//! In: seeds and sizes of the test sets. Out: tables and acceptance criteria, as Markdown and as data to serialise.
+//!
+//! | module | contents |
+//! | --- | --- |
+//! | [`ground_truth`] | simulators of springs with known effects; they share no code with `identify` |
+//! | [`criterion`], [`markdown`] | one acceptance criterion; Markdown tables |
+//! | [`campaign`] | counts the causes that the diagnosis names in many records |
+//! | [`closed_loop`] | the controller in closed loop with a spring with known effects, with a stiffness sensor and without |
 
 pub mod campaign;
 pub mod closed_loop;
-pub mod hidden;
+pub mod criterion;
+pub mod ground_truth;
+pub mod markdown;

@@ -11,7 +11,8 @@ use model::Plant;
 use serde::Serialize;
 use serde_json::Value;
 use simulation::plant_file;
-use validation::hidden::{Block, Cause};
+use validation::ground_truth::{Block, Cause};
+use validation::ground_truth::{Block, Cause};
 use xtask::shell;
 use xtask::variant::Controller;
 

@@ -13,7 +13,8 @@ use anyhow::{Context, Result, anyhow};
 use firmware::settings::SETTINGS;
 use model::Volts;
 use model::units::Signal;
-use validation::hidden::live::Live;
+use validation::ground_truth::live::Live;
+use validation::ground_truth::live::Live;
 use xtask::shell;
 
 use crate::qemu::emulator::{self, Run};

@@ -20,7 +20,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
-use validation::hidden::Cause;
+use validation::ground_truth::Cause;
 
 use xtask::setup;
 use xtask::variant::Controller;

@@ -7,7 +7,7 @@ use std::ops::Range;
 use anyhow::{Result, ensure};
 use firmware::RATE_HZ;
 use serde::Serialize;
-use validation::hidden::Cause;
+use validation::ground_truth::Cause;
 use xtask::build;
 use xtask::variant::Controller;
 

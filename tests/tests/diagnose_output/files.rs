@@ -6,10 +6,10 @@ use std::path::Path;
 
 use end_to_end::vsj::{json, run, text};
 use serde_json::Value;
-use validation::hidden::Cause;
-use validation::hidden::record::Recipe;
+use validation::ground_truth::Cause;
+use validation::ground_truth::record::Recipe;
 
-use super::{FILES, folder, names, papers, refused};
+use super::{FILES, folder, names, papers, rejected};
 
 /// A file name that is HTML, XML and shell at once.
 const NASTY: &str = "<script>alert('a & \"b\"')<script>$x$.csv";
@@ -137,17 +137,17 @@ fn all_files_or_none() {
     write(folder.path(), "record.csv", Cause::GainError);
     // The last file cannot be: a folder has its name.
     fs::create_dir_all(folder.path().join("out/diagnosis.json")).expect("a folder");
-    let (code, error) = refused(folder.path(), &["diagnose", "record.csv", "--out", "out"]);
+    let (code, error) = rejected(folder.path(), &["diagnose", "record.csv", "--out", "out"]);
     assert_eq!(code, Some(2), "{error}");
     assert_eq!(names(&folder.path().join("out")), ["diagnosis.json"]);
 
-    let (code, error) = refused(folder.path(), &["diagnose", "record.csv", "--out", "record.csv"]);
+    let (code, error) = rejected(folder.path(), &["diagnose", "record.csv", "--out", "record.csv"]);
     assert_eq!(code, Some(2), "{error}");
     assert!(error.contains("record.csv: cannot be made") && error.contains("expected a folder"), "{error}");
 
     // A bad record leaves no folder behind.
     fs::write(folder.path().join("bad.csv"), "time_s,voltage_v\n").expect("a file");
-    assert_eq!(refused(folder.path(), &["diagnose", "bad.csv", "--out", "new"]).0, Some(2));
+    assert_eq!(rejected(folder.path(), &["diagnose", "bad.csv", "--out", "new"]).0, Some(2));
     assert!(!folder.path().join("new").exists());
 }
 

@@ -1,4 +1,4 @@
-//! `vsj diagnose` as its users call it: what it writes, and what it says of records that are poor or no records at all.
+//! `vsj diagnose`: its files, its messages, and its verdicts on poor records.
 
 mod files;
 mod records;
@@ -11,7 +11,7 @@ use std::path::Path;
 use end_to_end::vsj::{run, text};
 use tempfile::TempDir;
 
-/// What `--out` writes.
+/// Files that `--out` writes.
 const FILES: [&str; 9] = [
     "autocorrelation.svg",
     "diagnosis.json",
@@ -28,7 +28,8 @@ fn folder() -> TempDir {
     tempfile::tempdir().expect("a folder")
 }
 
-/// The paper's spring on plateaus of 10 s, ten rows a second, read within half a volt and off by `error(row)`.
+/// A record of the paper's spring on plateaus of 10 s, ten rows per second, with uniform noise of +-0.5 V and
+/// `error(row)`.
 fn papers(rows: u32, error: impl Fn(u32) -> f64) -> String {
     let mut csv = "time_s,voltage_v,stiffness\n".to_owned();
     let (mut relaxed, mut noise) = (0.0, 1u32);
@@ -50,8 +51,8 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Exit code and the one line on stderr.
-fn refused(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+/// Runs `vsj` with `arguments` that it rejects; exit code and the one line on stderr.
+fn rejected(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let output = run(folder, arguments);
     assert!(output.stdout.is_empty(), "{arguments:?} printed {}", text(&output.stdout));
     let error = text(&output.stderr);

@@ -1,16 +1,16 @@
-//! What it says of records that are none, that are poor, and that no cause explains.
+//! Verdicts and messages for invalid files, poor records and records that no cause explains.
 
 use std::fmt::Write;
 use std::fs;
 
 use end_to_end::vsj::{json, run, text};
 use serde_json::Value;
-use validation::hidden::Cause;
-use validation::hidden::record::Recipe;
+use validation::ground_truth::Cause;
+use validation::ground_truth::record::Recipe;
 
-use super::{FILES, folder, names, papers, refused};
+use super::{FILES, folder, names, papers, rejected};
 
-/// A record whose readings are `reading(time, voltage)`, on a stair of 100 V each 10 s, two rows a second.
+/// A record with the readings `reading(time, voltage)` on a stair of 100 V every 10 s, two rows per second.
 fn stair(reading: impl Fn(f64, f64) -> f64) -> String {
     let mut csv = "time_s,voltage_v,stiffness\n".to_owned();
     for row in 0..120 {
@@ -22,7 +22,7 @@ fn stair(reading: impl Fn(f64, f64) -> f64) -> String {
 }
 
 #[test]
-fn a_bad_file_is_named_with_its_place() {
+fn an_invalid_file_is_rejected_with_line_and_column() {
     let folder = folder();
     let good = stair(|_, voltage| voltage);
     let edited = |from: &str, to: &str| good.replacen(from, to, 1);
@@ -48,21 +48,21 @@ fn a_bad_file_is_named_with_its_place() {
         let name = format!("{name}.csv");
         fs::write(folder.path().join(&name), csv).expect("a file");
         for more in [&[][..], &["--json"]] {
-            let (code, error) = refused(folder.path(), &[&["diagnose", name.as_str()][..], more].concat());
+            let (code, error) = rejected(folder.path(), &[&["diagnose", name.as_str()][..], more].concat());
             assert_eq!(code, Some(2), "{name}: {error}");
             assert!(error.contains(&name) && error.contains(expected), "{name}: {error}");
         }
     }
-    let (code, error) = refused(folder.path(), &["diagnose", "none.csv"]);
+    let (code, error) = rejected(folder.path(), &["diagnose", "none.csv"]);
     assert!(code == Some(2) && error.contains("none.csv: cannot be read"), "{error}");
-    let (code, error) = refused(folder.path(), &["diagnose", "reading.csv", "--column", "force"]);
+    let (code, error) = rejected(folder.path(), &["diagnose", "reading.csv", "--column", "force"]);
     assert!(code == Some(2) && error.contains("no column `force`"), "{error}");
     fs::write(folder.path().join("other.csv"), "time_s,voltage_v,stiffness\n0,0,1\n25,0,1\n").expect("a file");
-    let (code, error) = refused(folder.path(), &["diagnose", "other.csv", "--input", "stair"]);
+    let (code, error) = rejected(folder.path(), &["diagnose", "other.csv", "--input", "stair"]);
     assert!(code == Some(2) && error.contains("other.csv, line 3, column voltage_v: 0 V at 25 s"), "{error}");
 }
 
-/// Poor records are not bad files: they get a verdict, whichever files are asked for.
+/// Poor records are not invalid files: they get a verdict and all output files.
 #[test]
 fn a_poor_record_gets_a_verdict() {
     let folder = folder();
@@ -90,17 +90,17 @@ fn a_poor_record_gets_a_verdict() {
         let answer = json(folder.path(), &["diagnose", &name, "--json", "--out", &format!("{name}.out")]);
         let verdict = answer["verdict"].as_str().expect("a verdict");
         assert!(verdicts.contains(&verdict), "{name}: {verdict}");
-        assert!(verdict == "explained" || answer["next_experiment"].is_string(), "{name}: no way on");
+        assert!(verdict == "explained" || answer["next_experiment"].is_string(), "{name}: no next experiment");
         assert_eq!(names(&folder.path().join(format!("{name}.out"))), FILES, "{name}");
         let page = fs::read_to_string(folder.path().join(format!("{name}.out/report.html"))).expect("a page");
         assert!(page.contains(verdict) && !page.contains("NaN"), "{name}");
-        assert!(verdict != "insufficient" || !page.contains("xtended"), "{name}: nothing was extended");
+        assert!(verdict != "insufficient" || !page.contains("xtended"), "{name}: the page shows an extended model");
     }
 }
 
-/// Readings shifted within a single held-out stretch are named, but no other stretch could have foretold them.
+/// Readings shifted within a single held-out segment are named, but no other segment can predict them.
 #[test]
-fn what_one_stretch_alone_shows_is_no_gain_on_unseen_ones() {
+fn an_offset_within_one_held_out_segment_gives_no_held_out_improvement() {
     let csv = papers(1200, |row| if (633..655).contains(&row) { 40.0 } else { 0.0 });
     let folder = folder();
     fs::write(folder.path().join("record.csv"), csv).expect("a file");
@@ -113,9 +113,10 @@ fn what_one_stretch_alone_shows_is_no_gain_on_unseen_ones() {
     assert!(printed.contains("no other part of the record foretells it"), "{printed}");
 }
 
-/// Errors that no cause makes are neither agreement nor outliers, though noise with a memory might look alike for a while.
+/// Errors that no cause explains are neither consistent nor outliers, although autocorrelated noise may resemble them
+/// locally.
 #[test]
-fn what_no_cause_makes_is_unexplained() {
+fn errors_that_no_cause_explains_are_unexplained() {
     use std::f64::consts::{PI, TAU};
     let strange = |what: usize, part: f64| match what {
         0 => 20.0 * (PI * part).sin(),

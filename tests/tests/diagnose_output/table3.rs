@@ -1,4 +1,4 @@
-//! The report's own measurement: `docs/table3/` is what the diagnosis says of it today.
+//! The report's own measurement: `docs/table3/` is the current diagnosis of it.
 
 use std::fs;
 use std::path::Path;
@@ -11,11 +11,11 @@ use super::folder;
 const AGAIN: &str = "run `cargo run --release -- diagnose data/table3_stair.csv --column measured --input stair --out \
                      docs/table3`, and see its README";
 
-/// A set of causes; nats behind the best, error, error on held-out stretches.
-type Standing = (String, [String; 3]);
+/// A set of causes with its distance to the best in nats, its error and its held-out error.
+type Candidate = (String, [String; 3]);
 
-/// As a page lists them.
-fn of_page(page: &str) -> Vec<Standing> {
+/// Candidates as the HTML page lists them.
+fn of_page(page: &str) -> Vec<Candidate> {
     let cell = |text: &str| text.split('<').next().unwrap_or_default().to_owned();
     let row = |row: &str| {
         let mut numbers = row.split("<td class=\"number\">").skip(1).map(cell);
@@ -24,8 +24,8 @@ fn of_page(page: &str) -> Vec<Standing> {
     page.split("<td class=\"set\">").skip(1).map(row).collect()
 }
 
-/// As the README does, which says more of some causes.
-fn of_readme(readme: &str, known: &[Standing]) -> Vec<Standing> {
+/// Candidates as the README lists them, which adds remarks to some causes.
+fn of_readme(readme: &str, known: &[Candidate]) -> Vec<Candidate> {
     let rows = readme.lines().skip_while(|line| !line.starts_with("| causes")).skip(2);
     let row = |row: &str| {
         let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
@@ -43,11 +43,11 @@ fn the_page_on_table_3_is_up_to_date() {
     let (data, out) = (format!("{root}/data/table3_stair.csv"), made.path().display().to_string());
     let arguments = ["diagnose", &data, "--column", "measured", "--input", "stair", "--json", "--out", &out];
     let mut today = json(Path::new(root), &arguments);
-    let mut told: Value = serde_json::from_str(&committed("diagnosis.json")).expect("JSON");
-    for report in [&mut today, &mut told] {
+    let mut documented: Value = serde_json::from_str(&committed("diagnosis.json")).expect("JSON");
+    for report in [&mut today, &mut documented] {
         report["extended"]["model"].take();
     }
-    assert_eq!(today, told, "{AGAIN}");
+    assert_eq!(today, documented, "{AGAIN}");
     assert_eq!(today["verdict"], "unexplained");
 
     let today = of_page(&fs::read_to_string(made.path().join("report.html")).expect("a page"));
@@ -55,7 +55,7 @@ fn the_page_on_table_3_is_up_to_date() {
     assert_eq!(of_page(&committed("report.html")), today, "{AGAIN}");
     let readme = committed("README.md");
     assert_eq!(of_readme(&readme, &today), today, "{AGAIN}");
-    // The first is the simulation as it was.
+    // The first candidate is the unchanged simulation.
     let off = format!("off by {} V RMS", today[0].1[1]);
     assert!(readme.contains(&off), "not in the README: {off}");
 }

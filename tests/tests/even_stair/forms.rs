@@ -1,13 +1,13 @@
-//! Laws that follow the spring itself instead of the voltage, and what is no law at all.
+//! Laws that depend on the state of the spring instead of the voltage, and ageing, which no cause describes.
 
 use super::{LEVELS_V, ROWS_PER_LEVEL, SAMPLE_S, causes, diagnosed, noise};
 
 const SHARE: f64 = 1.0 / 11.0;
-/// Steps of the integration in a row.
+/// Integration steps per row.
 const STEPS: usize = 40;
 
-/// What is said of `dw/dt = (u - w)/tau(s, w, y)`, `s` from 0 to 1 along the record, read as `read(y)` in noise of 1 V.
-fn told(seed: u64, tau: impl Fn(f64, f64, f64) -> f64, read: impl Fn(f64) -> f64) -> serde_json::Value {
+/// Diagnosis of `dw/dt = (u - w)/tau(s, w, y)`, `s` from 0 to 1 along the record, read as `read(y)` in noise of 1 V.
+fn diagnosis_of(seed: u64, tau: impl Fn(f64, f64, f64) -> f64, read: impl Fn(f64) -> f64) -> serde_json::Value {
     let volts: Vec<f64> = LEVELS_V.into_iter().flat_map(|volts| std::iter::repeat_n(volts, ROWS_PER_LEVEL)).collect();
     let rows_in_all = volts.len() as f64;
     let (mut w, mut rows) = (0.0, Vec::new());
@@ -25,44 +25,45 @@ fn told(seed: u64, tau: impl Fn(f64, f64, f64) -> f64, read: impl Fn(f64) -> f64
     diagnosed(&rows)
 }
 
-/// The extended spring leaves the noise, and the parameters are the true ones.
-fn holds(report: &serde_json::Value, cause: &str, parameters: &[(&str, f64)]) {
+/// Asserts that the cause is found, the error is that of the noise, and the parameters are within 3 % of the truth.
+fn assert_explained(report: &serde_json::Value, cause: &str, parameters: &[(&str, f64)]) {
     assert_eq!(causes(report), [cause], "{report}");
     assert_eq!(report["verdict"], "explained", "{report}");
     assert!(report["extended"]["held_out_rmse"].as_f64().unwrap() < 1.06, "{report}");
     for (name, truth) in parameters {
         let found = report["findings"][0]["parameters"][name]["value"].as_f64().unwrap();
-        assert!((found / truth - 1.0).abs() < 0.03, "{name}: {found} beside {truth}");
+        assert!((found / truth - 1.0).abs() < 0.03, "{name}: {found} instead of {truth}");
     }
 }
 
 #[test]
-fn a_time_constant_may_follow_the_spring_itself() {
+fn a_time_constant_that_depends_on_the_springs_state_is_found() {
     for (seed, (low, high)) in [(5.5, 14.0), (5.5, 2.2), (9.0, 5.5)].into_iter().enumerate() {
         let (straight, ratio) = (move |x: f64| low + (high - low) * x / 500.0, f64::ln(high / low));
         let geometric = move |x: f64| low * (ratio * x / 500.0).exp();
         let parameters = [("tau_low_s", low), ("tau_high_s", high)];
         let cause = "voltage-dependent-time-constant";
-        holds(&told(seed as u64, |_, w, _| straight(w), |y| y), cause, &parameters);
-        holds(&told(seed as u64 + 10, |_, _, y| geometric(y), |y| y), cause, &parameters);
+        assert_explained(&diagnosis_of(seed as u64, |_, w, _| straight(w), |y| y), cause, &parameters);
+        assert_explained(&diagnosis_of(seed as u64 + 10, |_, _, y| geometric(y), |y| y), cause, &parameters);
     }
 }
 
 #[test]
-fn a_law_may_be_behind_the_relaxation() {
+fn a_nonlinearity_after_the_relaxation_is_found() {
     for (seed, bend) in [0.12, -0.12, 0.5, -0.5].into_iter().enumerate() {
         let law = |y: f64| y * (1.0 + bend * (y / 500.0 - 1.0));
         let settled = [("at_200_v", law(200.0)), ("at_400_v", law(400.0))];
-        holds(&told(seed as u64 + 20, |_, _, _| 5.5, law), "static-nonlinearity", &settled);
+        assert_explained(&diagnosis_of(seed as u64 + 20, |_, _, _| 5.5, law), "static-nonlinearity", &settled);
     }
 }
 
-/// A spring that grows slower all along: what no cause explains is not taken for noise with a memory.
+/// A relaxation that slows down with time is not explained by a cause and must not be mistaken for autocorrelated
+/// noise.
 #[test]
-fn an_error_far_above_the_noise_is_not_called_consistent() {
+fn ageing_is_unexplained_and_not_consistent() {
     for seed in 0..3 {
         let aged = 0.6 + 0.2 * seed as f64;
-        let report = told(seed + 30, |along, _, _| 5.5 * f64::exp(aged * (along - 0.5)), |y| y);
+        let report = diagnosis_of(seed + 30, |along, _, _| 5.5 * f64::exp(aged * (along - 0.5)), |y| y);
         assert!(report["extended"]["rmse"].as_f64().unwrap() > 2.0, "{report}");
         assert_eq!(report["verdict"], "unexplained", "{report}");
     }

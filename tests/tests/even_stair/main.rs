@@ -1,4 +1,5 @@
-//! Records as people make them first: a stair of even steps up and down, from another simulation, with little noise or none.
+//! Diagnosis of typical first records: a stair of equal steps up and down, from an independent simulation, with little
+//! or no noise.
 
 use std::fmt::Write;
 
@@ -7,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use tempfile::tempdir;
-use validation::hidden::noise::Noise;
+use validation::ground_truth::noise::Noise;
 
 mod forms;
 mod margins;
@@ -20,10 +21,10 @@ mod zero;
 
 const SAMPLE_S: f64 = 0.1;
 const LEVELS_V: [f64; 8] = [0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 300.0, 100.0];
-/// As many rows as a turn of the folds that are held out.
+/// Rows of each level, as many as one period of the held-out segments.
 const ROWS_PER_LEVEL: usize = 300;
 
-/// `gain (w + share (u - w))`, `w` following `u` with `tau_s`; the paper's share.
+/// Command and stiffness `gain (w + share (u - w))` of every row, `w` following `u` with `tau_s`; the paper's share.
 fn stiffness(gain: f64, tau_s: f64) -> Vec<(f64, f64)> {
     with_share(1.0 / 11.0, gain, tau_s)
 }
@@ -39,7 +40,8 @@ fn with_share(share: f64, gain: f64, tau_s: f64) -> Vec<(f64, f64)> {
     spring.collect()
 }
 
-/// Each row's command and stiffness, where the spring sees what `amplifier` makes of the command, millisecond by millisecond.
+/// Command and stiffness of every row; `amplifier` maps the command to the spring's voltage, millisecond by
+/// millisecond.
 fn seen_through(
     volts: impl Iterator<Item = f64>,
     share: f64,
@@ -60,24 +62,24 @@ fn seen_through(
     spring.collect()
 }
 
-/// Independent noise of 1 V.
+/// White noise of 1 V.
 fn noise(seed: u64, rows: usize) -> Vec<f64> {
     Noise::white(0.2).draw(&mut ChaCha8Rng::seed_from_u64(seed), rows)
 }
 
-/// The paper's spring, each reading made from the exact one and its noise.
+/// The paper's spring; `reading(row, exact, noise)` gives each reading, in V.
 fn read(seed: u64, reading: impl Fn(usize, f64, f64) -> f64) -> Vec<(f64, f64)> {
     let exact = stiffness(1.0, 5.5);
     let noise = noise(seed, exact.len());
     exact.into_iter().zip(noise).enumerate().map(|(row, ((u, y), noise))| (u, reading(row, y, noise))).collect()
 }
 
-/// What is said of readings.
+/// Diagnosis of readings with the paper's plant.
 fn diagnosed(rows: &[(f64, f64)]) -> Value {
     diagnosed_in(rows, None)
 }
 
-/// What is said of them beside a plant file.
+/// Diagnosis of readings with a plant file.
 fn diagnosed_with(rows: &[(f64, f64)], plant: &str) -> Value {
     diagnosed_in(rows, Some(plant))
 }
@@ -98,9 +100,9 @@ fn causes(report: &Value) -> Vec<&str> {
     report["findings"].as_array().unwrap().iter().map(|finding| finding["cause"].as_str().unwrap()).collect()
 }
 
-/// All that a quick spring shows is just after the steps.
+/// The response of a fast spring is visible in the first rows after each step only.
 #[test]
-fn a_quick_spring_is_no_row_of_outliers() {
+fn a_fast_spring_is_not_mistaken_for_outliers() {
     for (seed, tau_s) in [(1, 0.5), (2, 1.0), (3, 1.2)] {
         let exact = stiffness(1.0, tau_s);
         let noise = noise(seed, exact.len());
@@ -113,7 +115,7 @@ fn a_quick_spring_is_no_row_of_outliers() {
 }
 
 #[test]
-fn a_record_without_noise_is_read_as_it_is() {
+fn noise_free_records_are_diagnosed_correctly() {
     let as_is: fn(f64) -> f64 = |y| y;
     for round in [as_is, |y| (y * 1e3).round() / 1e3, |y| (y * 1e2).round() / 1e2] {
         let rounded = |gain, tau_s| stiffness(gain, tau_s).into_iter().map(|(u, y)| (u, round(y))).collect::<Vec<_>>();
@@ -124,12 +126,12 @@ fn a_record_without_noise_is_read_as_it_is() {
     }
 }
 
-/// A spring that the tick cannot run is named all the same, and its file says that it is not for the tick.
+/// A spring that the control tick cannot run is named, and the report states why the tick rejects it.
 #[test]
-fn a_spring_beyond_the_tick_is_told() {
+fn a_spring_that_the_tick_rejects_is_reported() {
     let report = diagnosed(&with_share(0.95, 1.0, 5.5));
     assert_eq!(causes(&report), ["instantaneous-share"], "{report}");
-    let refused = report["extended"]["tick_refuses"].as_str().expect("why");
-    assert!(refused.contains("relaxation.share") && refused.contains("0 to 0.9"), "{refused}");
+    let reason = report["extended"]["tick_refuses"].as_str().expect("why");
+    assert!(reason.contains("relaxation.share") && reason.contains("0 to 0.9"), "{reason}");
     assert!(diagnosed(&stiffness(0.9, 5.5))["extended"]["tick_refuses"].is_null());
 }

@@ -1,11 +1,11 @@
-//! What is said to show shows, and not much less does.
+//! The detection margins that a consistent diagnosis states: errors of that size are found, much smaller ones are not.
 
 use super::{ROWS_PER_LEVEL, SAMPLE_S, diagnosed, noise, read, stiffness};
 
 const RECORDS: u64 = 5;
 
-/// How many records of a spring that far off are not said to agree.
-fn shown(first_seed: u64, gain: f64, tau_s: f64) -> usize {
+/// Number of records of a spring with this gain and time constant whose verdict is not `consistent`.
+fn detected(first_seed: u64, gain: f64, tau_s: f64) -> usize {
     let agrees = |seed| {
         let exact = stiffness(gain, tau_s);
         let noise = noise(seed, exact.len());
@@ -16,23 +16,23 @@ fn shown(first_seed: u64, gain: f64, tau_s: f64) -> usize {
 }
 
 #[test]
-fn an_error_as_large_as_the_margin_shows() {
+fn an_error_of_the_margins_size_is_detected_and_one_of_0_4_times_is_not() {
     let exact = stiffness(1.0, 5.5);
     let noise = noise(100, exact.len());
     let rows: Vec<_> = exact.into_iter().zip(noise).map(|((u, y), noise)| (u, y + noise)).collect();
     let report = diagnosed(&rows);
     let [gain, time_constant] =
         ["gain", "time_constant"].map(|of| report["would_show"][of].as_f64().expect("a margin"));
-    // Nine of ten are foretold; and of those 0.4 times as large few.
-    assert!(shown(200, 1.0 + gain, 5.5) >= 4, "{gain}");
-    assert!(shown(300, 1.0, 5.5 * (1.0 + time_constant)) >= 4, "{time_constant}");
-    assert!(shown(400, 1.0 + 0.4 * gain, 5.5) <= 2, "{gain}");
-    assert!(shown(500, 1.0, 5.5 * (1.0 + 0.4 * time_constant)) <= 2, "{time_constant}");
+    // Nine of ten are expected to be detected, and few of those 0.4 times as large.
+    assert!(detected(200, 1.0 + gain, 5.5) >= 4, "{gain}");
+    assert!(detected(300, 1.0, 5.5 * (1.0 + time_constant)) >= 4, "{time_constant}");
+    assert!(detected(400, 1.0 + 0.4 * gain, 5.5) <= 2, "{gain}");
+    assert!(detected(500, 1.0, 5.5 * (1.0 + 0.4 * time_constant)) <= 2, "{time_constant}");
 }
 
 #[test]
-fn a_record_that_would_not_show_a_gain_off_by_half_cannot_tell() {
-    // Steps of 2 V in noise of 1 V, from just before the first one on.
+fn a_record_that_could_not_show_a_gain_error_of_half_is_insufficient() {
+    // Steps of 2 V in noise of 1 V, starting just before the first step.
     let exact = stiffness(1.0, 5.5).split_off(ROWS_PER_LEVEL - 10);
     let noise = noise(7, exact.len());
     let rows = |rows: usize| -> Vec<(f64, f64)> {
@@ -44,9 +44,9 @@ fn a_record_that_would_not_show_a_gain_off_by_half_cannot_tell() {
     assert!(!report["next_experiment"].is_null(), "{report}");
 }
 
-/// A gain that swings slowly looks like noise with a long memory: it is named as such at least, with what would tell.
+/// A slowly oscillating gain resembles strongly autocorrelated noise: the report at least proposes the next experiment.
 #[test]
-fn what_may_hide_in_noise_that_wanders_is_said() {
+fn an_effect_that_resembles_autocorrelated_noise_is_not_explained() {
     let swinging = |part: f64| {
         let swing = move |row: usize| 1.0 + part * (row as f64 * SAMPLE_S / 80.0 * std::f64::consts::TAU).sin();
         diagnosed(&read(9, |row, y, noise| swing(row) * y + noise))

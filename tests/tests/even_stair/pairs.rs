@@ -1,10 +1,11 @@
-//! Two causes of which each alone seems to leave nothing that the other could explain.
+//! Pairs of causes of which each alone seems to explain the whole error.
 
 use std::collections::VecDeque;
 
 use super::{LEVELS_V, ROWS_PER_LEVEL, causes, diagnosed, noise, seen_through};
 
-/// The stair, read from a spring of another share behind an amplifier, which is asked 1000 times a second.
+/// Diagnosis of the stair with a spring of the instantaneous share `share` after an amplifier, evaluated 1000 times per
+/// second.
 fn found(seed: u64, share: f64, amplifier: impl FnMut(f64) -> f64) -> serde_json::Value {
     let volts = LEVELS_V.into_iter().flat_map(|volts| std::iter::repeat_n(volts, ROWS_PER_LEVEL));
     let exact = seen_through(volts, share, amplifier);
@@ -12,10 +13,10 @@ fn found(seed: u64, share: f64, amplifier: impl FnMut(f64) -> f64) -> serde_json
     diagnosed(&exact.into_iter().zip(noise).map(|((u, y), noise)| (u, y + noise)).collect::<Vec<_>>())
 }
 
-/// Without the delay, the rows just after a step are few and far off, as outliers are; with it, a part of a row more does
-/// what a larger share does.
+/// Without the delay, the few rows after a step resemble outliers; with it, a fraction of a row resembles a larger
+/// share.
 #[test]
-fn a_share_is_found_beside_a_delay() {
+fn a_delay_and_an_instantaneous_share_are_both_found() {
     for (seed, delay_ms) in [(1, 330), (2, 550), (3, 870)] {
         let mut on_the_way = VecDeque::from(vec![0.0; delay_ms]);
         let report = found(seed, 0.25, |volts| {
@@ -36,7 +37,7 @@ fn a_share_is_found_beside_a_delay() {
 }
 
 #[test]
-fn a_share_is_found_behind_a_slow_amplifier() {
+fn a_slew_limit_and_an_instantaneous_share_are_both_found() {
     for (seed, volts_per_s) in [(4, 120.0), (5, 170.0), (6, 240.0)] {
         let mut out = 0.0;
         let report = found(seed, 0.3, |volts: f64| {

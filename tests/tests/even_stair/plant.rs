@@ -1,4 +1,4 @@
-//! A plant file that says what the spring has not.
+//! Plant files with an effect that the spring does not have.
 
 use serde_json::Value;
 
@@ -7,7 +7,7 @@ use super::{causes, diagnosed_with, noise, with_share};
 const RELAXATION: &str = "[relaxation]\nshare = 0.09090909090909091\n";
 const MEMORY: &str = "[memory]\ndirect = 0.7\nthresholds_v = [20.0, 50.0]\nweights = [0.2, 0.1]\n";
 
-/// Each part with what stands behind it in the file.
+/// Name of each part of a plant file, its text, and the text of the relaxation before it.
 const PARTS: [(&str, &str, &str); 6] = [
     ("memory", MEMORY, "tau_s = 5.5\n"),
     ("law", "[law]\nvoltage_v = [0, 200, 350, 500]\nstiffness = [0, 160, 310, 500]\n", "tau_s = 5.5\n"),
@@ -17,7 +17,7 @@ const PARTS: [(&str, &str, &str); 6] = [
     ("relaxation.weights", "", "tau_s = [5.5, 40.0]\nweights = [0.75, 0.1590909090909091]\n"),
 ];
 
-fn told(gain: f64, seed: u64, part: &str, relaxation: &str) -> Value {
+fn diagnosis_of(gain: f64, seed: u64, part: &str, relaxation: &str) -> Value {
     let exact = with_share(1.0 / 11.0, gain, 5.5);
     let noise = noise(seed, exact.len());
     let rows: Vec<_> = exact.into_iter().zip(noise).map(|((u, y), noise)| (u, y + noise)).collect();
@@ -30,7 +30,7 @@ fn it_is_taken_out_and_what_is_wrong_beside_it_is_named() {
         // A law times a gain is another law.
         let gains = if name == "law" { &[(1.0, None)][..] } else { &[(1.0, None), (1.1, Some("gain-error"))] };
         for &(gain, wrong) in gains {
-            let report = told(gain, seed as u64, part, relaxation);
+            let report = diagnosis_of(gain, seed as u64, part, relaxation);
             assert_eq!(report["take_out"], serde_json::json!([name]), "{report}");
             assert_eq!(report["verdict"], "explained", "{name}: {report}");
             assert_eq!(causes(&report), Vec::from_iter(wrong), "{name}: {report}");
@@ -42,11 +42,11 @@ fn it_is_taken_out_and_what_is_wrong_beside_it_is_named() {
 
 #[test]
 fn what_the_spring_has_stays() {
-    // What an amplifier never comes near takes nothing off.
-    let report = told(1.1, 1, "[amplifier]\nlimit_v = 690.0\n", "tau_s = 5.5\n");
+    // A limit that the record never reaches is not removed.
+    let report = diagnosis_of(1.1, 1, "[amplifier]\nlimit_v = 690.0\n", "tau_s = 5.5\n");
     assert!(report["take_out"].is_null() && causes(&report) == ["gain-error"], "{report}");
     // The same spring, its gain written as a law.
     let law = "[law]\nvoltage_v = [0, 500]\nstiffness = [0, 550]\n";
-    let report = told(1.1, 2, law, "tau_s = 5.5\n");
+    let report = diagnosis_of(1.1, 2, law, "tau_s = 5.5\n");
     assert!(report["take_out"].is_null() && report["verdict"] == "consistent", "{report}");
 }

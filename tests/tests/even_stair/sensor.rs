@@ -1,10 +1,10 @@
-//! What a sensor makes of the readings.
+//! Sensor faults and sensor noise.
 
 use super::{causes, diagnosed, noise, read, stiffness};
 
-/// What a cable, a unit or a wrong channel makes is no spring's, however full the schedule.
+/// Readings of a wrong unit, a broken cable or a wrong channel are not those of a spring.
 #[test]
-fn a_sensor_that_reads_no_spring_is_told() {
+fn readings_of_a_wrong_scale_or_without_response_are_unexplained() {
     let exact = stiffness(1.0, 5.5);
     let noise = noise(4, exact.len());
     for scale in [0.0, 1000.0, 0.001, -1.0] {
@@ -12,17 +12,19 @@ fn a_sensor_that_reads_no_spring_is_told() {
         let rows: Vec<_> = exact.iter().zip(noise).map(|((u, y), noise)| (*u, scale * y + noise)).collect();
         let report = diagnosed(&rows);
         assert_eq!(report["verdict"], "unexplained", "{scale}: {report}");
-        let told = report["leftover"].as_str().unwrap();
-        let times = told.strip_prefix("The readings are ").and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
-        let right = times.map_or(told.contains("do not follow"), |times| (times - scale).abs() <= 0.01 * scale.abs());
+        let leftover = report["leftover"].as_str().unwrap();
+        let times =
+            leftover.strip_prefix("The readings are ").and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
+        let right =
+            times.map_or(leftover.contains("do not follow"), |times| (times - scale).abs() <= 0.01 * scale.abs());
         assert!(right && times.is_some() == (scale != 0.0), "{scale}: {report}");
         assert!(report["next_experiment"].as_str().unwrap().contains("sensor"), "{scale}: {report}");
     }
 }
 
-/// A sensor that stays where it is has noise, which no spring explains.
+/// A constant reading with noise is not explained by any spring.
 #[test]
-fn a_sensor_that_stands_still_is_told() {
+fn a_constant_reading_is_unexplained() {
     for (seed, (level, scatter)) in
         [(0.0, 1.0), (42.0, 0.02), (42.0, 20.0), (200.0, 1.0), (600.0, 1.0)].into_iter().enumerate()
     {
@@ -33,18 +35,18 @@ fn a_sensor_that_stands_still_is_told() {
     }
 }
 
-/// A part of what is read: ten times as much at the top as at rest.
+/// The noise at full scale is ten times as large as at rest.
 #[test]
-fn noise_that_grows_with_the_reading_is_no_cause() {
+fn noise_that_grows_with_the_reading_gets_no_finding() {
     for seed in 0..12 {
         let report = diagnosed(&read(seed, |_, y, noise| y + (0.2 + 0.004 * y) * noise));
         assert_eq!(report["verdict"], "consistent", "{seed}: {report}");
     }
 }
 
-/// A step that is no multiple of the last digit printed, by a converter that rounds and by one that cuts off.
+/// A quantisation step that is not a multiple of the last printed digit, by a rounding and by a truncating converter.
 #[test]
-fn a_step_is_found_behind_the_digits_that_were_printed() {
+fn a_quantisation_step_is_found_in_rounded_decimal_readings() {
     const STEP: f64 = 9.7737;
     for (seed, digits) in [(1, 1), (2, 2), (3, 4)] {
         let unit = 10f64.powi(digits);
@@ -61,9 +63,9 @@ fn a_step_is_found_behind_the_digits_that_were_printed() {
     }
 }
 
-/// A sensor stops where it comes to; a code above all else, now and then, is a reading that failed.
+/// A saturating sensor stops at its limit; an isolated code above all others is a failed reading.
 #[test]
-fn a_code_that_stands_alone_is_an_outlier() {
+fn an_isolated_code_is_an_outlier_and_not_saturation() {
     let failed = |row: usize| row * 37 % 101 < 2;
     let report = diagnosed(&read(5, |row, y, noise| if failed(row) { 1000.0 } else { y + noise }));
     assert_eq!(causes(&report), ["outliers"], "{report}");
@@ -71,9 +73,9 @@ fn a_code_that_stands_alone_is_an_outlier() {
     assert_eq!(causes(&stopped), ["sensor-saturation"], "{stopped}");
 }
 
-/// Far readings in runs to one side are no outliers: here each is held for five rows.
+/// Runs of deviating readings to one side are not outliers: here each reading is repeated for five rows.
 #[test]
-fn held_readings_are_no_outliers() {
+fn repeated_readings_are_not_outliers() {
     let fresh = read(6, |_, y, noise| y + noise);
     let held: Vec<(f64, f64)> = fresh.iter().enumerate().map(|(row, (u, _))| (*u, fresh[row / 5 * 5].1)).collect();
     let report = diagnosed(&held);

@@ -1,16 +1,16 @@
-//! Where a record begins.
+//! The initial state of a record.
 
 use std::collections::VecDeque;
 
 use super::{LEVELS_V, ROWS_PER_LEVEL, SAMPLE_S, causes, diagnosed, noise, read};
 
-/// At 0 V, but still on the way down from a voltage before; few readings tell of it.
+/// The record starts at 0 V while the spring still relaxes from an earlier voltage.
 #[test]
-fn a_spring_still_on_its_way_down_is_no_cause() {
+fn a_spring_that_still_relaxes_at_the_start_gets_no_finding() {
     for (seed, rest) in [(1, 5), (2, 10), (3, 60)] {
         let before = |row: usize| 120.0 * (-(row as f64) * SAMPLE_S / 5.5).exp() * 10.0 / 11.0;
         let skipped = ROWS_PER_LEVEL - rest;
-        // All of it shifted in time: what was left at the first row decays beside all that comes.
+        // The rest at the first row decays in addition to the response to the commands.
         let rows: Vec<_> =
             read(seed, |row, y, noise| if row < skipped { y } else { y + before(row - skipped) + noise });
         let report = diagnosed(&rows[skipped..]);
@@ -18,9 +18,9 @@ fn a_spring_still_on_its_way_down_is_no_cause() {
     }
 }
 
-/// Play operators that come from a large voltage, read by a sensor that was then set to zero.
+/// Play operators with an initial condition on the descending branch, and a sensor that was zeroed there.
 #[test]
-fn hysteresis_is_found_on_the_branch_that_comes_down_too() {
+fn hysteresis_that_starts_on_the_descending_branch_is_found() {
     const PLAYS: [(f64, f64); 3] = [(15.0, 0.1), (50.0, 0.1), (100.0, 0.1)];
     let kept = (-SAMPLE_S / 5.5).exp();
     let mut plays = PLAYS.map(|(threshold, _)| threshold);
@@ -46,10 +46,10 @@ fn hysteresis_is_found_on_the_branch_that_comes_down_too() {
     assert!(report["extended"]["rmse"].as_f64().unwrap() < 1.1, "{report}");
 }
 
-/// Rows before the record, of the longer one that it is cut out of: 0.3 s after a step from 150 to 370 V.
+/// Number of rows before the record in the longer one that it is cut from: 0.3 s after a step from 150 to 370 V.
 const CUT: usize = 790;
 
-/// A stair of uneven steps, and what a spring answers row by row, cut.
+/// A record cut from a longer stair of uneven steps; `spring` maps each row's voltage to its stiffness.
 fn cut(seed: u64, spring: impl FnMut(f64) -> f64) -> Vec<(f64, f64)> {
     const LEVELS_V: [f64; 10] = [0.0, 320.0, 500.0, 150.0, 430.0, 240.0, 370.0, 60.0, 460.0, 200.0];
     let step = |index: usize| (LEVELS_V[index * 3 % 10], 40 + index * 37 % 61);
@@ -60,7 +60,7 @@ fn cut(seed: u64, spring: impl FnMut(f64) -> f64) -> Vec<(f64, f64)> {
     volts.iter().copied().zip(read.collect::<Vec<_>>()).skip(CUT).collect()
 }
 
-/// What follows its input with a time constant, as it is when the input comes.
+/// First-order lag with the time constant `tau_s`; returns its output before the input acts.
 fn lag(tau_s: f64) -> impl FnMut(f64) -> f64 {
     let (kept, mut value) = ((-SAMPLE_S / tau_s).exp(), 0.0);
     move |input| {
@@ -74,7 +74,7 @@ fn relaxed(mut lag: impl FnMut(f64) -> f64) -> impl FnMut(f64) -> f64 {
     move |volts| volts / 11.0 + lag(volts) * 10.0 / 11.0
 }
 
-/// What was leaked, crept or swinging, sent or slewed before the first row is no cause of its own.
+/// The state of leakage, creep, resonance, delay or slew before the first row must not cause a finding of its own.
 #[test]
 fn a_cause_is_found_in_a_record_cut_out_of_a_longer_one() {
     let leaking = || {
@@ -85,7 +85,7 @@ fn a_cause_is_found_in_a_record_cut_out_of_a_longer_one() {
         let (mut spring, mut slow) = (relaxed(lag(5.5)), lag(40.0));
         move |volts| 0.85 * spring(volts) + 0.15 * slow(volts)
     };
-    // What comes at once swings at 0.6 Hz, damped by 0.05: (x - e) and its rate turn by an angle a row.
+    // The instantaneous part oscillates at 0.6 Hz with a damping ratio of 0.05; its state rotates by an angle per row.
     let swinging = || {
         let (mut spring, mut last, mut x, mut rate) = (relaxed(lag(5.5)), 0.0, 0.0, 0.0);
         move |volts: f64| {
@@ -105,7 +105,7 @@ fn a_cause_is_found_in_a_record_cut_out_of_a_longer_one() {
         let (mut spring, mut sent) = (relaxed(lag(5.5)), VecDeque::from([0.0; 5]));
         move |volts| {
             sent.push_back(volts);
-            spring(sent.pop_front().expect("five"))
+            spring(sent.pop_front().expect("the queue has five entries"))
         }
     };
     let slewing = || {

@@ -1,12 +1,12 @@
-//! The voltage goes up and down without end: what swings with it may pass for a resonance.
+//! Periodic sweeps, in which a static nonlinearity may be confused with a resonance.
 
 use std::f64::consts::{PI, TAU};
 
 use super::{SAMPLE_S, causes, diagnosed, noise, seen_through};
 
-/// A law whose ends and middle are where they should be: no bend of any size lessens what it leaves.
+/// An S-shaped law that is exact at both ends and in the middle, so that a single bend does not reduce the error.
 #[test]
-fn a_law_like_an_s_is_no_resonance() {
+fn an_s_shaped_nonlinearity_is_not_mistaken_for_a_resonance() {
     let sine = |turns: f64| 0.5 - 0.5 * (TAU * turns).cos();
     let triangle = |turns: f64| 1.0 - (2.0 * turns.fract() - 1.0).abs();
     let forms: [fn(f64) -> f64; 2] = [sine, triangle];

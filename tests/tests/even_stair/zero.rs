@@ -1,20 +1,20 @@
-//! What is shifted all along: a sensor whose zero is off, a converter that cuts off.
+//! Constant offsets: a sensor with a zero error, a truncating converter.
 
 use super::{causes, diagnosed, read};
 
-/// `None` where the cause has another name.
+/// Offset of the finding `reading-offset`, in V; `None` if the record has no such finding.
 fn offset(report: &serde_json::Value) -> Option<f64> {
     report["findings"].as_array()?.iter().find(|it| it["cause"] == "reading-offset")?["parameters"]["offset"]["value"]
         .as_f64()
 }
 
 #[test]
-fn a_zero_that_is_off_is_one_number() {
+fn a_zero_error_is_found_as_one_offset() {
     for (seed, zero) in [(1, 15.0), (2, -15.0), (3, 4.0)] {
         let report = diagnosed(&read(seed, |_, y, noise| y + noise + zero));
         assert_eq!(causes(&report), ["reading-offset"], "{zero}: {report}");
         assert!((offset(&report).unwrap() - zero).abs() < 0.2, "{zero}: {report}");
-        // What holds all along is foretold.
+        // A constant offset is predicted in held-out segments too.
         assert!(report["extended"]["held_out_rmse"].as_f64().unwrap() < 1.1, "{zero}: {report}");
         let report = diagnosed(&read(seed, |_, y, noise| 1.1 * y + noise + zero));
         assert!(offset(&report).is_some_and(|found| (found - zero).abs() < 0.5), "{zero}: {report}");
@@ -22,21 +22,21 @@ fn a_zero_that_is_off_is_one_number() {
     }
 }
 
-/// Half a step all along is what a converter cuts off, not the sensor's zero.
+/// An offset of half a step is due to the truncation, not to the sensor's zero.
 #[test]
-fn what_is_cut_off_is_no_shift() {
+fn truncation_is_quantisation_and_not_an_offset() {
     for (seed, step) in [(1, 6.0), (2, 10.115), (3, 12.0), (4, 14.6), (5, 15.7), (6, 17.5)] {
         let report = diagnosed(&read(seed, |_, y, noise| step * ((y + noise) / step).floor()));
         assert_eq!(causes(&report), ["quantisation"], "{step}: {report}");
     }
-    // One that rounds keeps the zero that is off.
+    // With a rounding converter the zero error is found too.
     let report = diagnosed(&read(7, |_, y, noise| 12.0 * ((y + noise + 20.0) / 12.0).round()));
     assert!(offset(&report).is_some_and(|found| (found - 20.0).abs() < 1.0), "{report}");
 }
 
-/// What no cause explains is told by its time.
+/// An error that no cause explains is located in time.
 #[test]
-fn a_sensor_that_sticks_for_a_while_is_told_by_its_time() {
+fn a_sensor_that_sticks_for_a_while_is_reported_with_its_time() {
     let fresh = read(8, |_, y, noise| y + noise);
     // Over two steps of the stair.
     let stuck = 1100..1600;
@@ -45,7 +45,7 @@ fn a_sensor_that_sticks_for_a_while_is_told_by_its_time() {
         .collect();
     let report = diagnosed(&rows);
     assert_eq!(report["verdict"], "unexplained", "{report}");
-    let told = report["leftover"].as_str().unwrap();
-    let times: Vec<f64> = told.split(" s").filter_map(|part| part.rsplit(' ').next()?.parse().ok()).collect();
-    assert!(times.iter().any(|time| (110.0..160.0).contains(time)), "{told}");
+    let leftover = report["leftover"].as_str().unwrap();
+    let times: Vec<f64> = leftover.split(" s").filter_map(|part| part.rsplit(' ').next()?.parse().ok()).collect();
+    assert!(times.iter().any(|time| (110.0..160.0).contains(time)), "{leftover}");
 }

@@ -1,4 +1,4 @@
-//! Hides effects in records and asks `vsj diagnose` for their names: `cargo campaign`.
+//! `cargo campaign`: diagnoses simulated records with known effects and counts the causes that are named.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -9,20 +9,21 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use validation::campaign::aim::{self, Aim};
-use validation::campaign::ladder::{self, RUNGS};
+use validation::campaign::diagnosis::diagnose;
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
-use validation::campaign::seam::diagnose;
-use validation::campaign::{rivals, strangers, tables};
-use validation::hidden::noise::{Kind, Noise};
-use validation::hidden::record::Recipe;
-use validation::hidden::strangers::Form;
-use validation::hidden::{self, Cause, Hidden};
+use validation::campaign::sensitivity::{self, SIZES};
+use validation::campaign::{criteria, out_of_model, rivals, tables};
+use validation::criterion::{self, Criterion};
+use validation::ground_truth::noise::{Kind, Noise};
+use validation::ground_truth::out_of_model::form::Form;
+use validation::ground_truth::record::Recipe;
+use validation::ground_truth::{self, Cause, LabelledRecord};
 
-/// Hide effects in records of a simulated spring and ask `vsj diagnose` for their names.
+/// Diagnose simulated records with known effects and count the causes that `vsj diagnose` names.
 ///
-/// The simulator shares no code with vsj. Every record comes from a seed; the same seeds make the same records, to the bit.
+/// The simulator shares no code with the diagnosis. Every record is drawn from a seed; the same seeds give the same
+/// records, to the bit.
 #[derive(Parser)]
 #[command(
     name = "cargo campaign",
@@ -34,93 +35,118 @@ Examples:
   cargo campaign --first-seed 2 --docs docs/identification
   cargo campaign --write out/hidden --cause hysteresis --seed 3
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
-  cargo campaign rivals                      beside PySINDy and SysIdentPy
-  RAYON_NUM_THREADS=1 cargo campaign speed   seconds by rows and noise, each record alone on the machine
+  cargo campaign rivals                      comparison with PySINDy and SysIdentPy
+  RAYON_NUM_THREADS=1 cargo campaign speed   CPU time by rows and noise, one record at a time
 
-Exit codes: 0 success, 1 an aim was not met or the work failed, 2 bad arguments."
+Exit codes: 0 success, 1 a criterion is not met or the work failed, 2 bad arguments."
 )]
 struct Cli {
     /// Parts to run
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
-    /// Records per cause (singles, forms, stress, small, noise, speed), per form (strangers), per pair, or in all (nulls,
-    /// triples)
+    /// Records per cause (singles, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
+    /// long), or in total (nulls, triples)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
-    /// Where the seeds start: another number, other records
+    /// First seed; another number gives other records
     #[arg(long, default_value_t = 1, value_name = "N")]
     first_seed: u64,
-    /// One JSON object on stdout, every record in it
+    /// Print one JSON object with every record
     #[arg(long)]
     json: bool,
-    /// Write the tables to this folder, one Markdown file a part
+    /// Write the tables to this folder, one Markdown file per part
     #[arg(long, value_name = "DIR")]
     docs: Option<PathBuf>,
-    /// Diagnose nothing; write one record as CSV, and the truth about it as JSON
+    /// Do not diagnose; write one record as CSV and its true values as JSON
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
     #[command(flatten)]
     record: Wanted,
 }
 
-/// The record to write.
+/// Options of the record to write.
 #[derive(clap::Args)]
 struct Wanted {
-    /// What to hide in the record; may be repeated, without it nothing is hidden. Of strangers, only the forms of these
+    /// Cause in the record; repeatable, none by default. With out-of-model, only the forms of these causes
     #[arg(long, value_name = "CAUSE", value_parser = cause)]
     cause: Vec<Cause>,
-    /// The record's seed
+    /// Seed of the record
     #[arg(long, default_value_t = 1, value_name = "N", requires = "write")]
     seed: u64,
-    /// Size of the effects, 1 is plain to see
+    /// Size of the effects, from 0 for none to 1 for full size
     #[arg(long, default_value_t = 1.0, value_name = "X", requires = "write", value_parser = size)]
     size: f64,
     /// Kind of noise
     #[arg(long, default_value = "white", requires = "write")]
     noise: NoiseKind,
-    /// Strength of the noise in percent of 500 V
+    /// Standard deviation of the noise in percent of 500 V
     #[arg(long, default_value_t = 0.2, value_name = "PERCENT", requires = "write", value_parser = positive)]
     noise_percent: f64,
     /// Number of rows
     #[arg(long, default_value_t = 2401, value_name = "N", requires = "write", value_parser = clap::value_parser!(u32).range(10..))]
     rows: u32,
-    /// Steps of time that differ, rows that are missing
+    /// Uneven time steps and missing rows
     #[arg(long, requires = "write")]
     uneven: bool,
-    /// A form of the effect that is not the plain one
+    /// Another physical form of the effect than the first
     #[arg(long, requires = "write")]
     other_form: bool,
-    /// Instead, a stranger by the name of its form, in white noise of 0.2 %: "output resistance"
-    #[arg(long, value_name = "NAME", requires = "write", value_parser = stranger, conflicts_with_all = ["cause", "size", "rows"])]
-    stranger: Option<Form>,
+    /// Instead, a form of the out-of-model test set by its name, such as "output resistance", in white noise of 0.2 %
+    #[arg(
+        long,
+        alias = "stranger",
+        value_name = "NAME",
+        requires = "write",
+        value_parser = form,
+        conflicts_with_all = ["cause", "size", "rows"]
+    )]
+    out_of_model: Option<Form>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Part {
-    /// One effect, plain to see: 20 records of each cause
+    /// One effect of full size: 20 records of each cause
     Singles,
-    /// The same in other physical forms: 20 of each
+    /// One effect in another physical form: 20 records of each cause
     Forms,
-    /// No effect; white, coloured, heavy-tailed noise: 500
+    /// No effect; white, coloured, heavy-tailed noise: 500 records
     Nulls,
-    /// Two effects of different blocks: 3 of every pair
+    /// Two effects of different blocks: 3 records of every pair
     Pairs,
-    /// Three effects of different blocks: 100
+    /// Three effects of different blocks: 100 records
     Triples,
-    /// Two effects in records of 20 000 rows, white and coloured noise: 1 of every pair
+    /// Two effects in records of 20 000 rows, white and coloured noise: 1 record of every pair
     Long,
-    /// One effect in short, uneven, coloured, heavy-tailed, noisy records: 5 of each cause
+    /// One effect in few rows, uneven rows, coloured, heavy-tailed or strong noise: 5 records of each cause
     Stress,
-    /// How small an effect may be: 20 of each cause and size
+    /// Smallest effect that is named: 20 records of each cause and size
     Small,
-    /// The same at 0.1, 0.2, 0.5 and 1 % noise
+    /// Smallest effect that is named at 0.1, 0.2, 0.5 and 1 % noise
     Noise,
-    /// Seconds of a processor for 2401 to 100 000 rows, in white and coloured noise: one record of each cause
+    /// CPU time for 2401 to 100 000 rows, white and coloured noise: 1 record of each cause
     Speed,
-    /// One effect by laws that the diagnosis was not made with: 5 of each
-    Strangers,
-    /// Beside PySINDy and SysIdentPy: one record of each cause, and one of none
+    /// One effect by laws that the diagnosis does not model: 5 records of each
+    #[value(alias = "strangers")]
+    OutOfModel,
+    /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
     Rivals,
+}
+
+impl Part {
+    /// Name on the command line and of the page.
+    fn name(self) -> String {
+        self.to_possible_value().expect("no part is skipped").get_name().to_owned()
+    }
+
+    /// Title of the page.
+    fn title(self) -> String {
+        if self == Self::OutOfModel { "Out of model".to_owned() } else { format!("{self:?}") }
+    }
+
+    /// Key in the JSON object.
+    fn key(self) -> String {
+        if self == Self::OutOfModel { "strangers".to_owned() } else { self.name() }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -142,8 +168,8 @@ impl From<NoiseKind> for Kind {
     }
 }
 
-fn stranger(name: &str) -> Result<Form, String> {
-    let forms = hidden::strangers::all();
+fn form(name: &str) -> Result<Form, String> {
+    let forms = ground_truth::out_of_model::all();
     let names: Vec<&str> = forms.iter().map(|form| form.name).collect();
     forms.iter().find(|form| form.name == name).copied().ok_or_else(|| format!("expected one of: {}", names.join(", ")))
 }
@@ -163,28 +189,28 @@ fn positive(text: &str) -> Result<f64, String> {
     if number > 0.0 && number <= 100.0 { Ok(number) } else { Err("expected above 0, at most 100".to_owned()) }
 }
 
-/// What a part says.
+/// Result of a part.
 struct Done {
     part: Part,
     markdown: String,
     wrong: String,
-    aims: Vec<Aim>,
+    criteria: Vec<Criterion>,
     json: Value,
 }
 
 fn main() -> ExitCode {
-    // `cargo campaign -- singles` is meant as `cargo campaign singles`.
+    // Accept `cargo campaign -- singles` as `cargo campaign singles`.
     let arguments = std::env::args().enumerate().filter(|(index, text)| !(*index == 1 && text == "--"));
     let cli = Cli::parse_from(arguments.map(|(_, text)| text));
-    let picks = cli.write.is_some() || cli.parts.iter().all(|part| *part == Part::Strangers);
+    let picks = cli.write.is_some() || cli.parts.iter().all(|part| *part == Part::OutOfModel);
     if !cli.record.cause.is_empty() && !picks {
-        let told = "--cause: expected --write, or strangers as the only part";
-        Cli::command().error(ErrorKind::ArgumentConflict, told).exit();
+        let message = "--cause: expected --write, or out-of-model as the only part";
+        Cli::command().error(ErrorKind::ArgumentConflict, message).exit();
     }
-    aim::exit_code(run(&cli))
+    criterion::exit_code(run(&cli))
 }
 
-/// True if every aim was met.
+/// True if every criterion is met.
 fn run(cli: &Cli) -> Result<bool> {
     if let Some(folder) = &cli.write {
         return write(folder, &cli.record).map(|()| true);
@@ -196,18 +222,17 @@ fn run(cli: &Cli) -> Result<bool> {
             result.write(folder)?;
         }
         if !cli.json {
-            print!("## {:?}\n\n{}\n{}", part, result.markdown, result.wrong);
-            result.aims.iter().for_each(|aim| println!("- {aim}"));
+            print!("## {}\n\n{}\n{}", part.title(), result.markdown, result.wrong);
+            result.criteria.iter().for_each(|criterion| println!("- {criterion}"));
             println!();
         }
         done.push(result);
     }
     if cli.json {
-        let parts: serde_json::Map<_, _> =
-            done.iter().map(|done| (format!("{:?}", done.part).to_lowercase(), done.json.clone())).collect();
+        let parts: serde_json::Map<_, _> = done.iter().map(|done| (done.part.key(), done.json.clone())).collect();
         println!("{}", Value::Object(parts));
     }
-    Ok(done.iter().flat_map(|done| &done.aims).all(Aim::is_met))
+    Ok(done.iter().flat_map(|done| &done.criteria).all(Criterion::is_met))
 }
 
 impl Cli {
@@ -218,44 +243,44 @@ impl Cli {
     fn part(&self, part: Part) -> Result<Done> {
         let first = self.first_seed;
         match part {
-            Part::Singles => self.jobs(part, &part::singles(first, self.count(20)), aim::singles),
+            Part::Singles => self.jobs(part, &part::singles(first, self.count(20)), criteria::singles),
             Part::Forms => self.jobs(part, &part::forms(first, self.count(20)), |_| Vec::new()),
-            Part::Nulls => self.jobs(part, &part::nulls(first, self.count(500)), aim::nulls),
-            Part::Pairs => self.jobs(part, &part::pairs(first, self.count(3)), aim::pairs),
-            Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), aim::triples),
-            Part::Long => self.jobs(part, &part::long(first, self.count(1)), aim::pairs),
+            Part::Nulls => self.jobs(part, &part::nulls(first, self.count(500)), criteria::nulls),
+            Part::Pairs => self.jobs(part, &part::pairs(first, self.count(3)), criteria::pairs),
+            Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), criteria::triples),
+            Part::Long => self.jobs(part, &part::long(first, self.count(1)), criteria::pairs),
             Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
             Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
-            Part::Small => self.climbs(part, &[0.2]),
-            Part::Noise => self.climbs(part, &[0.1, 0.2, 0.5, 1.0]),
-            Part::Strangers => {
-                let (mut forms, causes) = (hidden::strangers::all(), &self.record.cause);
-                let mut jobs = strangers::jobs(&forms, first, self.count(5));
+            Part::Small => self.sensitivities(part, &[0.2]),
+            Part::Noise => self.sensitivities(part, &[0.1, 0.2, 0.5, 1.0]),
+            Part::OutOfModel => {
+                let (mut forms, causes) = (ground_truth::out_of_model::all(), &self.record.cause);
+                let mut jobs = out_of_model::jobs(&forms, first, self.count(5));
                 if !causes.is_empty() {
                     forms.retain(|form| causes.contains(&form.cause));
                     jobs.retain(|(form, _)| causes.contains(&form.cause));
                 }
-                let bar = bar("strangers", jobs.len())?;
-                let answers = strangers::run(&jobs, &diagnose, &bar)?;
+                let bar = bar("out-of-model", jobs.len())?;
+                let answers = out_of_model::run(&jobs, &diagnose, &bar)?;
                 bar.finish_and_clear();
-                let (markdown, wrong) = (strangers::page(&forms, &answers), strangers::wrong(&forms, &answers));
-                Ok(Done { part, markdown, wrong, aims: Vec::new(), json: json!(answers) })
+                let (markdown, wrong) = (out_of_model::page(&forms, &answers), out_of_model::wrong(&forms, &answers));
+                Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!(answers) })
             }
             Part::Rivals => {
                 let bar = bar("rivals", rivals::RECORDS)?;
                 let rows = rivals::run(first, &bar)?;
                 bar.finish_and_clear();
                 let markdown = rivals::table(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), aims: Vec::new(), json: json!(rows) })
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows) })
             }
         }
     }
 
-    fn jobs(&self, part: Part, jobs: &[Job], aims: fn(&[Outcome]) -> Vec<Aim>) -> Result<Done> {
+    fn jobs(&self, part: Part, jobs: &[Job], criteria: fn(&[Outcome]) -> Vec<Criterion>) -> Result<Done> {
         let bar = bar(&format!("{part:?}"), jobs.len())?;
         let outcomes = part::run(jobs, &diagnose, &bar);
         bar.finish_and_clear();
-        // A report that never comes is a fault of the set-up, not of the diagnosis.
+        // If every record fails, the set-up is at fault, not the diagnosis.
         if let Some(failure) = outcomes.iter().find_map(|outcome| outcome.failure.as_ref())
             && outcomes.iter().all(|outcome| outcome.failure.is_some())
         {
@@ -276,45 +301,45 @@ impl Cli {
             write!(markdown, "\n{}", tables::confusion(&outcomes))?;
         }
         let wrong = tables::wrong(jobs, &outcomes);
-        let aims = aims(&outcomes);
-        let json = json!({"aims": aims, "records": outcomes});
-        Ok(Done { part, markdown, wrong, aims, json })
+        let criteria = criteria(&outcomes);
+        let json = json!({"aims": criteria, "records": outcomes});
+        Ok(Done { part, markdown, wrong, criteria, json })
     }
 
-    fn climbs(&self, part: Part, levels: &[f64]) -> Result<Done> {
+    fn sensitivities(&self, part: Part, levels: &[f64]) -> Result<Done> {
         let count = self.count(20);
-        // As many as there may be: most climbs end on the first rungs.
-        let bar = bar(&format!("{part:?}, at most"), levels.len() * Cause::ALL.len() * RUNGS.len() * count)?;
+        // The largest possible number: most searches end at the first sizes.
+        let bar = bar(&format!("{part:?}, at most"), levels.len() * Cause::ALL.len() * SIZES.len() * count)?;
         let each = levels.iter().flat_map(|&level| Cause::ALL.map(|cause| (level, cause)));
-        let climbs: Vec<_> =
-            each.map(|(level, cause)| ladder::climb(cause, level, self.first_seed, count, &diagnose, &bar)).collect();
+        let found: Vec<_> = each
+            .map(|(level, cause)| sensitivity::measure(cause, level, self.first_seed, count, &diagnose, &bar))
+            .collect();
         bar.finish_and_clear();
         let small = part == Part::Small;
-        let markdown = if small { tables::ladder(&climbs) } else { tables::noise(&climbs) };
-        let aims = if small { aim::small(&climbs) } else { Vec::new() };
-        let json = json!({"aims": aims, "climbs": climbs});
-        Ok(Done { part, markdown, wrong: String::new(), aims, json })
+        let markdown = if small { tables::sensitivity(&found) } else { tables::noise(&found) };
+        let criteria = if small { criteria::small(&found) } else { Vec::new() };
+        let json = json!({"aims": criteria, "climbs": found});
+        Ok(Done { part, markdown, wrong: String::new(), criteria, json })
     }
 }
 
 impl Done {
     fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-        let name = format!("{:?}", self.part).to_lowercase();
-        let path = folder.join(format!("{name}.md"));
+        let path = folder.join(format!("{}.md", self.part.name()));
         let arguments: Vec<String> = std::env::args().skip(1).collect();
-        let mut text =
-            format!("# {:?}\n\nPrinted by `cargo campaign {}`.\n\n{}", self.part, arguments.join(" "), self.markdown);
-        if !self.aims.is_empty() {
+        let (title, command) = (self.part.title(), arguments.join(" "));
+        let mut text = format!("# {title}\n\nPrinted by `cargo campaign {command}`.\n\n{}", self.markdown);
+        if !self.criteria.is_empty() {
             text.push('\n');
-            self.aims.iter().try_for_each(|aim| writeln!(text, "- {aim}"))?;
+            self.criteria.iter().try_for_each(|criterion| writeln!(text, "- {criterion}"))?;
         }
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 }
 
 fn bar(what: &str, length: usize) -> Result<ProgressBar> {
-    let style = ProgressStyle::with_template("{msg} {bar:40} {pos} of {len}, {elapsed}, {eta} to go")?;
+    let style = ProgressStyle::with_template("{msg} {bar:40} {pos} of {len}, {elapsed}, {eta} left")?;
     Ok(ProgressBar::new(length as u64).with_style(style).with_message(what.to_owned()))
 }
 
@@ -329,15 +354,15 @@ fn write(folder: &Path, wanted: &Wanted) -> Result<()> {
         rows: wanted.rows as usize,
         uneven: wanted.uneven,
     };
-    let (what, hidden): (String, Hidden) = match wanted.stranger {
+    let (name, record): (String, LabelledRecord) = match wanted.out_of_model {
         Some(form) => (form.name.replace(' ', "-"), form.draw(wanted.seed)),
         None => {
-            let hidden = recipe.draw(wanted.seed).at(wanted.size);
-            let names: Vec<_> = hidden.effects.iter().map(|effect| effect.cause.name()).collect();
-            (if names.is_empty() { "nothing".to_owned() } else { names.join("+") }, hidden)
+            let record = recipe.draw(wanted.seed).at(wanted.size);
+            let names: Vec<_> = record.effects.iter().map(|effect| effect.cause.name()).collect();
+            (if names.is_empty() { "nothing".to_owned() } else { names.join("+") }, record)
         }
     };
-    for path in hidden.write(folder, &format!("{what}-{}", wanted.seed))? {
+    for path in record.write(folder, &format!("{name}-{}", wanted.seed))? {
         println!("wrote {}", path.display());
     }
     Ok(())

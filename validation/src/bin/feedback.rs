@@ -1,4 +1,4 @@
-//! What a stiffness sensor is worth, effect by effect, and what its failures do: `cargo feedback`.
+//! `cargo feedback`: the benefit of a stiffness sensor, effect by effect, and the response to its failures.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -7,19 +7,19 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, anyhow};
 use clap::Parser;
 use model::{Amplifier, Approach, Compensation, Feedback, Settings};
-use validation::campaign::aim::{self, Aim};
-use validation::closed_loop::{effects, failing, tables};
+use validation::closed_loop::{effects, sensor_failure, tables};
+use validation::criterion::{self, Criterion};
 
-/// Run the controller around springs with hidden effects, with a stiffness sensor and without.
+/// Run the controller in closed loop with springs with known effects, with a stiffness sensor and without.
 ///
-/// Exit codes: 0 success, 1 an aim was not met or the work failed, 2 bad arguments.
+/// Exit codes: 0 success, 1 a criterion is not met or the work failed, 2 bad arguments.
 #[derive(Parser)]
 #[command(name = "cargo feedback", bin_name = "cargo feedback")]
 struct Cli {
-    /// Springs of each effect
+    /// Springs with each effect
     #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Where the seeds start: another number, other springs
+    /// First seed; another number gives other springs
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(..1_000_000))]
     first_seed: u64,
     /// Write the tables to this file
@@ -28,10 +28,10 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    aim::exit_code(run(&Cli::parse()))
+    criterion::exit_code(run(&Cli::parse()))
 }
 
-/// True if every aim was met.
+/// True if every criterion is met.
 fn run(cli: &Cli) -> Result<bool> {
     let feedback = Feedback::TYPICAL;
     let paper = Settings { feedback: Some(feedback), ..Settings::PAPER };
@@ -41,22 +41,22 @@ fn run(cli: &Cli) -> Result<bool> {
         ..paper
     };
     let mut text = String::new();
-    let mut aims: Vec<Aim> = Vec::new();
+    let mut criteria: Vec<Criterion> = Vec::new();
     for (name, settings) in [("The paper's controller at 700 V", paper), ("The fast controller at 1000 V", fast)] {
-        let refused = |error| anyhow!("{name}: {error}");
-        let outcomes = effects::all(&settings, cli.seeds, cli.first_seed).map_err(refused)?;
+        let rejected = |error| anyhow!("{name}: {error}");
+        let outcomes = effects::all(&settings, cli.seeds, cli.first_seed).map_err(rejected)?;
         write!(text, "## {name}\n\n{}\n", tables::effects(&outcomes))?;
         // At rest at 500 V, and in the middle of the step down from there.
-        let consequences = failing::all(&settings, cli.first_seed, &[140.0, 150.2]).map_err(refused)?;
-        write!(text, "### Its sensor fails for {} s\n\n{}\n", failing::FAILS_S, tables::failures(&consequences))?;
-        aims.extend(tables::aims(name, &outcomes, feedback.noise_v));
+        let responses = sensor_failure::all(&settings, cli.first_seed, &[140.0, 150.2]).map_err(rejected)?;
+        write!(text, "### Sensor failure for {} s\n\n{}\n", sensor_failure::FAILS_S, tables::failures(&responses))?;
+        criteria.extend(tables::criteria(name, &outcomes, feedback.noise_v));
     }
-    text.push_str("## Asked for\n\n");
-    aims.iter().try_for_each(|aim| writeln!(text, "- {aim}"))?;
+    text.push_str("## Acceptance criteria\n\n");
+    criteria.iter().try_for_each(|criterion| writeln!(text, "- {criterion}"))?;
     print!("{text}");
     if let Some(path) = &cli.docs {
         let page = format!("{}\n{text}", include_str!("feedback.md"));
         std::fs::write(path, page).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    Ok(aims.iter().all(Aim::is_met))
+    Ok(criteria.iter().all(Criterion::is_met))
 }

@@ -1,41 +1,42 @@
-//! The smallest effect that can be detected: by a likelihood-ratio test that is told the structure.
+//! The smallest effect that an oracle detector, a likelihood-ratio test with known structure, can detect.
 //!
-//! The test knows the paper's plant, the noise (white, Gaussian) and what to look for; it has to find the effect's k
-//! unknown values. At the 5 % level it detects an effect in 95 % of the records if the noncentrality, the sum of squares of
-//! what the effect changes over the noise's variance, is [`NONCENTRALITY`] (noncentral chi-square, k degrees of freedom).
+//! The test knows the paper's plant, the noise (white, Gaussian) and the cause; it estimates the effect's k unknown
+//! values. At the 5 % level it detects the effect in 95 % of the records if the noncentrality, the sum of squares of
+//! the change of the expected readings over the variance of the noise, is [`NONCENTRALITY`] (noncentral chi-square, k
+//! degrees of freedom).
 //!
-//! Where an effect is no shift of the expected readings, an equivalent stands in:
-//! - Quantisation: a test of the residual's variance, which rounding raises by step^2/12. Finding the lattice itself needs
-//!   no size at all, but a lattice finer than this hides in the noise.
+//! Where an effect does not shift the expected readings, an equivalent test is used:
+//! - Quantisation: a test of the residual's variance, which rounding increases by step^2/12. The quantisation grid
+//! itself
+//!   could be found at any step size, but is not visible below this one in the noise.
 //! - Outliers: the likelihood ratio of the true [`mixture`](super::mixture).
-//! - Saturation: the shift by which the bound clips the expected readings; that clipped readings repeat to the bit is left
-//!   out.
-//! - Delay and slew: against the least of them (see [`Effect::least`](crate::hidden::Effect::least)), not against none.
+//! - Saturation: the shift by which the limit clips the expected readings; that clipped readings are identical is not
+//! used.
+//! - Delay and slew: compared with the smallest one (see [`Effect::least`](crate::ground_truth::Effect::least)), not
+//! with none.
 
 use super::mixture::Mixture;
-use crate::hidden::{Cause, Hidden};
+use super::statistics::NORMAL_95;
+use crate::ground_truth::{Cause, LabelledRecord};
 
-/// By number of unknowns, from 1. From the noncentral chi-square distribution.
+/// Noncentrality for a detection probability of 95 % at the 5 % level, by the number of unknown values from 1 to 3.
 pub const NONCENTRALITY: [f64; 3] = [12.9947, 15.4432, 17.1699];
 
-/// One-sided 95 % point of the normal distribution.
-pub(super) const NORMAL_95: f64 = 1.6449;
-
-/// The detectable size of the record's one effect. None if even the plain effect is too small.
+/// Detectable size of the record's effect, as a fraction of its full size; `None` if full size is too small.
 ///
 /// # Panics
-/// If the record doesn't hide exactly one effect.
-pub fn size(hidden: &Hidden) -> Option<f64> {
-    let [effect] = hidden.effects.as_slice() else { panic!("one effect at a time") };
+/// If the record does not have exactly one effect.
+pub fn size(hidden: &LabelledRecord) -> Option<f64> {
+    let [effect] = hidden.effects.as_slice() else { panic!("expected exactly one effect") };
     let (rows, sigma) = (hidden.readings.read.len() as f64, hidden.noise.sigma_v);
     match effect.cause {
         Cause::Quantisation => {
-            // A variance 1 + r times as large: r sqrt(n/2) = 1.645 + 1.645 (1 + r).
+            // The variance is 1 + r times that of the noise, with r sqrt(n/2) = 1.645 + 1.645 (1 + r).
             let scatter = NORMAL_95 * (2.0 / rows).sqrt();
             let step = sigma * (12.0 * 2.0 * scatter / (1.0 - scatter)).sqrt();
-            Some(step / effect.plain[0]).filter(|&size| size <= 1.0)
+            Some(step / effect.full_size[0]).filter(|&size| size <= 1.0)
         }
-        Cause::Outliers => smallest(|size| Mixture::of(effect, size, sigma).detected(rows)),
+        Cause::Outliers => smallest(|size| Mixture::of(effect, size, sigma).excess_over_noise(rows)),
         cause => {
             let least = hidden.at(effect.least());
             let needed = NONCENTRALITY[cause.facts().unknowns - 1];
@@ -48,7 +49,7 @@ pub fn size(hidden: &Hidden) -> Option<f64> {
     }
 }
 
-/// The least size, to a percent, from where on `excess` is positive; none if it isn't at 1.
+/// Smallest size, to 1 %, at which `excess` is positive; `None` if it is negative at size 1.
 pub(super) fn smallest(excess: impl Fn(f64) -> f64) -> Option<f64> {
     if excess(1.0) < 0.0 {
         return None;
@@ -67,10 +68,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::hidden::noise::Noise;
-    use crate::hidden::record::Recipe;
+    use crate::ground_truth::noise::Noise;
+    use crate::ground_truth::record::Recipe;
 
-    /// The test itself, on noisy readings: a gain's estimate is linear in them, so that its statistic is a formula.
+    /// Runs the test on noisy readings: the estimate of a gain is linear in them, so that its statistic has a closed
+    /// form.
     #[test]
     fn a_gain_of_the_detectable_size_is_detected_in_95_percent() {
         let hidden = Recipe::of(&[Cause::GainError]).draw(5);
@@ -89,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn every_cause_has_a_detectable_size_below_its_plain_one() {
+    fn every_cause_has_a_detectable_size_below_half_its_full_size() {
         for cause in Cause::ALL {
             let size = size(&Recipe::of(&[cause]).draw(11));
             assert!(size.is_some_and(|size| (1e-4..0.5).contains(&size)), "{cause}: {size:?}");

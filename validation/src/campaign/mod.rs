@@ -1,27 +1,32 @@
-//! Hides effects in many records, has each diagnosed, and counts what was named.
+//! The identification campaign: diagnoses many records with known effects and counts the causes that are named.
 //!
-//! | module | what it is |
+//! In: records of [`ground_truth`](crate::ground_truth). Out: counts, accuracies and detection limits with their
+//! acceptance criteria, as Markdown and as data to serialise.
+//!
+//! | module | contents |
 //! | --- | --- |
-//! | [`seam`] | the one place that calls the diagnosis |
-//! | [`part`] | which records a part of the campaign is made of |
-//! | [`score`], [`summary`] | what became of one record, and of many |
-//! | [`bound`] | how near a parameter can come at best |
-//! | [`detectable`], [`apart`], [`mixture`], [`ladder`] | the smallest effect that can be seen, told from others, and that is named |
-//! | [`aim`] | what is asked for, and whether it came out |
-//! | [`tables`] | all of it as Markdown |
-//! | [`rivals`] | what other tools make of the same records |
-//! | [`strangers`] | records of laws that the diagnosis was not made with |
+//! | [`statistics`] | a normal quantile and sample quantiles |
+//! | [`diagnosis`] | the only module that calls `identify` |
+//! | [`cramer_rao`] | lower bound of a parameter's error |
+//! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
+//! | [`score`] | the diagnosis of one record compared with the truth |
+//! | [`part`], [`summary`] | the parts of the campaign, and the counts over their records |
+//! | [`sensitivity`] | the smallest effect that is named |
+//! | [`out_of_model`] | records of laws that the diagnosis does not model |
+//! | [`rivals`] | other identification tools on the same records |
+//! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
 
-pub mod aim;
-pub mod apart;
-pub mod bound;
+pub mod cramer_rao;
+pub mod criteria;
 pub mod detectable;
-pub mod ladder;
+pub mod diagnosis;
+pub mod isolable;
 pub mod mixture;
+pub mod out_of_model;
 pub mod part;
 pub mod rivals;
 pub mod score;
-pub mod seam;
-pub mod strangers;
+pub mod sensitivity;
+pub mod statistics;
 pub mod summary;
 pub mod tables;

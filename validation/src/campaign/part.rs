@@ -1,4 +1,4 @@
-//! The parts of the campaign and the records that each is made of.
+//! The parts of the campaign and the records in each.
 
 use indicatif::ProgressBar;
 use rand::seq::IndexedRandom;
@@ -6,24 +6,24 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::diagnosis::Diagnose;
 use super::score::Outcome;
-use super::seam::Diagnose;
-use crate::hidden::cause::{Block, Cause};
-use crate::hidden::noise::{Kind, Noise};
-use crate::hidden::record::Recipe;
+use crate::ground_truth::cause::{Block, Cause};
+use crate::ground_truth::noise::{Kind, Noise};
+use crate::ground_truth::record::Recipe;
 
-/// A record to make, and in which line of the part's table it counts.
+/// A record to simulate and diagnose.
 #[derive(Clone, Debug)]
 pub struct Job {
-    /// The line.
+    /// Row of the part's table in which the record counts.
     pub group: String,
-    /// What to hide.
+    /// Causes, noise and rows of the record.
     pub recipe: Recipe,
-    /// In which record.
+    /// Seed of the record.
     pub seed: u64,
 }
 
-/// Seeds of the records of a part; parts never share a record.
+/// Seed of record `index` of a part; seeds of different parts do not overlap.
 pub(super) fn seed(first: u64, part: u64, index: usize) -> u64 {
     first.wrapping_mul(1_000_000_007) + part * 100_000_000 + index as u64
 }
@@ -48,7 +48,7 @@ fn each_cause(first: u64, part: u64, count: usize, causes: &[Cause], change: imp
     causes.iter().flat_map(|cause| (0..count).map(move |k| (cause, k))).enumerate().map(job).collect()
 }
 
-/// `count` records of the paper's spring: white, coloured (both kinds) and heavy-tailed noise in turn.
+/// `count` records of the paper's spring with white, coloured (both kinds) and heavy-tailed noise in turn.
 pub fn nulls(first: u64, count: usize) -> Vec<Job> {
     const TURN: [Kind; 6] =
         [Kind::White, Kind::Coloured, Kind::HeavyTailed, Kind::White, Kind::OneOverF, Kind::HeavyTailed];
@@ -62,7 +62,7 @@ pub fn nulls(first: u64, count: usize) -> Vec<Job> {
     jobs
 }
 
-/// `count` records of every two causes of different blocks.
+/// `count` records of every pair of causes of different blocks.
 pub fn pairs(first: u64, count: usize) -> Vec<Job> {
     let mut jobs = Vec::new();
     for (i, &a) in Cause::ALL.iter().enumerate() {
@@ -73,7 +73,8 @@ pub fn pairs(first: u64, count: usize) -> Vec<Job> {
     numbered(first, 4, jobs)
 }
 
-/// `count` records of 20 000 rows of every two causes of different blocks: white and coloured noise (both kinds) in turn.
+/// `count` records of 20 000 rows of every pair of causes of different blocks, with white and coloured noise (both
+/// kinds) in turn.
 pub fn long(first: u64, count: usize) -> Vec<Job> {
     let kinds = [Kind::White, Kind::Coloured, Kind::OneOverF].into_iter().cycle();
     let longer = |(job, kind): (Job, Kind)| {
@@ -85,7 +86,7 @@ pub fn long(first: u64, count: usize) -> Vec<Job> {
     jobs
 }
 
-/// `count` records of three causes of three different blocks, drawn at random.
+/// `count` records of three random causes of three different blocks.
 pub fn triples(first: u64, count: usize) -> Vec<Job> {
     let mut random = ChaCha8Rng::seed_from_u64(seed(first, 5, 0));
     let jobs = (0..count).map(|_| {
@@ -101,17 +102,17 @@ pub fn triples(first: u64, count: usize) -> Vec<Job> {
     numbered(first, 5, jobs)
 }
 
-/// `count` records of each cause with what makes it hard: few rows, uneven rows, coloured and heavy-tailed noise.
+/// `count` records of each cause under each difficulty: few rows, uneven rows, coloured, heavy-tailed and strong noise.
 pub fn stress(first: u64, count: usize) -> Vec<Job> {
-    let plain = Recipe::of(&[]);
+    let reference = Recipe::of(&[]);
     let hard = [
-        ("600 rows", Recipe { rows: 600, ..plain.clone() }),
-        ("uneven rows", Recipe { uneven: true, ..plain.clone() }),
-        ("600 uneven rows", Recipe { rows: 600, uneven: true, ..plain.clone() }),
-        ("coloured noise, AR(1)", Recipe { noise: plain.noise.of(Kind::Coloured), ..plain.clone() }),
-        ("coloured noise, 1/f", Recipe { noise: plain.noise.of(Kind::OneOverF), ..plain.clone() }),
-        ("heavy-tailed noise", Recipe { noise: plain.noise.of(Kind::HeavyTailed), ..plain.clone() }),
-        ("1 % noise", Recipe { noise: Noise::white(1.0), ..plain.clone() }),
+        ("600 rows", Recipe { rows: 600, ..reference.clone() }),
+        ("uneven rows", Recipe { uneven: true, ..reference.clone() }),
+        ("600 uneven rows", Recipe { rows: 600, uneven: true, ..reference.clone() }),
+        ("coloured noise, AR(1)", Recipe { noise: reference.noise.of(Kind::Coloured), ..reference.clone() }),
+        ("coloured noise, 1/f", Recipe { noise: reference.noise.of(Kind::OneOverF), ..reference.clone() }),
+        ("heavy-tailed noise", Recipe { noise: reference.noise.of(Kind::HeavyTailed), ..reference.clone() }),
+        ("1 % noise", Recipe { noise: Noise::white(1.0), ..reference.clone() }),
     ];
     let jobs = hard.iter().flat_map(|(group, recipe)| {
         Cause::ALL.into_iter().flat_map(move |cause| {
@@ -123,8 +124,8 @@ pub fn stress(first: u64, count: usize) -> Vec<Job> {
     numbered(first, 6, jobs)
 }
 
-/// `count` records of each cause of 2401 to 100 000 rows: white and coloured noise (both kinds). Every length has the same
-/// schedules and values.
+/// `count` records of each cause of 2401 to 100 000 rows, with white and coloured noise (both kinds). Records of every
+/// length have the same schedules and values.
 pub fn speed(first: u64, count: usize) -> Vec<Job> {
     let of = |kind, rows| {
         let change = move |recipe| Recipe { noise: Noise::white(0.2).of(kind), rows, ..recipe };
@@ -138,7 +139,7 @@ pub fn speed(first: u64, count: usize) -> Vec<Job> {
         .collect()
 }
 
-/// Several causes in one record, counted by their blocks.
+/// A record with several causes, grouped by their blocks.
 fn several(causes: &[Cause]) -> Job {
     let mut blocks: Vec<_> = causes.iter().map(|cause| cause.block()).collect();
     blocks.sort_unstable();
@@ -151,7 +152,7 @@ fn numbered(first: u64, part: u64, jobs: Vec<Job>) -> Vec<Job> {
     jobs.into_iter().enumerate().map(numbered).collect()
 }
 
-/// Makes the records and has them diagnosed, on all cores. Outcomes come in the order of the jobs.
+/// Simulates and diagnoses the records on all cores; the outcomes are in the order of the jobs.
 pub fn run(jobs: &[Job], diagnose: &Diagnose<'_>, progress: &ProgressBar) -> Vec<Outcome> {
     let one = |job: &Job| {
         let outcome = Outcome::of(&job.recipe.draw(job.seed), diagnose);
@@ -166,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_are_made_of_what_they_say() {
+    fn parts_have_the_documented_records_and_share_none() {
         assert_eq!(singles(1, 20).len(), 360);
         let nulls = nulls(1, 500);
         let of = |kind| nulls.iter().filter(|job| job.recipe.noise.kind == kind).count();
@@ -186,6 +187,6 @@ mod tests {
         let mut seeds: Vec<_> = all.iter().map(|job| job.seed).collect();
         seeds.sort_unstable();
         seeds.dedup();
-        assert_eq!(seeds.len(), all.len(), "no two jobs share a record");
+        assert_eq!(seeds.len(), all.len(), "two jobs share a record");
     }
 }

@@ -1,15 +1,15 @@
-//! What became of one record.
+//! The diagnosis of one record compared with its true causes and values.
 
 use std::collections::BTreeMap;
 
 use cpu_time::ThreadTime;
 use serde::{Deserialize, Serialize};
 
-use super::bound;
-use super::seam::Diagnose;
-use crate::hidden::{Cause, Hidden};
+use super::cramer_rao;
+use super::diagnosis::Diagnose;
+use crate::ground_truth::{Cause, LabelledRecord};
 
-/// What of a report is scored.
+/// The fields of a report that are scored.
 #[derive(Debug, Deserialize)]
 pub(super) struct Report {
     pub(super) verdict: String,
@@ -38,51 +38,51 @@ struct Extended {
     held_out_rmse: Option<f64>,
 }
 
-/// What was hidden, what was named.
+/// True and named causes of one record.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
-    /// Of the record.
+    /// Seed of the record.
     pub seed: u64,
-    /// The causes that are in it.
+    /// True causes.
     pub hidden: Vec<&'static str>,
-    /// The verdict; `failed` if there was no report.
+    /// Verdict; `failed` if there was no report.
     pub verdict: String,
-    /// The causes that were found, in order.
+    /// Named causes, in the order of the findings.
     pub found: Vec<String>,
-    /// The verdict is `ambiguous`, and one of the alternatives is the truth.
+    /// True if the verdict is `ambiguous` and one alternative is the set of true causes.
     pub truth_among_alternatives: bool,
-    /// Of every cause that was rightly found.
+    /// Parameters of every correct finding.
     pub parameters: Vec<Estimate>,
-    /// Held-out error of the extended model over what the true spring leaves.
+    /// Held-out error of the extended model, relative to the error of the true spring.
     pub held_out_ratio: Option<f64>,
-    /// Of a processor, for the diagnosis, in s.
+    /// CPU time of the diagnosis, in s.
     pub seconds: f64,
-    /// Why there was no report.
+    /// Error message if there was no report.
     pub failure: Option<String>,
 }
 
-/// A parameter of a finding beside the truth.
+/// A parameter of a finding compared with its true value.
 #[derive(Clone, Debug, Serialize)]
 pub struct Estimate {
-    /// Of which cause.
+    /// Cause that the parameter belongs to.
     pub cause: Cause,
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// In the record.
+    /// True value.
     pub truth: f64,
-    /// As found; none if the finding lacks it.
+    /// Estimated value; `None` if the finding lacks it.
     pub value: Option<f64>,
-    /// Relative error, absolute; infinite where the finding lacks the value.
+    /// Absolute relative error; infinite if the finding lacks the value.
     pub error: f64,
-    /// The truth lies within the finding's 95 % bounds.
+    /// True if the 95 % interval of the finding contains the true value.
     pub covered: bool,
-    /// The least median of the error that is possible in this record, where there is such a bound.
+    /// Cramer-Rao bound of the median error in this record, where there is one.
     pub at_best: Option<f64>,
 }
 
 impl Outcome {
-    /// Has a record diagnosed and scores the answer.
-    pub fn of(hidden: &Hidden, diagnose: &Diagnose<'_>) -> Self {
+    /// Diagnoses a record and scores the report.
+    pub fn of(hidden: &LabelledRecord, diagnose: &Diagnose<'_>) -> Self {
         let start = ThreadTime::now();
         let answer =
             diagnose(hidden).and_then(|report| serde_json::from_value::<Report>(report).map_err(anyhow::Error::from));
@@ -117,30 +117,30 @@ impl Outcome {
         outcome
     }
 
-    /// The finding that explains most is one of the hidden causes.
+    /// True if the first finding is one of the true causes.
     pub fn first_is_right(&self) -> bool {
         self.found.first().is_some_and(|first| self.hidden.contains(&first.as_str()))
     }
 
-    /// Every hidden cause was found.
+    /// True if every true cause is named.
     pub fn all_named(&self) -> bool {
         self.failure.is_none() && self.hidden.iter().all(|name| self.found.iter().any(|found| found == name))
     }
 
-    /// The verdict fits what is hidden: nothing, or something that has a name.
+    /// True if the verdict is correct: `consistent` without an effect, `explained` or `ambiguous` with one.
     pub fn verdict_is_right(&self) -> bool {
         let right: &[&str] = if self.hidden.is_empty() { &["consistent"] } else { &["explained", "ambiguous"] };
         right.contains(&self.verdict.as_str())
     }
 
-    /// Nothing was found that isn't there.
+    /// True if no other cause than the true ones is named.
     pub fn nothing_extra(&self) -> bool {
         self.failure.is_none() && self.found.iter().all(|found| self.hidden.contains(&found.as_str()))
     }
 }
 
-/// Every parameter of a finding that is right in its cause; those of the contract even if they are missing.
-fn estimates(hidden: &Hidden, finding: &Finding) -> Vec<Estimate> {
+/// Every parameter of a finding whose cause is correct, including the documented ones that the finding lacks.
+fn estimates(hidden: &LabelledRecord, finding: &Finding) -> Vec<Estimate> {
     let Some(cause) = Cause::named(&finding.cause) else { return Vec::new() };
     let missing = cause.facts().parameters.iter().filter(|&&name| !finding.parameters.contains_key(name));
     let names = finding.parameters.keys().map(String::as_str).chain(missing.copied());
@@ -153,7 +153,7 @@ fn estimates(hidden: &Hidden, finding: &Finding) -> Vec<Estimate> {
                 found.low.is_some_and(|low| low <= truth) && found.high.is_some_and(|high| truth <= high)
             });
             let error = value.map_or(f64::INFINITY, |value| ((value - truth) / scale).abs());
-            let at_best = bound::median_error(hidden, cause, name);
+            let at_best = cramer_rao::median_error(hidden, cause, name);
             Some(Estimate { cause, name: name.to_owned(), truth, value, error, covered, at_best })
         })
         .collect()
@@ -164,7 +164,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::hidden::record::Recipe;
+    use crate::ground_truth::record::Recipe;
 
     fn report(cause: &str, parameters: serde_json::Value) -> serde_json::Value {
         json!({"verdict": "explained", "findings": [{"cause": cause, "parameters": parameters}],
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_right_answer_scores_and_a_wrong_one_does_not() {
+    fn correct_findings_score_and_false_or_missing_ones_do_not() {
         let hidden = Recipe::of(&[Cause::GainError]).draw(1);
         let (gain, _) = hidden.true_value(Cause::GainError, "gain").unwrap();
         let right = json!({"gain": {"value": gain * 1.02, "low": gain * 1.01, "high": gain * 1.03}});
@@ -186,7 +186,7 @@ mod tests {
         let outcome = Outcome::of(&hidden, &|_| Ok(report("drift", json!({}))));
         assert!(!outcome.first_is_right() && !outcome.all_named() && !outcome.nothing_extra());
         let outcome = Outcome::of(&hidden, &|_| Ok(report("gain-error", json!({}))));
-        assert!(outcome.parameters[0].error.is_infinite(), "a parameter that is missing is no estimate");
+        assert!(outcome.parameters[0].error.is_infinite(), "a missing parameter has an infinite error");
         let outcome = Outcome::of(&hidden, &|_| anyhow::bail!("no"));
         assert!(!outcome.all_named() && !outcome.nothing_extra() && !outcome.verdict_is_right());
         let null = Recipe::of(&[]).draw(1);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_static_curve_is_scored_at_the_voltage_in_the_parameters_name() {
+    fn a_static_nonlinearity_is_scored_at_the_voltage_in_the_parameters_name() {
         let hidden = Recipe::of(&[Cause::StaticNonlinearity]).draw(1);
         let at = hidden.effects[0].law().unwrap().at(250.0);
         let curve = json!({"at_250_v": {"value": at, "low": at - 1.0, "high": at + 1.0}});

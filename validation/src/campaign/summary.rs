@@ -1,60 +1,62 @@
-//! What became of many records.
+//! Counts and medians over many scored records.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::part::Job;
-use super::score::Outcome;
+use super::score::{Estimate, Outcome};
+use super::statistics::quantile;
+use crate::ground_truth::Cause;
 
-/// Counts over the records of one line of a table.
+/// Counts over the records of one table row.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// The line.
+    /// Name of the row.
     pub group: String,
     /// Number of records.
     pub records: usize,
-    /// First finding right, in parts of 1. Without a hidden cause, 0.
+    /// Fraction of records whose first finding is a true cause; 0 without an effect.
     pub first: f64,
-    /// Every hidden cause named, in parts of 1.
+    /// Fraction of records of which every true cause is named.
     pub all_named: f64,
-    /// No finding that isn't there, in parts of 1.
+    /// Fraction of records without a false finding.
     pub nothing_extra: f64,
-    /// The verdict fits, in parts of 1.
+    /// Fraction of records with a correct verdict.
     pub verdict_right: f64,
-    /// Ambiguous with the truth among the alternatives, in parts of 1.
+    /// Fraction of records that are ambiguous with the true causes among the alternatives.
     pub truth_among_alternatives: f64,
-    /// Verdicts and their number.
+    /// Number of records by verdict.
     pub verdicts: BTreeMap<String, usize>,
-    /// By cause and parameter.
+    /// Accuracy of every estimated parameter.
     pub parameters: Vec<Accuracy>,
-    /// Median over the records, of the held-out error over what the true spring leaves.
+    /// Median over the records of the held-out error, relative to the error of the true spring.
     pub held_out_ratio: Option<f64>,
-    /// The same, 95 of 100 are below.
+    /// 95 % quantile of that ratio.
     pub held_out_ratio_95: Option<f64>,
-    /// Median time of a diagnosis, in s of a processor.
+    /// Median CPU time of a diagnosis, in s.
     pub seconds: Option<f64>,
 }
 
-/// How well a parameter came out.
+/// Accuracy of one parameter over many records.
 #[derive(Clone, Debug, Serialize)]
 pub struct Accuracy {
-    /// Of which cause.
+    /// Cause that the parameter belongs to.
     pub cause: &'static str,
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// How often it was estimated.
+    /// Number of estimates.
     pub estimates: usize,
-    /// Median of the relative error.
+    /// Median of the absolute relative error.
     pub median_error: f64,
-    /// The least that was possible: median over the records, of those that have a bound.
+    /// Median of the Cramer-Rao bound, over the records that have one.
     pub at_best: Option<f64>,
-    /// How often the 95 % bounds held the truth, in parts of 1.
+    /// Fraction of the 95 % intervals that contain the true value.
     pub covered: f64,
 }
 
 impl Summary {
-    /// Of the outcomes of `jobs`, in one line for each group, in the order of the jobs.
+    /// Summaries of the outcomes of `jobs`, one for each group, in the order of the jobs.
     pub fn by_group(jobs: &[Job], outcomes: &[Outcome]) -> Vec<Self> {
         let mut groups: Vec<(&str, Vec<&Outcome>)> = Vec::new();
         for (job, outcome) in jobs.iter().zip(outcomes) {
@@ -66,7 +68,7 @@ impl Summary {
         groups.into_iter().map(|(group, outcomes)| Self::of(group, &outcomes)).collect()
     }
 
-    /// Of all outcomes in one.
+    /// Summary of all outcomes in one row named `group`.
     pub fn of(group: &str, outcomes: &[&Outcome]) -> Self {
         let mut verdicts = BTreeMap::new();
         for outcome in outcomes {
@@ -96,8 +98,8 @@ fn accuracies(outcomes: &[&Outcome]) -> Vec<Accuracy> {
     for estimate in outcomes.iter().flat_map(|outcome| &outcome.parameters) {
         found.entry((estimate.cause, estimate.name.clone())).or_default().push(estimate);
     }
-    let accuracy = |((cause, name), estimates): ((crate::hidden::Cause, String), Vec<_>)| {
-        let estimates: Vec<&super::score::Estimate> = estimates;
+    let accuracy = |((cause, name), estimates): ((Cause, String), Vec<_>)| {
+        let estimates: Vec<&Estimate> = estimates;
         let errors: Vec<f64> = estimates.iter().map(|estimate| estimate.error).collect();
         Accuracy {
             cause: cause.name(),
@@ -113,12 +115,4 @@ fn accuracies(outcomes: &[&Outcome]) -> Vec<Accuracy> {
 
 fn share<T>(all: &[T], is: impl Fn(&T) -> bool) -> f64 {
     all.iter().filter(|one| is(one)).count() as f64 / all.len().max(1) as f64
-}
-
-/// The value that a part of the values is at most; none of none.
-pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().checked_sub(1)?;
-    Some(sorted[(part * last as f64).round() as usize])
 }

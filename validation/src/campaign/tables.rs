@@ -1,20 +1,13 @@
-//! The campaign's results as Markdown.
+//! Results of the campaign as Markdown.
 
 use std::fmt::Write;
 
-use super::ladder::{Climb, RUNGS};
 use super::part::Job;
 use super::score::Outcome;
+use super::sensitivity::{SIZES, Sensitivity};
 use super::summary::{Accuracy, Summary};
-use crate::hidden::Cause;
-
-/// A table: header, then rows.
-pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-    let owned: Vec<String> = header.iter().map(|&cell| cell.to_owned()).collect();
-    let rule: Vec<String> = header.iter().map(|_| "---".to_owned()).collect();
-    rows.into_iter().fold(line(&owned) + &line(&rule), |text, row| text + &line(&row))
-}
+use crate::ground_truth::Cause;
+use crate::markdown::table;
 
 fn percent(part: f64) -> String {
     let percent = 100.0 * part;
@@ -25,7 +18,7 @@ fn number(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
 }
 
-/// Named, extra findings, verdicts, held-out error: one line a group and one for all.
+/// Named causes, false findings, verdicts and held-out error: one row for each group and one for all.
 pub fn named(what: &str, jobs: &[Job], outcomes: &[Outcome]) -> String {
     let mut summaries = Summary::by_group(jobs, outcomes);
     summaries.push(Summary::of("**all**", &outcomes.iter().collect::<Vec<_>>()));
@@ -50,20 +43,20 @@ pub fn named(what: &str, jobs: &[Job], outcomes: &[Outcome]) -> String {
         &[
             what,
             "records",
-            "first right",
+            "first correct",
             "all named",
-            "nothing extra",
-            "verdict right",
+            "no false finding",
+            "verdict correct",
             "verdicts",
-            "error to floor",
-            "95 %",
-            "time [s]",
+            "held-out error / floor",
+            "95 % quantile",
+            "CPU time [s]",
         ],
         summaries.iter().map(row),
     )
 }
 
-/// What a diagnosis takes of a processor, and what it finds: one line a group, in each noise the shortest records first.
+/// CPU time of a diagnosis and what it finds: one row for each noise and length, the shortest records first.
 pub fn speed(jobs: &[Job], outcomes: &[Outcome]) -> String {
     let mut before: Option<(&str, f64, f64)> = None;
     let row = |chunk: &[(&Job, &Outcome)]| {
@@ -73,8 +66,8 @@ pub fn speed(jobs: &[Job], outcomes: &[Outcome]) -> String {
         let mean = chunk.iter().map(|(_, outcome)| outcome.seconds).sum::<f64>() / count;
         let (_, worst) = chunk.iter().max_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds)).expect("no group is empty");
         let (noise, rows) = (job.recipe.noise.kind.name(), job.recipe.rows as f64);
-        let of_shorter = before.filter(|(of, ..)| *of == noise);
-        let power = of_shorter.map(|(_, fewer, less)| (mean / less).ln() / (rows / fewer).ln());
+        let shorter = before.filter(|(of, ..)| *of == noise);
+        let power = shorter.map(|(_, fewer, less)| (mean / less).ln() / (rows / fewer).ln());
         before = Some((noise, rows, mean));
         vec![
             noise.to_owned(),
@@ -95,16 +88,16 @@ pub fn speed(jobs: &[Job], outcomes: &[Outcome]) -> String {
         "rows",
         "records",
         "mean [s]",
-        "worst [s]",
-        "hidden in it",
-        "grows as rows^",
-        "first right",
-        "nothing extra",
+        "largest [s]",
+        "its cause",
+        "exponent of rows",
+        "first correct",
+        "no false finding",
     ];
-    "Seconds of one processor.\n\n".to_owned() + &table(&header, groups.map(row))
+    "CPU time in seconds.\n\n".to_owned() + &table(&header, groups.map(row))
 }
 
-/// How near the parameters come and how often their bounds hold.
+/// Errors of the parameters, their Cramer-Rao bounds and the coverage of their 95 % intervals.
 pub fn accuracy(outcomes: &[Outcome]) -> String {
     let row = |a: Accuracy| {
         let error = |part: f64| format!("{} %", significant(100.0 * part));
@@ -113,15 +106,15 @@ pub fn accuracy(outcomes: &[Outcome]) -> String {
     };
     let summary = Summary::of("all", &outcomes.iter().collect::<Vec<_>>());
     table(
-        &["cause", "parameter", "estimates", "median error", "at best", "95 % bounds hold"],
+        &["cause", "parameter", "estimates", "median error", "Cramer-Rao bound", "95 % interval coverage"],
         summary.parameters.into_iter().map(row),
     )
 }
 
-/// First finding over hidden cause; columns are numbered as the rows, the last is for no finding.
+/// Confusion matrix, first finding over true cause; columns are numbered as the rows, the last is for no finding.
 pub fn confusion(outcomes: &[Outcome]) -> String {
     let numbers: Vec<String> = (1..=Cause::ALL.len()).map(|n| n.to_string()).collect();
-    let mut header = vec!["hidden"];
+    let mut header = vec!["true cause"];
     header.extend(numbers.iter().map(String::as_str));
     header.push("none");
     let row = |(index, cause): (usize, &Cause)| {
@@ -136,33 +129,29 @@ pub fn confusion(outcomes: &[Outcome]) -> String {
     table(&header, Cause::ALL.iter().enumerate().map(row))
 }
 
-/// How often each cause is named at the rungs of the ladder.
-pub fn ladder(climbs: &[Climb]) -> String {
-    let rungs: Vec<String> = RUNGS.iter().map(|rung| format!("x {rung}")).collect();
-    let mut header = vec!["cause", "records", "detectable", "told apart from"];
-    header.extend(rungs.iter().map(String::as_str));
+/// How often each cause is named at increasing sizes, relative to the detectable size.
+pub fn sensitivity(sensitivities: &[Sensitivity]) -> String {
+    let sizes: Vec<String> = SIZES.iter().map(|size| format!("x {size}")).collect();
+    let mut header = vec!["cause", "records", "detectable", "isolable from"];
+    header.extend(sizes.iter().map(String::as_str));
     header.push("named from");
-    let row = |climb: &Climb| {
+    let row = |it: &Sensitivity| {
         let mut cells = vec![
-            climb.cause.to_string(),
-            climb.records.to_string(),
-            format!("{} {}", significant(climb.detectable), climb.unit),
-            if climb.told_apart > 100.0 {
-                "x > 100".to_owned()
-            } else {
-                format!("x {}", significant(climb.told_apart))
-            },
+            it.cause.to_string(),
+            it.records.to_string(),
+            format!("{} {}", significant(it.detectable), it.unit),
+            if it.isolable > 100.0 { "x > 100".to_owned() } else { format!("x {}", significant(it.isolable)) },
         ];
-        cells.extend((0..RUNGS.len()).map(|i| climb.named.get(i).map_or(String::new(), |&named| percent(named))));
-        cells.push(climb.ratio.map_or_else(|| "never".to_owned(), |ratio| format!("x {ratio}")));
+        cells.extend((0..SIZES.len()).map(|i| it.named.get(i).map_or(String::new(), |&named| percent(named))));
+        cells.push(it.ratio.map_or_else(|| "never".to_owned(), |ratio| format!("x {ratio}")));
         cells
     };
-    table(&header, climbs.iter().map(row))
+    table(&header, sensitivities.iter().map(row))
 }
 
-/// The smallest size that is named, and the smallest detectable one, cause over noise.
-pub fn noise(climbs: &[Climb]) -> String {
-    let mut levels: Vec<f64> = climbs.iter().map(|climb| climb.noise_percent).collect();
+/// Smallest named and smallest detectable size by cause and noise.
+pub fn noise(sensitivities: &[Sensitivity]) -> String {
+    let mut levels: Vec<f64> = sensitivities.iter().map(|it| it.noise_percent).collect();
     levels.sort_by(f64::total_cmp);
     levels.dedup();
     let header: Vec<String> = ["cause".to_owned(), "unit".to_owned()]
@@ -171,31 +160,31 @@ pub fn noise(climbs: &[Climb]) -> String {
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let row = |cause: &Cause| {
-        let of = |level: &f64| climbs.iter().find(|climb| climb.cause == *cause && climb.noise_percent == *level);
+        let of = |level: &f64| sensitivities.iter().find(|it| it.cause == *cause && it.noise_percent == *level);
         let cell = |level: &f64| {
-            let named = |climb: &Climb| climb.size.map_or_else(|| "never".to_owned(), significant);
+            let named = |it: &Sensitivity| it.size.map_or_else(|| "never".to_owned(), significant);
             of(level).map_or(String::new(), |c| format!("{} ({})", named(c), significant(c.detectable)))
         };
         let unit = cause.facts().measure.unit.to_owned();
         [cause.to_string(), unit].into_iter().chain(levels.iter().map(cell)).collect()
     };
-    table(&header, Cause::ALL.iter().filter(|cause| climbs.iter().any(|climb| climb.cause == **cause)).map(row))
+    table(&header, Cause::ALL.iter().filter(|cause| sensitivities.iter().any(|it| it.cause == **cause)).map(row))
 }
 
-/// Records that went wrong, for whoever wants to look at one.
+/// List of the records with a missing or false finding or a wrong verdict, one line each with its seed.
 pub fn wrong(jobs: &[Job], outcomes: &[Outcome]) -> String {
     let mut text = String::new();
     for (job, outcome) in jobs.iter().zip(outcomes) {
         if !outcome.all_named() || !outcome.nothing_extra() || !outcome.verdict_is_right() {
             let Outcome { seed, hidden, verdict, found, failure, .. } = outcome;
             let found = failure.clone().unwrap_or_else(|| found.join(", "));
-            let _ = writeln!(text, "{}, seed {seed}: hidden [{}], {verdict} [{found}]", job.group, hidden.join(", "));
+            let _ = writeln!(text, "{}, seed {seed}: causes [{}], {verdict} [{found}]", job.group, hidden.join(", "));
         }
     }
     text
 }
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 pub(super) fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -209,7 +198,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_keep_three_digits() {
+    fn numbers_are_printed_with_three_significant_digits() {
         assert_eq!(["0.00123", "12.3", "123"].map(str::to_owned), [0.001_234, 12.34, 123.4].map(significant));
         assert_eq!((percent(0.5), percent(0.996)), ("50 %".to_owned(), "99.6 %".to_owned()));
     }

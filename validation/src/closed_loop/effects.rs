@@ -1,57 +1,67 @@
-//! Every hidden effect in closed loop, with a sensor and without.
+//! Every effect in closed loop, with a sensor and without.
 
 use model::{OutOfRange, Sensor, Settings};
 use rayon::prelude::*;
 
-use super::run::{Sample, Scene, fresh};
+use super::scenario::{Sample, Scenario, fresh};
 use super::stair::{self, Step};
-use crate::hidden::Cause;
+use crate::ground_truth::Cause;
 
-/// What became of an effect, over all its seeds.
+/// Effects whose steady error a sensor has to correct to within the noise of one reading.
+pub const CORRECTED: [Cause; 6] = [
+    Cause::GainError,
+    Cause::StaticNonlinearity,
+    Cause::Hysteresis,
+    Cause::SecondRelaxation,
+    Cause::ChargeLeakage,
+    Cause::Drift,
+];
+
+/// Figures of one effect over all its seeds.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// None: the paper's spring.
+    /// Cause of the effect; `None` for the paper's spring.
     pub cause: Option<Cause>,
-    /// Without a sensor.
+    /// Figures without a sensor.
     pub without: Figures,
-    /// With one.
+    /// Figures with a sensor.
     pub with: Figures,
-    /// What part of the time it was trusted.
+    /// Fraction of the time in which the sensor was trusted.
     pub trusted: f64,
 }
 
-/// Of one way to run the loop, over all steps.
+/// Figures over all steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Root mean square of the steps' steady errors, in V.
+    /// Root mean square of the steady errors, in V.
     pub steady_v: f64,
-    /// Median over the steps of 100 V upward, in s; none if most of them never get to 97 %.
+    /// Median time to 97 % over the steps of 100 V upward, in s; `None` if most of them do not reach 97 %.
     pub t97_s: Option<f64>,
-    /// Largest overshoot of these, in percent.
+    /// Largest overshoot of these steps, in percent.
     pub overshoot_percent: f64,
 }
 
-/// No effect, then one after the other.
+/// Runs the paper's spring and every effect.
 ///
 /// # Errors
-/// Settings that the model refuses.
+/// The model rejects the settings.
 pub fn all(settings: &Settings, seeds: u64, first_seed: u64) -> Result<Vec<Outcome>, OutOfRange> {
     let causes: Vec<_> = std::iter::once(None).chain(Cause::ALL.map(Some)).collect();
     causes.par_iter().map(|&cause| one(settings, cause, first_seed..first_seed + seeds)).collect()
 }
 
-/// One effect; `None`: none.
+/// Runs one effect; `None` is the paper's spring.
 ///
 /// # Errors
-/// Settings that the model refuses.
+/// The model rejects the settings.
 pub fn one(settings: &Settings, cause: Option<Cause>, seeds: std::ops::Range<u64>) -> Result<Outcome, OutOfRange> {
     let alone = Settings { feedback: None, ..*settings };
     let (mut without, mut with, mut trusted) = (Vec::new(), Vec::new(), 0);
     let mut ticks = 0;
     for seed in seeds {
-        let scene = cause.map_or_else(|| Scene::nothing(seed), |cause| Scene::of(cause, seed));
-        without.extend(steps(&scene.run(&alone, |_, _| None)?, settings.rate_hz));
-        let run = scene.run(settings, |_, read| fresh(read))?;
+        let scenario = cause.map_or_else(|| Scenario::nothing(seed), |cause| Scenario::of(cause, seed));
+        without.extend(steps(&scenario.run(&alone, |_, _| None)?, settings.rate_hz));
+        let run = scenario.run(settings, |_, read| fresh(read))?;
         with.extend(steps(&run, settings.rate_hz));
         trusted += run.iter().filter(|sample| sample.sensor == Some(Sensor::Trusted)).count();
         ticks += run.len();
@@ -80,13 +90,11 @@ impl Figures {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tables::MADE_GOOD;
     use super::*;
     use model::{Amplifier, Approach, Compensation, Feedback};
 
-    /// Whatever the model gets wrong of the static stiffness: with a sensor it is right to within the noise.
     #[test]
-    fn a_sensor_makes_a_wrong_model_good() {
+    fn a_sensor_corrects_the_steady_error_of_a_wrong_model_to_the_noise() {
         let fast = Settings {
             compensation: Compensation::TimeOptimal(Approach::DEAD_BEAT),
             amplifier: Amplifier::up_to(1000.0),
@@ -94,13 +102,13 @@ mod tests {
             ..Settings::PAPER
         };
         let noise_v = Feedback::TYPICAL.noise_v;
-        for cause in MADE_GOOD {
+        for cause in CORRECTED {
             let Outcome { without, with, trusted, .. } = one(&fast, Some(cause), 21..22).unwrap();
-            assert!(without.steady_v > 3.0 * noise_v, "{cause} does nothing: {without:?}");
+            assert!(without.steady_v > 3.0 * noise_v, "{cause} has no effect: {without:?}");
             assert!(with.steady_v < noise_v, "{cause}: {with:?}, without {without:?}");
-            assert!(trusted > 0.99, "{cause} is taken for a fault of the sensor: {trusted}");
+            assert!(trusted > 0.99, "{cause} is mistaken for a fault of the sensor: {trusted}");
         }
-        // What is only late is not driven beyond, and what excites itself is calmed.
+        // The correction must not overcompensate a delay nor excite a resonance.
         for cause in [Cause::Resonance, Cause::Delay] {
             let Outcome { without, with, .. } = one(&fast, Some(cause), 21..22).unwrap();
             assert!(with.steady_v < noise_v, "{cause}: {with:?}");

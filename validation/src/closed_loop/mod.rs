@@ -1,15 +1,19 @@
-//! The MCU's controller in closed loop with a spring that hides an effect, with a stiffness sensor and without.
+//! The fixed-point controller of `model` in closed loop with a ground-truth spring, with a stiffness sensor and
+//! without.
 //!
-//! | module | what it is |
+//! In: controller settings, causes, seeds. Out: steady errors, settling times, overshoots and the response to sensor
+//! failures, as values and as Markdown.
+//!
+//! | module | contents |
 //! | --- | --- |
-//! | [`stair`] | the targets, and how long each step takes |
-//! | [`run`] | the loop, tick by tick |
-//! | [`effects`] | every hidden effect, with a sensor and without |
-//! | [`failing`] | a sensor that fails and comes back |
-//! | [`tables`] | what came of it as Markdown |
+//! | [`stair`] | the targets, and the figures of each step response |
+//! | [`scenario`] | one run of the loop, tick by tick |
+//! | [`effects`] | every effect, with a sensor and without |
+//! | [`sensor_failure`] | a sensor that fails and recovers |
+//! | [`tables`] | results as Markdown |
 
 pub mod effects;
-pub mod failing;
-pub mod run;
+pub mod scenario;
+pub mod sensor_failure;
 pub mod stair;
 pub mod tables;

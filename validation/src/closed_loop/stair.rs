@@ -1,45 +1,45 @@
-//! The stair up to 500 V in steps of 100 V and down again in steps of 200 V, and how long each step takes.
+//! The target: a stair up to 500 V in steps of 100 V and down in steps of 200 V, and the figures of each step response.
 
-use crate::hidden::Schedule;
+use crate::ground_truth::Schedule;
 
-/// Where each step leads to, in V; it starts from rest.
+/// Target of each step, in V; the first starts from rest at 0 V.
 pub const LEVELS_V: [f64; 7] = [100.0, 200.0, 300.0, 400.0, 500.0, 300.0, 100.0];
-/// How long each level is held, in s.
+/// Duration of each level, in s.
 pub const HOLD_S: f64 = 30.0;
-/// The steady error is that of the last of these seconds.
+/// Length of the window at the end of a step over which the steady error is averaged, in s.
 const STEADY_S: f64 = 1.0;
 
-/// The target at `t`, in V.
+/// Target at the time `t` in s, in V.
 pub fn target_v(t: f64) -> f64 {
     LEVELS_V[((t / HOLD_S + 1e-9) as usize).min(LEVELS_V.len() - 1)]
 }
 
-/// From the first step to the end, in s.
+/// Duration of the stair, in s.
 pub const fn duration_s() -> f64 {
     HOLD_S * LEVELS_V.len() as f64
 }
 
-/// The stair as a record of 20 rows a second would have it: what the sizes of hidden effects go by.
+/// The stair as a schedule of 20 rows per second, from which the sizes of the effects are drawn.
 pub fn schedule() -> Schedule {
     let time_s: Vec<f64> = (0..(duration_s() * 20.0) as u32).map(|k| f64::from(k) / 20.0).collect();
     let voltage_v = time_s.iter().map(|&t| target_v(t)).collect();
     Schedule { time_s, voltage_v }
 }
 
-/// What became of one step.
+/// Figures of one step response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// It leads upward.
+    /// True for a step upward.
     pub up: bool,
-    /// When 97 % are first reached, in s; none if never before the next step.
+    /// Time from the step until 97 % are first reached, in s; `None` if they are not reached before the next step.
     pub t97_s: Option<f64>,
-    /// Mean of the stiffness less the target over the last second, in V.
+    /// Steady error: mean of stiffness less target over the last second, in V.
     pub steady_v: f64,
-    /// How far beyond the target it gets, in percent of the step.
+    /// Overshoot, in percent of the step.
     pub overshoot_percent: f64,
 }
 
-/// The steps of a run of true stiffnesses, one a tick.
+/// Figures of all steps of a run, from the true stiffness of every tick, in V.
 pub fn steps(stiffness: &[f64], rate_hz: f64) -> Vec<Step> {
     let ticks = (HOLD_S * rate_hz).round() as usize;
     let froms = std::iter::once(0.0).chain(LEVELS_V);

@@ -1,22 +1,12 @@
-//! Closed loops as Markdown.
+//! Results of the closed loop as Markdown, and their acceptance criteria.
 
-use super::effects::Outcome;
-use super::failing::Consequence;
-use crate::campaign::aim::Aim;
-use crate::campaign::tables::table;
-use crate::hidden::Cause;
+use super::effects::{CORRECTED, Outcome};
+use super::sensor_failure::FailureResponse;
+use crate::criterion::Criterion;
+use crate::ground_truth::Cause;
+use crate::markdown::table;
 
-/// Effects that a sensor has to make good, to within the noise of one reading.
-pub const MADE_GOOD: [Cause; 6] = [
-    Cause::GainError,
-    Cause::StaticNonlinearity,
-    Cause::Hysteresis,
-    Cause::SecondRelaxation,
-    Cause::ChargeLeakage,
-    Cause::Drift,
-];
-
-/// One row an effect.
+/// Table with one row for each effect.
 pub fn effects(outcomes: &[Outcome]) -> String {
     let row = |outcome: &Outcome| {
         let Outcome { cause, without, with, trusted } = outcome;
@@ -40,41 +30,45 @@ pub fn effects(outcomes: &[Outcome]) -> String {
     table(&header, outcomes.iter().map(row))
 }
 
-/// The steady errors that are asked for.
-pub fn aims(controller: &str, outcomes: &[Outcome], noise_v: f64) -> Vec<Aim> {
-    let asked = |outcome: &&Outcome| outcome.cause.is_some_and(|cause| MADE_GOOD.contains(&cause));
-    let aim = |outcome: &Outcome| {
+/// Criteria of the steady errors that a sensor has to correct.
+pub fn criteria(controller: &str, outcomes: &[Outcome], noise_v: f64) -> Vec<Criterion> {
+    let required = |outcome: &&Outcome| outcome.cause.is_some_and(|cause| CORRECTED.contains(&cause));
+    let criterion = |outcome: &Outcome| {
         let name = outcome.cause.map_or("none", Cause::name);
-        Aim::at_most(format!("{controller}, {name}: steady error with sensor [V]"), noise_v, outcome.with.steady_v)
+        Criterion::at_most(
+            format!("{controller}, {name}: steady error with sensor [V]"),
+            noise_v,
+            outcome.with.steady_v,
+        )
     };
-    outcomes.iter().filter(asked).map(aim).collect()
+    outcomes.iter().filter(required).map(criterion).collect()
 }
 
-/// One row a failure.
-pub fn failures(consequences: &[Consequence]) -> String {
+/// Table with one row for each failure.
+pub fn failures(responses: &[FailureResponse]) -> String {
     let milliseconds =
         |time_s: Option<f64>| time_s.map_or_else(|| "-".to_owned(), |time_s| format!("{:.0}", 1000.0 * time_s));
-    let row = |it: &Consequence| {
+    let row = |it: &FailureResponse| {
         vec![
             it.failure.name().to_owned(),
             format!("{}", it.at_s),
             it.failure.fault().map_or_else(|| "none".to_owned(), |fault| format!("{fault:?}")),
-            milliseconds(it.seen_s),
+            milliseconds(it.detected_s),
             format!("{:.2}", it.moved_v),
             format!("{:.2}", it.bump_v),
             format!("{:.2}", it.healthy_bump_v),
-            milliseconds(it.back_s),
+            milliseconds(it.trusted_again_s),
         ]
     };
     let header = [
         "readings",
         "from [s]",
         "fault",
-        "seen after [ms]",
-        "moved the stiffness by [V]",
+        "detected after [ms]",
+        "deviation until then [V]",
         "largest change of voltage in a tick [V]",
         "with a good sensor",
         "trusted again after [ms]",
     ];
-    table(&header, consequences.iter().map(row))
+    table(&header, responses.iter().map(row))
 }
