@@ -78,7 +78,7 @@ fn an_open_interlock_and_its_fault() {
     mcu.with(|shared| shared.interlock_open = false);
     assert!(bad(1, port, &["arm"]).contains("faulted: interlock (4)"));
     assert_eq!(json(port, &["disarm"])["state"], "faulted", "a disarm does not acknowledge");
-    assert!(bad(1, port, &["acknowledge", "panic"]).contains("another one: interlock (4)"));
+    assert!(bad(1, port, &["acknowledge", "panic"]).contains("a different fault is present: interlock (4)"));
     assert_eq!(json(port, &["acknowledge", "interlock"])["state"], "disarmed");
     assert_eq!(json(port, &["arm"])["state"], "armed");
 }
