@@ -1,45 +1,54 @@
-//! The amplifier stage: what of a wanted voltage really comes out.
+//! The amplifier stage: the part of a wanted voltage that really reaches the spring.
 //!
-//! In order: slew, range, rounding to a DAC code. The range wins over the slew, because it protects the spring. The
-//! voltage before rounding is kept between ticks, and what a slew leaves below a signal's resolution is carried over, so
-//! that the slowest slew still moves at its own rate.
+//! Important terms:
 //!
-//! A code `n` of a `b`-bit converter stands for `n * full_scale / (2^b - 1)`. The ends of the range are moved inward to
-//! the next code, so that rounding cannot leave it.
+//! - *wanted voltage*: the output of the pre-compensator, in V, before any limit.
+//! - *slew*: the fastest change of the voltage, in V/s.
+//! - *range*: the lowest and the highest voltage that may be put out, in V.
+//! - *code*: the number written to the DAC. Code `n` of a `b`-bit converter stands for `n * full_scale / (2^b - 1)`.
+//! - *applied voltage*: the voltage of the code, in V, which is what the spring sees.
+//!
+//! Each tick limits the slew, then the range, then rounds to the nearest code. The range wins over the slew, because it
+//! protects the spring. The voltage before rounding is kept between ticks, and the part of a slew step below a signal's
+//! resolution is carried over, so that the slowest slew still moves at its own rate.
+//!
+//! The ends of the range are moved inward to the next code, so that rounding cannot leave the range.
 
 use fixed::types::I3F29;
 
 use crate::error::OutOfRange;
 use crate::units::{Accumulator, DacCode, SampleTime, Signal, Volts, accumulator, signal};
+use crate::validated::{Validate, Validated};
 
-/// An amplifier and its converter, in SI units.
+/// An amplifier and its digital-to-analog converter, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Amplifier {
     /// Voltage at the highest code, 50 to 1000 V.
     pub full_scale_v: f64,
-    /// Lowest voltage that may be put out, 0 V to one below `max_v`.
+    /// Lowest voltage that may be put out, 0 V to 10 V below `full_scale_v`.
     pub min_v: f64,
-    /// Highest voltage that may be put out, up to `full_scale_v`.
+    /// Highest voltage that may be put out, `min_v` + 10 V to `full_scale_v`.
     pub max_v: f64,
-    /// Fastest change in V/s, 1 to 1e9; `None` where a change within one tick is no concern.
+    /// Fastest change of the voltage, 1 to 1e9 V/s; `None` if it is not limited.
     pub slew_v_per_s: Option<f64>,
     /// Width of the converter, 8 to 16 bits.
     pub dac_bits: u32,
 }
 
 impl Amplifier {
-    /// The report's range: 0 to 700 V, from the 12-bit converter of the MCU.
+    /// The source report's range: 0 to 700 V, from the 12-bit converter of the MCU.
     pub const PAPER: Self = Self::up_to(700.0);
 
-    /// 0 V to `full_scale_v` from a 12-bit converter, no slew limit.
+    /// Returns an amplifier of 0 V to `full_scale_v` behind a 12-bit converter, without a slew limit.
     pub const fn up_to(full_scale_v: f64) -> Self {
         Self { full_scale_v, min_v: 0.0, max_v: full_scale_v, slew_v_per_s: None, dac_bits: 12 }
     }
 
-    /// The stricter of this one's highest voltage and slew, and those that were found on the real one.
-    pub fn found_with(self, limit_v: Option<f64>, slew_v_per_s: Option<f64>) -> Self {
-        // Not `f64::min`, which takes NaN for no limit at all: here it stays, and the check refuses it.
-        let stricter = |own: f64, found: f64| if found > own { own } else { found };
+    /// Returns this amplifier with the stricter of its own and the given limits: the highest voltage in V and the slew
+    /// in V/s. A limit of NaN stays NaN, which [`Validate::check`] rejects.
+    pub fn limited_to(self, limit_v: Option<f64>, slew_v_per_s: Option<f64>) -> Self {
+        // `f64::min` would ignore NaN.
+        let stricter = |own: f64, other: f64| if other > own { own } else { other };
         Self {
             max_v: limit_v.map_or(self.max_v, |limit| stricter(self.max_v, limit)),
             slew_v_per_s: [self.slew_v_per_s, slew_v_per_s].into_iter().flatten().reduce(stricter),
@@ -47,9 +56,19 @@ impl Amplifier {
         }
     }
 
-    /// # Errors
-    /// [`OutOfRange`] names the field.
-    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+    /// Returns the largest change of the voltage in one tick, in V; `None` if a tick is long enough for any change.
+    pub(crate) fn slew_per_tick_v(&self, sample_time: SampleTime) -> Option<f64> {
+        self.slew_v_per_s.map(|slew| slew * sample_time.seconds()).filter(|step_v| *step_v < self.full_scale_v)
+    }
+
+    /// Returns the voltage between two neighbouring codes, in V.
+    pub fn volts_per_code(&self) -> f64 {
+        self.full_scale_v / f64::from((1u32 << self.dac_bits) - 1)
+    }
+}
+
+impl Validate for Amplifier {
+    fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
         let Self { full_scale_v, min_v, max_v, slew_v_per_s, dac_bits } = *self;
         OutOfRange::check("full_scale_v", full_scale_v, 50.0..=1000.0, "V")?;
         OutOfRange::check("dac_bits", f64::from(dac_bits), 8.0..=16.0, "bits")?;
@@ -57,73 +76,63 @@ impl Amplifier {
         OutOfRange::check("max_v", max_v, min_v + 10.0..=full_scale_v, "V")?;
         OutOfRange::check("slew_v_per_s", slew_v_per_s.unwrap_or(1e9), 1.0..=1e9, "V/s")
     }
-
-    /// The most by which the voltage changes in a tick, in V, where that is a limit.
-    pub(crate) fn step_v(&self, sample_time: SampleTime) -> Option<f64> {
-        self.slew_v_per_s.map(|slew| slew * sample_time.seconds()).filter(|step_v| *step_v < self.full_scale_v)
-    }
-
-    /// Volts between two neighbouring codes.
-    pub fn volts_per_code(&self) -> f64 {
-        self.full_scale_v / f64::from((1u32 << self.dac_bits) - 1)
-    }
 }
 
-/// The amplifier for one sample time, scaled for the tick.
+/// The amplifier for one sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
     lowest: Signal,
     highest: Signal,
-    /// What to report of a change that was held back: nothing where a tick is long enough for any change.
+    /// The limit to report when a change was held back: none if a tick is long enough for any change.
     slew: Limits,
     step: Accumulator,
     codes_per_volt: Signal,
     volts_per_code: I3F29,
 }
 
-/// The voltage at the amplifier's input, before rounding.
+/// The voltage at the amplifier's input after the limits, before rounding to a code; the default is 0 V.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct State {
     voltage: Signal,
-    /// What the last step of the slew left below a signal's resolution, in 2^-52 V.
+    /// Part of the last slew step below a signal's resolution, in 2^-52 V.
     carried: u32,
 }
 
-/// What comes out at one tick.
+/// Output of the amplifier stage at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Drive {
-    /// The limited voltage before rounding.
+    /// Voltage after slew and range, before rounding to a code.
     pub voltage: Volts,
-    /// What to write to the DAC.
+    /// Code to be written to the DAC.
     pub code: DacCode,
-    /// The voltage that `code` puts across the spring.
+    /// Voltage across the spring while `code` is written.
     pub applied: Volts,
-    /// What held the voltage back.
+    /// Limits that held the voltage back.
     pub limits: Limits,
 }
 
-/// Which limits acted in a tick; none is the normal case.
+/// Set of the limits that acted in one tick; usually empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Limits(u8);
 
 impl Limits {
-    /// Nothing was limited.
+    /// No limit acted.
     pub const NONE: Self = Self(0);
-    /// The range ended at `max_v`.
+    /// The voltage was held at the upper end of the range.
     pub const UPPER: Self = Self(1);
-    /// The range ended at `min_v`.
+    /// The voltage was held at the lower end of the range.
     pub const LOWER: Self = Self(2);
-    /// The change was held to `slew_v_per_s`.
+    /// The change of the voltage was held to `slew_v_per_s`.
     pub const SLEW: Self = Self(4);
-    /// The target itself was outside of the range and taken at its end.
+    /// The target itself was outside the range and was moved to its end.
     pub const TARGET: Self = Self(8);
 
-    /// True if any limit of `other` acted.
-    pub const fn any_of(self, other: Self) -> bool {
+    /// Returns true if at least one limit is in both sets.
+    pub const fn intersects(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
 
-    /// One byte for logs and telemetry: upper 1, lower 2, slew 4, target 8.
+    /// Returns the set as one byte for logs and telemetry: upper 1, lower 2, slew 4, target 8.
     pub const fn bits(self) -> u8 {
         self.0
     }
@@ -134,12 +143,13 @@ impl Limits {
     }
 }
 
-impl Config {
-    /// Of an amplifier that [`Amplifier::check`] accepts.
-    pub(crate) fn new(amplifier: &Amplifier, sample_time: SampleTime) -> Self {
-        let step_v = amplifier.step_v(sample_time);
+impl Validated<'_, Amplifier> {
+    /// Quantizes the amplifier for the tick.
+    pub(crate) fn quantize(self) -> Config {
+        let amplifier = self.settings();
+        let step_v = amplifier.slew_per_tick_v(self.sample_time());
         let unit = amplifier.volts_per_code();
-        let mut config = Self {
+        let mut config = Config {
             lowest: Signal::ZERO,
             highest: Signal::ZERO,
             slew: Limits::NONE.with(Limits::SLEW, step_v.is_some()),
@@ -148,14 +158,16 @@ impl Config {
             // Rounded down: the highest code never stands for more than the full scale.
             volts_per_code: I3F29::from_bits((unit * f64::from(1 << 29)) as i32),
         };
-        // Rounded up and down; a hair's breadth keeps an end that is a code's own voltage from losing that code.
-        let hair = 1e-9;
-        config.lowest = config.volts(DacCode((amplifier.min_v / unit + (1.0 - hair)) as u16)).0;
-        config.highest = config.volts(DacCode((amplifier.max_v / unit + hair) as u16)).0;
+        // Rounded inward, with a tolerance so that an end which is the voltage of a code keeps that code.
+        let tolerance = 1e-9;
+        config.lowest = config.volts(DacCode((amplifier.min_v / unit + (1.0 - tolerance)) as u16)).0;
+        config.highest = config.volts(DacCode((amplifier.max_v / unit + tolerance) as u16)).0;
         config
     }
+}
 
-    /// Puts out as much of `wanted` as the amplifier can.
+impl Config {
+    /// Limits the wanted voltage, rounds it to a code, and advances the state by one tick.
     #[inline(always)]
     pub(crate) fn drive(&self, state: &mut State, wanted: Volts) -> Drive {
         let step = self.step.to_bits() + i64::from(state.carried);
@@ -176,25 +188,25 @@ impl Config {
         }
     }
 
-    /// The voltage that the last tick put across the spring, rounding included.
+    /// Returns the voltage that the last tick put across the spring, rounded to a code.
     #[inline(always)]
     pub(crate) fn applied(&self, state: &State) -> Volts {
         self.volts(self.code(Volts(state.voltage)))
     }
 
-    /// `target` as far as the range goes, and whether it had to be moved.
+    /// Returns `target` moved into the range, and whether it had to be moved.
     #[inline(always)]
-    pub(crate) fn reachable(&self, target: Volts) -> (Volts, bool) {
-        let reachable = target.0.max(self.lowest).min(self.highest);
-        (Volts(reachable), reachable != target.0)
+    pub(crate) fn clamp_target(&self, target: Volts) -> (Volts, bool) {
+        let clamped = target.0.max(self.lowest).min(self.highest);
+        (Volts(clamped), clamped != target.0)
     }
 
-    /// The range that is really used, its ends moved inward to the next code.
+    /// Returns the lowest and the highest voltage that is put out, moved inward to the next code.
     pub fn range(&self) -> (Volts, Volts) {
         (Volts(self.lowest), Volts(self.highest))
     }
 
-    /// The nearest code to a voltage inside the range.
+    /// Returns the code nearest to a voltage inside the range.
     #[inline(always)]
     pub fn code(&self, voltage: Volts) -> DacCode {
         // 20 and 20 fraction bits; the upper half keeps 8 of them for rounding.
@@ -202,7 +214,7 @@ impl Config {
         DacCode(((codes + (1 << 7)) >> 8) as u16)
     }
 
-    /// The voltage of a code, low by at most 0.13 mV (at 16 bits; 9 uV at 12).
+    /// Returns the voltage of a code, too low by at most 0.13 mV (at 16 bits; 9 uV at 12 bits).
     #[inline(always)]
     pub fn volts(&self, code: DacCode) -> Volts {
         Volts(Signal::from_bits(((i64::from(code.0) * i64::from(self.volts_per_code.to_bits())) >> 9) as i32))
@@ -210,7 +222,7 @@ impl Config {
 }
 
 impl State {
-    /// The limited voltage of the last tick, before rounding.
+    /// Returns the limited voltage of the last tick, before rounding to a code.
     pub fn voltage(&self) -> Volts {
         Volts(self.voltage)
     }
@@ -222,8 +234,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn config(amplifier: &Amplifier, rate_hz: f64) -> Config {
-        amplifier.check().unwrap();
-        Config::new(amplifier, SampleTime::from_rate(rate_hz).unwrap())
+        amplifier.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize()
     }
 
     fn volts(value: f64) -> Volts {
@@ -232,14 +243,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_code_survives_the_way_to_volts_and_back(full_scale in 50.0..1000.0f64, bits in 8u32..=16, part: f64) {
+        fn a_code_survives_conversion_to_volts(full_scale in 50.0..1000.0f64, bits in 8u32..=16, part: f64) {
             let config = config(&Amplifier { dac_bits: bits, ..Amplifier::up_to(full_scale) }, 1000.0);
             let code = DacCode((part.abs().fract() * f64::from((1u32 << bits) - 1)) as u16);
             prop_assert_eq!(config.code(config.volts(code)), code);
         }
 
         #[test]
-        fn nothing_leaves_the_range_and_rounding_is_to_the_nearest_code(
+        fn the_output_stays_in_range_and_is_rounded_to_the_nearest_code(
             full_scale in 50.0..1000.0f64,
             (low, high) in (0.0..0.5f64, 0.6..1.0f64),
             bits in 8u32..=16,
@@ -259,13 +270,13 @@ mod tests {
             prop_assert!(out >= lowest && out <= highest, "{out:?} outside {lowest:?}..{highest:?}");
             let ideal = wanted.clamp(lowest.to_f64(), highest.to_f64());
             prop_assert!((out.to_f64() - ideal).abs() <= 0.503 * unit + 2e-6);
-            prop_assert_eq!(drive.limits.any_of(Limits::UPPER), volts(wanted) > highest);
-            prop_assert_eq!(drive.limits.any_of(Limits::LOWER), volts(wanted) < lowest);
-            prop_assert!(!drive.limits.any_of(Limits::SLEW), "there is no limit of the slew");
+            prop_assert_eq!(drive.limits.intersects(Limits::UPPER), volts(wanted) > highest);
+            prop_assert_eq!(drive.limits.intersects(Limits::LOWER), volts(wanted) < lowest);
+            prop_assert!(!drive.limits.intersects(Limits::SLEW), "no slew limit is set");
         }
 
         #[test]
-        fn a_slew_is_kept_on_average_even_below_one_code_a_tick(slew in 1.0..5000.0f64, rate in 100.0..10_000.0f64) {
+        fn the_mean_slew_is_exact_even_below_one_code_per_tick(slew in 1.0..5000.0f64, rate in 100.0..10_000.0f64) {
             let config = config(&Amplifier { slew_v_per_s: Some(slew), ..Amplifier::PAPER }, rate);
             let mut state = State::default();
             let ticks = (rate / 20.0) as u32;
@@ -275,12 +286,13 @@ mod tests {
             }
             let expected = (slew / rate * f64::from(ticks)).min(700.0);
             prop_assert!((drive.voltage.to_f64() - expected).abs() < 5e-5);
-            prop_assert_eq!(drive.limits.any_of(Limits::SLEW), expected < 700.0);
+            prop_assert_eq!(drive.limits.intersects(Limits::SLEW), expected < 700.0);
         }
     }
 
     #[test]
-    fn a_wrong_amplifier_is_named() {
+    fn a_setting_out_of_range_is_rejected_by_name() {
+        let sample_time = SampleTime::from_rate(1000.0).unwrap();
         let good = Amplifier::PAPER;
         for (field, wrong) in [
             ("full_scale_v", Amplifier { full_scale_v: 1500.0, ..good }),
@@ -291,7 +303,7 @@ mod tests {
             ("max_v", Amplifier { max_v: 701.0, ..good }),
             ("slew_v_per_s", Amplifier { slew_v_per_s: Some(0.0), ..good }),
         ] {
-            assert_eq!(wrong.check().unwrap_err().field, field, "{wrong:?}");
+            assert_eq!(wrong.validate(sample_time).unwrap_err().field, field, "{wrong:?}");
         }
     }
 }

@@ -1,8 +1,19 @@
 //! One tick of the whole controller.
 //!
-//! [`Settings`] are what a person writes, in SI units and floats. [`Settings::check`] turns them, once and off the hot
-//! path, into a [`Config`] of scaled fixed-point numbers, or into an error that names the field. [`Config::tick`] sees
-//! nothing else. Each of them is written for any spring; without a name it is the plain one, [`Plant`].
+//! Important terms:
+//!
+//! - [`Settings`]: what a person writes, in SI units and floats. [`Settings::validate`] checks them once, off the hot
+//!   path, and `Validated::quantize` turns them into a `Config`.
+//! - [`Config`]: the same in fixed-point numbers, which is all that a tick sees.
+//! - [`State`]: what the controller remembers from tick to tick.
+//! - *target*: the desired stiffness expressed as the equivalent static voltage, in V.
+//! - *pre-compensator*: shapes the voltage so that the spring reaches the target faster than by itself
+//!   ([`Compensation`]).
+//! - *bumpless transfer*: a change of the configuration that does not move the voltage.
+//!
+//! [`Config::tick`] does, in this order: target into the amplifier's range, correction by the sensor, pre-compensator,
+//! amplifier limits and rounding, estimator on the applied voltage, integrator. All types are generic over the spring;
+//! without a parameter it is the plain one, [`Plant`].
 
 use crate::amplifier::{self, Amplifier, Limits};
 use crate::error::OutOfRange;
@@ -11,35 +22,53 @@ use crate::feedback::{self, Feedback, Reading, Sensor};
 use crate::pre_compensator::{self, Gains, ProportionalIntegral};
 use crate::time_optimal::{self, Approach, TimeOptimal};
 use crate::units::{DacCode, SampleTime, ScaledStiffness, Volts};
+use crate::validated::{Validate, Validated};
 
 /// Everything the controller is built from, in SI units.
+///
+/// ```
+/// use model::{Amplifier, Config, Input, OutOfRange, Settings, State, Volts};
+///
+/// fn main() -> Result<(), OutOfRange> {
+///     let settings = Settings { amplifier: Amplifier::up_to(1000.0), ..Settings::PAPER };
+///     let config: Config = settings.validate()?.quantize();
+///     let mut state = State::default();
+///     let input = Input { target: Volts::new(500.0)?, ..Input::default() };
+///     // The voltage overshoots the target deliberately. After 4 s the stiffness is within 3 % of the target; with
+///     // a constant 500 V it would have reached 280 V by then.
+///     assert_eq!(config.tick(&mut state, input).applied.to_f64().round(), 1000.0);
+///     let after_4_s = (1..4000).map(|_| config.tick(&mut state, input)).last().unwrap();
+///     assert!((after_4_s.stiffness.to_f64() - 500.0).abs() < 0.03 * 500.0);
+///     Ok(())
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings<P = Plant> {
     /// Ticks per second, 100 to 10 000 Hz.
     pub rate_hz: f64,
     /// The spring that the estimator runs.
     pub plant: P,
-    /// How the voltage is led to its target.
+    /// The pre-compensator.
     pub compensation: Compensation,
     /// The amplifier and its limits.
     pub amplifier: Amplifier,
-    /// A stiffness sensor that corrects the estimate.
+    /// A stiffness sensor that corrects the estimate; `None` if there is no sensor.
     pub feedback: Option<Feedback>,
 }
 
-/// Which pre-compensator, in SI units.
+/// Choice of the pre-compensator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Compensation {
-    /// None: the target is put out as it is.
+    /// No pre-compensator: the target is put out as the voltage.
     None,
-    /// The report's.
+    /// The source report's proportional-integral pre-compensator ([`crate::pre_compensator`]).
     ProportionalIntegral(Gains),
-    /// As fast as the amplifier allows.
+    /// The time-optimal pre-compensator, as fast as the amplifier allows ([`crate::time_optimal`]).
     TimeOptimal(Approach),
 }
 
 impl Settings {
-    /// The report's spring, controller and range at 1 kHz.
+    /// The source report's spring, controller and range at 1 kHz.
     pub const PAPER: Self = Self {
         rate_hz: 1000.0,
         plant: Plant::PAPER,
@@ -50,74 +79,67 @@ impl Settings {
 }
 
 impl<P: Model> Settings<P> {
-    /// Scales the settings for the tick.
+    /// Checks every field and returns the token with which the settings can be quantized.
     ///
     /// # Errors
-    /// [`OutOfRange`] names the field, its value and what is allowed.
-    pub fn check(&self) -> Result<Config<P::Config>, OutOfRange> {
-        self.judge().map(|sample_time| self.scaled(sample_time))
-    }
-
-    /// The time between two ticks, if the settings can be scaled for it: [`Settings::check`] without making anything.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] names the field, its value and what is allowed.
-    pub fn judge(&self) -> Result<SampleTime, OutOfRange> {
+    /// [`OutOfRange`] names the first field outside its allowed range, its value and the range.
+    pub fn validate(&self) -> Result<Validated<'_, Self>, OutOfRange> {
         let sample_time = SampleTime::from_rate(self.rate_hz)?;
         self.plant.check(sample_time)?;
-        self.amplifier.check()?;
+        self.amplifier.check(sample_time)?;
         match &self.compensation {
             Compensation::None => {}
             Compensation::ProportionalIntegral(gains) => {
-                gains.check(&self.plant.promptness(sample_time), sample_time)?;
+                gains.check(&self.plant.largest_step_gain(sample_time), sample_time)?;
             }
             Compensation::TimeOptimal(approach) => {
                 self.plant.check_inverse()?;
-                approach.check()?;
+                approach.check(sample_time)?;
             }
         }
-        self.feedback.as_ref().map_or(Ok(()), |feedback| feedback.check(sample_time))?;
-        Ok(sample_time)
+        self.feedback.check(sample_time)?;
+        Ok(Validated::new(self, sample_time))
     }
+}
 
-    /// Of settings and the sample time that [`Settings::judge`] gives for them; of others, anything.
-    pub fn scaled(&self, sample_time: SampleTime) -> Config<P::Config> {
-        let estimator = self.plant.scaled(sample_time);
-        let promptness = self.plant.promptness(sample_time);
-        let pre_compensator = match &self.compensation {
+impl<P: Model> Validated<'_, Settings<P>> {
+    /// Rounds the validated settings to the fixed-point numbers that a tick sees.
+    pub fn quantize(self) -> Config<P::Config> {
+        let (settings, sample_time) = (self.settings(), self.sample_time());
+        let plant = self.part(&settings.plant);
+        let estimator = P::quantize(plant);
+        let step_gain = settings.plant.largest_step_gain(sample_time);
+        let pre_compensator = match &settings.compensation {
             Compensation::None => PreCompensator::None,
             Compensation::ProportionalIntegral(gains) => {
-                PreCompensator::ProportionalIntegral(ProportionalIntegral::new(gains, &promptness, sample_time))
+                PreCompensator::ProportionalIntegral(self.part(gains).quantize(&step_gain))
             }
             Compensation::TimeOptimal(approach) => {
-                let inverse = self.plant.inverse(&estimator, sample_time, self.amplifier.volts_per_code());
-                let step_v = self.amplifier.step_v(sample_time);
-                let slew = step_v.map(|step_v| (self.plant.least_promptness(sample_time), step_v));
-                PreCompensator::TimeOptimal(TimeOptimal::new(approach, inverse, &promptness, slew, sample_time))
+                let inverse = P::inverse(plant, &estimator, settings.amplifier.volts_per_code());
+                let step_v = settings.amplifier.slew_per_tick_v(sample_time);
+                let slew = step_v.map(|step_v| (settings.plant.smallest_step_gain(sample_time), step_v));
+                PreCompensator::TimeOptimal(self.part(approach).quantize(inverse, &step_gain, slew))
             }
         };
         Config {
             estimator,
             pre_compensator,
-            amplifier: amplifier::Config::new(&self.amplifier, sample_time),
-            feedback: self.feedback.as_ref().map(|feedback| feedback::Config::new(feedback, sample_time)),
+            amplifier: self.part(&settings.amplifier).quantize(),
+            feedback: settings.feedback.as_ref().map(|feedback| self.part(feedback).quantize()),
         }
     }
 }
 
-/// How the voltage is led to its target. A tag of its own is read faster than one that hides in 64 bits of a variant.
+/// The quantized pre-compensator. A tag of its own is read faster than one hidden in 64 bits of a variant.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PreCompensator<I> {
-    /// The target is the voltage.
     None,
-    /// Past the target and back, around the estimate.
     ProportionalIntegral(ProportionalIntegral),
-    /// To where the target can be held, by the spring's inverse.
     TimeOptimal(TimeOptimal<I>),
 }
 
-/// A checked configuration, scaled for the tick.
+/// A validated configuration, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config<E: Estimator = estimator::Config> {
     estimator: E,
@@ -126,7 +148,7 @@ pub struct Config<E: Estimator = estimator::Config> {
     feedback: Option<feedback::Config>,
 }
 
-/// What the controller remembers from tick to tick; the default is a spring at rest without voltage.
+/// What the controller remembers from tick to tick; the default is a spring at rest at 0 V.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct State<S = estimator::State> {
     estimator: S,
@@ -137,61 +159,62 @@ pub struct State<S = estimator::State> {
 }
 
 impl<S> State<S> {
-    /// What the sensor adds to the model, in V.
+    /// Returns the correction that the sensor adds to the model's stiffness, in V.
     pub fn correction(&self) -> ScaledStiffness {
         self.feedback.correction()
     }
 }
 
-/// What a tick is told.
+/// Input of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Input {
-    /// Static voltage of the desired stiffness.
+    /// Desired stiffness, expressed as the equivalent static voltage.
     pub target: Volts,
-    /// What the stiffness sensor said last; nobody asks for it without [`Settings::feedback`].
+    /// Latest reading of the stiffness sensor; ignored without [`Settings::feedback`].
     pub measured: Option<Reading>,
 }
 
-/// What a tick says.
+/// Output of one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// The target that was pursued: the input's, held inside the amplifier's range.
+    /// The input's target, moved into the amplifier's range.
     pub target: Volts,
-    /// Voltage after slew and range, before rounding.
+    /// Voltage after slew and range, before rounding to a code.
     pub voltage: Volts,
-    /// What to write to the DAC now.
+    /// Code to be written to the DAC.
     pub code: DacCode,
-    /// The voltage that `code` stands for.
+    /// Voltage across the spring while `code` is written.
     pub applied: Volts,
-    /// Stiffness with `applied` just put across the spring, as the model says and the sensor corrects.
+    /// Estimated stiffness just after `applied` was put across the spring: the model's, corrected by the sensor.
     pub stiffness: ScaledStiffness,
-    /// The limits that acted.
+    /// Limits that acted in this tick.
     pub limits: Limits,
-    /// Whether the stiffness sensor is trusted; none without [`Settings::feedback`].
+    /// Whether the stiffness sensor is trusted; `None` without [`Settings::feedback`].
     pub sensor: Option<Sensor>,
 }
 
 impl<E: Estimator> Config<E> {
-    /// The range of voltages that is really used.
+    /// Returns the lowest and the highest voltage that is put out, moved inward to the next DAC code.
     pub fn range(&self) -> (Volts, Volts) {
         self.amplifier.range()
     }
 
-    /// One tick: no heap, no float, no panic, no loop without bound.
+    /// Advances the controller by one tick. No heap, no float, no panic, no unbounded loop: the same bits on every
+    /// machine.
     #[inline(always)]
     pub fn tick(&self, state: &mut State<E::State>, input: Input) -> Output {
-        let (target, moved) = self.amplifier.reachable(input.target);
+        let (target, moved) = self.amplifier.clamp_target(input.target);
         let pursued = match &self.feedback {
             None => target,
             Some(feedback) => {
-                let corrected = feedback.hear(&mut state.feedback, target, input.measured);
-                self.amplifier.reachable(corrected).0
+                let corrected = feedback.update(&mut state.feedback, target, input.measured);
+                self.amplifier.clamp_target(corrected).0
             }
         };
         let wanted = match &self.pre_compensator {
             PreCompensator::None => pursued,
             PreCompensator::ProportionalIntegral(it) => {
-                it.voltage(&state.pre_compensator, pursued, self.estimator.pivot(&state.estimator))
+                it.voltage(&state.pre_compensator, pursued, self.estimator.operating_point(&state.estimator))
             }
             PreCompensator::TimeOptimal(it) => self.time_optimal(it, state, pursued),
         };
@@ -200,34 +223,36 @@ impl<E: Estimator> Config<E> {
         if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
             it.track(&mut state.pre_compensator, drive.voltage);
         }
-        let (stiffness, sensor) = self.correct(&mut state.feedback, model);
+        let (stiffness, sensor) = self.estimate(&mut state.feedback, model);
         let limits = drive.limits.with(Limits::TARGET, moved);
         Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits, sensor }
     }
 
-    /// One tick with the amplifier off: zero volts at once, whatever slew and range. The integrator waits for
-    /// [`Config::adopt`]; the sensor is heard as ever.
+    /// Advances the controller by one tick with the amplifier off: 0 V regardless of slew and range. The integrator is
+    /// not advanced; [`Config::bumpless_transfer`] presets it. The sensor's readings are processed as in
+    /// [`Config::tick`].
     pub fn rest(&self, state: &mut State<E::State>, measured: Option<Reading>) -> Output {
         let (zero, code) = (Volts::ZERO, DacCode(0));
         state.amplifier = amplifier::State::default();
         if let Some(feedback) = &self.feedback {
-            feedback.hear(&mut state.feedback, zero, measured);
+            feedback.update(&mut state.feedback, zero, measured);
         }
         let model = self.estimator.run(&mut state.estimator, zero);
-        let (stiffness, sensor) = self.correct(&mut state.feedback, model);
+        let (stiffness, sensor) = self.estimate(&mut state.feedback, model);
         Output { target: zero, voltage: zero, code, applied: zero, stiffness, limits: Limits::NONE, sensor }
     }
 
-    /// The estimate, and what is thought of the sensor.
+    /// Returns the model's stiffness corrected by the sensor, and whether the sensor is trusted.
     #[inline(always)]
-    fn correct(&self, state: &mut feedback::State, model: ScaledStiffness) -> (ScaledStiffness, Option<Sensor>) {
+    fn estimate(&self, state: &mut feedback::State, model: ScaledStiffness) -> (ScaledStiffness, Option<Sensor>) {
         match &self.feedback {
             None => (model, None),
-            Some(feedback) => feedback.correct(state, model),
+            Some(feedback) => feedback.estimate(state, model),
         }
     }
 
-    /// A function of its own, so that a tick which leads by other means keeps its registers.
+    /// Returns the voltage that the time-optimal law asks for. Not inlined, so that a tick with another pre-compensator
+    /// keeps its registers.
     #[inline(never)]
     fn time_optimal(&self, it: &TimeOptimal<E::Inverse>, state: &mut State<E::State>, target: Volts) -> Volts {
         let State { estimator, time_optimal, amplifier, .. } = state;
@@ -241,23 +266,25 @@ impl<E: Estimator> Config<E> {
         )
     }
 
-    /// Takes over a running `state` without a bump: with the same `target`, the next voltage is the last one.
+    /// Makes this configuration take over a running `state` without moving the voltage: for the same `target`, the next
+    /// voltage is the last one.
     ///
-    /// For new gains, limits, plant or rate. A new range that excludes the last voltage still takes effect at once, and
-    /// without a pre-compensator the voltage goes to the target.
-    pub fn adopt(&self, state: &mut State<E::State>, target: Volts) {
-        state.feedback.adopted_by(self.feedback.as_ref());
-        let (target, _) = self.amplifier.reachable(target);
-        let (target, _) = self.amplifier.reachable(state.feedback.corrected(target));
+    /// To be called once after a change of gains, limits, plant or rate, and before the first tick after
+    /// [`Config::rest`]. A new range that excludes the last voltage takes effect in the next tick, and without a
+    /// pre-compensator the next voltage is the target.
+    pub fn bumpless_transfer(&self, state: &mut State<E::State>, target: Volts) {
+        state.feedback.transfer_to(self.feedback.as_ref());
+        let (target, _) = self.amplifier.clamp_target(target);
+        let (target, _) = self.amplifier.clamp_target(state.feedback.corrected(target));
         match &self.pre_compensator {
             PreCompensator::None => (),
             PreCompensator::ProportionalIntegral(it) => {
-                let pivot = self.estimator.pivot(&state.estimator);
-                it.align(&mut state.pre_compensator, state.amplifier.voltage(), target, pivot);
+                let point = self.estimator.operating_point(&state.estimator);
+                it.preset_integrator(&mut state.pre_compensator, state.amplifier.voltage(), target, point);
             }
             PreCompensator::TimeOptimal(it) => {
                 let applied = self.amplifier.applied(&state.amplifier);
-                it.align(&mut state.time_optimal, target, &self.estimator, &state.estimator, applied);
+                it.preset_offset(&mut state.time_optimal, target, &self.estimator, &state.estimator, applied);
             }
         }
     }

@@ -1,25 +1,35 @@
-//! The one error of this crate: a value that a person set is outside what is allowed.
+//! The error of this crate: a setting outside its allowed range.
 
 use core::fmt;
 use core::ops::RangeInclusive;
 
-/// A named value outside its allowed range; NaN is outside of every range.
+/// A named value outside its allowed range. NaN is outside every range.
+///
+/// It prints as one line that names the field, the value, the range and the unit:
+///
+/// ```
+/// use model::{Amplifier, Settings};
+///
+/// let amplifier = Amplifier { full_scale_v: 1500.0, ..Amplifier::PAPER };
+/// let error = Settings { amplifier, ..Settings::PAPER }.validate().unwrap_err();
+/// assert_eq!(error.to_string(), "full_scale_v = 1500 is not allowed: expected 50 to 1000 V");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfRange {
-    /// Name of the setting, as in [`crate::Settings`].
+    /// Name of the setting, spelled as the field of the settings or as the key in a plant file.
     pub field: &'static str,
-    /// The refused value, in `unit`.
+    /// The rejected value, in `unit`.
     pub value: f64,
     /// Lowest allowed value, in `unit`.
     pub lowest: f64,
     /// Highest allowed value, in `unit`.
     pub highest: f64,
-    /// Unit of the three numbers.
+    /// Unit of `value`, `lowest` and `highest`.
     pub unit: &'static str,
 }
 
 impl OutOfRange {
-    /// An error unless `value` lies in `allowed`.
+    /// Returns an error unless `value` lies inside `allowed`, ends included.
     #[inline(always)]
     pub(crate) fn check(
         field: &'static str,
@@ -28,17 +38,18 @@ impl OutOfRange {
         unit: &'static str,
     ) -> Result<(), Self> {
         let (lowest, highest) = allowed.into_inner();
-        Self { field, value, lowest, highest, unit }.judged()
+        Self { field, value, lowest, highest, unit }.unless_inside()
     }
 
-    /// Not inlined: soft floats are long.
+    /// Returns `self` as an error unless its value lies inside its range. Not inlined: each comparison of soft floats
+    /// is a call.
     #[inline(never)]
-    fn judged(self) -> Result<(), Self> {
+    fn unless_inside(self) -> Result<(), Self> {
         let inside = self.lowest <= self.value && self.value <= self.highest;
         if inside { Ok(()) } else { Err(self) }
     }
 
-    /// The same for how many there are of something.
+    /// Returns an error unless `count` lies inside `allowed`, ends included.
     pub(crate) fn check_count(
         field: &'static str,
         count: usize,
@@ -53,9 +64,9 @@ impl fmt::Display for OutOfRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { field, value, lowest, highest, unit } = self;
         write!(f, "{field} = ")?;
-        // Not with hundreds of digits.
-        let many = value.is_finite() && *value != 0.0 && !(1e-9..1e15).contains(&value.abs());
-        if many { write!(f, "{value:e}") } else { write!(f, "{value}") }?;
+        // Plain decimals of very large or very small numbers would have hundreds of digits.
+        let exponential = value.is_finite() && *value != 0.0 && !(1e-9..1e15).contains(&value.abs());
+        if exponential { write!(f, "{value:e}") } else { write!(f, "{value}") }?;
         write!(f, " is not allowed: expected {lowest}")?;
         if lowest != highest {
             write!(f, " to {highest}")?;

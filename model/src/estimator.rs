@@ -1,196 +1,232 @@
 //! The stiffness estimator: the spring's relaxation, run on the voltage that was really applied.
 //!
+//! Important terms:
+//!
+//! - *plant*: the spring's response to its voltage, in SI units ([`Plant`], [`crate::ExtendedPlant`]).
+//! - *feedthrough* or *share*: the part of a change of voltage that the stiffness follows instantaneously, in V/V.
+//! - *relaxed part*, `w`: the state of the plant, in V, which follows the voltage `u` with the time constant `tau`.
+//! - *operating point*: a voltage and the stiffness that it would give instantaneously ([`OperatingPoint`]).
+//! - *prediction*: the stiffness before the coming tick and at its end while the voltage stays ([`Prediction`]).
+//! - *step gain*: bounds of what one volt more does now and in one tick ([`StepGain`]).
+//!
 //! The plant of the source report's section 4.2.2 is a unity feedback loop around a proportional-integral block,
-//! `u = Kp e + Ki integral(e)` with `Kp = 0.1` and `Ki = 0.2 1/s`. Closed, it is
+//! `u = Kp e + Ki integral(e)` with `Kp = 0.1` and `Ki = 0.2 1/s`. The closed loop is
 //!
 //! ```text
 //! y/u = (Kp s + Ki) / ((1 + Kp) s + Ki)
 //!     = share + (1 - share) / (1 + tau s),   share = Kp / (1 + Kp),   tau = (1 + Kp) / Ki
 //! ```
 //!
-//! an instantaneous share of 1/11 and a relaxation of 5.5 s. With `w` the relaxed part:
+//! a feedthrough of 1/11 and a relaxation of 5.5 s. In state space:
 //!
 //! ```text
 //! y = w + share (u - w),   dw/dt = (u - w) / tau
 //! ```
 //!
 //! The amplifier holds its voltage between ticks, and for a held `u` the tick is exact, not an approximation:
-//! `w' = w + (1 - exp(-T / tau)) (u - w)`. `w` is always between voltages that were
-//! applied, so no sum here can overflow.
+//! `w' = w + (1 - exp(-T / tau)) (u - w)`. `w` is always between voltages that were applied, so no sum here can
+//! overflow.
 
 use core::fmt::Debug;
 
-use crate::coefficient::{Gain, Rate, Steep, upper};
+use crate::coefficient::{Gain, Rate, WideGain, upper};
 use crate::error::OutOfRange;
 use crate::units::{Accumulator, SampleTime, ScaledStiffness, Signal, Volts};
+use crate::validated::{Validate, Validated};
 
-/// A spring in SI units, to be scaled for one sample time.
-pub trait Model: Copy {
-    /// What it becomes.
+/// A spring in SI units that can be quantized for one sample time.
+pub trait Model: Validate + Copy {
+    /// The quantized spring.
     type Config: Estimator;
 
-    /// Whether it can be scaled.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] names the field.
-    fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange>;
+    /// Rounds the validated spring to fixed-point numbers; also available as `Validated::quantize`.
+    fn quantize(plant: Validated<'_, Self>) -> Self::Config;
 
-    /// Of a spring that [`Model::check`] accepts; of another one, anything.
-    fn scaled(&self, sample_time: SampleTime) -> Self::Config;
+    /// Returns the largest step gain that the spring has at any voltage and in any direction.
+    fn largest_step_gain(&self, sample_time: SampleTime) -> StepGain;
 
-    /// How much of a change of voltage shows how soon, at the most.
-    fn promptness(&self, sample_time: SampleTime) -> Promptness;
-
-    /// The same at the least, in the direction that the voltage turns to.
-    fn least_promptness(&self, sample_time: SampleTime) -> Promptness {
-        self.promptness(sample_time)
+    /// Returns the smallest step gain that the spring has at any voltage, in the direction in which the voltage turns.
+    fn smallest_step_gain(&self, sample_time: SampleTime) -> StepGain {
+        self.largest_step_gain(sample_time)
     }
 
-    /// Whether there is a way back, from a stiffness to a voltage.
+    /// Checks that more voltage always gives more stiffness, so that the spring can be inverted.
     ///
     /// # Errors
-    /// [`OutOfRange`] names what keeps more voltage from always giving more stiffness.
+    /// [`OutOfRange`] names the field that prevents it.
     fn check_inverse(&self) -> Result<(), OutOfRange> {
         Ok(())
     }
 
-    /// The way back of this spring, which has become `config`, if there is one; `resolution_v` is that of the amplifier's
-    /// converter.
+    /// Quantizes the inverse of this spring, which has become `config`; `resolution_v` is the voltage of one DAC code.
+    /// The inverse of a spring that [`Model::check_inverse`] rejects saturates: it is safe to run, and of no use.
     fn inverse(
-        &self,
+        plant: Validated<'_, Self>,
         config: &Self::Config,
-        sample_time: SampleTime,
         resolution_v: f64,
     ) -> <Self::Config as Estimator>::Inverse;
 }
 
-/// A spring that runs in a tick, on the voltage that was really applied.
+impl<P: Model> Validated<'_, P> {
+    /// Rounds the validated spring to the fixed-point numbers that a tick sees.
+    ///
+    /// ```
+    /// use model::estimator::Estimator;
+    /// use model::{OutOfRange, Plant, SampleTime, Validate, Volts, estimator};
+    ///
+    /// fn main() -> Result<(), OutOfRange> {
+    ///     let plant = Plant { share: 0.1, time_constant_s: 2.0 };
+    ///     let config = plant.validate(SampleTime::from_rate(1000.0)?)?.quantize();
+    ///     let mut state = estimator::State::default();
+    ///     let applied = Volts::new(500.0)?;
+    ///     // 10 % of the step is there instantaneously, the rest relaxes with 2 s.
+    ///     assert_eq!(config.run(&mut state, applied).to_f64().round(), 50.0);
+    ///     for _ in 1..2000 {
+    ///         config.run(&mut state, applied);
+    ///     }
+    ///     let exact = 500.0 * (1.0 - 0.9 * f64::exp(-1.0));
+    ///     assert!((config.run(&mut state, applied).to_f64() - exact).abs() < 1e-4);
+    ///     Ok(())
+    /// }
+    /// ```
+    pub fn quantize(self) -> P::Config {
+        P::quantize(self)
+    }
+}
+
+/// A quantized spring that runs once per tick, on the voltage that was really applied.
 pub trait Estimator: Copy {
-    /// What it remembers; the default is a spring at rest without voltage.
+    /// State of the spring; the default is a spring at rest at 0 V.
     type State: Copy + Default;
-    /// What it takes to go back from a stiffness to a voltage.
+    /// Quantized inverse of the spring, from a change of stiffness to a voltage.
     type Inverse: Copy + Debug + Eq;
 
-    /// One tick: the stiffness with `applied` just put across the spring, which then holds for one sample time.
+    /// Returns the stiffness just after `applied` was put across the spring, and holds that voltage for one sample
+    /// time.
     fn run(&self, state: &mut Self::State, applied: Volts) -> ScaledStiffness;
 
-    /// A point of what the spring would answer at once to a voltage now.
-    fn pivot(&self, state: &Self::State) -> Pivot;
+    /// Returns a point on the curve of the stiffness over the voltage applied now.
+    fn operating_point(&self, state: &Self::State) -> OperatingPoint;
 
-    /// Where the spring is and where it goes, while the `applied` voltage of the last tick stays.
-    fn outlook(&self, state: &Self::State, applied: Volts) -> Outlook;
+    /// Returns the stiffness now and at the end of the coming tick if the `applied` voltage of the last tick stays.
+    fn predict(&self, state: &Self::State, applied: Volts) -> Prediction;
 
-    /// The voltage that makes the stiffness at the end of the coming tick `change` V more than `applied` would.
+    /// Returns the voltage with which the stiffness at the end of the coming tick is `change` V above the one with
+    /// `applied`.
     fn voltage_for(&self, state: &Self::State, inverse: &Self::Inverse, applied: Volts, change: Signal) -> Volts;
 }
 
 /// Stiffness before the coming tick and at its end, both under the last voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outlook {
+pub struct Prediction {
     pub(crate) now: Signal,
-    pub(crate) then: Signal,
+    pub(crate) end: Signal,
 }
 
-/// The most volts that a law asks for to make up for one volt of stiffness within a tick: more only amplifies rounding.
-const MOST_DEMANDED: f64 = 8192.0;
+/// Largest gain of an inverse, in V of voltage per V of stiffness. A higher one would only amplify rounding errors.
+const MAX_INVERSE_GAIN: f64 = 8192.0;
 
-/// The volts that make up for one volt of stiffness, where one volt makes up for `within_a_tick`.
-pub(crate) fn demanded(within_a_tick: f64) -> f64 {
-    (1.0 / within_a_tick).min(MOST_DEMANDED)
+/// Returns the gain of the inverse, in V of voltage per V of stiffness, for a step gain of `within_a_tick` V/V, bounded
+/// by `MAX_INVERSE_GAIN`.
+pub(crate) fn inverse_gain(within_a_tick: f64) -> f64 {
+    (1.0 / within_a_tick).min(MAX_INVERSE_GAIN)
 }
 
-/// Bounds of what one volt more does, in V/V.
+/// Response of the stiffness to one volt more, in V/V: what it does now, and what one more tick adds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Promptness {
-    /// At once.
-    pub at_once: f64,
-    /// Later, by one more tick.
-    pub in_a_tick: f64,
-    /// What part of its distance the relaxation makes in a tick.
-    pub relaxed: f64,
+pub struct StepGain {
+    /// Change of the stiffness at the moment of the step, in V/V.
+    pub feedthrough: f64,
+    /// Further change of the stiffness by the end of one tick, in V/V.
+    pub in_one_tick: f64,
+    /// Fraction of its distance that the relaxation covers in one tick, 0 to 1.
+    pub relaxation: f64,
 }
 
-/// A voltage, and the stiffness that it would give at once.
+/// A voltage and the stiffness that it would give instantaneously, both in V.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pivot {
+pub struct OperatingPoint {
     pub(crate) voltage: Signal,
     pub(crate) stiffness: Signal,
 }
 
-/// The spring's response to a change of voltage, in SI units.
+/// The plain spring: a feedthrough and one relaxation, static gain 1, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plant {
-    /// Part of a change that comes at once, 0 to 0.9.
+    /// Part of a step that the stiffness follows instantaneously, 0 to 0.9.
     pub share: f64,
-    /// Time constant of the rest, in seconds, two sample times to 10 000 s.
+    /// Time constant of the remaining part, two sample times to 10 000 s.
     pub time_constant_s: f64,
 }
 
 impl Plant {
-    /// The report's plant: `Kp = 0.1`, `Ki = 0.2 1/s`.
+    /// The source report's plant: `Kp = 0.1`, `Ki = 0.2 1/s`, hence a share of 1/11 and a time constant of 5.5 s.
     pub const PAPER: Self = Self::proportional_integral(0.1, 0.2);
 
-    /// A unity feedback loop around `proportional` (no unit) and `integral_per_s` (1/s).
+    /// Returns the plant of a unity feedback loop around a block with the gains `proportional` (no unit) and
+    /// `integral_per_s` (1/s).
     pub const fn proportional_integral(proportional: f64, integral_per_s: f64) -> Self {
         Self { share: proportional / (1.0 + proportional), time_constant_s: (1.0 + proportional) / integral_per_s }
     }
 }
 
-/// The plant for one sample time, scaled for the tick.
+/// The plain spring for one sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
     share: Gain,
     relaxation: Rate,
 }
 
-/// The relaxed part of the stiffness.
+/// The relaxed part of the stiffness; the default is a spring at rest at 0 V.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct State {
     relaxed: Accumulator,
 }
 
 impl Config {
-    /// Stiffness at this tick, with `applied` just put across the spring.
+    /// Returns the stiffness just after `applied` was put across the spring.
     #[inline(always)]
     pub fn estimate(&self, state: &State, applied: Volts) -> ScaledStiffness {
         let relaxed = state.relaxed();
         ScaledStiffness(relaxed + self.share.times(applied.0 - relaxed))
     }
 
-    /// One sample time passes with `applied` held.
+    /// Advances the state by one sample time with `applied` held.
     #[inline(always)]
     pub fn advance(&self, state: &mut State, applied: Volts) {
         state.relaxed += self.relaxation.step(applied.0 - state.relaxed());
     }
 }
 
-impl Model for Plant {
-    type Config = Config;
-
+impl Validate for Plant {
     fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
         OutOfRange::check("share", self.share, 0.0..=0.9, "of a step")?;
         OutOfRange::check("time_constant_s", self.time_constant_s, 2.0 * sample_time.seconds()..=1e4, "s")
     }
+}
 
-    fn scaled(&self, sample_time: SampleTime) -> Config {
-        let relaxation = Rate::new(sample_time.part_of_way(self.time_constant_s));
-        Config { share: Gain::new(self.share), relaxation }
+impl Model for Plant {
+    type Config = Config;
+
+    fn quantize(plant: Validated<'_, Self>) -> Config {
+        let Self { share, time_constant_s } = *plant.settings();
+        Config { share: Gain::new(share), relaxation: Rate::new(plant.sample_time().lag_fraction(time_constant_s)) }
     }
 
-    fn promptness(&self, sample_time: SampleTime) -> Promptness {
-        let relaxed = sample_time.part_of_way(self.time_constant_s);
-        Promptness { at_once: self.share, in_a_tick: (1.0 - self.share) * relaxed, relaxed }
+    fn largest_step_gain(&self, sample_time: SampleTime) -> StepGain {
+        let relaxation = sample_time.lag_fraction(self.time_constant_s);
+        StepGain { feedthrough: self.share, in_one_tick: (1.0 - self.share) * relaxation, relaxation }
     }
 
-    fn inverse(&self, _: &Config, sample_time: SampleTime, _: f64) -> Steep {
-        let Promptness { at_once, in_a_tick, .. } = self.promptness(sample_time);
-        Steep::new(demanded(at_once + in_a_tick))
+    fn inverse(plant: Validated<'_, Self>, _: &Config, _: f64) -> WideGain {
+        let StepGain { feedthrough, in_one_tick, .. } = plant.settings().largest_step_gain(plant.sample_time());
+        WideGain::new(inverse_gain(feedthrough + in_one_tick))
     }
 }
 
 impl Estimator for Config {
     type State = State;
-    type Inverse = Steep;
+    type Inverse = WideGain;
 
     #[inline(always)]
     fn run(&self, state: &mut State, applied: Volts) -> ScaledStiffness {
@@ -199,27 +235,27 @@ impl Estimator for Config {
         stiffness
     }
 
-    /// Where nothing moves: the voltage that equals the relaxed part.
+    /// Returns the point where the spring is in equilibrium: voltage and stiffness both equal the relaxed part.
     #[inline(always)]
-    fn pivot(&self, state: &State) -> Pivot {
-        Pivot { voltage: state.relaxed(), stiffness: state.relaxed() }
+    fn operating_point(&self, state: &State) -> OperatingPoint {
+        OperatingPoint { voltage: state.relaxed(), stiffness: state.relaxed() }
     }
 
     #[inline(always)]
-    fn outlook(&self, state: &State, applied: Volts) -> Outlook {
+    fn predict(&self, state: &State, applied: Volts) -> Prediction {
         let mut next = *state;
         self.advance(&mut next, applied);
-        Outlook { now: self.estimate(state, applied).0, then: self.estimate(&next, applied).0 }
+        Prediction { now: self.estimate(state, applied).0, end: self.estimate(&next, applied).0 }
     }
 
     #[inline(always)]
-    fn voltage_for(&self, _: &State, inverse: &Steep, applied: Volts, change: Signal) -> Volts {
+    fn voltage_for(&self, _: &State, inverse: &WideGain, applied: Volts, change: Signal) -> Volts {
         Volts(applied.0.saturating_add(inverse.times(change)))
     }
 }
 
 impl State {
-    /// The stiffness that would be left if the voltage's instantaneous share were taken away.
+    /// Returns the relaxed part, in V: the stiffness that would be left without the feedthrough of the voltage.
     #[inline(always)]
     fn relaxed(&self) -> Signal {
         upper(self.relaxed)
@@ -231,18 +267,18 @@ mod tests {
     use super::*;
 
     fn paper(rate_hz: f64) -> Config {
-        Plant::PAPER.scaled(SampleTime::from_rate(rate_hz).unwrap())
+        Plant::PAPER.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize()
     }
 
     #[test]
-    fn the_report_gives_a_share_of_one_eleventh_and_five_and_a_half_seconds() {
+    fn the_paper_plant_has_a_share_of_1_11_and_a_time_constant_of_5_5_s() {
         assert!((Plant::PAPER.share - 1.0 / 11.0).abs() < 1e-15);
         assert!((Plant::PAPER.time_constant_s - 5.5).abs() < 1e-12);
     }
 
     /// Exact for a held voltage at any rate: forward Euler would be off by 0.03 V at 100 Hz.
     #[test]
-    fn a_step_follows_the_exponential_at_every_rate() {
+    fn a_step_response_is_the_exact_exponential_at_every_rate() {
         for rate in [100.0, 333.0, 1000.0, 10_000.0] {
             let (config, mut state) = (paper(rate), State::default());
             let applied = Volts::new(700.0).unwrap();
@@ -257,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn one_millivolt_still_integrates_at_10_khz() {
+    fn a_lag_of_one_millivolt_is_integrated_at_10_khz() {
         let (config, mut state) = (paper(10_000.0), State::default());
         let applied = Volts::new(0.001).unwrap();
         config.advance(&mut state, applied);
@@ -270,9 +306,9 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_plant_is_named() {
+    fn a_setting_out_of_range_is_rejected_by_name() {
         let time = SampleTime::from_rate(1000.0).unwrap();
-        let named = |share, time_constant_s| Plant { share, time_constant_s }.check(time).unwrap_err().field;
+        let named = |share, time_constant_s| Plant { share, time_constant_s }.validate(time).unwrap_err().field;
         assert_eq!(named(-0.1, 5.5), "share");
         assert_eq!(named(f64::NAN, 5.5), "share");
         assert_eq!(named(0.1, 0.001), "time_constant_s");

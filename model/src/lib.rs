@@ -1,8 +1,18 @@
-//! What is true about the variable-stiffness spring, its amplifier and its control, in fixed point.
+//! The variable-stiffness spring, its amplifier and its control, in fixed point.
 //!
-//! No heap, no `unsafe`, no hardware, and no floating point once a [`Config`] is built: the same bits on a host and on
-//! the MCU. One tick is [`Config::tick`], a pure function of the configuration, the state and the input, and data goes
-//! through it one way:
+//! Important terms:
+//!
+//! - *spring* or *plant*: a piezo cantilever whose stiffness follows the voltage across it: a part instantaneously, the
+//!   rest with a relaxation of seconds.
+//! - *scaled stiffness*: stiffness expressed as the equivalent static voltage, in V.
+//! - *target*: the desired scaled stiffness, in V.
+//! - *estimator*: the model of the spring, run on the voltage that was really applied.
+//! - *pre-compensator*: shapes the voltage, with deliberate overshoot, so that the stiffness reaches the target sooner.
+//! - *supervisor*: decides whether the output is enabled.
+//! - *settings*, *config*, *state*: SI units and floats as a person writes them; the same validated and quantized to
+//!   fixed point; what changes from tick to tick.
+//!
+//! One tick is [`Config::tick`], a pure function of configuration, state and input. Data goes through it one way:
 //!
 //! ```text
 //! target [V] -> pre-compensator -> amplifier limits -> DAC code
@@ -12,20 +22,38 @@
 //!               ^ measured stiffness, if there is a sensor
 //! ```
 //!
-//! A desired stiffness in Pa or N/m becomes a target in volts off the hot path, in [`stiffness`].
+//! No heap, no `unsafe`, no hardware, and no floating point once a [`Config`] is built: the same bits on a host and on
+//! the MCU. A desired stiffness in Pa or N/m becomes a target off the hot path, by [`Spring::target`].
 //!
-//! | module | what it is |
+//! | module | content |
 //! | --- | --- |
-//! | [`stiffness`] | Young's modulus against voltage, spring constant of the cantilever, both ways |
-//! | [`estimator`] | the spring's relaxation, run on the applied voltage |
-//! | [`extended`] | the same for a spring with hysteresis, a static law, leakage and several relaxations |
-//! | [`pre_compensator`] | proportional-integral drive past the target and back |
-//! | [`time_optimal`] | the same, as fast as the amplifier allows |
-//! | [`feedback`] | a stiffness sensor that corrects the estimate, and when it is not believed |
-//! | [`amplifier`] | range, slew, rounding to a DAC code, and back to volts |
-//! | [`controller`] | the four in one tick; settings in SI, checked once |
-//! | [`supervisor`] | whether a voltage may leave at all |
-//! | [`units`], [`coefficient`] | the number formats |
+//! | [`stiffness`] | Young's modulus and spring constant over voltage, and the inverse |
+//! | [`estimator`] | the plain spring: feedthrough and one relaxation |
+//! | [`extended`] | a spring with hysteresis, a static law, leakage and several relaxations |
+//! | [`pre_compensator`] | the proportional-integral pre-compensator |
+//! | [`time_optimal`] | the pre-compensator that is as fast as the amplifier allows |
+//! | [`feedback`] | correction of the estimate by a stiffness sensor, and detection of the sensor's faults |
+//! | [`amplifier`] | slew, range, rounding to a DAC code |
+//! | [`controller`] | all of these in one tick |
+//! | [`supervisor`] | whether the output is enabled |
+//! | [`validated`] | settings are validated before they are quantized |
+//! | [`units`], [`coefficient`] | number formats |
+//!
+//! `examples/timer_loop.rs` is the loop of a firmware's timer interrupt, to be copied:
+//!
+//! ```
+//! use model::{Config, Input, OutOfRange, Settings, State, Volts};
+//!
+//! fn main() -> Result<(), OutOfRange> {
+//!     let config: Config = Settings::PAPER.validate()?.quantize();
+//!     let mut state = State::default();
+//!     let output = config.tick(&mut state, Input { target: Volts::new(100.0)?, ..Input::default() });
+//!     // 4 times the error, divided by 1 + 4/11 for the feedthrough; written to a 12-bit DAC of 700 V.
+//!     assert_eq!(output.voltage.to_f64().round(), 293.0);
+//!     assert_eq!(output.code.0, 1716);
+//!     Ok(())
+//! }
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -38,14 +66,13 @@ pub mod controller;
 pub mod error;
 pub mod estimator;
 pub mod extended;
-#[cfg_attr(not(feature = "feedback"), path = "absent/feedback.rs")]
 pub mod feedback;
 pub mod pre_compensator;
 pub mod stiffness;
 pub mod supervisor;
-#[cfg_attr(not(feature = "time-optimal"), path = "absent/time_optimal.rs")]
 pub mod time_optimal;
 pub mod units;
+pub mod validated;
 
 pub use amplifier::{Amplifier, Limits};
 pub use controller::{Compensation, Config, Input, Output, Settings, State};
@@ -57,3 +84,4 @@ pub use pre_compensator::Gains;
 pub use stiffness::Spring;
 pub use time_optimal::Approach;
 pub use units::{DacCode, SampleTime, ScaledStiffness, Volts};
+pub use validated::{Validate, Validated};

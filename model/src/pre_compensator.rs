@@ -1,122 +1,135 @@
-//! The proportional-integral pre-compensator: drives the voltage past the target and back.
+//! The proportional-integral pre-compensator: shapes the voltage with deliberate overshoot, so that the stiffness
+//! settles faster.
 //!
-//! It closes a loop around the estimate, `u = Kp e + z`, `dz/dt = Ki e`, `e = target - y`. Two things make it more than
-//! that line:
+//! Important terms:
 //!
-//! - **No delay in the loop.** Part of the stiffness follows the voltage at once, so `u` stands on both sides. The
-//!   estimator gives a [`Pivot`], a voltage `v0` and the stiffness `y0` that it would give at once; with
-//!   `y = y0 + s (u - v0)` and `g = 1 / (1 + Kp s)`, solved: `u = g z + (1 - g) v0 + g Kp (target - y0)`.
-//!   For the plain spring `s` is its share, `v0 = y0` its relaxed part, and this is exact. An
-//!   [extended](crate::extended) spring answers with a curve of slope `s'`, 0 to `s`, that depends on voltage and
-//!   direction; `s` is the steepest, and the pivot the last voltage. One tick then brings `u` at least
-//!   `g (1 + Kp s')` of the way to the curve's exact solution and never past it, so that what is left shrinks in each
-//!   tick by `Kp (s - s') / (1 + Kp s)`: with the report's gain and share, 0.27 at the most. No division in a tick.
-//! - **Anti-windup by structure.** While nothing limits, `Kp e = u - z`, so `dz/dt = (u - z) Ki / Kp`: the integrator is
-//!   a first-order lag, with the reset time `Kp / Ki`, of the voltage *that the amplifier really gave* after slew and
-//!   range. Limited, it follows the output instead of running away, and it cannot leave the amplifier's range
-//!   (Astrom and Haegglund's tracking form; Hanus's conditioning).
+//! - *error*, `e`: target minus estimated stiffness, in V.
+//! - *gains*: proportional `Kp` in V/V and integral `Ki` in 1/s ([`Gains`]).
+//! - *integrator*, `z`: the state of the pre-compensator, in V.
+//! - *operating point*: a voltage `v0` and the stiffness `y0` that it would give instantaneously ([`OperatingPoint`]).
+//! - *anti-windup*: what keeps the integrator from running away while the amplifier limits the voltage.
+//!
+//! It closes a loop around the estimate, `u = Kp e + z`, `dz/dt = Ki e`, `e = target - y`, with two additions:
+//!
+//! - **No delay in the loop.** Part of the stiffness follows the voltage instantaneously, so `u` stands on both sides.
+//!   With the operating point, `y = y0 + s (u - v0)` and `g = 1 / (1 + Kp s)`, the solution is
+//!   `u = g z + (1 - g) v0 + g Kp (target - y0)`. For the plain spring `s` is its share, `v0 = y0` its relaxed part, and
+//!   this is exact. An [extended](crate::extended) spring follows a curve of slope `s'`, 0 to `s`, that depends on
+//!   voltage and direction; `s` is the largest slope, and the operating point is at the last voltage. One tick then
+//!   brings `u` at least `g (1 + Kp s')` of the way to the curve's exact solution and never past it, so that the
+//!   remaining distance shrinks in each tick to `Kp (s - s') / (1 + Kp s)` of itself: with the report's gain and share,
+//!   to 0.27 at most. A tick needs no division.
+//! - **Anti-windup by structure.** While nothing limits, `Kp e = u - z`, so `dz/dt = (u - z) Ki / Kp`: the integrator
+//!   is a first-order lag, with the reset time `Kp / Ki`, of the voltage *that the amplifier really gave* after slew
+//!   and range. While the amplifier limits, the integrator follows the output instead of running away, and it cannot
+//!   leave the amplifier's range (Astrom and Haegglund's tracking form; Hanus's conditioning).
 //!
 //! Rounding to a DAC code is left out of that feedback: an integrator that tracked codes would stop short of the target
 //! by up to a fraction of a code.
 
-use crate::coefficient::{Gain, Rate, upper};
+use crate::coefficient::{Gain, Rate, upper, widened};
 use crate::error::OutOfRange;
-use crate::estimator::{Pivot, Promptness};
+use crate::estimator::{OperatingPoint, StepGain};
 use crate::units::{Accumulator, SampleTime, Signal, Volts, signal};
+use crate::validated::Validated;
 
-/// Volts of proportional action beyond which any range is at its end, so that no more need be computed.
-const ENOUGH_V: f64 = 1024.0;
+/// Proportional action, in V, beyond which any amplifier is at the end of its range.
+const MAX_ACTION_V: f64 = 1024.0;
 
-/// Gains in SI units.
+/// Gains of the proportional-integral pre-compensator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
-    /// Volts per volt of error, 0.001 to 100, and no more than what brings the spring to its target in one tick.
+    /// Proportional gain `Kp`, in V of voltage per V of error, 0.001 to 100; the spring's dead-beat gain, which brings
+    /// it to the target in one tick, is the upper bound where it is lower.
     pub proportional: f64,
-    /// Volts per volt of error and second, 0 to `proportional` / ten sample times.
+    /// Integral gain `Ki`, in V of voltage per V of error and second, 0 to `proportional` / (10 sample times).
     pub integral_per_s: f64,
 }
 
 impl Gains {
-    /// The gains that reproduce the report's column "with controller"; it does not print them.
+    /// The gains that reproduce the source report's column "with controller"; the report does not print them.
     pub const PAPER: Self = Self { proportional: 4.0, integral_per_s: 1.35 };
 }
 
-/// The pre-compensator for one plant and sample time, scaled for the tick.
+/// The pre-compensator for one plant and sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProportionalIntegral {
     /// Kp g
     error_gain: Gain,
-    /// Errors beyond +-this drive the voltage to an end of any range all the same.
+    /// Larger errors bring the voltage to the end of any range, too.
     largest_error: Signal,
     /// 1 - g
-    pivot_gain: Gain,
+    operating_point_gain: Gain,
     /// g
     integrator_gain: Gain,
     /// T Ki / Kp
     reset: Rate,
 }
 
-/// The integrator as it enters the voltage, g z, in volts.
+/// The integrator's contribution to the voltage, `g z`, in V; the default is 0 V.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct State {
     integrator: Accumulator,
 }
 
 impl Gains {
-    /// For a spring that is as prompt as this.
+    /// Checks the gains for a spring of this largest step gain.
     ///
     /// # Errors
     /// [`OutOfRange`] names `proportional_gain` or `integral_gain_per_s`.
-    pub(crate) fn check(&self, spring: &Promptness, sample_time: SampleTime) -> Result<(), OutOfRange> {
-        // One tick moves what has relaxed by `relaxed + in_a_tick Kp g` of its distance; more than all of it rings.
-        let Promptness { at_once, in_a_tick, relaxed } = *spring;
-        let ringing = in_a_tick - (1.0 - relaxed) * at_once;
-        let deadbeat = if ringing > 0.0 { (1.0 - relaxed) / ringing } else { f64::INFINITY };
-        OutOfRange::check("proportional_gain", self.proportional, 0.001..=deadbeat.min(100.0), "V/V")?;
-        // A reset within a few ticks makes the loop hunt over DAC codes.
+    pub(crate) fn check(&self, spring: &StepGain, sample_time: SampleTime) -> Result<(), OutOfRange> {
+        // One tick moves the relaxed part by `relaxation + in_one_tick Kp g` of its distance; more than all of it
+        // rings.
+        let StepGain { feedthrough, in_one_tick, relaxation } = *spring;
+        let ringing = in_one_tick - (1.0 - relaxation) * feedthrough;
+        let dead_beat = if ringing > 0.0 { (1.0 - relaxation) / ringing } else { f64::INFINITY };
+        OutOfRange::check("proportional_gain", self.proportional, 0.001..=dead_beat.min(100.0), "V/V")?;
+        // With a reset time of a few ticks the loop would hunt over DAC codes.
         let fastest = self.proportional / (10.0 * sample_time.seconds());
         OutOfRange::check("integral_gain_per_s", self.integral_per_s, 0.0..=fastest, "1/s")
     }
 }
 
-impl ProportionalIntegral {
-    /// Of gains that [`Gains::check`] accepts for this spring.
-    pub(crate) fn new(gains: &Gains, spring: &Promptness, sample_time: SampleTime) -> Self {
-        let Gains { proportional, integral_per_s } = *gains;
-        let g = 1.0 / (1.0 + proportional * spring.at_once);
-        Self {
+impl Validated<'_, Gains> {
+    /// Quantizes the gains, which were checked for a spring of this largest step gain.
+    pub(crate) fn quantize(self, spring: &StepGain) -> ProportionalIntegral {
+        let Gains { proportional, integral_per_s } = *self.settings();
+        let g = 1.0 / (1.0 + proportional * spring.feedthrough);
+        ProportionalIntegral {
             error_gain: Gain::new(proportional * g),
-            largest_error: signal((ENOUGH_V / (proportional * g)).min(ENOUGH_V)),
-            pivot_gain: Gain::new(1.0 - g),
+            largest_error: signal((MAX_ACTION_V / (proportional * g)).min(MAX_ACTION_V)),
+            operating_point_gain: Gain::new(1.0 - g),
             integrator_gain: Gain::new(g),
-            reset: Rate::new(sample_time.seconds() * integral_per_s / proportional),
+            reset: Rate::new(self.sample_time().seconds() * integral_per_s / proportional),
         }
     }
+}
 
-    /// The voltage that this loop asks for, before the amplifier's limits.
+impl ProportionalIntegral {
+    /// Returns the voltage that this loop asks for, before the amplifier's limits.
     #[inline(always)]
-    pub(crate) fn voltage(&self, state: &State, target: Volts, pivot: Pivot) -> Volts {
-        Volts(upper(state.integrator).saturating_add(self.without_integrator(target, pivot)))
+    pub(crate) fn voltage(&self, state: &State, target: Volts, point: OperatingPoint) -> Volts {
+        Volts(upper(state.integrator).saturating_add(self.without_integrator(target, point)))
     }
 
-    /// `(1 - g) v0 + g Kp (target - y0)`
+    /// Returns `(1 - g) v0 + g Kp (target - y0)`, in V.
     #[inline(always)]
-    fn without_integrator(&self, target: Volts, pivot: Pivot) -> Signal {
-        let error = (target.0 - pivot.stiffness).max(-self.largest_error).min(self.largest_error);
-        self.pivot_gain.times(pivot.voltage) + self.error_gain.times(error)
+    fn without_integrator(&self, target: Volts, point: OperatingPoint) -> Signal {
+        let error = (target.0 - point.stiffness).max(-self.largest_error).min(self.largest_error);
+        self.operating_point_gain.times(point.voltage) + self.error_gain.times(error)
     }
 
-    /// One sample time passes with `driven` at the amplifier's input, after limits and before rounding.
+    /// Advances the integrator by one sample time with `driven` at the amplifier's input, after limits and before
+    /// rounding.
     #[inline(always)]
     pub(crate) fn track(&self, state: &mut State, driven: Volts) {
         let lag = self.integrator_gain.times(driven.0).saturating_sub(upper(state.integrator));
         state.integrator += self.reset.step(lag);
     }
 
-    /// Sets the integrator so that, at this `target`, the loop asks for the `driven` voltage again.
-    pub(crate) fn align(&self, state: &mut State, driven: Volts, target: Volts, pivot: Pivot) {
-        let integrator = driven.0.saturating_sub(self.without_integrator(target, pivot));
-        state.integrator = Accumulator::from_bits(i64::from(integrator.to_bits()) << 32);
+    /// Sets the integrator so that the next voltage for this `target` is the last one, `driven`.
+    pub(crate) fn preset_integrator(&self, state: &mut State, driven: Volts, target: Volts, point: OperatingPoint) {
+        state.integrator = widened(driven.0.saturating_sub(self.without_integrator(target, point)));
     }
 }
 
@@ -126,22 +139,22 @@ mod tests {
     use crate::estimator::{Model, Plant};
 
     #[test]
-    fn wrong_gains_are_named() {
+    fn a_gain_out_of_range_is_rejected_by_name() {
         let time = SampleTime::from_rate(1000.0).unwrap();
         let named = |proportional, integral_per_s| {
             let gains = Gains { proportional, integral_per_s };
-            gains.check(&Plant::PAPER.promptness(time), time).unwrap_err().field
+            gains.check(&Plant::PAPER.largest_step_gain(time), time).unwrap_err().field
         };
         assert_eq!(named(-4.0, 1.35), "proportional_gain");
         assert_eq!(named(0.0, 1.35), "proportional_gain");
         assert_eq!(named(f64::NAN, 1.35), "proportional_gain");
         assert_eq!(named(4.0, -1.35), "integral_gain_per_s");
         assert_eq!(named(4.0, f64::NAN), "integral_gain_per_s");
-        // A reset faster than ten ticks is not sampled well.
+        // The reset time is shorter than ten ticks.
         assert_eq!(named(4.0, 401.0), "integral_gain_per_s");
-        // The spring would be past its target after one tick, back after two, and so on.
+        // The spring would overshoot its target in every tick: it would ring.
         let slow = SampleTime::from_rate(100.0).unwrap();
-        let quick = Plant { share: 0.0, time_constant_s: 0.1 }.promptness(slow);
+        let quick = Plant { share: 0.0, time_constant_s: 0.1 }.largest_step_gain(slow);
         let error = Gains { proportional: 20.0, integral_per_s: 1.0 }.check(&quick, slow);
         assert_eq!(error.unwrap_err().field, "proportional_gain");
     }

@@ -1,4 +1,5 @@
-//! The whole tick over long runs, limits and changes of its configuration. Built with overflow checks: a wrap panics.
+//! Tests of the whole tick: long runs, limits, changes of the configuration. They are built with overflow checks: a
+//! wrap panics.
 
 use model::{Amplifier, Compensation, Config, Gains, Input, Limits, Output, Plant, Settings, State, Volts};
 use proptest::prelude::*;
@@ -16,11 +17,11 @@ fn run(config: &Config, state: &mut State, target_v: f64, ticks: u32) -> Output 
     output
 }
 
-/// Ten million ticks at rest on a voltage between two codes: no drift, no wrap, no hunting over more than one code.
+/// Ten million ticks at rest on a voltage between two codes.
 #[test]
-fn ten_million_ticks_stay_within_one_code() {
+fn the_code_stays_within_one_step_for_ten_million_ticks_at_rest() {
     let settings = Settings { rate_hz: 10_000.0, ..Settings::PAPER };
-    let config = settings.check().unwrap();
+    let config = settings.validate().unwrap().quantize();
     let mut state = State::default();
     let target = 333.3;
     run(&config, &mut state, target, 1_000_000);
@@ -35,23 +36,23 @@ fn ten_million_ticks_stay_within_one_code() {
         assert_eq!(output.limits, Limits::NONE);
     }
     assert!(highest - lowest <= 1, "codes {lowest} to {highest}");
-    // The loop balances its error with the voltage before rounding: share times half a code may stay.
+    // The loop settles with the voltage before rounding: the feedthrough of half a code may remain.
     let allowed = settings.plant.share * 0.5 * settings.amplifier.volts_per_code();
     assert!((sum / 1e7).abs() < allowed, "mean error {} of {allowed}", sum / 1e7);
 }
 
-/// Held at a limit for a minute, then asked for less: the answer is that of a loop that was never limited. A wound-up
-/// integrator would keep the voltage at the limit for long.
+/// After a minute at a limit, the response to a lower target is that of a loop that was never limited. A wound-up
+/// integrator would keep the voltage at the limit for a while.
 #[test]
 fn the_integrator_does_not_wind_up() {
     for slew_v_per_s in [None, Some(200.0)] {
         let answer = |max_v, first| {
             let amplifier = Amplifier { max_v, slew_v_per_s, ..Amplifier::PAPER };
-            let config = Settings { amplifier, ..Settings::PAPER }.check().unwrap();
+            let config = Settings { amplifier, ..Settings::PAPER }.validate().unwrap().quantize();
             let mut state = State::default();
             let held = run(&config, &mut state, first, 60_000);
             assert!((held.stiffness.to_f64() - 500.0).abs() < 0.2);
-            assert_eq!(held.limits.any_of(Limits::TARGET), first > max_v, "a target beyond the range is reported");
+            assert_eq!(held.limits.intersects(Limits::TARGET), first > max_v, "a target beyond the range is reported");
             [100, 500, 1000, 3500].map(|ticks| run(&config, &mut state, 300.0, ticks).stiffness.to_f64())
         };
         let (limited, free) = (answer(500.0, 700.0), answer(700.0, 500.0));
@@ -62,9 +63,9 @@ fn the_integrator_does_not_wind_up() {
 }
 
 #[test]
-fn new_gains_limits_and_plant_come_without_a_bump() {
+fn a_transfer_to_new_gains_limits_plant_or_rate_is_bumpless() {
     let settings = Settings::PAPER;
-    let before = settings.check().unwrap();
+    let before = settings.validate().unwrap().quantize();
     let others = [
         Settings { compensation: gains(12.0, 0.3), ..settings },
         Settings { compensation: gains(0.5, 5.0), ..settings },
@@ -74,30 +75,33 @@ fn new_gains_limits_and_plant_come_without_a_bump() {
         Settings { rate_hz: 5000.0, ..settings },
     ];
     for other in others {
-        let after = other.check().unwrap();
+        let after = other.validate().unwrap().quantize();
         let mut state = State::default();
         // In the middle of a transient, where the error is large.
         let last = run(&before, &mut state, 150.0, 700);
-        let mut unprepared = state;
-        after.adopt(&mut state, Volts::new(150.0).unwrap());
+        let mut without_transfer = state;
+        after.bumpless_transfer(&mut state, Volts::new(150.0).unwrap());
         let next = run(&after, &mut state, 150.0, 1);
         let bump = (next.voltage.to_f64() - last.voltage.to_f64()).abs();
         assert!(bump < 1e-5, "{other:?}: {bump} V");
         if other.compensation != settings.compensation {
-            let unprepared = run(&after, &mut unprepared, 150.0, 1);
-            assert!((unprepared.voltage.to_f64() - last.voltage.to_f64()).abs() > 1.0, "the test sees no bump at all");
+            let next = run(&after, &mut without_transfer, 150.0, 1);
+            assert!(
+                (next.voltage.to_f64() - last.voltage.to_f64()).abs() > 1.0,
+                "this change would not move the voltage without a transfer either"
+            );
         }
     }
 }
 
 #[test]
-fn a_range_that_shrinks_below_the_voltage_acts_at_once() {
-    let wide = Settings::PAPER.check().unwrap();
+fn a_new_range_below_the_voltage_takes_effect_in_the_next_tick() {
+    let wide = Settings::PAPER.validate().unwrap().quantize();
     let amplifier = Amplifier { max_v: 250.0, slew_v_per_s: Some(10.0), ..Amplifier::PAPER };
-    let narrow = Settings { amplifier, ..Settings::PAPER }.check().unwrap();
+    let narrow = Settings { amplifier, ..Settings::PAPER }.validate().unwrap().quantize();
     let mut state = State::default();
     run(&wide, &mut state, 400.0, 10_000);
-    narrow.adopt(&mut state, Volts::new(400.0).unwrap());
+    narrow.bumpless_transfer(&mut state, Volts::new(400.0).unwrap());
     let output = run(&narrow, &mut state, 400.0, 1);
     assert!(output.applied.to_f64() <= 250.0);
 }
@@ -105,9 +109,9 @@ fn a_range_that_shrinks_below_the_voltage_acts_at_once() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Whatever the settings, the targets and the changes of settings: the output stays inside the range.
+    /// Random settings, targets and changes of the settings.
     #[test]
-    fn nothing_gets_out_of_the_range(
+    fn the_output_stays_in_range(
         rate in 2.0..=4.0f64,
         share in 0.0..=0.9f64,
         time_constant in -2.0..4.0f64,
@@ -130,9 +134,10 @@ proptest! {
                 },
                 feedback: None,
             };
-            let Ok(config) = settings.check() else { continue };
+            let Ok(valid) = settings.validate() else { continue };
+    let config = valid.quantize();
             let (lowest, highest) = config.range();
-            config.adopt(&mut state, Volts::new(targets[0]).unwrap());
+            config.bumpless_transfer(&mut state, Volts::new(targets[0]).unwrap());
             for &target in &targets {
                 let output = run(&config, &mut state, target, 50);
                 prop_assert!(output.applied >= lowest && output.applied <= highest);

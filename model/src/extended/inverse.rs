@@ -1,109 +1,120 @@
-//! The extended spring's way back, against the order of its blocks: from a stiffness to the voltage that gives it.
+//! The extended spring's inverse, against the order of its blocks: from a change of the stiffness to the voltage that
+//! gives it.
+//!
+//! Important terms:
+//!
+//! - *step gain*, `H`: the change of the stiffness at the end of a tick for one volt more of the law's output, held for
+//!   that tick, in V/V.
+//! - *inverse gain*: `1 / H`, bounded, in V/V.
 //!
 //! ```text
 //! change of the stiffness at the end of a tick -> relaxation -> law -> memory -> voltage
-//!                                                 more f        p      v
+//!                                               change of f      p      v
 //! ```
 //!
-//! Through relaxation and leakage one volt more of `f`, held for a tick of length `T`, brings at its end
+//! Through relaxation and leakage, for a tick of length `T`,
 //!
 //! ```text
-//! H = share (1 - loss exp1(T / tau_l)) + (1 - loss m) sum_k weight_k exp1(T / tau_k),    exp1(x) = 1 - exp(-x)
+//! H = share (1 - loss r(T / tau_l)) + (1 - loss m) sum_k weight_k r(T / tau_k),    r(x) = 1 - exp(-x)
 //! ```
 //!
-//! with `loss` and `m` of the [leakage](super::leakage), whose effect on what was there before is not needed: the spring
-//! is run ahead for it. Where the first time constant depends on the voltage, `1 / H` is that of the present voltage, taken for
-//! straight between both ends. It bends the other way, so too little is asked for there; a voltage that is itself on its way
-//! to quicker time constants brings more than was asked. What is left shrinks with every tick. [`law`] and [`memory`] are
-//! inverted exactly.
+//! with `loss` and `m` of the [leakage](super::leakage). The effect of earlier voltages is not part of `H`: it is in
+//! the prediction. Where the first time constant depends on the voltage, `1 / H` is interpolated linearly at the
+//! present voltage. Its curve bends the other way, so too little is asked for there; a voltage that is itself moving to
+//! shorter time constants has more effect than was asked for. The remaining distance shrinks with every tick. [`law`]
+//! and [`memory`] are inverted exactly.
 //!
-//! What it needs of a spring: no negative weight in the relaxation, a rising law, a memory that rises once all plays move.
+//! An invertible spring has no negative weight in the relaxation, a rising law, and a memory that rises once all plays
+//! move.
 
-use super::{Config, ExtendedPlant, Law, Memory, law, memory};
-use crate::coefficient::{Steep, Weight};
+use super::leakage::Leakage;
+use super::plant::ExtendedPlant;
+use super::{law, memory};
+use crate::coefficient::{Weight, WideGain};
 use crate::error::OutOfRange;
-use crate::estimator::demanded;
+use crate::estimator::inverse_gain;
 use crate::units::{SampleTime, Signal, signal};
 
-/// The largest loss of charge that leaves something to hold a stiffness by.
-const MOST_LOSS: f64 = 0.95;
-/// The least gain of a relaxation.
-const LEAST_GAIN: f64 = 0.01;
+/// Largest share of a leakage with which a stiffness can still be held.
+const MAX_LOSS: f64 = 0.95;
+/// Smallest static gain of a relaxation that can be inverted.
+const MIN_GAIN: f64 = 0.01;
 
-/// The way back for one sample time, scaled for the tick.
+/// The inverse for one sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inverse {
-    demanded: Demanded,
+    at_zero: WideGain,
+    varying: Option<Varying>,
     pub(super) law: law::Inverse,
     pub(super) memory: memory::Inverse,
 }
 
-/// `1 / H`
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Demanded {
-    at_zero: Steep,
-    varying: Option<Varying>,
-}
-
+/// The inverse gain where the first time constant depends on the voltage: linear from 0 V to `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Varying {
-    at_end: Steep,
+    at_end: WideGain,
     end: Signal,
     /// 1 / end
-    per_volt: Steep,
+    per_volt: WideGain,
 }
 
-/// Whether a spring has a way back.
+/// Checks that a spring can be inverted.
 ///
 /// # Errors
-/// [`OutOfRange`] names the field as [`ExtendedPlant`]'s blocks do.
+/// [`OutOfRange`] names the field as the blocks of [`ExtendedPlant`] do.
 pub(super) fn check(plant: &ExtendedPlant<'_>) -> Result<(), OutOfRange> {
     let ExtendedPlant { memory, law, leakage, relaxation } = plant;
     let mut gain = relaxation.share;
     for (_, weight) in relaxation.lags() {
-        OutOfRange::check("relaxation.weights", weight, 0.0..=Weight::MOST, "to be led by its inverse")?;
+        OutOfRange::check("relaxation.weights", weight, 0.0..=Weight::MAX, "for the spring to be invertible")?;
         gain += weight;
     }
-    OutOfRange::check("relaxation.weights", gain, LEAST_GAIN..=Weight::MOST, "with the share, in all")?;
+    OutOfRange::check("relaxation.weights", gain, MIN_GAIN..=Weight::MAX, "in total, share included")?;
     let loss = leakage.map_or(0.0, |leakage| leakage.share);
-    OutOfRange::check("leakage.share", loss, 0.0..=MOST_LOSS, "of the stiffness, to be led by its inverse")?;
-    law.as_ref().map_or(Ok(()), Law::check_inverse)?;
-    memory.as_ref().map_or(Ok(()), Memory::check_inverse)
+    OutOfRange::check("leakage.share", loss, 0.0..=MAX_LOSS, "of the stiffness, for the spring to be invertible")?;
+    law.as_ref().map_or(Ok(()), law::Law::check_inverse)?;
+    memory.as_ref().map_or(Ok(()), memory::Memory::check_inverse)
 }
 
 impl Inverse {
-    /// Of a spring that [`check`] accepts, and that has become `config`.
-    pub(super) fn new(plant: &ExtendedPlant<'_>, config: &Config, sample_time: SampleTime, resolution_v: f64) -> Self {
+    /// Quantizes the inverse of a spring that [`check`] accepts and whose memory has become `bank`; `resolution_v` is
+    /// the voltage of one DAC code.
+    pub(super) fn new(
+        plant: &ExtendedPlant<'_>,
+        bank: Option<&memory::Config>,
+        sample_time: SampleTime,
+        resolution_v: f64,
+    ) -> Self {
         let ExtendedPlant { law, leakage, relaxation, .. } = plant;
-        let (lost, lost_in_mean) = leakage.map_or((0.0, 0.0), |leakage| leakage.lost_in_a_tick(sample_time));
-        let demanded_at = |volts: f64| {
-            let later: f64 = relaxation.lags_at(volts).map(|(tau, weight)| weight * sample_time.part_of_way(tau)).sum();
-            Steep::new(demanded(relaxation.share * (1.0 - lost) + (1.0 - lost_in_mean) * later))
+        let loss = |leakage: Leakage| leakage.loss_in_one_tick(sample_time);
+        let (lost, lost_in_mean) = leakage.map_or((0.0, 0.0), loss);
+        let gain_at = |volts: f64| {
+            let lags: f64 = relaxation.lags_at(volts).map(|(tau, weight)| weight * sample_time.lag_fraction(tau)).sum();
+            WideGain::new(inverse_gain(relaxation.share * (1.0 - lost) + (1.0 - lost_in_mean) * lags))
         };
         let varying = relaxation.varying().map(|tau| {
             let end_v = tau.end_v();
-            Varying { at_end: demanded_at(end_v), end: signal(end_v), per_volt: Steep::new(1.0 / end_v) }
+            Varying { at_end: gain_at(end_v), end: signal(end_v), per_volt: WideGain::new(1.0 / end_v) }
         });
-        let memory = config.memory.as_ref().map(|bank| memory::Inverse::new(bank, resolution_v));
         Self {
-            demanded: Demanded { at_zero: demanded_at(0.0), varying },
+            at_zero: gain_at(0.0),
+            varying,
             law: law.as_ref().map(law::Inverse::new).unwrap_or_default(),
-            memory: memory.unwrap_or_default(),
+            memory: bank.map(|bank| memory::Inverse::new(bank, resolution_v)).unwrap_or_default(),
         }
     }
 
-    /// How much more the law must answer, at this voltage, for a `change` of the stiffness.
+    /// Returns the change of the law's output that gives a `change` of the stiffness at this voltage, in V.
     #[inline(always)]
-    pub(super) fn more(&self, voltage: Signal, change: Signal) -> Signal {
-        let Demanded { at_zero, varying } = &self.demanded;
-        let at_zero = at_zero.times(change);
-        match varying {
+    pub(super) fn change_of_law(&self, voltage: Signal, change: Signal) -> Signal {
+        let at_zero = self.at_zero.times(change);
+        match &self.varying {
             None => at_zero,
             Some(Varying { at_end, end, per_volt }) => {
+                // 0 to 1.
                 let part = per_volt.times(voltage.max(Signal::ZERO).min(*end));
-                let apart = at_end.times(change).saturating_sub(at_zero);
-                // At most all of it.
-                let more = (i64::from(apart.to_bits()) * i64::from(part.to_bits())) >> Signal::FRAC_NBITS;
+                let difference = at_end.times(change).saturating_sub(at_zero);
+                let more = (i64::from(difference.to_bits()) * i64::from(part.to_bits())) >> Signal::FRAC_NBITS;
                 at_zero.saturating_add(Signal::from_bits(more as i32))
             }
         }

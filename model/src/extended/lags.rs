@@ -1,52 +1,59 @@
-//! Relaxation with several time constants: what comes at once, and what later.
+//! Relaxation with a feedthrough and up to four time constants.
+//!
+//! Important terms:
+//!
+//! - *share*: the feedthrough, the part of its input `q` that the stiffness follows instantaneously.
+//! - *lag*, `w_k`: a first-order low-pass of the input with the time constant `tau_k`, in V.
+//! - *weight*: the contribution of a lag to the stiffness.
 //!
 //! ```text
 //! y = share q + sum_k weight_k w_k,    dw_k/dt = (q - w_k) / tau_k,    w_k = 0 at rest
 //! ```
 //!
-//! A sum of first-order lags with spread time constants is the usual model of creep in piezo actuators, a generalised
-//! Kelvin-Voigt chain. For a `q` that is held between ticks each lag is exact, as in [`crate::estimator`]. A lag moves by
-//! less than half of its distance in a tick, so it stays between inputs that were there.
+//! A sum of first-order lags with widely spread time constants is the usual model of creep in piezo actuators, a
+//! generalised Kelvin-Voigt chain. For a `q` that is held between ticks each lag is exact, as in [`crate::estimator`].
+//! A lag covers less than half of its distance in a tick, so it stays between inputs that occurred.
 //!
 //! The first time constant may depend on the voltage: [`super::varying_rate`].
 
 use super::varying_rate::{TimeConstant, VaryingRate};
 use crate::coefficient::{Rate, Weight, saturated, upper};
 use crate::error::OutOfRange;
-use crate::estimator::Promptness;
+use crate::estimator::StepGain;
 use crate::units::{Accumulator, SampleTime, Signal};
+use crate::validated::{Validate, Validated};
 
-/// The most lags of a relaxation.
-pub const MOST_LAGS: usize = 4;
+/// Largest number of lags in a relaxation.
+pub const MAX_LAGS: usize = 4;
 
-/// Share and lags. The magnitudes of `share` and `weights` add up to at most 10; for a static gain of 1 their sum is 1.
+/// Feedthrough and lags of a relaxation, in SI units. The magnitudes of `share` and `weights` add up to at most 10; for
+/// a static gain of 1 their sum is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation<'a> {
-    /// What comes at once, 0 to 10.
+    /// Feedthrough, 0 to 10.
     pub share: f64,
-    /// One to four time constants, in s, each two sample times (four where it varies) to 10 000 s.
+    /// One to four time constants, in s, each two sample times (the first one four, if it varies) to 10 000 s.
     pub time_constants_s: &'a [f64],
-    /// What each of them brings; none for one time constant that brings all the rest, `1 - share`.
+    /// Weight of each lag; empty for a single time constant whose weight is `1 - share`.
     pub weights: &'a [f64],
-    /// The first time constant at 500 V, in s, a tenth to ten times of that at 0 V; `None`: the same at all voltages.
+    /// First time constant at 500 V, in s, a tenth to ten times the one at 0 V; `None` if it does not depend on the
+    /// voltage.
     pub time_constant_high_s: Option<f64>,
 }
 
-impl Relaxation<'_> {
-    /// # Errors
-    /// [`OutOfRange`] names `relaxation.share`, `.tau_s`, `.weights` or `.tau_high_s`.
-    pub(super) fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+impl Validate for Relaxation<'_> {
+    fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
         let Self { share, time_constants_s, weights, time_constant_high_s } = *self;
         let (count, seconds) = (time_constants_s.len(), sample_time.seconds());
-        OutOfRange::check_count("relaxation.tau_s", count, 1..=MOST_LAGS, "time constants")?;
+        OutOfRange::check_count("relaxation.tau_s", count, 1..=MAX_LAGS, "time constants")?;
         let fewest = if count == 1 { 0 } else { count };
-        OutOfRange::check_count("relaxation.weights", weights.len(), fewest..=count, "weights, one a time constant")?;
-        OutOfRange::check("relaxation.share", share, 0.0..=Weight::MOST, "of a step")?;
-        let mut left = Weight::MOST - share;
+        OutOfRange::check_count("relaxation.weights", weights.len(), fewest..=count, "weights, one per time constant")?;
+        OutOfRange::check("relaxation.share", share, 0.0..=Weight::MAX, "of a step")?;
+        let mut budget = Weight::MAX - share;
         let mut ticks = if time_constant_high_s.is_some() { 4.0 } else { 2.0 };
         for (tau, weight) in self.lags() {
             OutOfRange::check("relaxation.tau_s", tau, ticks * seconds..=1e4, "s")?;
-            left = Weight::budget("relaxation.weights", weight, left)?;
+            budget = Weight::spend("relaxation.weights", weight, budget)?;
             ticks = 2.0;
         }
         self.varying().map_or(Ok(()), |TimeConstant { low_s, high_s }| {
@@ -54,98 +61,105 @@ impl Relaxation<'_> {
             OutOfRange::check("relaxation.tau_high_s", high_s, lowest..=(10.0 * low_s).min(1e4), "s")
         })
     }
+}
 
-    /// Time constant and weight of each lag.
+impl Relaxation<'_> {
+    /// Returns the time constant, in s, and the weight of each lag, at 0 V.
     pub fn lags(&self) -> impl Iterator<Item = (f64, f64)> {
         let weight = |lag| self.weights.get(lag).copied().unwrap_or(1.0 - self.share);
         self.time_constants_s.iter().enumerate().map(move |(lag, &tau)| (tau, weight(lag)))
     }
 
-    /// The first time constant, if it depends on the voltage.
+    /// Returns the first time constant if it depends on the voltage.
     pub(super) fn varying(&self) -> Option<TimeConstant> {
         let (&low_s, high_s) = (self.time_constants_s.first()?, self.time_constant_high_s?);
         Some(TimeConstant { low_s, high_s })
     }
 
-    /// Time constant and weight of each lag at `volts`.
+    /// Returns the time constant, in s, and the weight of each lag, at `volts`.
     pub(super) fn lags_at(&self, volts: f64) -> impl Iterator<Item = (f64, f64)> {
         let first = self.varying().map(|tau| tau.at(volts));
         let at = move |(lag, (tau, weight))| (first.filter(|_| lag == 0).unwrap_or(tau), weight);
         self.lags().enumerate().map(at)
     }
 
-    pub(super) fn least_promptness(&self, sample_time: SampleTime) -> Promptness {
+    /// Returns the step gain at the voltage where the first time constant is longest.
+    pub(super) fn smallest_step_gain(&self, sample_time: SampleTime) -> StepGain {
         let slowest = if self.varying().is_some_and(|tau| tau.at(1000.0) > tau.at(0.0)) { 1000.0 } else { 0.0 };
-        let mut promptness = Promptness { at_once: self.share, in_a_tick: 0.0, relaxed: 1.0 };
+        let mut gain = StepGain { feedthrough: self.share, in_one_tick: 0.0, relaxation: 1.0 };
         for (tau, weight) in self.lags_at(slowest) {
-            let part = sample_time.part_of_way(tau);
-            promptness.in_a_tick += part * weight;
-            promptness.relaxed = promptness.relaxed.min(part);
+            let part = sample_time.lag_fraction(tau);
+            gain.in_one_tick += part * weight;
+            gain.relaxation = gain.relaxation.min(part);
         }
-        promptness
+        gain
     }
 
-    pub(crate) fn promptness(&self, sample_time: SampleTime) -> Promptness {
-        let mut promptness = Promptness { at_once: self.share.max(0.0), in_a_tick: 0.0, relaxed: 0.0 };
-        // At an end it is shortest.
-        let shortest = if self.varying().is_some_and(|tau| tau.at(1000.0) < tau.at(0.0)) { 1000.0 } else { 0.0 };
-        for (tau, weight) in self.lags_at(shortest) {
-            let part = sample_time.part_of_way(tau);
-            promptness.in_a_tick += part * weight.max(0.0);
-            promptness.relaxed = promptness.relaxed.max(part);
+    /// Returns the step gain at the voltage where the first time constant is shortest; negative weights count as 0.
+    pub(super) fn largest_step_gain(&self, sample_time: SampleTime) -> StepGain {
+        let mut gain = StepGain { feedthrough: self.share.max(0.0), in_one_tick: 0.0, relaxation: 0.0 };
+        // The shortest one is at an end of the range of voltages.
+        let fastest = if self.varying().is_some_and(|tau| tau.at(1000.0) < tau.at(0.0)) { 1000.0 } else { 0.0 };
+        for (tau, weight) in self.lags_at(fastest) {
+            let part = sample_time.lag_fraction(tau);
+            gain.in_one_tick += part * weight.max(0.0);
+            gain.relaxation = gain.relaxation.max(part);
         }
-        promptness
+        gain
     }
 }
 
-/// The relaxation for one sample time, scaled for the tick.
+/// The relaxation for one sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Config {
     share: Weight,
-    weights: [Weight; MOST_LAGS],
-    rates: [Rate; MOST_LAGS],
+    weights: [Weight; MAX_LAGS],
+    rates: [Rate; MAX_LAGS],
     count: u8,
-    /// In place of the first rate.
+    /// Replaces the first rate.
     varying: Option<VaryingRate>,
 }
 
-/// How far each lag has come.
-pub(crate) type State = [Accumulator; MOST_LAGS];
+/// The lags `w_k`, in V.
+pub(crate) type State = [Accumulator; MAX_LAGS];
 
-impl Config {
-    /// Of a relaxation that [`Relaxation::check`] accepts.
-    pub(crate) fn new(relaxation: &Relaxation<'_>, sample_time: SampleTime) -> Self {
-        let mut config = Self {
+impl Validated<'_, Relaxation<'_>> {
+    /// Quantizes the relaxation for the tick.
+    pub(crate) fn quantize(self) -> Config {
+        let (relaxation, sample_time) = (self.settings(), self.sample_time());
+        let mut config = Config {
             share: Weight::new(relaxation.share),
-            weights: [Weight::default(); MOST_LAGS],
-            rates: [Rate::default(); MOST_LAGS],
+            weights: [Weight::default(); MAX_LAGS],
+            rates: [Rate::default(); MAX_LAGS],
             count: relaxation.time_constants_s.len() as u8,
             varying: relaxation.varying().map(|tau| VaryingRate::new(&tau, sample_time)),
         };
         let places = config.weights.iter_mut().zip(&mut config.rates);
         for ((weight, rate), (tau, of_lag)) in places.zip(relaxation.lags()) {
             *weight = Weight::new(of_lag);
-            *rate = Rate::new(sample_time.part_of_way(tau));
+            *rate = Rate::new(sample_time.lag_fraction(tau));
         }
         config
     }
+}
 
-    /// Stiffness with `input` just there.
+impl Config {
+    /// Returns the stiffness just after the input became `input`.
     #[inline(always)]
     pub(crate) fn stiffness(&self, state: &State, input: Signal) -> Signal {
-        let mut sum = self.share.of(input);
-        for (weight, relaxed) in self.weights.iter().zip(state).take(usize::from(self.count)) {
-            sum += weight.of(upper(*relaxed));
+        let mut sum = self.share.times(input);
+        for (weight, lag) in self.weights.iter().zip(state).take(usize::from(self.count)) {
+            sum += weight.times(upper(*lag));
         }
         saturated(sum)
     }
 
-    /// One sample time passes with `input` held, at this voltage.
+    /// Advances the lags by one sample time with `input` held, at this voltage.
     #[inline(always)]
     pub(crate) fn advance(&self, state: &mut State, input: Signal, voltage: Signal) {
         let before = state[0];
-        for (rate, relaxed) in self.rates.iter().zip(&mut *state).take(usize::from(self.count)) {
-            *relaxed += rate.step(input.saturating_sub(upper(*relaxed)));
+        for (rate, lag) in self.rates.iter().zip(&mut *state).take(usize::from(self.count)) {
+            *lag += rate.step(input.saturating_sub(upper(*lag)));
         }
         if let Some(varying) = &self.varying {
             state[0] = before + varying.step(voltage, input.saturating_sub(upper(before)));
@@ -157,9 +171,9 @@ impl Config {
 mod tests {
     use super::*;
 
-    /// Exact for a held input at any rate, and the slowest lag moves at 10 kHz.
+    /// The slowest lag of 3000 s is integrated even at 10 kHz.
     #[test]
-    fn a_step_follows_its_exponentials() {
+    fn a_step_response_is_the_exact_sum_of_exponentials_at_any_rate() {
         let relaxation = Relaxation {
             share: 0.1,
             time_constants_s: &[0.3, 2.0, 40.0, 3000.0],
@@ -167,7 +181,7 @@ mod tests {
             time_constant_high_s: None,
         };
         for rate_hz in [100.0, 10_000.0] {
-            let config = Config::new(&relaxation, SampleTime::from_rate(rate_hz).unwrap());
+            let config = relaxation.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize();
             let (mut state, input) = (State::default(), Signal::from_num(600));
             for tick in 0..(10.0 * rate_hz) as u32 {
                 let time = f64::from(tick) / rate_hz;
@@ -181,10 +195,10 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_relaxation_is_named() {
+    fn a_setting_out_of_range_is_rejected_by_name() {
         let named = |share, time_constants_s: &[f64], weights: &[f64], time_constant_high_s| {
             let relaxation = Relaxation { share, time_constants_s, weights, time_constant_high_s };
-            relaxation.check(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field
+            relaxation.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field
         };
         assert_eq!(named(-0.1, &[5.0], &[], None), "relaxation.share");
         assert_eq!(named(0.1, &[], &[], None), "relaxation.tau_s");

@@ -1,6 +1,9 @@
-//! The static law: sensitivity that depends on the voltage, without memory.
+//! The static law: a sensitivity that depends on the voltage, without memory.
 //!
-//! Straight lines through up to nine points, the first of them (0, 0); beyond both ends the line goes on as it was:
+//! Important terms:
+//!
+//! - *point*: a voltage and the law's value there, both in V. The first point is (0, 0).
+//! - *line*: the straight line from one point to the next. The first and the last line continue beyond the points.
 //!
 //! ```text
 //! f = value_i + slope_i (p - start_i),    i: the last point at or below p
@@ -8,37 +11,37 @@
 //!
 //! Exact but for the rounding of values (2^-21 V) and slopes (2^-28 of the distance to the point).
 
-use crate::coefficient::{Steep, Sum, Weight, saturated};
+use crate::coefficient::{Weight, WideGain, saturated, sum};
 use crate::error::OutOfRange;
-use crate::units::{Signal, signal};
+use crate::units::{SampleTime, Signal, signal};
+use crate::validated::{Validate, Validated};
 
-/// The most points of a law, (0, 0) included.
-pub const MOST_POINTS: usize = 9;
+/// Largest number of points of a law, (0, 0) included.
+pub const MAX_POINTS: usize = 9;
 
-/// The least slope that can be gone back.
-const LEAST_SLOPE: f64 = 0.01;
+/// Smallest slope of a line that can be inverted.
+const MIN_SLOPE: f64 = 0.01;
 
-/// Points that the law goes through.
+/// A static law through up to nine points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law<'a> {
-    /// 2 to 9 voltages, from 0 V upwards at least 1 mV apart, up to 1000 V.
+    /// 2 to 9 voltages, from 0 V upwards, at least 1 mV apart, up to 1000 V.
     pub voltage_v: &'a [f64],
-    /// The law at each, in V; the first is 0. No line between two is steeper than 10, no value beyond +-2000 V.
+    /// Value of the law at each voltage, in V, within +-2000 V; the first is 0. The slope between two points is within
+    /// +-10.
     pub stiffness: &'a [f64],
 }
 
-impl Law<'_> {
-    /// # Errors
-    /// [`OutOfRange`] names `law.voltage_v` or `law.stiffness`.
-    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+impl Validate for Law<'_> {
+    fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
         let count = self.voltage_v.len();
-        OutOfRange::check_count("law.voltage_v", count, 2..=MOST_POINTS, "points")?;
-        OutOfRange::check_count("law.stiffness", self.stiffness.len(), count..=count, "values, one a voltage")?;
+        OutOfRange::check_count("law.voltage_v", count, 2..=MAX_POINTS, "points")?;
+        OutOfRange::check_count("law.stiffness", self.stiffness.len(), count..=count, "values, one per voltage")?;
         let mut last = None;
         for (&voltage, &value) in self.voltage_v.iter().zip(self.stiffness) {
             let (allowed_v, unit, from, reach) = match last {
                 None => (0.0..=0.0, "V, where the law starts", 0.0, 0.0),
-                Some((start, from)) => (start + 1e-3..=1000.0, "V, upwards", from, Weight::MOST * (voltage - start)),
+                Some((start, from)) => (start + 1e-3..=1000.0, "V, upwards", from, Weight::MAX * (voltage - start)),
             };
             OutOfRange::check("law.voltage_v", voltage, allowed_v, unit)?;
             let (lowest, highest) = (f64::max(from - reach, -2000.0), f64::min(from + reach, 2000.0));
@@ -47,28 +50,30 @@ impl Law<'_> {
         }
         Ok(())
     }
+}
 
-    /// Whether every line rises.
+impl Law<'_> {
+    /// Checks that every line rises.
     ///
     /// # Errors
-    /// [`OutOfRange`] names `law.stiffness` where it does not rise.
+    /// [`OutOfRange`] names `law.stiffness` at the first point to which the law does not rise.
     pub(super) fn check_inverse(&self) -> Result<(), OutOfRange> {
         for (volts, values) in self.voltage_v.windows(2).zip(self.stiffness.windows(2)) {
             if let ([from_v, to_v], [from, to]) = (volts, values) {
-                let lowest = from + LEAST_SLOPE * (to_v - from_v);
-                OutOfRange::check("law.stiffness", *to, lowest..=2000.0, "V, to be led by its inverse")?;
+                let lowest = from + MIN_SLOPE * (to_v - from_v);
+                OutOfRange::check("law.stiffness", *to, lowest..=2000.0, "V, for the spring to be invertible")?;
             }
         }
         Ok(())
     }
 
-    /// The steepest line's slope, at least 0.
-    pub(crate) fn steepest(&self) -> f64 {
+    /// Returns the slope of the steepest line, at least 0.
+    pub(super) fn largest_slope(&self) -> f64 {
         self.slopes().fold(0.0, f64::max)
     }
 
-    /// The flattest line's slope.
-    pub(super) fn flattest(&self) -> f64 {
+    /// Returns the slope of the flattest line.
+    pub(super) fn smallest_slope(&self) -> f64 {
         self.slopes().fold(f64::INFINITY, f64::min)
     }
 
@@ -84,10 +89,10 @@ fn slope(voltages: &[f64], values: &[f64]) -> f64 {
     }
 }
 
-/// The law, scaled for the tick; lines that are not needed repeat the last.
+/// The law, quantized for the tick; unused places repeat the last line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Config {
-    lines: [Line; MOST_POINTS - 1],
+    lines: [Line; MAX_POINTS - 1],
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,10 +102,11 @@ struct Line {
     slope: Weight,
 }
 
-impl Config {
-    /// Of a law that [`Law::check`] accepts.
-    pub(crate) fn new(law: &Law<'_>) -> Self {
-        let mut lines = [Line::default(); MOST_POINTS - 1];
+impl Validated<'_, Law<'_>> {
+    /// Quantizes the law for the tick.
+    pub(crate) fn quantize(self) -> Config {
+        let law = self.settings();
+        let mut lines = [Line::default(); MAX_POINTS - 1];
         let mut line = Line::default();
         let mut points = law.voltage_v.iter().zip(law.stiffness).zip(law.slopes());
         for place in &mut lines {
@@ -109,10 +115,12 @@ impl Config {
             }
             *place = line;
         }
-        Self { lines }
+        Config { lines }
     }
+}
 
-    /// The law at `input`.
+impl Config {
+    /// Returns the law's value at `input`, saturated to a signal's range.
     #[inline(always)]
     pub(crate) fn at(&self, input: Signal) -> Signal {
         let mut line = &self.lines[0];
@@ -122,32 +130,32 @@ impl Config {
             }
         }
         // Cannot wrap: either the line starts at 0 V, or the input lies beyond its positive start.
-        let along = input - line.start;
-        saturated(Sum::from_bits(i64::from(line.value.to_bits()) << Weight::FRACTION_BITS) + line.slope.of(along))
+        let distance = input - line.start;
+        saturated(sum(line.value) + line.slope.times(distance))
     }
 }
 
-/// The law's way back, where every line rises: the reciprocal slope of each.
+/// Inverse of a law whose lines all rise: the reciprocal slope of each line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inverse {
-    per_slope: [Steep; MOST_POINTS - 1],
+    per_slope: [WideGain; MAX_POINTS - 1],
 }
 
 impl Inverse {
-    /// Of a law that [`Law::check_inverse`] accepts.
+    /// Quantizes the inverse of a law that [`Law::check_inverse`] accepts.
     pub(crate) fn new(law: &Law<'_>) -> Self {
         let mut inverse = Self::default();
-        let (mut per_slope, mut slopes) = (Steep::default(), law.slopes());
+        let (mut per_slope, mut slopes) = (WideGain::default(), law.slopes());
         for place in &mut inverse.per_slope {
             if let Some(slope) = slopes.next() {
-                per_slope = Steep::new(1.0 / slope);
+                per_slope = WideGain::new(1.0 / slope);
             }
             *place = per_slope;
         }
         inverse
     }
 
-    /// The input that `law` answers with `value`.
+    /// Returns the input at which `law` has this value.
     #[inline(always)]
     pub(crate) fn at(&self, law: &Config, value: Signal) -> Signal {
         let [first, lines @ ..] = &law.lines;
@@ -168,15 +176,18 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
+    fn sample_time() -> SampleTime {
+        SampleTime::from_rate(1000.0).unwrap()
+    }
+
     fn at(law: &Law<'_>, input: f64) -> f64 {
-        law.check().unwrap();
-        Config::new(law).at(Signal::from_num(input)).to_num()
+        law.validate(sample_time()).unwrap().quantize().at(Signal::from_num(input)).to_num()
     }
 
     proptest! {
-        /// Another way to the same curve: a sum of kinks.
+        /// The same curve computed as a sum of changes of slope.
         #[test]
-        fn it_goes_straight_through_its_points(
+        fn the_law_is_linear_between_its_points(
             lines in prop::collection::vec((1.0..100.0f64, -2.0..2.0f64), 1..=8),
             input in -500.0..1000.0f64,
         ) {
@@ -197,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn too_steep_an_end_saturates() {
+    fn a_value_beyond_the_signal_range_saturates() {
         let steep = Law { voltage_v: &[0.0, 100.0], stiffness: &[0.0, 900.0] };
         assert_eq!(at(&steep, 2000.0), Signal::MAX.to_num::<f64>());
         assert_eq!(at(&steep, -2000.0), Signal::MIN.to_num::<f64>());
@@ -205,8 +216,10 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_law_is_named() {
-        let named = |voltage_v: &[f64], stiffness: &[f64]| Law { voltage_v, stiffness }.check().unwrap_err().field;
+    fn a_setting_out_of_range_is_rejected_by_name() {
+        let named = |voltage_v: &[f64], stiffness: &[f64]| {
+            Law { voltage_v, stiffness }.validate(sample_time()).unwrap_err().field
+        };
         assert_eq!(named(&[0.0], &[0.0]), "law.voltage_v");
         assert_eq!(named(&[0.0; 10], &[0.0; 10]), "law.voltage_v");
         assert_eq!(named(&[0.0, 1.0], &[0.0]), "law.stiffness");

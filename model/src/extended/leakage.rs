@@ -1,79 +1,89 @@
-//! Leakage of charge: the stiffness falls back while the voltage stays.
+//! Leakage of charge: the stiffness falls while the voltage stays.
+//!
+//! Important terms:
+//!
+//! - *input*, `f`: the law's output, in V, held between ticks.
+//! - *charge*, `q`: what leakage leaves of the input, in V.
+//! - *follower*, `l`: a first-order low-pass of the input, in V, the state.
 //!
 //! ```text
 //! q = f - share l,    dl/dt = (f - l) / tau,    l = 0 at rest
 //! ```
 //!
-//! `f` is held between ticks, and `l` is exact. But `q` moves while it is held, and the [lags](super::lags) behind it take
-//! one number a tick: they get its mean over the sample time,
-//! `q - share m (f - l)` with `m = 1 - (1 - exp(-T / tau)) T^-1 tau`, which leaves an error of less than
-//! `share |f - l| T^2 / (12 tau tau_lag)` where `q` itself would leave `share |f - l| T / (2 tau)`.
+//! `l` is exact. But `q` moves within a tick, and the [lags](super::lags) behind it take one number per tick: they get
+//! its mean over the sample time, `q - share m (f - l)` with `m = 1 - (1 - exp(-T / tau)) tau / T`. The error is less
+//! than `share |f - l| T^2 / (12 tau tau_lag)`; with `q` itself it would be `share |f - l| T / (2 tau)`.
 
-use crate::coefficient::{Rate, Sum, Weight, saturated, upper};
+use crate::coefficient::{Rate, Weight, saturated, sum, upper};
 use crate::error::OutOfRange;
 use crate::units::{Accumulator, SampleTime, Signal};
+use crate::validated::{Validate, Validated};
 
-/// Loss of charge through the spring's own resistance.
+/// Loss of charge through the spring's own resistance, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leakage {
-    /// Part that is lost in the end, 0 to 1.
+    /// Part of the stiffness that is lost in the end, 0 to 1.
     pub share: f64,
-    /// Its time constant, in s, 100 sample times to 100 000 s.
+    /// Time constant of the loss, 100 sample times to 100 000 s.
     pub time_constant_s: f64,
 }
 
-impl Leakage {
-    /// # Errors
-    /// [`OutOfRange`] names `leakage.share` or `leakage.tau_s`.
-    pub(super) fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+impl Validate for Leakage {
+    fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
         OutOfRange::check("leakage.share", self.share, 0.0..=1.0, "of the stiffness")?;
         OutOfRange::check("leakage.tau_s", self.time_constant_s, 100.0 * sample_time.seconds()..=1e5, "s")
     }
+}
 
-    /// What part of a new input is lost at the end of a tick, and of its mean in the tick.
-    pub(super) fn lost_in_a_tick(&self, sample_time: SampleTime) -> (f64, f64) {
+impl Leakage {
+    /// Returns which fraction of a new input is lost at the end of a tick, and which fraction of its mean over the
+    /// tick.
+    pub(super) fn loss_in_one_tick(&self, sample_time: SampleTime) -> (f64, f64) {
         let ticks = self.time_constant_s / sample_time.seconds();
-        let rate = sample_time.part_of_way(self.time_constant_s);
+        let rate = sample_time.lag_fraction(self.time_constant_s);
         (self.share * rate, self.share * (1.0 - rate * ticks))
     }
 }
 
-/// The leakage for one sample time, scaled for the tick.
+/// The leakage for one sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Config {
     share: Weight,
     /// share m
-    until_mean: Weight,
+    share_of_mean: Weight,
     rate: Rate,
 }
 
-/// What has followed of the input, `l`.
+/// The follower `l`, in V.
 pub(crate) type State = Accumulator;
 
-impl Config {
-    /// Of a leakage that [`Leakage::check`] accepts.
-    pub(crate) fn new(leakage: &Leakage, sample_time: SampleTime) -> Self {
-        let (_, until_mean) = leakage.lost_in_a_tick(sample_time);
-        Self {
+impl Validated<'_, Leakage> {
+    /// Quantizes the leakage for the tick.
+    pub(crate) fn quantize(self) -> Config {
+        let (leakage, sample_time) = (self.settings(), self.sample_time());
+        let (_, share_of_mean) = leakage.loss_in_one_tick(sample_time);
+        Config {
             share: Weight::new(leakage.share),
-            until_mean: Weight::new(until_mean),
-            rate: Rate::new(sample_time.part_of_way(leakage.time_constant_s)),
+            share_of_mean: Weight::new(share_of_mean),
+            rate: Rate::new(sample_time.lag_fraction(leakage.time_constant_s)),
         }
     }
+}
 
-    /// What is left of `input` now.
+impl Config {
+    /// Returns the charge `q` just after the input became `input`.
     #[inline(always)]
     pub(crate) fn charge(&self, state: &State, input: Signal) -> Signal {
-        let whole = Sum::from_bits(i64::from(input.to_bits()) << Weight::FRACTION_BITS);
-        saturated(whole - self.share.of(upper(*state)))
+        saturated(sum(input) - self.share.times(upper(*state)))
     }
 
-    /// One sample time passes with `input` held; the mean of what is left of it, which was `charge` at first.
+    /// Advances the follower by one sample time with `input` held. Returns the mean charge over it; `charge` is the one
+    /// at its start.
     #[inline(always)]
     pub(crate) fn advance(&self, state: &mut State, input: Signal, charge: Signal) -> Signal {
         let lag = input.saturating_sub(upper(*state));
         *state += self.rate.step(lag);
-        charge.saturating_sub(saturated(self.until_mean.of(lag)))
+        charge.saturating_sub(saturated(self.share_of_mean.times(lag)))
     }
 }
 
@@ -81,13 +91,12 @@ impl Config {
 mod tests {
     use super::*;
 
-    /// What is left at a tick, and its mean until the next, are those of the exponential.
     #[test]
-    fn it_falls_back_exponentially() {
+    fn the_charge_and_its_mean_over_a_tick_are_the_exact_exponentials() {
         for rate_hz in [100.0, 1000.0, 10_000.0] {
             let sample_time = SampleTime::from_rate(rate_hz).unwrap();
             let leakage = Leakage { share: 0.4, time_constant_s: 2.0 };
-            let (config, mut state) = (Config::new(&leakage, sample_time), State::default());
+            let (config, mut state) = (leakage.validate(sample_time).unwrap().quantize(), State::default());
             let input = Signal::from_num(500);
             for tick in 0..(4.0 * rate_hz) as u32 {
                 let (from, to) = (f64::from(tick) / rate_hz, f64::from(tick + 1) / rate_hz);
@@ -103,9 +112,10 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_leakage_is_named() {
+    fn a_setting_out_of_range_is_rejected_by_name() {
         let sample_time = SampleTime::from_rate(1000.0).unwrap();
-        let named = |share, time_constant_s| Leakage { share, time_constant_s }.check(sample_time).unwrap_err().field;
+        let named =
+            |share, time_constant_s| Leakage { share, time_constant_s }.validate(sample_time).unwrap_err().field;
         assert_eq!(named(1.1, 5.0), "leakage.share");
         assert_eq!(named(f64::NAN, 5.0), "leakage.share");
         assert_eq!(named(0.1, 0.05), "leakage.tau_s");

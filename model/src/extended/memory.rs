@@ -1,85 +1,92 @@
-//! Rate-independent memory: a bank of play operators.
+//! Rate-independent memory (hysteresis): a bank of play operators.
+//!
+//! Important terms:
+//!
+//! - *play operator*: an output `z` that follows the voltage at a distance `r` and stays where it is while the voltage
+//!   turns.
+//! - *threshold*, `r`: half the width of a play, in V.
+//! - *bank*: a weighted sum of plays and of the voltage itself, the Prandtl-Ishlinskii model of hysteresis.
 //!
 //! ```text
 //! p = direct v + sum_j weight_j z_j,    z_j' = max(v - r_j, min(v + r_j, z_j)),    z_j = 0 at rest
 //! ```
 //!
-//! A play follows the voltage from a distance `r` and stays where it is while the voltage turns. A weighted sum of plays
-//! is the Prandtl-Ishlinskii model of hysteresis (M. Brokate, J. Sprekels: Hysteresis and Phase Transitions, 1996,
-//! chapter 2; K. Kuhnen: Modeling, identification and compensation of complex hysteretic nonlinearities, European
-//! Journal of Control 9, 2003). With a [law](super::law) behind it, it is Kuhnen's modified model.
+//! Sources: M. Brokate, J. Sprekels: Hysteresis and Phase Transitions, 1996, chapter 2; K. Kuhnen: Modeling,
+//! identification and compensation of complex hysteretic nonlinearities, European Journal of Control 9, 2003. With a
+//! [law](super::law) behind it, the bank is Kuhnen's modified model.
 //!
 //! Exact but for the rounding of thresholds (2^-21 V) and weights (2^-28).
 
-use crate::coefficient::{Steep, Weight, saturated};
+use crate::coefficient::{Weight, WideGain, saturated};
 use crate::error::OutOfRange;
-use crate::units::{Signal, signal};
+use crate::units::{SampleTime, Signal, signal};
+use crate::validated::{Validate, Validated};
 
-/// The most plays of a bank.
-pub const MOST_PLAYS: usize = 8;
+/// Largest number of plays in a bank.
+pub const MAX_PLAYS: usize = 8;
 
-/// The least slope with all plays in motion that can be gone back.
-const LEAST_SLOPE: f64 = 0.01;
-/// What is not steeper than this is level.
+/// Smallest slope, with all plays in motion, that can be inverted.
+const MIN_SLOPE: f64 = 0.01;
+/// Slope up to which a piece of the bank counts as level.
 const LEVEL: f64 = 1e-3;
 
-/// A bank of plays. The magnitudes of `direct` and `weights` add up to at most 10.
+/// A bank of play operators. The magnitudes of `direct` and `weights` add up to at most 10.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory<'a> {
     /// Weight of the voltage itself.
     pub direct: f64,
-    /// Half the width of each play, in V, 0 to 1000; up to 8.
+    /// Threshold of each play (half its width), 0 to 1000 V; up to 8 plays.
     pub thresholds_v: &'a [f64],
     /// Weight of each play.
     pub weights: &'a [f64],
 }
 
-impl Memory<'_> {
-    /// # Errors
-    /// [`OutOfRange`] names `memory.direct`, `memory.thresholds_v` or `memory.weights`.
-    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+impl Validate for Memory<'_> {
+    fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
         let count = self.thresholds_v.len();
-        OutOfRange::check_count("memory.thresholds_v", count, 0..=MOST_PLAYS, "plays")?;
-        OutOfRange::check_count("memory.weights", self.weights.len(), count..=count, "weights, one a threshold")?;
-        let mut left = Weight::budget("memory.direct", self.direct, Weight::MOST)?;
+        OutOfRange::check_count("memory.thresholds_v", count, 0..=MAX_PLAYS, "plays")?;
+        OutOfRange::check_count("memory.weights", self.weights.len(), count..=count, "weights, one per threshold")?;
+        let mut budget = Weight::spend("memory.direct", self.direct, Weight::MAX)?;
         for (&threshold, &weight) in self.thresholds_v.iter().zip(self.weights) {
             OutOfRange::check("memory.thresholds_v", threshold, 0.0..=1000.0, "V")?;
-            left = Weight::budget("memory.weights", weight, left)?;
+            budget = Weight::spend("memory.weights", weight, budget)?;
         }
         Ok(())
     }
+}
 
-    /// Whether the bank rises once all plays move.
+impl Memory<'_> {
+    /// Checks that the bank rises once all plays move.
     ///
     /// # Errors
     /// [`OutOfRange`] names `memory.direct`.
     pub(super) fn check_inverse(&self) -> Result<(), OutOfRange> {
-        let unit = "with all weights, to be led by its inverse";
-        OutOfRange::check("memory.direct", self.all_moving(), LEAST_SLOPE..=Weight::MOST, unit)
+        let unit = "in total, weights included, for the spring to be invertible";
+        OutOfRange::check("memory.direct", self.slope_in_motion(), MIN_SLOPE..=Weight::MAX, unit)
     }
 
-    /// How steep the bank is while all plays move.
-    fn all_moving(&self) -> f64 {
+    /// Returns the slope of the bank while all plays move.
+    fn slope_in_motion(&self) -> f64 {
         self.direct + self.weights.iter().sum::<f64>()
     }
 
-    /// How steep the bank is when the voltage turns, and all plays stay at first; but a quarter of what it is later, so
-    /// that a bank which does not answer at all at first is not thought never to answer.
-    pub(super) fn turning(&self) -> f64 {
-        self.direct.max(0.25 * self.all_moving())
+    /// Returns the slope of the bank when the voltage turns and all plays stay at first, but at least a quarter of the
+    /// slope with all plays in motion: a bank that does not respond at first will respond later.
+    pub(super) fn slope_at_turn(&self) -> f64 {
+        self.direct.max(0.25 * self.slope_in_motion())
     }
 
-    /// The steepest that the bank can be: all plays move.
-    pub(crate) fn steepest(&self) -> f64 {
+    /// Returns an upper bound of the bank's slope: the sum of all positive weights.
+    pub(super) fn largest_slope(&self) -> f64 {
         self.direct.max(0.0) + self.weights.iter().map(|weight| weight.max(0.0)).sum::<f64>()
     }
 }
 
-/// The bank, scaled for the tick.
+/// The bank, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Config {
     direct: Weight,
-    plays: [Play; MOST_PLAYS],
+    plays: [Play; MAX_PLAYS],
     count: u8,
 }
 
@@ -89,17 +96,18 @@ struct Play {
     weight: Weight,
 }
 
-/// Where each play is.
-pub(crate) type State = [Signal; MOST_PLAYS];
+/// The output `z` of each play, in V.
+pub(crate) type State = [Signal; MAX_PLAYS];
 
-impl Config {
-    /// Of a memory that [`Memory::check`] accepts.
-    pub(crate) fn new(memory: &Memory<'_>) -> Self {
-        let mut plays = [Play::default(); MOST_PLAYS];
+impl Validated<'_, Memory<'_>> {
+    /// Quantizes the bank for the tick, its plays sorted by threshold.
+    pub(crate) fn quantize(self) -> Config {
+        let memory = self.settings();
+        let mut plays = [Play::default(); MAX_PLAYS];
         let mut count = 0;
-        for (&threshold, &weight) in memory.thresholds_v.iter().zip(memory.weights).take(MOST_PLAYS) {
+        for (&threshold, &weight) in memory.thresholds_v.iter().zip(memory.weights).take(MAX_PLAYS) {
             let mut new = Play { threshold: signal(threshold), weight: Weight::new(weight) };
-            // Smaller thresholds first: the sum is exact, so its order is the inverse's choice.
+            // The inverse needs this order; the sum is exact in any order.
             for play in plays.iter_mut().take(count) {
                 if new.threshold < play.threshold {
                     core::mem::swap(play, &mut new);
@@ -109,78 +117,85 @@ impl Config {
                 (*end, count) = (new, count + 1);
             }
         }
-        Self { direct: Weight::new(memory.direct), plays, count: count as u8 }
+        Config { direct: Weight::new(memory.direct), plays, count: count as u8 }
     }
+}
 
-    /// The bank's output with `voltage` just applied.
+impl Config {
+    /// Returns the bank's output just after `voltage` was applied, and updates the plays.
     #[inline(always)]
     pub(crate) fn run(&self, state: &mut State, voltage: Signal) -> Signal {
-        let mut sum = self.direct.of(voltage);
-        for (play, place) in self.plays.iter().zip(state).take(usize::from(self.count)) {
+        let mut sum = self.direct.times(voltage);
+        for (play, output) in self.plays.iter().zip(state).take(usize::from(self.count)) {
             let (low, high) = (voltage.saturating_sub(play.threshold), voltage.saturating_add(play.threshold));
-            *place = (*place).max(low).min(high);
-            sum += play.weight.of(*place);
+            *output = (*output).max(low).min(high);
+            sum += play.weight.times(*output);
         }
         saturated(sum)
     }
 }
 
-/// The bank's way back. Upwards a play begins to move at `z + r`. Of two plays that saw the same voltages, the one with
-/// the smaller threshold begins first: `z' + r = max(v, min(v + 2 r, z + r))` keeps that order. So the bank is straight
-/// in pieces, each with one play more in motion, and downwards it is the same with all signs turned.
+/// Inverse of the bank.
+///
+/// Upwards a play begins to move at `z + r`. Of two plays that saw the same voltages, the one with the smaller
+/// threshold begins first: `z' + r = max(v, min(v + 2 r, z + r))` keeps that order. So the bank is piecewise linear,
+/// each piece with one more play in motion, and downwards it is the same with all signs changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inverse {
-    /// With as many plays in motion.
-    pieces: [Piece; MOST_PLAYS + 1],
-    /// What is not worth crossing a level piece for: one code of the converter where the bank is steepest.
-    toll: Signal,
+    /// Piece `i` has `i` plays in motion.
+    pieces: [Piece; MAX_PLAYS + 1],
+    /// Smallest change of the output, in V, for which a level piece is crossed: one DAC code where the bank is
+    /// steepest.
+    threshold: Signal,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Piece {
     slope: Weight,
-    /// `None`: level or falling; it is crossed at once or not at all.
-    per_slope: Option<Steep>,
+    /// Reciprocal slope; `None` if the piece is level or falls: it is crossed in one jump or not at all.
+    per_slope: Option<WideGain>,
 }
 
 impl Inverse {
-    /// Of a memory that [`Memory::check_inverse`] accepts, for steps of `resolution_v` of the voltage.
+    /// Quantizes the inverse of a memory that [`Memory::check_inverse`] accepts; `resolution_v` is the voltage of one
+    /// DAC code.
     pub(crate) fn new(bank: &Config, resolution_v: f64) -> Self {
         let (mut slope, mut steepest) = (bank.direct.to_f64(), 0.0f64);
         let mut inverse = Self::default();
         let plays = bank.plays.iter().take(usize::from(bank.count));
         for (piece, weight) in inverse.pieces.iter_mut().zip(plays.map(|play| play.weight.to_f64()).chain([0.0])) {
-            *piece = Piece { slope: Weight::new(slope), per_slope: (slope > LEVEL).then(|| Steep::new(1.0 / slope)) };
+            let per_slope = (slope > LEVEL).then(|| WideGain::new(1.0 / slope));
+            *piece = Piece { slope: Weight::new(slope), per_slope };
             (slope, steepest) = (slope + weight, steepest.max(slope));
         }
-        inverse.toll = signal(steepest * resolution_v);
+        inverse.threshold = signal(steepest * resolution_v);
         inverse
     }
 
-    /// The voltage that makes the bank's output `more` than at `voltage`, which is the last one.
+    /// Returns the voltage that changes the bank's output by `change` from what it is at `voltage`, the last voltage.
     #[inline(always)]
-    pub(crate) fn voltage(&self, bank: &Config, state: &State, voltage: Signal, more: Signal) -> Signal {
-        let down = more < Signal::ZERO;
-        let turned = |signal: Signal| if down { signal.saturating_neg() } else { signal };
-        let (mut at, mut left) = (turned(voltage), turned(more));
+    pub(crate) fn voltage(&self, bank: &Config, state: &State, voltage: Signal, change: Signal) -> Signal {
+        let down = change < Signal::ZERO;
+        let mirrored = |signal: Signal| if down { signal.saturating_neg() } else { signal };
+        let (mut at, mut left) = (mirrored(voltage), mirrored(change));
         let ends = bank.plays.iter().zip(state).take(usize::from(bank.count));
-        let ends = ends.map(|(play, &place)| turned(place).saturating_add(play.threshold));
+        let ends = ends.map(|(play, &output)| mirrored(output).saturating_add(play.threshold));
         for (piece, end) in self.pieces.iter().zip(ends.chain([Signal::MAX])) {
-            let way = match piece.per_slope {
+            let distance = match piece.per_slope {
                 Some(per_slope) => per_slope.times(left),
-                None if left > self.toll => Signal::MAX,
+                None if left > self.threshold => Signal::MAX,
                 None => Signal::ZERO,
             };
             if end > at {
                 let width = end.saturating_sub(at);
-                if way <= width {
-                    return turned(at.saturating_add(way));
+                if distance <= width {
+                    return mirrored(at.saturating_add(distance));
                 }
-                left = left.saturating_sub(saturated(piece.slope.of(width)));
+                left = left.saturating_sub(saturated(piece.slope.times(width)));
                 at = end;
             }
         }
-        turned(at)
+        mirrored(at)
     }
 }
 
@@ -191,17 +206,21 @@ mod tests {
 
     const BANK: Memory<'_> = Memory { direct: 0.5, thresholds_v: &[10.0, 40.0], weights: &[0.3, 0.2] };
 
+    fn sample_time() -> SampleTime {
+        SampleTime::from_rate(1000.0).unwrap()
+    }
+
     fn walk(memory: &Memory<'_>, voltages: &[f64]) -> f64 {
-        let (config, mut state) = (Config::new(memory), State::default());
+        let (config, mut state) = (memory.validate(sample_time()).unwrap().quantize(), State::default());
         let outputs = voltages.iter().map(|&voltage| config.run(&mut state, Signal::from_num(voltage)).to_num());
         outputs.last().unwrap_or(0.0)
     }
 
     #[test]
-    fn up_and_back_by_hand() {
+    fn a_bank_follows_the_values_computed_by_hand_up_and_back() {
         for (voltages, expected) in [
             (&[100.0][..], 50.0 + 0.3 * 90.0 + 0.2 * 60.0),
-            // Within twice the threshold a play stays.
+            // A play stays while the voltage turns by less than twice its threshold.
             (&[100.0, 85.0], 42.5 + 0.3 * 90.0 + 0.2 * 60.0),
             (&[100.0, 50.0], 25.0 + 0.3 * 60.0 + 0.2 * 60.0),
             (&[100.0, 0.0], 0.3 * 10.0 + 0.2 * 40.0),
@@ -212,9 +231,9 @@ mod tests {
     }
 
     proptest! {
-        /// A minor loop that is passed again leaves no trace, and speed does not matter: only the turns are remembered.
+        /// Only the turns of the voltage are remembered, and only until a larger loop passes them.
         #[test]
-        fn closed_loops_are_forgotten(peak in 200.0..900.0f64, low in 0.0..150.0f64, inner in 150.0..200.0f64) {
+        fn a_closed_loop_leaves_no_trace(peak in 200.0..900.0f64, low in 0.0..150.0f64, inner in 150.0..200.0f64) {
             let straight = walk(&BANK, &[peak, low, peak]);
             let detour = walk(&BANK, &[peak / 3.0, peak, low, inner, low, 0.5 * (low + inner), peak]);
             prop_assert!((straight - detour).abs() < 1e-5, "{straight} {detour}");
@@ -222,15 +241,15 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_bank_is_named() {
+    fn a_setting_out_of_range_is_rejected_by_name() {
         let named = |direct, thresholds_v: &[f64], weights: &[f64]| {
-            Memory { direct, thresholds_v, weights }.check().unwrap_err().field
+            Memory { direct, thresholds_v, weights }.validate(sample_time()).unwrap_err().field
         };
         assert_eq!(named(f64::NAN, &[], &[]), "memory.direct");
         assert_eq!(named(1.0, &[-1.0], &[0.1]), "memory.thresholds_v");
         assert_eq!(named(1.0, &[1.0; 9], &[0.1; 9]), "memory.thresholds_v");
         assert_eq!(named(1.0, &[1.0], &[]), "memory.weights");
-        // Each is allowed, but not all of them.
+        // Each weight is allowed, but not all of them together.
         assert_eq!(named(4.0, &[1.0, 2.0], &[4.0, -4.0]), "memory.weights");
     }
 }

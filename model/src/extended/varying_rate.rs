@@ -1,41 +1,42 @@
-//! A relaxation whose time constant depends on the voltage.
+//! A lag whose time constant depends on the voltage.
+//!
+//! Important terms:
+//!
+//! - *rate*, `r`: the fraction of its distance that the lag covers in a tick, `1 - exp(-T / tau)`.
+//! - *inverse rate*, `1 / r`: almost linear in the time constant.
 //!
 //! ```text
-//! tau(v) = low + (high - low) v / 500 V     for v >= 0; on up to 1000 V, but not below half of the shorter one
-//! ```
-//!
-//! What part `r` of its distance a lag makes in a tick is curved in `tau`, but `1 / r` is almost straight:
-//!
-//! ```text
+//! tau(v) = low + (high - low) v / 500 V     for 0 <= v <= 1000 V, but at least half of the shorter one
 //! r = 1 - exp(-x),   1 / r = 1 / x + 1 / 2 + x / 12 - ...,   x = T / tau
 //! ```
 //!
-//! So the tick takes `1 / r` for straight between 0 V and where `tau` ends, exact at both ends, and inverts it: one
-//! 32-bit division and one Newton step, exact to 2^-20. What is neglected is less than `x^2 / 12` of `r` with the shortest
-//! `tau`: 1e-5 from a hundred sample times on, 5e-3 at four. A rate that is off by a part `e` puts the response to a step
-//! off by less than `e / 2.7` of the step.
+//! So the tick interpolates `1 / r` linearly between 0 V and the voltage where `tau` ends, exact at both, and inverts
+//! it: one 32-bit division and one Newton step, exact to 2^-20. The neglected part is less than `x^2 / 12` of `r` for
+//! the shortest `tau`: 1e-5 from a hundred sample times on, 5e-3 at four. A rate that is wrong by a fraction `e` makes
+//! the step response wrong by less than `e / 2.7` of the step.
 
 use crate::units::{Accumulator, SampleTime, Signal, signal, steps};
 
-/// Fraction bits of the inverse rate's slope beyond its own; up to 500 V it changes by less than 2^31.
-const MORE_BITS: u32 = 8;
+/// Additional fraction bits of the inverse rate's slope; the inverse rate changes by less than 2^31 up to 500 V.
+const SLOPE_BITS: u32 = 8;
 
-/// A time constant that goes straight with the voltage, in s.
+/// A time constant that is linear in the voltage, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeConstant {
-    /// At 0 V.
+    /// Time constant at 0 V, in s.
     pub low_s: f64,
-    /// At 500 V.
+    /// Time constant at 500 V, in s.
     pub high_s: f64,
 }
 
 impl TimeConstant {
-    /// In s, at `volts`.
+    /// Returns the time constant, in s, at `volts`: constant below 0 V, linear above it, and at least half of the
+    /// shorter of the two given ones.
     pub fn at(&self, volts: f64) -> f64 {
-        self.straight(volts.max(0.0)).max(self.floor_s())
+        self.linear(volts.max(0.0)).max(self.floor_s())
     }
 
-    fn straight(&self, volts: f64) -> f64 {
+    fn linear(&self, volts: f64) -> f64 {
         self.low_s + (self.high_s - self.low_s) * volts / 500.0
     }
 
@@ -43,16 +44,16 @@ impl TimeConstant {
         0.5 * self.low_s.min(self.high_s)
     }
 
-    /// The voltage up to which it is straight, 500 to 1000 V.
+    /// Returns the voltage up to which the time constant is linear, 500 to 1000 V.
     pub(super) fn end_v(&self) -> f64 {
-        if self.straight(1000.0) >= self.floor_s() {
+        if self.linear(1000.0) >= self.floor_s() {
             return 1000.0;
         }
         500.0 * (self.low_s - self.floor_s()) / (self.low_s - self.high_s)
     }
 }
 
-/// The inverse of the rate, scaled for the tick.
+/// The inverse rate, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct VaryingRate {
     /// `1 / r` at 0 V, in 2^(shift - 24), below 2^31.
@@ -64,9 +65,10 @@ pub(crate) struct VaryingRate {
 }
 
 impl VaryingRate {
-    /// Of a time constant of two sample times or more at all voltages, the shortest at least a twentieth of the longest.
+    /// Quantizes the inverse rate of a time constant that is at least two sample times at all voltages, and nowhere
+    /// shorter than a twentieth of its longest value.
     pub(crate) fn new(tau: &TimeConstant, sample_time: SampleTime) -> Self {
-        let inverse = |volts| 1.0 / sample_time.part_of_way(tau.at(volts));
+        let inverse = |volts| 1.0 / sample_time.lag_fraction(tau.at(volts));
         let (end_v, at_zero) = (tau.end_v(), inverse(0.0));
         let longest = at_zero.max(inverse(end_v));
         let (mut shift, mut scale) = (0, f64::from(1 << 24));
@@ -76,18 +78,19 @@ impl VaryingRate {
         let per_volt = (inverse(end_v) - at_zero) / end_v;
         Self {
             at_zero: steps(at_zero, scale) as i32,
-            per_volt: steps(per_volt, f64::from(1 << MORE_BITS) * scale) as i32,
+            per_volt: steps(per_volt, f64::from(1 << SLOPE_BITS) * scale) as i32,
             end: signal(end_v),
             shift,
         }
     }
 
-    /// What one tick at `voltage` adds for `lag`.
+    /// Returns what one tick at `voltage` adds for the distance `lag`.
     #[inline(always)]
     pub(crate) fn step(&self, voltage: Signal, lag: Signal) -> Accumulator {
         let voltage = voltage.max(Signal::ZERO).min(self.end);
-        let more = (i64::from(voltage.to_bits()) * i64::from(self.per_volt)) >> (Signal::FRAC_NBITS + MORE_BITS);
-        // 25.3 to 31 bits, so that its guessed inverse is good to 2^-10 and the rate has at most 31.
+        let more = (i64::from(voltage.to_bits()) * i64::from(self.per_volt)) >> (Signal::FRAC_NBITS + SLOPE_BITS);
+        // 25.3 to 31 bits, so that the first guess of its reciprocal is exact to 2^-10 and the rate has at most 31
+        // bits.
         let inverse = self.at_zero + more as i32;
         let guess = (1u32 << 31).checked_div(inverse as u32 >> 15).unwrap_or(0);
         let missing = (1 << 46) - i64::from(inverse) * i64::from(guess);
@@ -105,9 +108,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
-        /// Over all that is accepted.
+        /// The bound of the module documentation, over the whole range of accepted settings.
         #[test]
-        fn the_rate_is_as_exact_as_promised(
+        fn the_error_of_the_rate_is_below_the_documented_bound(
             rate in 2.0..=4.0f64,
             ticks in 0.61..6.0f64,
             ratio in -1.0..=1.0f64,
@@ -129,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_on_beyond_500_v_down_to_half_of_the_shorter() {
+    fn the_time_constant_is_linear_beyond_500_v_and_at_least_half_of_the_shorter_one() {
         let rising = TimeConstant { low_s: 5.5, high_s: 8.0 };
         assert_eq!([-10.0, 0.0, 500.0, 700.0].map(|volts| rising.at(volts)), [5.5, 5.5, 8.0, 9.0]);
         let falling = TimeConstant { low_s: 8.0, high_s: 4.0 };

@@ -1,24 +1,25 @@
 //! The faults and their stable numbers.
 
-/// Why a voltage was taken away. The numbers are used in logs, frames and after a reset, and never change.
+/// Reason for which the output was disabled. The numbers are used in logs, in frames and after a reset, and never
+/// change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Fault {
-    /// The program stopped itself.
+    /// The program panicked.
     Panic = 1,
-    /// The processor stopped the program.
+    /// The processor raised a hard fault.
     HardFault = 2,
     /// Too many ticks were missed.
     Overrun = 3,
     /// The interlock opened.
     Interlock = 4,
-    /// A task did not check in, or the watchdog had to reset the chip.
+    /// A task did not check in, or the watchdog reset the chip.
     Watchdog = 5,
-    /// The amplifier's monitors disagree with what was put out.
+    /// The amplifier's monitors disagree with the output.
     Monitor = 6,
-    /// The settings were refused.
+    /// The settings were rejected.
     Config = 7,
-    /// The supply dipped and reset the chip.
+    /// The supply voltage dipped and reset the chip.
     Supply = 8,
 }
 
@@ -34,12 +35,12 @@ impl Fault {
         Self::Supply,
     ];
 
-    /// Stable number, 1 to 255; zero stands for no fault.
+    /// Returns the stable number, 1 to 255; zero stands for no fault.
     pub const fn code(self) -> u8 {
         self as u8
     }
 
-    /// Lower case, for logs.
+    /// Returns the stable lower-case name for logs.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Panic => "panic",
@@ -53,7 +54,7 @@ impl Fault {
         }
     }
 
-    /// The fault of a code; `None` for zero and unknown numbers.
+    /// Returns the fault with this number; `None` for zero and unknown numbers.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|fault| fault.code() == code)
     }
@@ -64,11 +65,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_lead_back_to_their_faults() {
+    fn codes_are_stable_and_convert_back_to_their_faults() {
         for fault in Fault::ALL {
             assert_eq!(Fault::from_code(fault.code()), Some(fault));
         }
         assert_eq!((Fault::from_code(0), Fault::from_code(9)), (None, None));
-        assert_eq!(Fault::ALL.map(Fault::code), [1, 2, 3, 4, 5, 6, 7, 8], "these numbers are a promise");
+        assert_eq!(Fault::ALL.map(Fault::code), [1, 2, 3, 4, 5, 6, 7, 8], "these numbers must not change");
     }
 }

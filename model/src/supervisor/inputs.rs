@@ -1,38 +1,39 @@
-//! What the supervisor is told in a tick.
+//! Inputs of the supervisor in one tick.
 
-use super::{Fault, Monitors};
+use super::fault::Fault;
+use super::monitors::Monitors;
 use crate::units::Volts;
 
-/// What a person or a host orders.
+/// Command of a person or a host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Let voltages out.
+    /// Enables the output.
     Arm,
-    /// Take the voltage away; acknowledges a fault.
+    /// Disables the output, and acknowledges a fault.
     Disarm,
 }
 
-/// What a tick knows.
+/// Everything that the supervisor decides on in one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inputs {
-    /// Given since the last tick.
+    /// Command that came since the last tick, if any.
     pub command: Option<Command>,
-    /// Static voltage of the desired stiffness.
+    /// Desired stiffness, expressed as the equivalent static voltage.
     pub target: Volts,
     /// Ticks since the last valid frame of the host.
     pub ticks_since_host: u32,
-    /// The safety circuit is closed.
+    /// True if the safety circuit is closed.
     pub interlock_closed: bool,
-    /// Ticks that were left out just before this one.
+    /// Ticks that were missed just before this one.
     pub missed_ticks: u32,
-    /// Readings of the amplifier, where it has monitors.
+    /// Readings of the amplifier's monitors; `None` if it has none.
     pub monitors: Option<Monitors>,
-    /// What somebody else found: a task that does not check in, refused settings.
+    /// Fault that another part of the program found: a task that does not check in, rejected settings.
     pub fault: Option<Fault>,
 }
 
 impl Default for Inputs {
-    /// Nothing ordered, nobody heard, interlock open: nothing that could let a voltage out.
+    /// Returns inputs that cannot enable the output: no command, no frame of a host, interlock open.
     fn default() -> Self {
         Self {
             command: None,

@@ -1,32 +1,36 @@
-//! The limits of the supervision, in SI units and scaled for the tick.
+//! The limits of the supervision, in SI units and quantized for the tick.
 
 use crate::error::OutOfRange;
 use crate::units::{Accumulator, SampleTime, Signal, accumulator, signal, steps};
+use crate::validated::Validated;
 
 /// Limits of the supervision, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Silence of the host, in s, after which the target is ramped down, 0.01 to 60.
+    /// Time without a valid frame of the host after which the target ramps down, 0.01 to 60 s.
     pub host_timeout_s: f64,
-    /// How fast the target then falls, in V/s, 10 to 100 000.
+    /// Slope of that ramp, 10 to 100 000 V/s, downwards.
     pub ramp_v_per_s: f64,
-    /// Missed ticks that are forgiven at once, 1 to 100.
+    /// Number of missed ticks that are tolerated together, 1 to 100.
     pub missed_ticks_allowed: u32,
-    /// Time in s after which one of them is forgotten, one sample time to 60.
+    /// Time after which one missed tick is forgotten, one sample time to 60 s.
     pub forget_missed_s: f64,
-    /// Largest difference in V between the amplifier's voltage monitor and what was put out, 1 to 1000.
+    /// Largest difference between the amplifier's voltage monitor and the output, 1 to 1000 V.
     pub monitor_tolerance_v: f64,
-    /// Largest reading of the current monitor, in A, either direction, 1e-6 to 1.
+    /// Largest magnitude of the current monitor, 1e-6 to 1 A.
     pub max_current_a: f64,
-    /// How long, in s, a monitor may disagree, one sample time to 10; longer than the amplifier takes to settle.
+    /// Time for which a monitor may disagree while the output is enabled, one sample time to 10 s; longer than the
+    /// amplifier takes to settle.
     pub monitor_time_s: f64,
-    /// The same while nothing may leave, in s, one sample time to 60; longer than a voltage that was taken away takes to go.
+    /// Time for which a monitor may disagree while the output is disabled, one sample time to 60 s; longer than the
+    /// spring takes to discharge.
     pub discharge_time_s: f64,
 }
 
 impl Settings {
-    /// Half a second without a host, then 700 V/s down; five missed ticks, one forgotten a second; 35 V, 5 % of the
-    /// report's range, and 2 mA for 50 ms, or for a second while nothing may leave.
+    /// Host timeout 0.5 s, then a ramp of 700 V/s; five missed ticks, one forgotten per second; a monitor may disagree
+    /// by more than 35 V (5 % of the source report's range) or 2 mA for 50 ms, and for 1 s while the output is
+    /// disabled.
     pub const DEFAULT: Self = Self {
         host_timeout_s: 0.5,
         ramp_v_per_s: 700.0,
@@ -38,16 +42,16 @@ impl Settings {
         discharge_time_s: 1.0,
     };
 
-    /// Silence of the host in ticks, as the supervisor counts it.
+    /// Returns the host timeout in ticks, rounded as the supervisor rounds it.
     pub fn host_timeout_ticks(&self, sample_time: SampleTime) -> u32 {
         ticks(self.host_timeout_s, sample_time)
     }
 
-    /// Scales the settings for the tick.
+    /// Checks every field and returns the token with which the limits can be quantized for `sample_time`.
     ///
     /// # Errors
-    /// [`OutOfRange`] names the field.
-    pub fn check(&self, sample_time: SampleTime) -> Result<Config, OutOfRange> {
+    /// [`OutOfRange`] names the first field outside its allowed range, its value and the range.
+    pub fn validate(&self, sample_time: SampleTime) -> Result<Validated<'_, Self>, OutOfRange> {
         let Self { host_timeout_s, ramp_v_per_s, missed_ticks_allowed, forget_missed_s, .. } = *self;
         let Self { monitor_tolerance_v, max_current_a, monitor_time_s, discharge_time_s, .. } = *self;
         let seconds = sample_time.seconds();
@@ -59,32 +63,41 @@ impl Settings {
         OutOfRange::check("max_current_a", max_current_a, 1e-6..=1.0, "A")?;
         OutOfRange::check("monitor_time_s", monitor_time_s, seconds..=10.0, "s")?;
         OutOfRange::check("discharge_time_s", discharge_time_s, seconds..=60.0, "s")?;
-        let ticks = |time_s| ticks(time_s, sample_time);
-        let forget = ticks(forget_missed_s);
-        Ok(Config {
-            host_timeout: self.host_timeout_ticks(sample_time),
-            ramp_step: accumulator((ramp_v_per_s * seconds).min(1000.0)),
-            miss_cost: forget,
-            miss_limit: forget.saturating_mul(missed_ticks_allowed),
-            tolerance: signal(monitor_tolerance_v),
-            max_current_ua: steps(max_current_a, 1e6) as i32,
-            monitor_ticks: ticks(monitor_time_s),
-            discharge_ticks: ticks(discharge_time_s),
-        })
+        Ok(Validated::new(self, sample_time))
     }
 }
 
-/// Rounded.
+impl Validated<'_, Settings> {
+    /// Rounds the validated limits to the integers that a tick sees.
+    pub fn quantize(self) -> Config {
+        let (settings, sample_time) = (self.settings(), self.sample_time());
+        let ticks = |time_s| ticks(time_s, sample_time);
+        let forget = ticks(settings.forget_missed_s);
+        Config {
+            host_timeout: settings.host_timeout_ticks(sample_time),
+            ramp_step: accumulator((settings.ramp_v_per_s * sample_time.seconds()).min(1000.0)),
+            miss_cost: forget,
+            miss_limit: forget.saturating_mul(settings.missed_ticks_allowed),
+            tolerance: signal(settings.monitor_tolerance_v),
+            max_current_ua: steps(settings.max_current_a, 1e6) as i32,
+            monitor_ticks: ticks(settings.monitor_time_s),
+            discharge_ticks: ticks(settings.discharge_time_s),
+        }
+    }
+}
+
+/// Returns a time in ticks, rounded to the nearest.
 fn ticks(time_s: f64, sample_time: SampleTime) -> u32 {
     steps(time_s, 1.0 / sample_time.seconds()) as u32
 }
 
-/// Checked limits, scaled for the tick.
+/// Validated limits, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
     pub(super) host_timeout: u32,
     pub(super) ramp_step: Accumulator,
-    /// A missed tick costs as many as it takes to forget it; each tick gives one back.
+    /// What a missed tick adds to the counter: the number of ticks in which it is forgotten, as each tick takes off
+    /// one.
     pub(super) miss_cost: u32,
     pub(super) miss_limit: u32,
     pub(super) tolerance: Signal,
@@ -98,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wrong_settings_are_named() {
+    fn a_setting_out_of_range_is_rejected_by_name() {
         let good = Settings::DEFAULT;
         for (field, wrong) in [
             ("host_timeout_s", Settings { host_timeout_s: 0.0, ..good }),
@@ -110,16 +123,16 @@ mod tests {
             ("max_current_a", Settings { max_current_a: 2.0, ..good }),
             ("monitor_time_s", Settings { monitor_time_s: 0.0, ..good }),
         ] {
-            assert_eq!(wrong.check(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field, field, "{wrong:?}");
+            assert_eq!(wrong.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field, field, "{wrong:?}");
         }
     }
 
-    /// 0.29 times 100 is a little less than 29 in floating point.
+    /// In floating point 0.29 * 100 is slightly less than 29.
     #[test]
-    fn the_host_is_told_the_silence_that_is_counted() {
+    fn the_reported_host_timeout_is_the_one_that_is_counted() {
         let settings = Settings { host_timeout_s: 0.29, ..Settings::DEFAULT };
         let sample_time = SampleTime::from_rate(100.0).unwrap();
         assert_eq!(settings.host_timeout_ticks(sample_time), 29);
-        assert_eq!(settings.check(sample_time).unwrap().host_timeout, 29);
+        assert_eq!(settings.validate(sample_time).unwrap().quantize().host_timeout, 29);
     }
 }

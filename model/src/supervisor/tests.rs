@@ -1,4 +1,4 @@
-//! Every way in and out of every state.
+//! Tests of every transition between the states.
 
 mod any_order;
 mod misses;
@@ -8,19 +8,19 @@ mod states;
 
 use super::*;
 use crate::amplifier::Limits;
-use crate::units::{SampleTime, ScaledStiffness};
+use crate::units::{SampleTime, ScaledStiffness, Signal};
 
 const RATE_HZ: f64 = 1000.0;
 
 fn config() -> Config {
-    Settings::DEFAULT.check(SampleTime::from_rate(RATE_HZ).unwrap()).unwrap()
+    Settings::DEFAULT.validate(SampleTime::from_rate(RATE_HZ).unwrap()).unwrap().quantize()
 }
 
 fn volts(value: f64) -> Volts {
     Volts::new(value).unwrap()
 }
 
-/// Nothing wrong, host just heard, 300 V wanted.
+/// No fault, a frame of the host in this tick, and a target of 300 V.
 fn good() -> Inputs {
     Inputs { ticks_since_host: 0, interlock_closed: true, target: volts(300.0), ..Inputs::default() }
 }
@@ -46,7 +46,7 @@ fn output(applied_v: f64) -> Output {
     }
 }
 
-/// A whole tick; the controller always offers 300 V.
+/// Both halves of a tick; the controller's output is always 300 V.
 fn tick(supervisor: &mut Supervisor, inputs: Inputs) -> (Decision, Drive) {
     let decision = supervisor.decide(&inputs);
     (decision, supervisor.release(&output(300.0)))

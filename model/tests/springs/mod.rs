@@ -1,8 +1,8 @@
-//! The spring of the tests that has every block.
+//! A spring with every block, for several tests.
 
 use model::extended::{ExtendedPlant, Law, Leakage, Memory, Relaxation};
 
-/// Everything at once, on the scale of a real spring. The plays come in no order.
+/// All blocks, on the scale of a real spring. The plays are not sorted by threshold.
 pub(crate) const WHOLE: ExtendedPlant<'_> = ExtendedPlant {
     memory: Some(Memory { direct: 0.8, thresholds_v: &[25.0, 10.0], weights: &[0.05, 0.15] }),
     law: Some(Law { voltage_v: &[0.0, 100.0, 300.0, 500.0], stiffness: &[0.0, 80.0, 300.0, 500.0] }),

@@ -1,4 +1,5 @@
-//! Random springs, compensations and amplifiers up to the ends of what is accepted: nothing wraps or leaves the range.
+//! Random springs, pre-compensators and amplifiers up to the ends of their allowed ranges: no overflow, output in
+//! range.
 
 use model::estimator::{Estimator, Model};
 use model::extended::{self, ExtendedPlant, Law, Leakage, Memory, Relaxation};
@@ -8,7 +9,7 @@ use proptest::prelude::*;
 use super::{FAST, tick};
 
 prop_compose! {
-    /// Up to the ends of what is accepted.
+    /// Pre-compensators up to the ends of their allowed ranges.
     fn compensation()(kind in 0..3u8, approach in 0.0..=1.0f64, gain in -3.0..2.0f64, integral in -4.0..2.0f64) -> Compensation {
         match kind {
             0 => FAST,
@@ -34,15 +35,16 @@ prop_compose! {
     }
 }
 
-/// Runs it over all targets from a state that others have left.
+/// Runs the settings over all targets, from the state that other settings have left.
 fn stays_in_range<P: Model>(
     settings: &Settings<P>,
     state: &mut State<<P::Config as Estimator>::State>,
     targets: &[f64],
 ) -> Result<(), TestCaseError> {
-    let Ok(config) = settings.check() else { return Ok(()) };
+    let Ok(valid) = settings.validate() else { return Ok(()) };
+    let config = valid.quantize();
     let (lowest, highest) = config.range();
-    config.adopt(state, Volts::new(targets[0]).unwrap());
+    config.bumpless_transfer(state, Volts::new(targets[0]).unwrap());
     for &target in targets {
         for _ in 0..50 {
             let output = tick(&config, state, target);
@@ -57,7 +59,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn nothing_wraps_on_a_plain_spring(
+    fn the_output_stays_in_range_with_a_plain_spring(
         rate in 2.0..=4.0f64,
         loops in prop::collection::vec((0.0..=0.9f64, -2.0..4.0f64, compensation(), amplifier()), 1..4),
         targets in prop::collection::vec(-2000.0..2000.0f64, 1..20),
@@ -71,7 +73,7 @@ proptest! {
     }
 
     #[test]
-    fn nothing_wraps_on_an_extended_spring(
+    fn the_output_stays_in_range_with_an_extended_spring(
         rate in 2.0..=4.0f64,
         plays in prop::collection::vec((0.0..=1000.0f64, -0.5..=1.0f64), 0..=8),
         direct in -0.5..=2.0f64,

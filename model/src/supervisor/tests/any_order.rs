@@ -1,4 +1,4 @@
-//! Whatever comes in, in whatever order.
+//! Random inputs in random order.
 
 use super::*;
 use proptest::prelude::*;
@@ -24,10 +24,11 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
 }
 
 proptest! {
-    /// A voltage leaves only in `Armed`, never with the interlock open or a fault reported, `Armed` is entered only from
-    /// `Disarmed` by an arm command, and neither it nor an acknowledgement comes while the amplifier holds a voltage.
+    /// The output is enabled only in `Armed`, never with the interlock open or a fault reported; `Armed` is entered
+    /// only from `Disarmed` by an arm command; and while the amplifier holds a voltage nothing is armed or
+    /// acknowledged.
     #[test]
-    fn no_order_of_events_lets_a_voltage_out(events in prop::collection::vec(any_inputs(), 1..400)) {
+    fn no_order_of_events_enables_the_output_outside_armed(events in prop::collection::vec(any_inputs(), 1..400)) {
         let mut supervisor = Supervisor::new(config(), None);
         for inputs in events {
             let before = supervisor.state();

@@ -1,9 +1,9 @@
-//! Ticks that were left out.
+//! Missed ticks.
 
 use super::*;
 
 #[test]
-fn few_missed_ticks_are_forgiven_and_forgotten_many_are_a_fault() {
+fn five_missed_ticks_are_tolerated_and_forgotten_six_are_a_fault() {
     let miss = |missed_ticks| Inputs { missed_ticks, ..good() };
     let mut supervisor = armed();
     tick(&mut supervisor, miss(5));
@@ -18,7 +18,7 @@ fn few_missed_ticks_are_forgiven_and_forgotten_many_are_a_fault() {
             tick(&mut supervisor, good());
         }
     }
-    assert_eq!(supervisor.state(), State::Armed, "one a second goes on for ever");
+    assert_eq!(supervisor.state(), State::Armed, "one per second is tolerated for ever");
 
     let mut supervisor = armed();
     tick(&mut supervisor, miss(u32::MAX));
@@ -26,5 +26,5 @@ fn few_missed_ticks_are_forgiven_and_forgotten_many_are_a_fault() {
     tick(&mut supervisor, disarm());
     tick(&mut supervisor, arm());
     tick(&mut supervisor, good());
-    assert_eq!(supervisor.state(), State::Armed, "what is acknowledged is forgotten");
+    assert_eq!(supervisor.state(), State::Armed, "missed ticks before the acknowledgement do not count");
 }

@@ -1,10 +1,10 @@
-//! A host that falls silent.
+//! A host that sends no more frames.
 
 use super::*;
 
-/// 0.5 s of patience, then 300 V at 700 V/s: 428 ticks on the ramp.
+/// 0.5 s of timeout, then from 300 V at 700 V/s: 428 ticks on the ramp.
 #[test]
-fn a_silent_host_is_followed_by_a_ramp_to_zero_and_a_disarm() {
+fn a_silent_host_leads_to_a_ramp_to_zero_and_a_disarm() {
     let mut supervisor = armed();
     let mut silent = good();
     for ticks in 1..=500 {
@@ -22,12 +22,12 @@ fn a_silent_host_is_followed_by_a_ramp_to_zero_and_a_disarm() {
     }
     silent.ticks_since_host = 929;
     assert_eq!(tick(&mut supervisor, silent), (Decision::Rest, Drive::SAFE));
-    assert_eq!(supervisor.state(), State::Disarmed, "silence is no fault");
-    assert_eq!(tick(&mut supervisor, good()).1, Drive::SAFE, "a host that is back has to arm");
+    assert_eq!(supervisor.state(), State::Disarmed, "a silent host is not a fault");
+    assert_eq!(tick(&mut supervisor, good()).1, Drive::SAFE, "the host has to arm again");
 }
 
 #[test]
-fn a_host_that_comes_back_on_the_ramp_goes_on() {
+fn a_host_that_returns_during_the_ramp_keeps_the_output_enabled() {
     let mut supervisor = armed();
     tick(&mut supervisor, good());
     for ticks in 501..600 {
@@ -39,7 +39,7 @@ fn a_host_that_comes_back_on_the_ramp_goes_on() {
 }
 
 #[test]
-fn a_silent_host_does_not_hide_an_open_interlock() {
+fn an_open_interlock_is_a_fault_while_the_host_is_silent() {
     let mut supervisor = armed();
     let silent = Inputs { ticks_since_host: 550, ..good() };
     tick(&mut supervisor, silent);
@@ -48,11 +48,11 @@ fn a_silent_host_does_not_hide_an_open_interlock() {
     assert!(!supervisor.ramping());
 }
 
-/// The slowest ramp, 10 V/s at 10 kHz, is 1 mV a tick.
+/// The slowest ramp is 10 V/s at 10 kHz, 1 mV per tick.
 #[test]
-fn the_slowest_ramp_keeps_its_rate() {
+fn the_slowest_ramp_falls_at_its_nominal_rate() {
     let settings = Settings { ramp_v_per_s: 10.0, ..Settings::DEFAULT };
-    let config = settings.check(SampleTime::from_rate(10_000.0).unwrap()).unwrap();
+    let config = settings.validate(SampleTime::from_rate(10_000.0).unwrap()).unwrap().quantize();
     let mut supervisor = Supervisor::new(config, None);
     tick(&mut supervisor, arm());
     let silent = Inputs { ticks_since_host: u32::MAX, ..good() };
@@ -64,7 +64,7 @@ fn the_slowest_ramp_keeps_its_rate() {
 }
 
 #[test]
-fn a_target_below_zero_is_at_the_end_of_its_ramp() {
+fn a_negative_target_ends_its_ramp_in_one_tick() {
     let mut supervisor = armed();
     tick(&mut supervisor, Inputs { target: volts(-10.0), ..good() });
     tick(&mut supervisor, Inputs { ticks_since_host: 501, target: volts(-10.0), ..good() });

@@ -3,14 +3,14 @@
 use super::*;
 
 #[test]
-fn nothing_leaves_before_arming() {
+fn the_output_is_disabled_before_arming() {
     let mut supervisor = Supervisor::new(config(), None);
     assert_eq!(tick(&mut supervisor, good()), (Decision::Rest, Drive::SAFE));
     assert_eq!(supervisor.state(), State::Disarmed);
 }
 
 #[test]
-fn arming_starts_once_then_pursues_the_target() {
+fn arming_starts_once_and_then_pursues_the_target() {
     let mut supervisor = Supervisor::new(config(), None);
     assert_eq!(tick(&mut supervisor, arm()).0, Decision::Start(volts(300.0)));
     let (decision, drive) = tick(&mut supervisor, arm());
@@ -19,27 +19,27 @@ fn arming_starts_once_then_pursues_the_target() {
 }
 
 #[test]
-fn disarming_takes_the_voltage_away_in_the_same_tick() {
+fn disarming_disables_the_output_in_the_same_tick() {
     let mut supervisor = armed();
     assert_eq!(tick(&mut supervisor, disarm()), (Decision::Rest, Drive::SAFE));
     assert_eq!(supervisor.state(), State::Disarmed);
-    assert_eq!(tick(&mut supervisor, arm()).0, Decision::Start(volts(300.0)), "and it may be armed again");
+    assert_eq!(tick(&mut supervisor, arm()).0, Decision::Start(volts(300.0)), "it can be armed again");
 }
 
 #[test]
-fn arming_is_refused_with_a_reason() {
-    let refused = |supervisor: &mut Supervisor, inputs| {
+fn arming_is_rejected_with_a_reason() {
+    let rejected = |supervisor: &mut Supervisor, inputs| {
         assert_eq!(tick(supervisor, inputs), (Decision::Rest, Drive::SAFE));
         supervisor.refusal()
     };
     let mut supervisor = Supervisor::new(config(), None);
     let open = Inputs { interlock_closed: false, ..arm() };
-    assert_eq!(refused(&mut supervisor, open), Some(Refusal::InterlockOpen));
+    assert_eq!(rejected(&mut supervisor, open), Some(Refusal::InterlockOpen));
     let silent = Inputs { ticks_since_host: 501, ..arm() };
-    assert_eq!(refused(&mut supervisor, silent), Some(Refusal::HostSilent));
+    assert_eq!(rejected(&mut supervisor, silent), Some(Refusal::HostSilent));
     let mut supervisor = Supervisor::new(config(), Some(Fault::Panic));
-    assert_eq!(refused(&mut supervisor, arm()), Some(Refusal::Faulted));
-    assert_eq!(refused(&mut supervisor, good()), None, "a refusal belongs to its command");
+    assert_eq!(rejected(&mut supervisor, arm()), Some(Refusal::Faulted));
+    assert_eq!(rejected(&mut supervisor, good()), None, "a rejection lasts for one tick");
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn an_open_interlock_is_a_fault_only_while_armed() {
 }
 
 #[test]
-fn a_fault_stays_until_acknowledged_and_then_needs_an_arm_of_its_own() {
+fn a_fault_stays_until_it_is_acknowledged_and_arming_needs_another_command() {
     for fault in Fault::ALL {
         let mut supervisor = armed();
         let bad = Inputs { fault: Some(fault), ..good() };
@@ -89,7 +89,7 @@ fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
 }
 
 #[test]
-fn after_a_reset_by_a_fault_the_fault_still_stands() {
+fn the_fault_that_caused_a_reset_is_kept_after_it() {
     let mut supervisor = Supervisor::new(config(), Some(Fault::HardFault));
     assert_eq!(tick(&mut supervisor, arm()).1, Drive::SAFE);
     assert_eq!(supervisor.state(), State::Faulted(Fault::HardFault));

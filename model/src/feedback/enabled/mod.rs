@@ -1,0 +1,126 @@
+//! The correction with its settings and state, built with the feature `feedback`.
+//!
+//! Readings come in through [`fault_detection`], which rejects what cannot be true; [`influence`] clips what remains,
+//! and [`oscillation`] reduces the gain if the loop oscillates. What goes out is the corrected target and the corrected
+//! estimate.
+
+mod envelope;
+pub mod fault_detection;
+mod influence;
+pub mod oscillation;
+mod settings;
+
+pub use fault_detection::{Fault, Sensor};
+pub use settings::{Feedback, HISTORY, Reading};
+
+use crate::coefficient::{Rate, upper};
+use crate::units::{Accumulator, ScaledStiffness, Signal, Volts};
+use crate::validated::Validated;
+
+/// The correction for one sensor and sample time, quantized for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    gain: Rate,
+    fade: Rate,
+    influence: influence::Config,
+    detection: fault_detection::Config,
+    oscillation: oscillation::Config,
+}
+
+/// State of the correction; the default is that of a sensor from which no reading has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    correction: Accumulator,
+    /// Ring buffer of the model's stiffness at the last ticks.
+    model: [Signal; HISTORY],
+    newest: u8,
+    influence: influence::State,
+    detection: fault_detection::State,
+    oscillation: oscillation::State,
+}
+
+impl Validated<'_, Feedback> {
+    /// Quantizes the correction for the tick.
+    pub(crate) fn quantize(self) -> Config {
+        let (feedback, sample_time) = (self.settings(), self.sample_time());
+        let detection = fault_detection::Config::new(feedback, sample_time);
+        Config {
+            gain: Rate::new(feedback.gain()),
+            fade: Rate::new(sample_time.lag_fraction(feedback.fade_s)),
+            influence: influence::Config::new(feedback.interval_s, detection.noise()),
+            detection,
+            oscillation: oscillation::Config::new(feedback.interval_s, sample_time),
+        }
+    }
+}
+
+impl Config {
+    /// First half of a tick, before its voltage: updates the correction with the latest reading, or lets it decay while
+    /// the sensor is not trusted. Returns the stiffness to which the model has to be brought for the spring to reach
+    /// `target`.
+    #[inline]
+    pub(crate) fn update(&self, state: &mut State, target: Volts, reading: Option<Reading>) -> Volts {
+        self.oscillation.track_target(&mut state.oscillation, target.0);
+        let correction = upper(state.correction);
+        let sample = reading.map(|reading| {
+            let model = state.model_at(reading.age);
+            fault_detection::Sample { reading, model, mismatch: reading.stiffness.0.saturating_sub(model) }
+        });
+        let accepted = self.detection.evaluate(&mut state.detection, sample);
+        let step = match (state.detection.sensor(), accepted) {
+            (Sensor::Trusted, Some(mismatch)) => {
+                self.oscillation.detect(&mut state.oscillation, mismatch, self.detection.noise());
+                let (innovation, model) = (mismatch.saturating_sub(correction), state.model_at(0));
+                let recent = state.detection.model_envelope();
+                let clipped = self.influence.clip(&mut state.influence, innovation, model, recent);
+                state.oscillation.reduce(self.gain.step(clipped))
+            }
+            (Sensor::Trusted, None) => Accumulator::ZERO,
+            _ => self.fade.step(Signal::ZERO.saturating_sub(correction)),
+        };
+        state.correction = state.correction.saturating_add(step);
+        state.corrected(target)
+    }
+
+    /// Second half of a tick, after its voltage was applied: records the model's stiffness. Returns the corrected
+    /// estimate, and whether the sensor is trusted.
+    #[inline]
+    pub(crate) fn estimate(&self, state: &mut State, model: ScaledStiffness) -> (ScaledStiffness, Option<Sensor>) {
+        self.detection.track_model(&mut state.detection, model.0);
+        state.newest = state.newest.wrapping_add(1);
+        if let Some(newest) = state.model.get_mut(usize::from(state.newest) % HISTORY) {
+            *newest = model.0;
+        }
+        (ScaledStiffness(model.0.saturating_add(upper(state.correction))), Some(state.detection.sensor()))
+    }
+}
+
+impl State {
+    /// Prepares the state for another configuration; `None` is one without a sensor.
+    pub(crate) fn transfer_to(&mut self, config: Option<&Config>) {
+        if config.is_some() {
+            self.oscillation = oscillation::State::default();
+        } else {
+            *self = Self::default();
+        }
+    }
+
+    /// Returns the stiffness to which the model has to be brought for the spring to reach `target`: `target - d`.
+    #[inline]
+    pub(crate) fn corrected(&self, target: Volts) -> Volts {
+        Volts(target.0.saturating_sub(upper(self.correction)))
+    }
+
+    /// Returns the correction `d` that is added to the model's stiffness, in V.
+    pub fn correction(&self) -> ScaledStiffness {
+        ScaledStiffness(upper(self.correction))
+    }
+
+    /// Returns the model's stiffness `age` ticks before the last one.
+    #[inline]
+    fn model_at(&self, age: u16) -> Signal {
+        // The length of the ring divides 256: the index may wrap.
+        let index = usize::from(self.newest.wrapping_sub(age as u8)) % HISTORY;
+        self.model.get(index).copied().unwrap_or(Signal::ZERO)
+    }
+}

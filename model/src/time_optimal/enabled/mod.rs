@@ -1,0 +1,123 @@
+//! The law with its settings and state, built with the feature `time-optimal`.
+
+mod braking;
+
+use self::braking::Braking;
+use crate::coefficient::{Rate, Weight, saturated, upper, widened};
+use crate::error::OutOfRange;
+use crate::estimator::{Estimator, Prediction, StepGain};
+use crate::units::{Accumulator, SampleTime, Volts};
+use crate::validated::{Validate, Validated};
+
+/// Time constant, in s, with which the offset of a bumpless transfer decays.
+const OFFSET_DECAY_S: f64 = 0.1;
+
+/// How the time-optimal pre-compensator approaches its target, in SI units.
+///
+/// ```
+/// use model::{Approach, Compensation, Input, OutOfRange, Settings, State, Volts};
+///
+/// fn main() -> Result<(), OutOfRange> {
+///     let compensation = Compensation::TimeOptimal(Approach::DEAD_BEAT);
+///     let config = Settings { compensation, ..Settings::PAPER }.validate()?.quantize();
+///     let mut state = State::default();
+///     let input = Input { target: Volts::new(50.0)?, ..Input::default() };
+///     // 550 V give 50 V instantaneously, through the feedthrough of 1/11; afterwards less voltage holds them.
+///     assert!((config.tick(&mut state, input).applied.to_f64() - 550.0).abs() < 2.0);
+///     let settled = (0..5000).map(|_| config.tick(&mut state, input)).last().unwrap();
+///     assert!((settled.stiffness.to_f64() - 50.0).abs() < 0.1);
+///     assert!((settled.applied.to_f64() - 50.0).abs() < 1.0);
+///     Ok(())
+/// }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach {
+    /// Time constant of the last part of the way, 0 to 1 s; 0 is dead-beat. A longer one is slower, smoother where the
+    /// target jumps, and needs less voltage.
+    pub time_constant_s: f64,
+}
+
+impl Approach {
+    /// The fastest approach: the target is reached within one tick where the amplifier's range allows it.
+    pub const DEAD_BEAT: Self = Self { time_constant_s: 0.0 };
+}
+
+impl Validate for Approach {
+    fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
+        OutOfRange::check("approach_s", self.time_constant_s, 0.0..=1.0, "s")
+    }
+}
+
+/// The pre-compensator for one spring and sample time, quantized for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimeOptimal<I> {
+    inverse: I,
+    /// Fraction of the distance to the target that is covered in a tick.
+    approach: Weight,
+    /// Fraction of the last voltage's rounding error that is asked for again: a long approach asks for less than a code
+    /// in a tick, and would otherwise stay where it is.
+    rounding: Weight,
+    offset_decay: Rate,
+    braking: Option<Braking>,
+}
+
+/// The offset that a bumpless transfer adds to the target, in V; the default is 0 V.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    offset: Accumulator,
+}
+
+impl Validated<'_, Approach> {
+    /// Quantizes the law for a spring with this inverse and largest step gain. `slew` is the spring's smallest step
+    /// gain and the amplifier's largest change in a tick, in V, if the slew is limited.
+    pub(crate) fn quantize<I>(self, inverse: I, spring: &StepGain, slew: Option<(StepGain, f64)>) -> TimeOptimal<I> {
+        let (time_constant, sample_time) = (self.settings().time_constant_s, self.sample_time());
+        let approach = if time_constant > 0.0 { sample_time.lag_fraction(time_constant) } else { 1.0 };
+        let braking = slew.map(|(smallest, step_v)| Braking::new(&smallest, step_v));
+        let feedthrough = spring.feedthrough / (spring.feedthrough + spring.in_one_tick).max(1e-9);
+        let rounding = Weight::new((1.0 - approach) * feedthrough);
+        let offset_decay = Rate::new(sample_time.lag_fraction(OFFSET_DECAY_S));
+        TimeOptimal { inverse, approach: Weight::new(approach), rounding, offset_decay, braking }
+    }
+}
+
+impl<I: Copy> TimeOptimal<I> {
+    /// Returns the voltage that this law asks for, before the amplifier's limits. `driven` is the last voltage after
+    /// them, and `applied` the same rounded to a code.
+    #[inline(always)]
+    pub(crate) fn voltage<E: Estimator<Inverse = I>>(
+        &self,
+        state: &mut State,
+        target: Volts,
+        spring: &E,
+        spring_state: &E::State,
+        driven: Volts,
+        applied: Volts,
+    ) -> Volts {
+        let target = target.0.saturating_add(upper(state.offset));
+        state.offset -= self.offset_decay.step(upper(state.offset));
+        let prediction = spring.predict(spring_state, applied);
+        let Prediction { now, end } = prediction;
+        let step = saturated(self.approach.times(target.saturating_sub(now)));
+        let mut change = step.saturating_sub(end.saturating_sub(now));
+        if let Some(braking) = &self.braking {
+            change = braking.limit(change, target, prediction);
+        }
+        let wanted = spring.voltage_for(spring_state, &self.inverse, applied, change);
+        Volts(wanted.0.saturating_add(saturated(self.rounding.times(driven.0.saturating_sub(applied.0)))))
+    }
+
+    /// Sets the offset so that the law asks for the last voltage, `applied`, again.
+    pub(crate) fn preset_offset<E: Estimator>(
+        &self,
+        state: &mut State,
+        target: Volts,
+        spring: &E,
+        spring_state: &E::State,
+        applied: Volts,
+    ) {
+        let Prediction { now, end } = spring.predict(spring_state, applied);
+        let distance = self.approach.divide(end.saturating_sub(now));
+        state.offset = widened(now.saturating_add(distance).saturating_sub(target.0));
+    }
+}
