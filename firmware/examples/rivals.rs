@@ -48,7 +48,7 @@ fn main() -> ! {
         // Nobody ticks, so it guards nothing here: it runs the clock that counts.
         hang_guard::start(&mut core.SYST, CLOCK_HZ);
     }
-    let Ok(config) = SETTINGS.check() else { semihosting::exit(1) };
+    let Ok(config) = SETTINGS.validate().map(|settings| settings.quantize()) else { semihosting::exit(1) };
     race("tick", &mut WholeTick { config, state: State::default() });
     race("tick_f64", &mut F64 { spring: Spring::default(), integral: 0.0, voltage: 0.0 });
     race("idsp", &mut Idsp::new());

@@ -80,7 +80,7 @@ pub fn run(
 /// Not inlined: all of them in one function are more than the compiler can reach across.
 #[inline(never)]
 fn ticks<P: Model>(settings: &Settings<P>, stopwatch: &mut impl Stopwatch) -> Result<u64, OutOfRange> {
-    let (config, mut state) = (settings.check()?, State::<<P::Config as Estimator>::State>::default());
+    let (config, mut state) = (settings.validate()?.quantize(), State::<<P::Config as Estimator>::State>::default());
     let mut digest = Digest::default();
     let (mut bits, mut target) = (1u32, 0);
     for tick in 0..TICKS {

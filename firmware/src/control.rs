@@ -6,7 +6,7 @@ use link::WireModel;
 use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Command, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
 use model::{
-    Config, ExtendedPlant, Input, OutOfRange, Output, Reading, SampleTime, ScaledStiffness, Settings, State, Volts,
+    Config, ExtendedPlant, Input, OutOfRange, Output, Reading, ScaledStiffness, Settings, State, Validated, Volts,
     estimator, extended,
 };
 
@@ -100,9 +100,10 @@ impl Control {
         supervision: &supervisor::Settings,
         last_fault: Option<Fault>,
     ) -> Result<Self, OutOfRange> {
-        let sample_time = settings.judge()?;
-        let supervisor = Supervisor::new(supervision.check(sample_time)?, last_fault);
-        let spring = Spring::Plain(Loop::new(settings, sample_time));
+        let settings = settings.validate()?;
+        let supervision = supervision.validate(settings.sample_time())?;
+        let supervisor = Supervisor::new(supervision.quantize(), last_fault);
+        let spring = Spring::Plain(Loop::new(settings));
         Ok(Self { spring, supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
     }
 
@@ -112,10 +113,9 @@ impl Control {
     /// [`OutOfRange`] names what is wrong with it; then the spring stays.
     pub fn take_on(&mut self, settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
         let settings = Found::new(settings, found);
-        let sample_time = settings.judge()?;
         self.spring = match &settings {
-            Found::Plain(settings) => Spring::Plain(Loop::new(settings, sample_time)),
-            Found::Extended(settings) => Spring::Extended(Loop::new(settings, sample_time)),
+            Found::Plain(settings) => Spring::Plain(Loop::new(settings.validate()?)),
+            Found::Extended(settings) => Spring::Extended(Loop::new(settings.validate()?)),
         };
         Ok(())
     }
@@ -125,7 +125,7 @@ impl Control {
     /// # Errors
     /// [`OutOfRange`] names what is wrong with it.
     pub fn check(settings: &Settings, found: &WireModel) -> Result<(), OutOfRange> {
-        Found::new(settings, found).judge().map(drop)
+        Found::new(settings, found).check()
     }
 
     /// Before the first tick: nothing may leave until this is acknowledged.
@@ -177,18 +177,18 @@ impl<'a> Found<'a> {
         }
     }
 
-    fn judge(&self) -> Result<SampleTime, OutOfRange> {
+    fn check(&self) -> Result<(), OutOfRange> {
         match self {
-            Self::Plain(settings) => settings.judge(),
-            Self::Extended(settings) => settings.judge(),
+            Self::Plain(settings) => settings.validate().map(drop),
+            Self::Extended(settings) => settings.validate().map(drop),
         }
     }
 }
 
 impl<E: Estimator> Loop<E> {
     /// At rest.
-    fn new<P: Model<Config = E>>(settings: &Settings<P>, sample_time: SampleTime) -> Self {
-        Self { config: settings.scaled(sample_time), state: State::default() }
+    fn new<P: Model<Config = E>>(settings: Validated<'_, Settings<P>>) -> Self {
+        Self { config: settings.quantize(), state: State::default() }
     }
 
     #[inline(always)]
@@ -197,7 +197,7 @@ impl<E: Estimator> Loop<E> {
             Decision::Rest => self.config.rest(&mut self.state, measured),
             Decision::Start(target) => {
                 // From zero volts, as if zero had been asked for until now.
-                self.config.adopt(&mut self.state, Volts::ZERO);
+                self.config.bumpless_transfer(&mut self.state, Volts::ZERO);
                 self.timed(Input { target, measured }, stopwatch)
             }
             Decision::Pursue(target) => self.timed(Input { target, measured }, stopwatch),

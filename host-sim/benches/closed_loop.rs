@@ -22,7 +22,7 @@ fn closed_loop(criterion: &mut Criterion) {
 
     let settings =
         Settings { amplifier: Amplifier { slew_v_per_s: Some(100_000.0), ..Amplifier::PAPER }, ..Settings::PAPER };
-    let config = settings.check().expect("valid settings");
+    let config = settings.validate().expect("valid settings").quantize();
     let mut outputs = vec![(0u16, 0i32); SAMPLES];
     group.bench_function("fixed_tick", |bencher| {
         bencher.iter(|| {

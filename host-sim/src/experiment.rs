@@ -64,8 +64,8 @@ impl<P: Judged> Experiment<P> {
     pub fn run(&self, mut progress: impl FnMut(usize, usize)) -> Result<Run> {
         let rate_hz = self.settings.rate_hz;
         let uncontrolled = Settings { compensation: Compensation::None, ..self.settings };
-        let controlled = self.settings.check().map_err(|error| BadInput(error.to_string()))?;
-        let alone = uncontrolled.check().map_err(|error| BadInput(error.to_string()))?;
+        let controlled = self.settings.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
+        let alone = uncontrolled.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
         self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;
 
         let last = self.schedule.last_tick(rate_hz);

@@ -17,8 +17,7 @@ use crate::bad_input::BadInput;
 pub fn simulate(spring: &impl Model, rate_hz: f64, time_s: &[f64], voltage_v: &[f64]) -> Result<Vec<f64>> {
     let refused = |error: model::OutOfRange| BadInput(error.to_string());
     let sample_time = SampleTime::from_rate(rate_hz).map_err(refused)?;
-    spring.check(sample_time).map_err(refused)?;
-    let config = spring.scaled(sample_time);
+    let config = spring.validate(sample_time).map_err(refused)?.quantize();
     let start = time_s.first().copied().unwrap_or(0.0);
     let mut state = Default::default();
     let mut tick = 0;

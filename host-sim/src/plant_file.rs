@@ -11,8 +11,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use link::WireModel;
-use model::estimator::Model;
-use model::{ExtendedPlant, OutOfRange, Plant, SampleTime, extended};
+use model::{ExtendedPlant, OutOfRange, Plant, SampleTime, Validate, extended};
 use serde::{Deserialize, Serialize};
 
 use crate::bad_input;
@@ -186,7 +185,7 @@ impl PlantFile {
     /// An amplifier with the limit and slew that the file records, where they are stricter.
     pub fn behind(&self, amplifier: model::Amplifier) -> model::Amplifier {
         let Some(Amplifier { limit_v, slew_v_per_s, .. }) = self.amplifier else { return amplifier };
-        amplifier.found_with(limit_v, slew_v_per_s)
+        amplifier.limited_to(limit_v, slew_v_per_s)
     }
 
     /// What the file says of the record that neither the tick nor its amplifier stage runs, by name.

@@ -45,7 +45,7 @@ pub struct LimitedTicks {
 
 impl LimitedTicks {
     fn of(samples: &[Sample]) -> Self {
-        let count = |limit| samples.iter().filter(|sample| sample.limits.any_of(limit)).count();
+        let count = |limit| samples.iter().filter(|sample| sample.limits.intersects(limit)).count();
         Self { upper: count(Limits::UPPER), lower: count(Limits::LOWER), slew: count(Limits::SLEW) }
     }
 }

@@ -59,7 +59,7 @@ fn disagreement(file: &PlantFile, rate_hz: f64) -> Worst {
 
 /// Of one loop, whose double is `told` the codes or left to itself.
 fn of_loop(settings: &Settings<ExtendedPlant<'_>>, told: bool) -> f64 {
-    let config = settings.check().expect("a spring such as identification finds");
+    let config = settings.validate().expect("a spring such as identification finds").quantize();
     let double = SampledLoop::from(settings);
     let (mut fixed, mut state) = (State::default(), double.at_rest());
     let (mut off, mut from) = (0.0f64, 0.0);

@@ -56,7 +56,7 @@ prop_compose! {
 /// Largest differences of stiffness and voltage, in V; `None` if the settings are refused.
 fn disagreement(case: &Case) -> Option<(f64, f64)> {
     let Settings { rate_hz, plant, compensation, amplifier, .. } = case.settings;
-    let config = case.settings.check().ok()?;
+    let config = case.settings.validate().ok()?.quantize();
     let Compensation::ProportionalIntegral(gains) = compensation else { return None };
     let (lowest, highest) = config.range();
     let range_v = (lowest.to_f64(), highest.to_f64());

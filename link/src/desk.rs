@@ -175,7 +175,7 @@ impl Desk {
 
     fn status(&self, view: &View) -> Status {
         let About { firmware, rate_hz, silence_limit_ticks, last_fault, .. } = self.about;
-        let (lowest, highest) = self.spring.reach_v();
+        let (lowest, highest) = self.spring.range_v();
         Status {
             lowest: WireVolts::from_f64(lowest),
             highest: WireVolts::from_f64(highest),

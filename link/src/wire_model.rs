@@ -11,7 +11,7 @@ use core::fmt;
 
 use heapless::Vec;
 use model::extended::{Law, Leakage, Memory, Relaxation};
-use model::extended::{lags::MOST_LAGS, law::MOST_POINTS, memory::MOST_PLAYS};
+use model::extended::{lags::MAX_LAGS, law::MAX_POINTS, memory::MAX_PLAYS};
 use model::{Amplifier, ExtendedPlant};
 use serde::{Deserialize, Serialize};
 
@@ -34,15 +34,15 @@ pub struct WireModel {
     /// Hysteresis.
     pub memory: Option<WireMemory>,
     /// Sensitivity over the voltage: voltages and stiffness, in V.
-    pub law: Option<(List<MOST_POINTS>, List<MOST_POINTS>)>,
+    pub law: Option<(List<MAX_POINTS>, List<MAX_POINTS>)>,
     /// Loss of charge: share, and time constant in s.
     pub leakage: Option<(f64, f64)>,
     /// Part of a change that comes at once.
     pub share: f64,
     /// In s.
-    pub time_constants_s: List<MOST_LAGS>,
+    pub time_constants_s: List<MAX_LAGS>,
     /// What each time constant brings.
-    pub weights: List<MOST_LAGS>,
+    pub weights: List<MAX_LAGS>,
     /// The first time constant at 500 V, in s.
     pub time_constant_high_s: Option<f64>,
     /// Where the amplifier's voltage ends, in V.
@@ -57,9 +57,9 @@ pub struct WireMemory {
     /// Weight of the voltage itself.
     pub direct: f64,
     /// Half the width of each play, in V.
-    pub thresholds_v: List<MOST_PLAYS>,
+    pub thresholds_v: List<MAX_PLAYS>,
     /// Weight of each play.
-    pub weights: List<MOST_PLAYS>,
+    pub weights: List<MAX_PLAYS>,
 }
 
 /// Which model, of all that an MCU has been given.
@@ -124,7 +124,7 @@ impl WireModel {
 
     /// The stricter of `amplifier` and the one that was found.
     pub fn behind(&self, amplifier: Amplifier) -> Amplifier {
-        amplifier.found_with(self.limit_v, self.slew_v_per_s)
+        amplifier.limited_to(self.limit_v, self.slew_v_per_s)
     }
 
     /// The payload. `None` if it does not fit, which no model does.
@@ -179,7 +179,7 @@ mod tests {
 
     /// Everything at its longest.
     fn largest() -> WireModel {
-        let (points, plays, lags) = ([1.5; MOST_POINTS], [2.5; MOST_PLAYS], [3.5; MOST_LAGS]);
+        let (points, plays, lags) = ([1.5; MAX_POINTS], [2.5; MAX_PLAYS], [3.5; MAX_LAGS]);
         let plant = ExtendedPlant {
             memory: Some(Memory { direct: 0.5, thresholds_v: &plays, weights: &plays }),
             law: Some(Law { voltage_v: &points, stiffness: &points }),

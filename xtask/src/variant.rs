@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn each_image_answers_a_target_with_codes_of_its_own() {
         let codes = |variant: Variant| {
-            let config = variant.settings().check().unwrap();
+            let config = variant.settings().validate().unwrap().quantize();
             let (lowest, highest) = config.range();
             let mut state = model::State::default();
             let target = model::Volts::new(200.0).unwrap();

@@ -185,7 +185,7 @@ fn run_plant<P: Judged>(
         }
     };
     let experiment = Experiment { name, schedule, settings };
-    if let Err(error) = experiment.settings.check() {
+    if let Err(error) = experiment.settings.validate() {
         return Err(named(BadInput(error.to_string()).into(), &[SETTINGS, OWN].concat()));
     }
 

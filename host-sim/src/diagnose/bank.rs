@@ -11,7 +11,7 @@
 //! curve rises, another bank is a bank again, and the curves are put into each other (Kuhnen, *European Journal of
 //! Control* 9, 2003).
 
-use model::extended::memory::MOST_PLAYS;
+use model::extended::memory::MAX_PLAYS;
 
 use crate::plant_file::Memory;
 
@@ -77,7 +77,7 @@ impl Bank {
 
     /// True if a plant file holds that many plays.
     pub fn fits(&self) -> bool {
-        self.plays.len() <= MOST_PLAYS
+        self.plays.len() <= MAX_PLAYS
     }
 
     /// True if the loading curve falls nowhere.

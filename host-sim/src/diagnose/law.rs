@@ -1,6 +1,6 @@
 //! The static law: a plant file's, and what effects put behind it.
 
-use model::extended::law::MOST_POINTS;
+use model::extended::law::MAX_POINTS;
 
 use super::knots::{Point, knots};
 use crate::plant_file;
@@ -51,7 +51,7 @@ impl<'a> Law<'a> {
         voltage_v.dedup_by(|b, a| *b - *a < 1e-3 * full_scale_v / STEPS as f64);
         let curve: Vec<Point> =
             voltage_v.into_iter().map(|voltage| (voltage, behind.at(gain * self.at(voltage)))).collect();
-        let (voltage_v, stiffness) = knots(&curve, MOST_POINTS, STRAIGHT * full_scale_v).into_iter().unzip();
+        let (voltage_v, stiffness) = knots(&curve, MAX_POINTS, STRAIGHT * full_scale_v).into_iter().unzip();
         Some(plant_file::Law { voltage_v, stiffness })
     }
 }

@@ -147,7 +147,7 @@ fn one(
 mod tests {
     use super::*;
     use model::Feedback;
-    use model::feedback::watch;
+    use model::feedback::fault_detection;
 
     /// At rest, noise and all: within the stated times, and without moving the stiffness.
     #[test]
@@ -157,11 +157,11 @@ mod tests {
         for it in all(&settings, 21, &[140.0]).unwrap() {
             let within = match it.failure.fault() {
                 None => continue,
-                Some(Fault::Stuck) => f64::from(watch::IDENTICAL_AT_REST) * feedback.interval_s,
+                Some(Fault::Stuck) => f64::from(fault_detection::IDENTICAL_AT_REST) * feedback.interval_s,
                 Some(Fault::Absent | Fault::Stale) => {
-                    feedback.oldest_s + f64::from(watch::SILENT) * feedback.interval_s + 1e-3
+                    feedback.oldest_s + f64::from(fault_detection::MISSED_INTERVALS) * feedback.interval_s + 1e-3
                 }
-                Some(Fault::Jumping | Fault::OutOfRange) => f64::from(watch::REJECTED) * feedback.interval_s,
+                Some(Fault::Jumping | Fault::OutOfRange) => f64::from(fault_detection::REJECTED) * feedback.interval_s,
             };
             assert!(it.seen_s.is_some_and(|seen_s| seen_s < within + 1e-9), "{it:?}, not within {within} s");
             assert!(it.moved_v < 0.2 && it.bump_v < 1.0, "{it:?}");

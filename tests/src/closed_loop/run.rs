@@ -58,7 +58,7 @@ impl Scene {
         settings: &Settings,
         mut sense: impl FnMut(usize, f64) -> Option<Reading>,
     ) -> Result<Vec<Sample>, OutOfRange> {
-        let config: Config = settings.check()?;
+        let config: Config = settings.validate()?.quantize();
         let mut state = State::default();
         let ticks = (stair::duration_s() * settings.rate_hz).round() as usize;
         let mut live = Live::new(&self.effects, self.noise, self.seed, 500.0, ticks);
