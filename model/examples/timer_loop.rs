@@ -1,8 +1,9 @@
-//! The loop of a firmware's timer interrupt, run on a host: `cargo run -p model --example timer_loop` prints a short trace.
+//! The loop of a firmware's timer interrupt, run on a host: `cargo run -p model --example timer_loop` prints a short
+//! trace.
 //!
-//! To use it in a firmware, copy [`Controller`] and [`Board`], implement `Board` for your pins, build the controller once at the
-//! start, and call [`Controller::on_timer`] from the interrupt of a timer that fires [`RATE_HZ`] times per second. What is left
-//! is the simulation of a board, so that the example prints something.
+//! To use it in a firmware, copy [`Controller`] and [`Board`], implement `Board` for your pins, build the controller
+//! once at the start, and call [`Controller::on_timer`] from the interrupt of a timer that fires [`RATE_HZ`] times per
+//! second. What is left is the simulation of a board, so that the example prints something.
 
 use model::estimator::Estimator;
 use model::stiffness::{Cantilever, Desired, YoungsModulus};

@@ -2,7 +2,7 @@
 //!
 //! Important terms:
 //!
-//! - *wanted voltage*: what the pre-compensator asks for, in V, without regard to any limit.
+//! - *wanted voltage*: the output of the pre-compensator, in V, before any limit.
 //! - *slew*: the fastest change of the voltage, in V/s.
 //! - *range*: the lowest and the highest voltage that may be put out, in V.
 //! - *code*: the number written to the DAC. Code `n` of a `b`-bit converter stands for `n * full_scale / (2^b - 1)`.
@@ -44,8 +44,8 @@ impl Amplifier {
         Self { full_scale_v, min_v: 0.0, max_v: full_scale_v, slew_v_per_s: None, dac_bits: 12 }
     }
 
-    /// Returns this amplifier with the stricter of its own and the given limits: the highest voltage in V and the slew in V/s.
-    /// A limit of NaN stays NaN, which [`Validate::check`] rejects.
+    /// Returns this amplifier with the stricter of its own and the given limits: the highest voltage in V and the slew
+    /// in V/s. A limit of NaN stays NaN, which [`Validate::check`] rejects.
     pub fn limited_to(self, limit_v: Option<f64>, slew_v_per_s: Option<f64>) -> Self {
         // `f64::min` would ignore NaN.
         let stricter = |own: f64, other: f64| if other > own { own } else { other };
@@ -243,7 +243,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_code_converted_to_volts_and_back_is_unchanged(full_scale in 50.0..1000.0f64, bits in 8u32..=16, part: f64) {
+        fn a_code_survives_conversion_to_volts(full_scale in 50.0..1000.0f64, bits in 8u32..=16, part: f64) {
             let config = config(&Amplifier { dac_bits: bits, ..Amplifier::up_to(full_scale) }, 1000.0);
             let code = DacCode((part.abs().fract() * f64::from((1u32 << bits) - 1)) as u16);
             prop_assert_eq!(config.code(config.volts(code)), code);

@@ -2,10 +2,10 @@
 //!
 //! Important terms:
 //!
-//! - [`Gain`]: turns a signal into a signal. It is an integer plus a signed remainder of 32 fraction bits, so that neither a
-//!   gain of 100 nor a share of 0.09 loses precision, and no shift is needed.
-//! - [`Rate`]: turns a lag into what an accumulator gains in one tick. A relaxation of 5.5 s covers 1.8e-5 of its distance in
-//!   a 10 kHz tick; 32 fraction bits would make its time constant wrong by parts in 1e5, so a rate has 64.
+//! - [`Gain`]: turns a signal into a signal. It is an integer plus a signed remainder of 32 fraction bits, so that
+//!   neither a gain of 100 nor a share of 0.09 loses precision, and no shift is needed.
+//! - [`Rate`]: turns a lag into what an accumulator gains in one tick. A relaxation of 5.5 s covers 1.8e-5 of its
+//!   distance in a 10 kHz tick; 32 fraction bits would make its time constant wrong by parts in 1e5, so a rate has 64.
 //! - [`Weight`]: a factor in a sum of products. The products are added 64 bits wide and saturated once.
 //! - [`WideGain`]: a positive factor of any size, for reciprocals. Its product saturates.
 
@@ -145,7 +145,8 @@ pub(crate) fn sum(signal: Signal) -> Sum {
     Sum::from_bits(i64::from(signal.to_bits()) << Weight::FRACTION_BITS)
 }
 
-/// Splits 64 bits into upper and lower 32 bits, the upper ones rounded to the nearest, so that the lower ones are signed.
+/// Splits 64 bits into upper and lower 32 bits, the upper ones rounded to the nearest, so that the lower ones are
+/// signed.
 const fn halves(bits: i64) -> (i32, i32) {
     let high = (bits + (1 << 31)) >> 32;
     (high as i32, (bits - (high << 32)) as i32)

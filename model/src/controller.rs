@@ -2,17 +2,18 @@
 //!
 //! Important terms:
 //!
-//! - [`Settings`]: what a person writes, in SI units and floats. [`Settings::validate`] checks them once, off the hot path, and
-//!   `Validated::quantize` turns them into a `Config`.
+//! - [`Settings`]: what a person writes, in SI units and floats. [`Settings::validate`] checks them once, off the hot
+//!   path, and `Validated::quantize` turns them into a `Config`.
 //! - [`Config`]: the same in fixed-point numbers, which is all that a tick sees.
 //! - [`State`]: what the controller remembers from tick to tick.
 //! - *target*: the desired stiffness expressed as the equivalent static voltage, in V.
-//! - *pre-compensator*: shapes the voltage so that the spring reaches the target faster than by itself ([`Compensation`]).
+//! - *pre-compensator*: shapes the voltage so that the spring reaches the target faster than by itself
+//!   ([`Compensation`]).
 //! - *bumpless transfer*: a change of the configuration that does not move the voltage.
 //!
 //! [`Config::tick`] does, in this order: target into the amplifier's range, correction by the sensor, pre-compensator,
-//! amplifier limits and rounding, estimator on the applied voltage, integrator. All types are generic over the spring; without
-//! a parameter it is the plain one, [`Plant`].
+//! amplifier limits and rounding, estimator on the applied voltage, integrator. All types are generic over the spring;
+//! without a parameter it is the plain one, [`Plant`].
 
 use crate::amplifier::{self, Amplifier, Limits};
 use crate::error::OutOfRange;
@@ -33,8 +34,8 @@ use crate::validated::{Validate, Validated};
 ///     let config: Config = settings.validate()?.quantize();
 ///     let mut state = State::default();
 ///     let input = Input { target: Volts::new(500.0)?, ..Input::default() };
-///     // The voltage overshoots the target deliberately. After 4 s the stiffness is within 3 % of the target; held at 500 V,
-///     // the spring would have reached 280 V by then.
+///     // The voltage overshoots the target deliberately. After 4 s the stiffness is within 3 % of the target; with
+///     // a constant 500 V it would have reached 280 V by then.
 ///     assert_eq!(config.tick(&mut state, input).applied.to_f64().round(), 1000.0);
 ///     let after_4_s = (1..4000).map(|_| config.tick(&mut state, input)).last().unwrap();
 ///     assert!((after_4_s.stiffness.to_f64() - 500.0).abs() < 0.03 * 500.0);
@@ -198,7 +199,8 @@ impl<E: Estimator> Config<E> {
         self.amplifier.range()
     }
 
-    /// Advances the controller by one tick. No heap, no float, no panic, no unbounded loop: the same bits on every machine.
+    /// Advances the controller by one tick. No heap, no float, no panic, no unbounded loop: the same bits on every
+    /// machine.
     #[inline(always)]
     pub fn tick(&self, state: &mut State<E::State>, input: Input) -> Output {
         let (target, moved) = self.amplifier.clamp_target(input.target);
@@ -226,8 +228,9 @@ impl<E: Estimator> Config<E> {
         Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits, sensor }
     }
 
-    /// Advances the controller by one tick with the amplifier off: 0 V regardless of slew and range. The integrator is not
-    /// advanced; [`Config::bumpless_transfer`] presets it. The sensor's readings are processed as in [`Config::tick`].
+    /// Advances the controller by one tick with the amplifier off: 0 V regardless of slew and range. The integrator is
+    /// not advanced; [`Config::bumpless_transfer`] presets it. The sensor's readings are processed as in
+    /// [`Config::tick`].
     pub fn rest(&self, state: &mut State<E::State>, measured: Option<Reading>) -> Output {
         let (zero, code) = (Volts::ZERO, DacCode(0));
         state.amplifier = amplifier::State::default();
@@ -248,8 +251,8 @@ impl<E: Estimator> Config<E> {
         }
     }
 
-    /// Returns the voltage that the time-optimal law asks for. Not inlined, so that a tick with another pre-compensator keeps
-    /// its registers.
+    /// Returns the voltage that the time-optimal law asks for. Not inlined, so that a tick with another pre-compensator
+    /// keeps its registers.
     #[inline(never)]
     fn time_optimal(&self, it: &TimeOptimal<E::Inverse>, state: &mut State<E::State>, target: Volts) -> Volts {
         let State { estimator, time_optimal, amplifier, .. } = state;
@@ -266,9 +269,9 @@ impl<E: Estimator> Config<E> {
     /// Makes this configuration take over a running `state` without moving the voltage: for the same `target`, the next
     /// voltage is the last one.
     ///
-    /// To be called once after a change of gains, limits, plant or rate, and before the first tick after [`Config::rest`]. A
-    /// new range that excludes the last voltage takes effect in the next tick, and without a pre-compensator the next voltage
-    /// is the target.
+    /// To be called once after a change of gains, limits, plant or rate, and before the first tick after
+    /// [`Config::rest`]. A new range that excludes the last voltage takes effect in the next tick, and without a
+    /// pre-compensator the next voltage is the target.
     pub fn bumpless_transfer(&self, state: &mut State<E::State>, target: Volts) {
         state.feedback.transfer_to(self.feedback.as_ref());
         let (target, _) = self.amplifier.clamp_target(target);

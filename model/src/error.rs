@@ -41,8 +41,8 @@ impl OutOfRange {
         Self { field, value, lowest, highest, unit }.unless_inside()
     }
 
-    /// Returns `self` as an error unless its value lies inside its range. Not inlined: each comparison of soft floats is a
-    /// call.
+    /// Returns `self` as an error unless its value lies inside its range. Not inlined: each comparison of soft floats
+    /// is a call.
     #[inline(never)]
     fn unless_inside(self) -> Result<(), Self> {
         let inside = self.lowest <= self.value && self.value <= self.highest;

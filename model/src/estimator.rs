@@ -24,7 +24,8 @@
 //! ```
 //!
 //! The amplifier holds its voltage between ticks, and for a held `u` the tick is exact, not an approximation:
-//! `w' = w + (1 - exp(-T / tau)) (u - w)`. `w` is always between voltages that were applied, so no sum here can overflow.
+//! `w' = w + (1 - exp(-T / tau)) (u - w)`. `w` is always between voltages that were applied, so no sum here can
+//! overflow.
 
 use core::fmt::Debug;
 
@@ -57,8 +58,8 @@ pub trait Model: Validate + Copy {
         Ok(())
     }
 
-    /// Quantizes the inverse of this spring, which has become `config`; `resolution_v` is the voltage of one DAC code. The
-    /// inverse of a spring that [`Model::check_inverse`] rejects saturates: it is safe to run, and of no use.
+    /// Quantizes the inverse of this spring, which has become `config`; `resolution_v` is the voltage of one DAC code.
+    /// The inverse of a spring that [`Model::check_inverse`] rejects saturates: it is safe to run, and of no use.
     fn inverse(
         plant: Validated<'_, Self>,
         config: &Self::Config,
@@ -100,7 +101,8 @@ pub trait Estimator: Copy {
     /// Quantized inverse of the spring, from a change of stiffness to a voltage.
     type Inverse: Copy + Debug + Eq;
 
-    /// Returns the stiffness just after `applied` was put across the spring, and holds that voltage for one sample time.
+    /// Returns the stiffness just after `applied` was put across the spring, and holds that voltage for one sample
+    /// time.
     fn run(&self, state: &mut Self::State, applied: Volts) -> ScaledStiffness;
 
     /// Returns a point on the curve of the stiffness over the voltage applied now.
@@ -109,7 +111,8 @@ pub trait Estimator: Copy {
     /// Returns the stiffness now and at the end of the coming tick if the `applied` voltage of the last tick stays.
     fn predict(&self, state: &Self::State, applied: Volts) -> Prediction;
 
-    /// Returns the voltage with which the stiffness at the end of the coming tick is `change` V above the one with `applied`.
+    /// Returns the voltage with which the stiffness at the end of the coming tick is `change` V above the one with
+    /// `applied`.
     fn voltage_for(&self, state: &Self::State, inverse: &Self::Inverse, applied: Volts, change: Signal) -> Volts;
 }
 
@@ -123,8 +126,8 @@ pub struct Prediction {
 /// Largest gain of an inverse, in V of voltage per V of stiffness. A higher one would only amplify rounding errors.
 const MAX_INVERSE_GAIN: f64 = 8192.0;
 
-/// Returns the gain of the inverse, in V of voltage per V of stiffness, for a step gain of `within_a_tick` V/V, bounded by
-/// `MAX_INVERSE_GAIN`.
+/// Returns the gain of the inverse, in V of voltage per V of stiffness, for a step gain of `within_a_tick` V/V, bounded
+/// by `MAX_INVERSE_GAIN`.
 pub(crate) fn inverse_gain(within_a_tick: f64) -> f64 {
     (1.0 / within_a_tick).min(MAX_INVERSE_GAIN)
 }
@@ -160,8 +163,8 @@ impl Plant {
     /// The source report's plant: `Kp = 0.1`, `Ki = 0.2 1/s`, hence a share of 1/11 and a time constant of 5.5 s.
     pub const PAPER: Self = Self::proportional_integral(0.1, 0.2);
 
-    /// Returns the plant of a unity feedback loop around a block with the gains `proportional` (no unit) and `integral_per_s`
-    /// (1/s).
+    /// Returns the plant of a unity feedback loop around a block with the gains `proportional` (no unit) and
+    /// `integral_per_s` (1/s).
     pub const fn proportional_integral(proportional: f64, integral_per_s: f64) -> Self {
         Self { share: proportional / (1.0 + proportional), time_constant_s: (1.0 + proportional) / integral_per_s }
     }

@@ -2,15 +2,15 @@
 //!
 //! Important terms:
 //!
-//! - *spring* or *plant*: a piezo cantilever whose stiffness follows the voltage across it: a part instantaneously, the rest
-//!   with a relaxation of seconds.
+//! - *spring* or *plant*: a piezo cantilever whose stiffness follows the voltage across it: a part instantaneously, the
+//!   rest with a relaxation of seconds.
 //! - *scaled stiffness*: stiffness expressed as the equivalent static voltage, in V.
 //! - *target*: the desired scaled stiffness, in V.
 //! - *estimator*: the model of the spring, run on the voltage that was really applied.
 //! - *pre-compensator*: shapes the voltage, with deliberate overshoot, so that the stiffness reaches the target sooner.
 //! - *supervisor*: decides whether the output is enabled.
-//! - *settings*, *config*, *state*: SI units and floats as a person writes them; the same validated and quantized to fixed
-//!   point; what changes from tick to tick.
+//! - *settings*, *config*, *state*: SI units and floats as a person writes them; the same validated and quantized to
+//!   fixed point; what changes from tick to tick.
 //!
 //! One tick is [`Config::tick`], a pure function of configuration, state and input. Data goes through it one way:
 //!
@@ -22,8 +22,8 @@
 //!               ^ measured stiffness, if there is a sensor
 //! ```
 //!
-//! No heap, no `unsafe`, no hardware, and no floating point once a [`Config`] is built: the same bits on a host and on the MCU.
-//! A desired stiffness in Pa or N/m becomes a target off the hot path, by [`Spring::target`].
+//! No heap, no `unsafe`, no hardware, and no floating point once a [`Config`] is built: the same bits on a host and on
+//! the MCU. A desired stiffness in Pa or N/m becomes a target off the hot path, by [`Spring::target`].
 //!
 //! | module | content |
 //! | --- | --- |

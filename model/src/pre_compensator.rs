@@ -1,5 +1,5 @@
-//! The proportional-integral pre-compensator: shapes the voltage with deliberate overshoot, so that the stiffness settles
-//! faster.
+//! The proportional-integral pre-compensator: shapes the voltage with deliberate overshoot, so that the stiffness
+//! settles faster.
 //!
 //! Important terms:
 //!
@@ -11,21 +11,21 @@
 //!
 //! It closes a loop around the estimate, `u = Kp e + z`, `dz/dt = Ki e`, `e = target - y`, with two additions:
 //!
-//! - **No delay in the loop.** Part of the stiffness follows the voltage instantaneously, so `u` stands on both sides. With
-//!   the operating point, `y = y0 + s (u - v0)` and `g = 1 / (1 + Kp s)`, the solution is
+//! - **No delay in the loop.** Part of the stiffness follows the voltage instantaneously, so `u` stands on both sides.
+//!   With the operating point, `y = y0 + s (u - v0)` and `g = 1 / (1 + Kp s)`, the solution is
 //!   `u = g z + (1 - g) v0 + g Kp (target - y0)`. For the plain spring `s` is its share, `v0 = y0` its relaxed part, and
-//!   this is exact. An [extended](crate::extended) spring follows a curve of slope `s'`, 0 to `s`, that depends on voltage and
-//!   direction; `s` is the largest slope, and the operating point is at the last voltage. One tick then brings `u` at least
-//!   `g (1 + Kp s')` of the way to the curve's exact solution and never past it, so that the remaining distance shrinks in
-//!   each tick to `Kp (s - s') / (1 + Kp s)` of itself: with the report's gain and share, to 0.27 at most. A tick needs no
-//!   division.
-//! - **Anti-windup by structure.** While nothing limits, `Kp e = u - z`, so `dz/dt = (u - z) Ki / Kp`: the integrator is a
-//!   first-order lag, with the reset time `Kp / Ki`, of the voltage *that the amplifier really gave* after slew and range. While
-//!   the amplifier limits, the integrator follows the output instead of running away, and it cannot leave the amplifier's
-//!   range (Astrom and Haegglund's tracking form; Hanus's conditioning).
+//!   this is exact. An [extended](crate::extended) spring follows a curve of slope `s'`, 0 to `s`, that depends on
+//!   voltage and direction; `s` is the largest slope, and the operating point is at the last voltage. One tick then
+//!   brings `u` at least `g (1 + Kp s')` of the way to the curve's exact solution and never past it, so that the
+//!   remaining distance shrinks in each tick to `Kp (s - s') / (1 + Kp s)` of itself: with the report's gain and share,
+//!   to 0.27 at most. A tick needs no division.
+//! - **Anti-windup by structure.** While nothing limits, `Kp e = u - z`, so `dz/dt = (u - z) Ki / Kp`: the integrator
+//!   is a first-order lag, with the reset time `Kp / Ki`, of the voltage *that the amplifier really gave* after slew
+//!   and range. While the amplifier limits, the integrator follows the output instead of running away, and it cannot
+//!   leave the amplifier's range (Astrom and Haegglund's tracking form; Hanus's conditioning).
 //!
-//! Rounding to a DAC code is left out of that feedback: an integrator that tracked codes would stop short of the target by up
-//! to a fraction of a code.
+//! Rounding to a DAC code is left out of that feedback: an integrator that tracked codes would stop short of the target
+//! by up to a fraction of a code.
 
 use crate::coefficient::{Gain, Rate, upper, widened};
 use crate::error::OutOfRange;
@@ -39,8 +39,8 @@ const MAX_ACTION_V: f64 = 1024.0;
 /// Gains of the proportional-integral pre-compensator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
-    /// Proportional gain `Kp`, in V of voltage per V of error, 0.001 to 100; the spring's dead-beat gain, which brings it to
-    /// the target in one tick, is the upper bound where it is lower.
+    /// Proportional gain `Kp`, in V of voltage per V of error, 0.001 to 100; the spring's dead-beat gain, which brings
+    /// it to the target in one tick, is the upper bound where it is lower.
     pub proportional: f64,
     /// Integral gain `Ki`, in V of voltage per V of error and second, 0 to `proportional` / (10 sample times).
     pub integral_per_s: f64,
@@ -78,7 +78,8 @@ impl Gains {
     /// # Errors
     /// [`OutOfRange`] names `proportional_gain` or `integral_gain_per_s`.
     pub(crate) fn check(&self, spring: &StepGain, sample_time: SampleTime) -> Result<(), OutOfRange> {
-        // One tick moves the relaxed part by `relaxation + in_one_tick Kp g` of its distance; more than all of it rings.
+        // One tick moves the relaxed part by `relaxation + in_one_tick Kp g` of its distance; more than all of it
+        // rings.
         let StepGain { feedthrough, in_one_tick, relaxation } = *spring;
         let ringing = in_one_tick - (1.0 - relaxation) * feedthrough;
         let dead_beat = if ringing > 0.0 { (1.0 - relaxation) / ringing } else { f64::INFINITY };
@@ -118,7 +119,8 @@ impl ProportionalIntegral {
         self.operating_point_gain.times(point.voltage) + self.error_gain.times(error)
     }
 
-    /// Advances the integrator by one sample time with `driven` at the amplifier's input, after limits and before rounding.
+    /// Advances the integrator by one sample time with `driven` at the amplifier's input, after limits and before
+    /// rounding.
     #[inline(always)]
     pub(crate) fn track(&self, state: &mut State, driven: Volts) {
         let lag = self.integrator_gain.times(driven.0).saturating_sub(upper(state.integrator));

@@ -2,10 +2,10 @@
 //!
 //! Important terms:
 //!
-//! - *Young's modulus*, `E`: of the whole beam, in Pa. It grows linearly with the static voltage `V` (regression of the source
-//!   report's section 8.1.3).
-//! - *spring constant*, `k`: force at the tip divided by displacement of the tip, in N/m, of a cantilever of length `L`, width
-//!   `b` and thickness `h`.
+//! - *Young's modulus*, `E`: of the whole beam, in Pa. It grows linearly with the static voltage `V` (regression of the
+//!   source report's section 8.1.3).
+//! - *spring constant*, `k`: force at the tip divided by displacement of the tip, in N/m, of a cantilever of length
+//!   `L`, width `b` and thickness `h`.
 //! - *scaled stiffness*: stiffness expressed as the equivalent static voltage, in V.
 //! - *target*: the scaled stiffness that the controller is to reach, in V.
 //!
@@ -75,8 +75,8 @@ pub enum Desired {
 }
 
 impl YoungsModulus {
-    /// The source report's fit: 1.301 GPa + 1.069 MPa/V. The report's text prints a slope of 0.1069 MPa/V, which none of its
-    /// own values supports.
+    /// The source report's fit: 1.301 GPa + 1.069 MPa/V. The report's text prints a slope of 0.1069 MPa/V, which none
+    /// of its own values supports.
     pub const PAPER: Self = Self { at_zero_pa: 1.301e9, per_volt_pa: 1.069e6 };
 }
 

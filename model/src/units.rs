@@ -4,8 +4,8 @@
 //!
 //! - *signal*: a value at one tick, 32 bits wide. [`Signal`] has 12 integer and 20 fraction bits: +-2048 V in steps of
 //!   0.95 uV, for voltages of up to 1000 V and their differences.
-//! - *accumulator*: a value summed over many ticks, 64 bits wide. [`Accumulator`] has 12 integer and 52 fraction bits, so its
-//!   upper half is a signal: reading it costs nothing and cannot wrap.
+//! - *accumulator*: a value summed over many ticks, 64 bits wide. [`Accumulator`] has 12 integer and 52 fraction bits,
+//!   so its upper half is a signal: reading it costs nothing and cannot wrap.
 //! - *scaled stiffness*: stiffness expressed as the equivalent static voltage, in V ([`ScaledStiffness`]).
 //! - *sample time*: the time between two ticks, in s ([`SampleTime`]).
 
@@ -22,8 +22,8 @@ pub(crate) const TWO_TO_20: f64 = 1_048_576.0;
 pub(crate) const TWO_TO_32: f64 = 4_294_967_296.0;
 const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
 
-/// Returns `value * steps_per_unit`, rounded to the nearest integer and saturated to 64 bits. Not inlined, like the functions
-/// below: without a double-precision unit each copy would be long.
+/// Returns `value * steps_per_unit`, rounded to the nearest integer and saturated to 64 bits. Not inlined, like the
+/// functions below: without a double-precision unit each copy would be long.
 #[inline(never)]
 pub(crate) fn steps(value: f64, steps_per_unit: f64) -> i64 {
     libm::rint(value * steps_per_unit) as i64
@@ -62,8 +62,8 @@ fn volts(signal: Signal) -> f64 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Volts(pub Signal);
 
-/// Stiffness expressed as the equivalent static voltage: the voltage, in V, that would give this stiffness once the spring has
-/// settled.
+/// Stiffness expressed as the equivalent static voltage: the voltage, in V, that would give this stiffness once the
+/// spring has settled.
 ///
 /// [`Spring`](crate::Spring) converts it to Pa and N/m.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

@@ -4,10 +4,10 @@
 //!
 //! - *settings*: what a person writes or a file holds, in SI units and floats ([`crate::Settings`], [`crate::Plant`],
 //!   [`crate::supervisor::Settings`]).
-//! - *validate*: check every field of the settings for one sample time. The result is an error that names the field, or a
-//!   [`Validated`] token.
-//! - *quantize*: round the settings to fixed-point numbers for that sample time. It cannot fail, and it is a method of the
-//!   token only: outside its allowed range a setting would overflow its number format.
+//! - *validate*: check every field of the settings for one sample time. The result is an error that names the field, or
+//!   a [`Validated`] token.
+//! - *quantize*: round the settings to fixed-point numbers for that sample time. It cannot fail, and it is a method of
+//!   the token only: outside its allowed range a setting would overflow its number format.
 //!
 //! ```
 //! use model::{OutOfRange, Settings};

@@ -1,4 +1,5 @@
-//! Tests of the whole tick: long runs, limits, changes of the configuration. They are built with overflow checks: a wrap panics.
+//! Tests of the whole tick: long runs, limits, changes of the configuration. They are built with overflow checks: a
+//! wrap panics.
 
 use model::{Amplifier, Compensation, Config, Gains, Input, Limits, Output, Plant, Settings, State, Volts};
 use proptest::prelude::*;
@@ -40,8 +41,8 @@ fn the_code_stays_within_one_step_for_ten_million_ticks_at_rest() {
     assert!((sum / 1e7).abs() < allowed, "mean error {} of {allowed}", sum / 1e7);
 }
 
-/// After a minute at a limit, the response to a lower target is that of a loop that was never limited. A wound-up integrator
-/// would keep the voltage at the limit for a while.
+/// After a minute at a limit, the response to a lower target is that of a loop that was never limited. A wound-up
+/// integrator would keep the voltage at the limit for a while.
 #[test]
 fn the_integrator_does_not_wind_up() {
     for slew_v_per_s in [None, Some(200.0)] {

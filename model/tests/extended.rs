@@ -1,5 +1,5 @@
-//! Tests of the whole tick with an extended spring, over the whole range of accepted settings. They are built with overflow
-//! checks: a wrap panics.
+//! Tests of the whole tick with an extended spring, over the whole range of accepted settings. They are built with
+//! overflow checks: a wrap panics.
 
 mod springs;
 
@@ -43,8 +43,8 @@ fn run(config: &Config<extended::Config>, state: &mut Running, target_v: f64, ti
     output
 }
 
-/// A target is limited to the amplifier's range. A spring of a smaller static gain ends at the upper limit, which is reported;
-/// one of a larger static gain could reach more than the range, but the target is moved to its end.
+/// A target is limited to the amplifier's range. A spring of a smaller static gain ends at the upper limit, which is
+/// reported; one of a larger static gain could reach more than the range, but the target is moved to its end.
 #[test]
 fn an_unreachable_target_ends_at_the_upper_limit() {
     for (leak, gain, target_v, ends_v) in [(0.3, 0.9, 650.0, 490.0), (0.0, 1.2, 800.0, 700.0)] {
@@ -81,8 +81,8 @@ fn an_extended_plant_without_blocks_runs_as_the_plain_plant() {
     }
 }
 
-/// The loop linearises the spring's curve with its largest slope, and converges to the exact solution of `u + Kp y(u) = ...` at
-/// the rate that the documentation of the pre-compensator states.
+/// The loop linearises the spring's curve with its largest slope, and converges to the exact solution of
+/// `u + Kp y(u) = ...` at the rate that the documentation of the pre-compensator states.
 #[test]
 fn the_voltage_converges_to_the_solution_on_the_curve_at_the_documented_rate() {
     // Without integral action nothing else moves within 12 ticks.

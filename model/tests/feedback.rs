@@ -1,5 +1,5 @@
-//! Tests of measured feedback: comparison with a reference in double precision that shares no code with it, and behaviour at the
-//! bounds. They are built with overflow checks: a wrap panics.
+//! Tests of measured feedback: comparison with a reference in double precision that shares no code with it, and
+//! behaviour at the bounds. They are built with overflow checks: a wrap panics.
 
 use model::feedback::{Fault, fault_detection};
 use model::{Config, Feedback, Input, Plant, Reading, ScaledStiffness, Sensor, Settings, State, Volts};
@@ -90,7 +90,8 @@ proptest! {
                 let output = config.tick(&mut state, Input { target: Volts::new(target).unwrap(), measured });
                 reference.update(target, measured.map(|it| (it.stiffness.to_f64(), u32::from(it.age))));
                 let correction = state.correction().to_f64();
-                prop_assert_eq!(output.sensor == Some(Sensor::Trusted), reference.trusted(), "{:?} {:?}", segment, reference);
+                let trusted = output.sensor == Some(Sensor::Trusted);
+                prop_assert_eq!(trusted, reference.trusted(), "{:?} {:?}", segment, reference);
                 prop_assert!((correction - reference.correction()).abs() < 1e-3, "{correction} {reference:?}");
                 model = output.stiffness.to_f64() - correction;
                 reference.track_model(model);
@@ -109,7 +110,8 @@ proptest! {
         let range = Feedback { lowest_v: -1000.0, highest_v: 1000.0, ..Feedback::TYPICAL };
         let feedback = Feedback { noise_v, fastest_s, model_uncertainty: 1000.0, fade_s: 0.01, ..range };
         let plant = Plant { share, time_constant_s: 0.01 };
-        let config = Settings { plant, compensation: model::Compensation::None, ..with(feedback) }.validate().unwrap().quantize();
+        let settings = Settings { plant, compensation: model::Compensation::None, ..with(feedback) };
+        let config = settings.validate().unwrap().quantize();
         let (lowest, highest) = config.range();
         let mut state = State::default();
         for (bits, age, often, target) in readings {
@@ -164,9 +166,9 @@ impl Bench {
         0.9 * self.model + 0.0005 * f64::from(self.tick % 2)
     }
 
-    fn step(&mut self, target: f64, said: impl Fn(&Self) -> Option<Reading>) -> Option<Sensor> {
+    fn step(&mut self, target: f64, read: impl Fn(&Self) -> Option<Reading>) -> Option<Sensor> {
         self.tick += 1;
-        let input = Input { target: Volts::new(target).unwrap(), measured: said(self) };
+        let input = Input { target: Volts::new(target).unwrap(), measured: read(self) };
         let output = self.config.tick(&mut self.state, input);
         self.model = output.stiffness.to_f64() - self.state.correction().to_f64();
         self.bump = self.bump.max((output.voltage.to_f64() - self.voltage).abs());
@@ -175,8 +177,8 @@ impl Bench {
     }
 
     /// Returns the number of ticks until the sensor has this state; 1000 at most.
-    fn until(&mut self, target: f64, sensor: Sensor, said: impl Fn(&Self) -> Option<Reading>) -> u32 {
-        (1..1000).find(|_| self.step(target, &said) == Some(sensor)).expect("within a second")
+    fn until(&mut self, target: f64, sensor: Sensor, read: impl Fn(&Self) -> Option<Reading>) -> u32 {
+        (1..1000).find(|_| self.step(target, &read) == Some(sensor)).expect("within a second")
     }
 }
 
@@ -200,12 +202,12 @@ fn every_fault_is_detected_within_its_documented_time_and_without_a_bump() {
         (Fault::Jumping, u32::from(fault_detection::REJECTED), |bench| Some(reading(bench.truth() + 20.0, 0))),
         (Fault::OutOfRange, u32::from(fault_detection::REJECTED), |_| Some(reading(1001.0, 0))),
     ];
-    for (fault, within, says) in cases {
+    for (fault, within, read) in cases {
         let mut bench = Bench::settled();
-        let found = bench.until(300.0, Sensor::Failed(fault), says);
+        let found = bench.until(300.0, Sensor::Failed(fault), read);
         assert!(found <= within, "{fault:?} after {found} ticks, not {within}");
         for _ in 0..20_000 {
-            assert_eq!(bench.step(300.0, says), Some(Sensor::Failed(fault)));
+            assert_eq!(bench.step(300.0, read), Some(Sensor::Failed(fault)));
         }
         // The loop runs on the model alone.
         assert!((bench.truth() - 270.0).abs() < 0.2, "{fault:?} {}", bench.truth());

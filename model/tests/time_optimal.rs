@@ -1,5 +1,5 @@
-//! Tests of the time-optimal pre-compensator: limits, moving targets and changes of the configuration, with plain and extended
-//! springs. They are built with overflow checks: a wrap panics.
+//! Tests of the time-optimal pre-compensator: limits, moving targets and changes of the configuration, with plain and
+//! extended springs. They are built with overflow checks: a wrap panics.
 
 #[path = "time_optimal/range.rs"]
 mod range;
@@ -88,8 +88,8 @@ fn a_reachable_step_takes_one_tick() {
     }
 }
 
-/// A bank without direct part does not respond after a turn until the voltage has changed by twice the threshold: the voltage
-/// jumps over this gap, and not again for less than a code.
+/// A bank without direct part does not respond after a turn until the voltage has changed by twice the threshold: the
+/// voltage jumps over this gap, and not again for less than a code.
 #[test]
 fn a_gap_without_response_after_a_turn_is_crossed_once() {
     let memory = Some(Memory { direct: 0.0, thresholds_v: &[20.0], weights: &[1.0] });

@@ -12,7 +12,6 @@ use serde::Serialize;
 use serde_json::Value;
 use simulation::plant_file;
 use validation::ground_truth::{Block, Cause};
-use validation::ground_truth::{Block, Cause};
 use xtask::shell;
 use xtask::variant::Controller;
 

@@ -14,7 +14,6 @@ use firmware::settings::SETTINGS;
 use model::Volts;
 use model::units::Signal;
 use validation::ground_truth::live::Live;
-use validation::ground_truth::live::Live;
 use xtask::shell;
 
 use crate::qemu::emulator::{self, Run};

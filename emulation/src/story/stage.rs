@@ -13,8 +13,6 @@ use serde::Serialize;
 use test_bench::script::{Script, UP_DOWN_TICKS, up_down_v};
 use test_bench::simulation::simulate;
 use validation::ground_truth::live::Live;
-use validation::ground_truth::live::Live;
-use validation::ground_truth::{Cause, Effect, Noise, Schedule};
 use validation::ground_truth::{Cause, Effect, Noise, Schedule};
 use xtask::build::{self, Board, Opt};
 use xtask::shell;

@@ -1,9 +1,10 @@
-//! The extended spring's inverse, against the order of its blocks: from a change of the stiffness to the voltage that gives it.
+//! The extended spring's inverse, against the order of its blocks: from a change of the stiffness to the voltage that
+//! gives it.
 //!
 //! Important terms:
 //!
-//! - *step gain*, `H`: the change of the stiffness at the end of a tick for one volt more of the law's output, held for that
-//!   tick, in V/V.
+//! - *step gain*, `H`: the change of the stiffness at the end of a tick for one volt more of the law's output, held for
+//!   that tick, in V/V.
 //! - *inverse gain*: `1 / H`, bounded, in V/V.
 //!
 //! ```text
@@ -17,12 +18,14 @@
 //! H = share (1 - loss r(T / tau_l)) + (1 - loss m) sum_k weight_k r(T / tau_k),    r(x) = 1 - exp(-x)
 //! ```
 //!
-//! with `loss` and `m` of the [leakage](super::leakage). The effect of earlier voltages is not part of `H`: it is in the
-//! prediction. Where the first time constant depends on the voltage, `1 / H` is interpolated linearly at the present voltage. Its
-//! curve bends the other way, so too little is asked for there; a voltage that is itself moving to shorter time constants has more
-//! effect than was asked for. The remaining distance shrinks with every tick. [`law`] and [`memory`] are inverted exactly.
+//! with `loss` and `m` of the [leakage](super::leakage). The effect of earlier voltages is not part of `H`: it is in
+//! the prediction. Where the first time constant depends on the voltage, `1 / H` is interpolated linearly at the
+//! present voltage. Its curve bends the other way, so too little is asked for there; a voltage that is itself moving to
+//! shorter time constants has more effect than was asked for. The remaining distance shrinks with every tick. [`law`]
+//! and [`memory`] are inverted exactly.
 //!
-//! An invertible spring has no negative weight in the relaxation, a rising law, and a memory that rises once all plays move.
+//! An invertible spring has no negative weight in the relaxation, a rising law, and a memory that rises once all plays
+//! move.
 
 use super::leakage::Leakage;
 use super::plant::ExtendedPlant;
@@ -74,8 +77,8 @@ pub(super) fn check(plant: &ExtendedPlant<'_>) -> Result<(), OutOfRange> {
 }
 
 impl Inverse {
-    /// Quantizes the inverse of a spring that [`check`] accepts and whose memory has become `bank`; `resolution_v` is the voltage
-    /// of one DAC code.
+    /// Quantizes the inverse of a spring that [`check`] accepts and whose memory has become `bank`; `resolution_v` is
+    /// the voltage of one DAC code.
     pub(super) fn new(
         plant: &ExtendedPlant<'_>,
         bank: Option<&memory::Config>,

@@ -10,9 +10,9 @@
 //! y = share q + sum_k weight_k w_k,    dw_k/dt = (q - w_k) / tau_k,    w_k = 0 at rest
 //! ```
 //!
-//! A sum of first-order lags with widely spread time constants is the usual model of creep in piezo actuators, a generalised
-//! Kelvin-Voigt chain. For a `q` that is held between ticks each lag is exact, as in [`crate::estimator`]. A lag covers less
-//! than half of its distance in a tick, so it stays between inputs that occurred.
+//! A sum of first-order lags with widely spread time constants is the usual model of creep in piezo actuators, a
+//! generalised Kelvin-Voigt chain. For a `q` that is held between ticks each lag is exact, as in [`crate::estimator`].
+//! A lag covers less than half of its distance in a tick, so it stays between inputs that occurred.
 //!
 //! The first time constant may depend on the voltage: [`super::varying_rate`].
 
@@ -26,8 +26,8 @@ use crate::validated::{Validate, Validated};
 /// Largest number of lags in a relaxation.
 pub const MAX_LAGS: usize = 4;
 
-/// Feedthrough and lags of a relaxation, in SI units. The magnitudes of `share` and `weights` add up to at most 10; for a static
-/// gain of 1 their sum is 1.
+/// Feedthrough and lags of a relaxation, in SI units. The magnitudes of `share` and `weights` add up to at most 10; for
+/// a static gain of 1 their sum is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation<'a> {
     /// Feedthrough, 0 to 10.
@@ -36,7 +36,8 @@ pub struct Relaxation<'a> {
     pub time_constants_s: &'a [f64],
     /// Weight of each lag; empty for a single time constant whose weight is `1 - share`.
     pub weights: &'a [f64],
-    /// First time constant at 500 V, in s, a tenth to ten times the one at 0 V; `None` if it does not depend on the voltage.
+    /// First time constant at 500 V, in s, a tenth to ten times the one at 0 V; `None` if it does not depend on the
+    /// voltage.
     pub time_constant_high_s: Option<f64>,
 }
 

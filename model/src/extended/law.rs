@@ -27,7 +27,8 @@ const MIN_SLOPE: f64 = 0.01;
 pub struct Law<'a> {
     /// 2 to 9 voltages, from 0 V upwards, at least 1 mV apart, up to 1000 V.
     pub voltage_v: &'a [f64],
-    /// Value of the law at each voltage, in V, within +-2000 V; the first is 0. The slope between two points is within +-10.
+    /// Value of the law at each voltage, in V, within +-2000 V; the first is 0. The slope between two points is within
+    /// +-10.
     pub stiffness: &'a [f64],
 }
 

@@ -10,9 +10,9 @@
 //! q = f - share l,    dl/dt = (f - l) / tau,    l = 0 at rest
 //! ```
 //!
-//! `l` is exact. But `q` moves within a tick, and the [lags](super::lags) behind it take one number per tick: they get its mean
-//! over the sample time, `q - share m (f - l)` with `m = 1 - (1 - exp(-T / tau)) tau / T`. The error is less than
-//! `share |f - l| T^2 / (12 tau tau_lag)`; with `q` itself it would be `share |f - l| T / (2 tau)`.
+//! `l` is exact. But `q` moves within a tick, and the [lags](super::lags) behind it take one number per tick: they get
+//! its mean over the sample time, `q - share m (f - l)` with `m = 1 - (1 - exp(-T / tau)) tau / T`. The error is less
+//! than `share |f - l| T^2 / (12 tau tau_lag)`; with `q` itself it would be `share |f - l| T / (2 tau)`.
 
 use crate::coefficient::{Rate, Weight, saturated, sum, upper};
 use crate::error::OutOfRange;
@@ -36,7 +36,8 @@ impl Validate for Leakage {
 }
 
 impl Leakage {
-    /// Returns which fraction of a new input is lost at the end of a tick, and which fraction of its mean over the tick.
+    /// Returns which fraction of a new input is lost at the end of a tick, and which fraction of its mean over the
+    /// tick.
     pub(super) fn loss_in_one_tick(&self, sample_time: SampleTime) -> (f64, f64) {
         let ticks = self.time_constant_s / sample_time.seconds();
         let rate = sample_time.lag_fraction(self.time_constant_s);
@@ -76,8 +77,8 @@ impl Config {
         saturated(sum(input) - self.share.times(upper(*state)))
     }
 
-    /// Advances the follower by one sample time with `input` held. Returns the mean charge over it; `charge` is the one at its
-    /// start.
+    /// Advances the follower by one sample time with `input` held. Returns the mean charge over it; `charge` is the one
+    /// at its start.
     #[inline(always)]
     pub(crate) fn advance(&self, state: &mut State, input: Signal, charge: Signal) -> Signal {
         let lag = input.saturating_sub(upper(*state));

@@ -2,7 +2,8 @@
 //!
 //! Important terms:
 //!
-//! - *play operator*: an output `z` that follows the voltage at a distance `r` and stays where it is while the voltage turns.
+//! - *play operator*: an output `z` that follows the voltage at a distance `r` and stays where it is while the voltage
+//!   turns.
 //! - *threshold*, `r`: half the width of a play, in V.
 //! - *bank*: a weighted sum of plays and of the voltage itself, the Prandtl-Ishlinskii model of hysteresis.
 //!
@@ -10,9 +11,9 @@
 //! p = direct v + sum_j weight_j z_j,    z_j' = max(v - r_j, min(v + r_j, z_j)),    z_j = 0 at rest
 //! ```
 //!
-//! Sources: M. Brokate, J. Sprekels: Hysteresis and Phase Transitions, 1996, chapter 2; K. Kuhnen: Modeling, identification and
-//! compensation of complex hysteretic nonlinearities, European Journal of Control 9, 2003. With a [law](super::law) behind it,
-//! the bank is Kuhnen's modified model.
+//! Sources: M. Brokate, J. Sprekels: Hysteresis and Phase Transitions, 1996, chapter 2; K. Kuhnen: Modeling,
+//! identification and compensation of complex hysteretic nonlinearities, European Journal of Control 9, 2003. With a
+//! [law](super::law) behind it, the bank is Kuhnen's modified model.
 //!
 //! Exact but for the rounding of thresholds (2^-21 V) and weights (2^-28).
 
@@ -69,8 +70,8 @@ impl Memory<'_> {
         self.direct + self.weights.iter().sum::<f64>()
     }
 
-    /// Returns the slope of the bank when the voltage turns and all plays stay at first, but at least a quarter of the slope
-    /// with all plays in motion: a bank that does not respond at first will respond later.
+    /// Returns the slope of the bank when the voltage turns and all plays stay at first, but at least a quarter of the
+    /// slope with all plays in motion: a bank that does not respond at first will respond later.
     pub(super) fn slope_at_turn(&self) -> f64 {
         self.direct.max(0.25 * self.slope_in_motion())
     }
@@ -136,14 +137,15 @@ impl Config {
 
 /// Inverse of the bank.
 ///
-/// Upwards a play begins to move at `z + r`. Of two plays that saw the same voltages, the one with the smaller threshold begins
-/// first: `z' + r = max(v, min(v + 2 r, z + r))` keeps that order. So the bank is piecewise linear, each piece with one more
-/// play in motion, and downwards it is the same with all signs changed.
+/// Upwards a play begins to move at `z + r`. Of two plays that saw the same voltages, the one with the smaller
+/// threshold begins first: `z' + r = max(v, min(v + 2 r, z + r))` keeps that order. So the bank is piecewise linear,
+/// each piece with one more play in motion, and downwards it is the same with all signs changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inverse {
     /// Piece `i` has `i` plays in motion.
     pieces: [Piece; MAX_PLAYS + 1],
-    /// Smallest change of the output, in V, for which a level piece is crossed: one DAC code where the bank is steepest.
+    /// Smallest change of the output, in V, for which a level piece is crossed: one DAC code where the bank is
+    /// steepest.
     threshold: Signal,
 }
 
@@ -155,7 +157,8 @@ struct Piece {
 }
 
 impl Inverse {
-    /// Quantizes the inverse of a memory that [`Memory::check_inverse`] accepts; `resolution_v` is the voltage of one DAC code.
+    /// Quantizes the inverse of a memory that [`Memory::check_inverse`] accepts; `resolution_v` is the voltage of one
+    /// DAC code.
     pub(crate) fn new(bank: &Config, resolution_v: f64) -> Self {
         let (mut slope, mut steepest) = (bank.direct.to_f64(), 0.0f64);
         let mut inverse = Self::default();
@@ -230,7 +233,7 @@ mod tests {
     proptest! {
         /// Only the turns of the voltage are remembered, and only until a larger loop passes them.
         #[test]
-        fn closed_minor_loops_and_the_number_of_steps_leave_no_trace(peak in 200.0..900.0f64, low in 0.0..150.0f64, inner in 150.0..200.0f64) {
+        fn a_closed_loop_leaves_no_trace(peak in 200.0..900.0f64, low in 0.0..150.0f64, inner in 150.0..200.0f64) {
             let straight = walk(&BANK, &[peak, low, peak]);
             let detour = walk(&BANK, &[peak / 3.0, peak, low, inner, low, 0.5 * (low + inner), peak]);
             prop_assert!((straight - detour).abs() < 1e-5, "{straight} {detour}");

@@ -1,4 +1,5 @@
-//! The extended spring: hysteresis, a static law, leakage and several relaxations, run one after the other in each tick.
+//! The extended spring: hysteresis, a static law, leakage and several relaxations, run one after the other in each
+//! tick.
 //!
 //! Important terms:
 //!
@@ -15,9 +16,9 @@
 //!
 //! All blocks but the relaxation may be absent, which costs one well-predicted branch. All states are zero at rest.
 //!
-//! Signals saturate at the ends of their format, +-2048 V. The tick is exact for a held voltage up to rounding, with two
-//! exceptions whose bounds are stated where they are made: the lags see the mean of a leaking input ([`leakage`]), and the
-//! rate of a time constant that depends on the voltage is approximated ([`varying_rate`]).
+//! Signals saturate at the ends of their format, +-2048 V. The tick is exact for a held voltage up to rounding, with
+//! two exceptions whose bounds are stated where they are made: the lags see the mean of a leaking input ([`leakage`]),
+//! and the rate of a time constant that depends on the voltage is approximated ([`varying_rate`]).
 
 pub mod inverse;
 pub mod lags;

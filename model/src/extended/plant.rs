@@ -16,7 +16,7 @@ use crate::validated::Validate;
 /// use model::{Input, OutOfRange, Settings, State, Volts};
 ///
 /// fn main() -> Result<(), OutOfRange> {
-///     // Hysteresis of 2 * 0.1 * 40 V along the stiffness axis, and creep with 60 s beside the relaxation with 5.5 s.
+///     // Hysteresis of 2 * 0.1 * 40 V along the stiffness axis, and creep with 60 s after the relaxation with 5.5 s.
 ///     let memory = Memory { direct: 0.9, thresholds_v: &[40.0], weights: &[0.1] };
 ///     let relaxation = Relaxation {
 ///         share: 0.1,

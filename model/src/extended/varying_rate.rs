@@ -10,10 +10,10 @@
 //! r = 1 - exp(-x),   1 / r = 1 / x + 1 / 2 + x / 12 - ...,   x = T / tau
 //! ```
 //!
-//! So the tick interpolates `1 / r` linearly between 0 V and the voltage where `tau` ends, exact at both, and inverts it: one
-//! 32-bit division and one Newton step, exact to 2^-20. The neglected part is less than `x^2 / 12` of `r` for the shortest `tau`:
-//! 1e-5 from a hundred sample times on, 5e-3 at four. A rate that is wrong by a fraction `e` makes the step response wrong by
-//! less than `e / 2.7` of the step.
+//! So the tick interpolates `1 / r` linearly between 0 V and the voltage where `tau` ends, exact at both, and inverts
+//! it: one 32-bit division and one Newton step, exact to 2^-20. The neglected part is less than `x^2 / 12` of `r` for
+//! the shortest `tau`: 1e-5 from a hundred sample times on, 5e-3 at four. A rate that is wrong by a fraction `e` makes
+//! the step response wrong by less than `e / 2.7` of the step.
 
 use crate::units::{Accumulator, SampleTime, Signal, signal, steps};
 
@@ -30,8 +30,8 @@ pub struct TimeConstant {
 }
 
 impl TimeConstant {
-    /// Returns the time constant, in s, at `volts`: constant below 0 V, linear above it, and at least half of the shorter of the
-    /// two given ones.
+    /// Returns the time constant, in s, at `volts`: constant below 0 V, linear above it, and at least half of the
+    /// shorter of the two given ones.
     pub fn at(&self, volts: f64) -> f64 {
         self.linear(volts.max(0.0)).max(self.floor_s())
     }
@@ -65,8 +65,8 @@ pub(crate) struct VaryingRate {
 }
 
 impl VaryingRate {
-    /// Quantizes the inverse rate of a time constant that is at least two sample times at all voltages, and nowhere shorter than
-    /// a twentieth of its longest value.
+    /// Quantizes the inverse rate of a time constant that is at least two sample times at all voltages, and nowhere
+    /// shorter than a twentieth of its longest value.
     pub(crate) fn new(tau: &TimeConstant, sample_time: SampleTime) -> Self {
         let inverse = |volts| 1.0 / sample_time.lag_fraction(tau.at(volts));
         let (end_v, at_zero) = (tau.end_v(), inverse(0.0));
@@ -89,7 +89,8 @@ impl VaryingRate {
     pub(crate) fn step(&self, voltage: Signal, lag: Signal) -> Accumulator {
         let voltage = voltage.max(Signal::ZERO).min(self.end);
         let more = (i64::from(voltage.to_bits()) * i64::from(self.per_volt)) >> (Signal::FRAC_NBITS + SLOPE_BITS);
-        // 25.3 to 31 bits, so that the first guess of its reciprocal is exact to 2^-10 and the rate has at most 31 bits.
+        // 25.3 to 31 bits, so that the first guess of its reciprocal is exact to 2^-10 and the rate has at most 31
+        // bits.
         let inverse = self.at_zero + more as i32;
         let guess = (1u32 << 31).checked_div(inverse as u32 >> 15).unwrap_or(0);
         let missing = (1 << 46) - i64::from(inverse) * i64::from(guess);

@@ -22,9 +22,10 @@
 //! ```
 //!
 //! The pre-compensator pursues `target - d`, and the estimate is `y + d`. At rest `m = y + d` and `y = target - d`: the
-//! *measured* stiffness is the target, whatever the error of the model. This is internal model control with the filter in the
-//! feedback (Garcia and Morari 1982; Morari and Zafiriou, *Robust Process Control*, 1989), and a disturbance observer whose
-//! disturbance is referred to the output (Ohnishi 1987). It does not depend on the spring or on the pre-compensator.
+//! *measured* stiffness is the target, whatever the error of the model. This is internal model control with the filter
+//! in the feedback (Garcia and Morari 1982; Morari and Zafiriou, *Robust Process Control*, 1989), and a disturbance
+//! observer whose disturbance is referred to the output (Ohnishi 1987). It does not depend on the spring or on the
+//! pre-compensator.
 //!
 //! **Gain.** Let the model's error be a random walk of `q` V per root second, and a reading's noise `r` V. The steady
 //! Kalman filter for that, with readings every `h` seconds, has `rho = q^2 h / r^2` and
@@ -39,21 +40,22 @@
 //!   `tau s + exp(-s theta) = 0`, stable for `tau > 2 theta / pi` and free of oscillation for `tau >= e theta`;
 //! - an unknown mode `omega`, `zeta` has `|D|` up to `1 / (2 zeta)`: stable for `tau > 1 / (2 zeta omega)`.
 //!
-//! [`Feedback::fastest_s`] therefore bounds `tau` from below, whatever noise and uncertainty are; and where that was not
-//! enough, the [`oscillation`] is detected and `L` reduced.
+//! [`Feedback::fastest_s`] therefore bounds `tau` from below, whatever noise and uncertainty are; and where that was
+//! not enough, the [`oscillation`] is detected and `L` reduced.
 //!
-//! **Late readings.** A reading is compared with the model's stiffness when the sensor sampled it, for which the state keeps
-//! the model's last [`HISTORY`] ticks. A *known* delay therefore is no model error.
+//! **Late readings.** A reading is compared with the model's stiffness when the sensor sampled it, for which the state
+//! keeps the model's last [`HISTORY`] ticks. A *known* delay therefore is no model error.
 //!
-//! **Robustness.** The innovation is clipped (Huber's bounded influence), more tightly where the spring may only be late.
+//! **Robustness.** The innovation is clipped (Huber's bounded influence), more tightly where the spring may only be
+//! late.
 //!
 //! **Faults.** The module [`fault_detection`] decides in each tick whether the sensor is trusted. While it is not, `d`
-//! decays to 0 V with the time constant [`Feedback::fade_s`], and the loop becomes the one without a sensor. When the sensor is
-//! trusted again, `d` continues from its present value. As `d` is the only thing that the sensor changes, and has no jumps,
-//! the voltage has none either.
+//! decays to 0 V with the time constant [`Feedback::fade_s`], and the loop becomes the one without a sensor. When the
+//! sensor is trusted again, `d` continues from its present value. As `d` is the only thing that the sensor changes, and
+//! has no jumps, the voltage has none either.
 //!
-//! Without the feature `feedback` the types of this module have no values, so that the branches which match on them cost
-//! nothing.
+//! Without the feature `feedback` the types of this module have no values, so that the branches which match on them
+//! cost nothing.
 #![cfg_attr(not(feature = "feedback"), allow(rustdoc::broken_intra_doc_links, reason = "the items are not built"))]
 
 #[cfg(not(feature = "feedback"))]

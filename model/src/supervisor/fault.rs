@@ -1,6 +1,7 @@
 //! The faults and their stable numbers.
 
-/// Reason for which the output was disabled. The numbers are used in logs, in frames and after a reset, and never change.
+/// Reason for which the output was disabled. The numbers are used in logs, in frames and after a reset, and never
+/// change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Fault {

@@ -2,16 +2,18 @@
 //!
 //! Important terms:
 //!
-//! - *enabled*: the amplifier is on and the controller's code is written to the DAC. Otherwise the amplifier is off at 0 V.
+//! - *enabled*: the amplifier is on and the controller's code is written to the DAC. Otherwise the amplifier is off at
+//!   0 V.
 //! - *arm*, *disarm*: the commands that enable and disable the output ([`Command`]).
 //! - *interlock*: the external safety circuit; the output is enabled only while it is closed.
 //! - *fault*: a reason for which the output was disabled, kept until a disarm acknowledges it ([`Fault`]).
 //! - *monitors*: the amplifier's own readings of its voltage and current ([`Monitors`]).
 //! - *silent host*: no valid frame came within the host timeout; the target then ramps down to 0 V.
 //!
-//! Each tick has two steps. [`Supervisor::decide`], before the controller, takes the command and everything that speaks against
-//! a voltage, and returns what the controller has to do. [`Supervisor::release`], after it, turns the controller's output into
-//! a [`Drive`], and nothing else can make a `Drive` that is not zero. A board's amplifier port accepts only that type.
+//! Each tick has two steps. [`Supervisor::decide`], before the controller, takes the command and everything that speaks
+//! against a voltage, and returns what the controller has to do. [`Supervisor::release`], after it, turns the
+//! controller's output into a [`Drive`], and nothing else can make a `Drive` that is not zero. A board's amplifier port
+//! accepts only that type.
 //!
 //! ```text
 //!             arm (interlock closed, host heard)
@@ -22,9 +24,9 @@
 //!      +--- disarm (the acknowledgement) --- Faulted <+
 //! ```
 //!
-//! The amplifier is off at 0 V in every state but `Armed`. The first fault stays until a disarm acknowledges it; arming again
-//! needs a command of its own. In one tick a fault wins over every command, and disarm over arm. An amplifier that holds a
-//! voltage although it is off is a fault in every state; while it does, nothing is armed or acknowledged.
+//! The amplifier is off at 0 V in every state but `Armed`. The first fault stays until a disarm acknowledges it; arming
+//! again needs a command of its own. In one tick a fault wins over every command, and disarm over arm. An amplifier
+//! that holds a voltage although it is off is a fault in every state; while it does, nothing is armed or acknowledged.
 //!
 //! No heap, no float, no panic in a tick; times are counted in ticks.
 
@@ -116,10 +118,11 @@ impl Drive {
 ///     let mut controller = model::State::default();
 ///
 ///     // The host was heard in this tick, the interlock is closed, and the host orders 300 V.
-///     let ready = Inputs { ticks_since_host: 0, interlock_closed: true, target: Volts::new(300.0)?, ..Inputs::default() };
-///     assert_eq!(supervisor.decide(&Inputs { command: Some(Command::Arm), ..ready }), Decision::Start(ready.target));
+///     let target = Volts::new(300.0)?;
+///     let ready = Inputs { ticks_since_host: 0, interlock_closed: true, target, ..Inputs::default() };
+///     assert_eq!(supervisor.decide(&Inputs { command: Some(Command::Arm), ..ready }), Decision::Start(target));
 ///     config.bumpless_transfer(&mut controller, Volts::ZERO);
-///     let output = config.tick(&mut controller, model::Input { target: ready.target, measured: None });
+///     let output = config.tick(&mut controller, model::Input { target, measured: None });
 ///     assert!(supervisor.release(&output).enabled());
 ///
 ///     // The interlock opens: the output is disabled in the same tick.
@@ -145,7 +148,8 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// Returns a disarmed supervisor, or a faulted one if `last_fault` caused the last reset, so that it has to be acknowledged.
+    /// Returns a disarmed supervisor, or a faulted one if `last_fault` caused the last reset, so that it has to be
+    /// acknowledged.
     pub const fn new(config: Config, last_fault: Option<Fault>) -> Self {
         let state = match last_fault {
             None => State::Disarmed,
@@ -174,7 +178,8 @@ impl Supervisor {
     pub fn decide(&mut self, inputs: &Inputs) -> Decision {
         self.refusal = None;
         let was_armed = self.state == State::Armed;
-        // Missed ticks are counted and forgotten in every state, so that those of a disarmed time are gone after a while.
+        // Missed ticks are counted and forgotten in every state, so that those of a disarmed time are gone after a
+        // while.
         let overrun = self.overrun(inputs.missed_ticks);
         let disagreement = self.monitors.update(&self.config, inputs.monitors);
         if let Some(fault) = inputs.fault {

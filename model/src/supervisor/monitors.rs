@@ -6,8 +6,8 @@
 //! - *expected voltage*: what was put out; 0 V while the output is disabled.
 //! - *disagreement*: the voltage differs from the expected one by more than the tolerance, or the current is too large.
 //!
-//! While the output is enabled a disagreement may last as long as the amplifier takes to settle; while it is disabled, as long as
-//! the spring takes to discharge.
+//! While the output is enabled a disagreement may last as long as the amplifier takes to settle; while it is disabled,
+//! as long as the spring takes to discharge.
 
 use super::settings::Config;
 use crate::units::Volts;
@@ -33,8 +33,8 @@ impl MonitorCheck {
     /// The output is disabled, and no disagreement was seen.
     pub(super) const NEW: Self = Self { driven: None, ticks: 0 };
 
-    /// Sets the voltage with which the next readings are compared; `None` if the output is disabled. The counter restarts when
-    /// the output is enabled or disabled.
+    /// Sets the voltage with which the next readings are compared; `None` if the output is disabled. The counter
+    /// restarts when the output is enabled or disabled.
     pub(super) fn expect(&mut self, driven: Option<Volts>) {
         if driven.is_some() != self.driven.is_some() {
             self.ticks = 0;

@@ -19,17 +19,18 @@ pub struct Settings {
     pub monitor_tolerance_v: f64,
     /// Largest magnitude of the current monitor, 1e-6 to 1 A.
     pub max_current_a: f64,
-    /// Time for which a monitor may disagree while the output is enabled, one sample time to 10 s; longer than the amplifier
-    /// takes to settle.
+    /// Time for which a monitor may disagree while the output is enabled, one sample time to 10 s; longer than the
+    /// amplifier takes to settle.
     pub monitor_time_s: f64,
-    /// Time for which a monitor may disagree while the output is disabled, one sample time to 60 s; longer than the spring takes
-    /// to discharge.
+    /// Time for which a monitor may disagree while the output is disabled, one sample time to 60 s; longer than the
+    /// spring takes to discharge.
     pub discharge_time_s: f64,
 }
 
 impl Settings {
-    /// Host timeout 0.5 s, then a ramp of 700 V/s; five missed ticks, one forgotten per second; a monitor may disagree by more
-    /// than 35 V (5 % of the source report's range) or 2 mA for 50 ms, and for 1 s while the output is disabled.
+    /// Host timeout 0.5 s, then a ramp of 700 V/s; five missed ticks, one forgotten per second; a monitor may disagree
+    /// by more than 35 V (5 % of the source report's range) or 2 mA for 50 ms, and for 1 s while the output is
+    /// disabled.
     pub const DEFAULT: Self = Self {
         host_timeout_s: 0.5,
         ramp_v_per_s: 700.0,
@@ -95,7 +96,8 @@ fn ticks(time_s: f64, sample_time: SampleTime) -> u32 {
 pub struct Config {
     pub(super) host_timeout: u32,
     pub(super) ramp_step: Accumulator,
-    /// What a missed tick adds to the counter: the number of ticks in which it is forgotten, as each tick takes off one.
+    /// What a missed tick adds to the counter: the number of ticks in which it is forgotten, as each tick takes off
+    /// one.
     pub(super) miss_cost: u32,
     pub(super) miss_limit: u32,
     pub(super) tolerance: Signal,

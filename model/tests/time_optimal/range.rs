@@ -1,4 +1,5 @@
-//! Random springs, pre-compensators and amplifiers up to the ends of their allowed ranges: no overflow, output in range.
+//! Random springs, pre-compensators and amplifiers up to the ends of their allowed ranges: no overflow, output in
+//! range.
 
 use model::estimator::{Estimator, Model};
 use model::extended::{self, ExtendedPlant, Law, Leakage, Memory, Relaxation};

@@ -1,5 +1,5 @@
-//! The range that a signal has covered recently: an upper and a lower envelope, which return to the signal with a time constant
-//! of 0.5 s.
+//! The range that a signal has covered recently: an upper and a lower envelope, which return to the signal with a time
+//! constant of 0.5 s.
 
 use crate::coefficient::{Rate, upper, widened};
 use crate::units::{Accumulator, Signal, lag_fraction};
@@ -46,7 +46,8 @@ impl Envelope {
         upper(self.upper).saturating_sub(upper(self.lower))
     }
 
-    /// Returns `least` plus twice the range, in V: the bound beyond which a deviation is not explained by the signal's movement.
+    /// Returns `least` plus twice the range, in V: the bound beyond which a deviation is not explained by the signal's
+    /// movement.
     #[inline]
     pub(super) fn gate(&self, least: Signal) -> Signal {
         let range = self.range();

@@ -5,10 +5,11 @@
 //! - *reading*, `m`, and *model*, `y`: measured and modelled stiffness at the same moment, in V.
 //! - *mismatch*: `m - y`, in V.
 //! - *deviation*: the mismatch minus the low-passed mismatch of the accepted readings, in V.
-//! - *moved*: the range that the model has covered recently, between its upper and its lower envelope, which return to the model
-//!   within about 0.5 s.
+//! - *moved*: the range that the model has covered recently, between its upper and its lower envelope, which return to
+//!   the model within about 0.5 s.
 //! - *gate*: `6 noise_v + 2 moved`, the largest deviation of an accepted reading, in V.
-//! - *accepted*: a new reading in which no fault was found, of a trusted sensor. Only accepted readings correct the model.
+//! - *accepted*: a new reading in which no fault was found, of a trusted sensor. Only accepted readings correct the
+//!   model.
 //!
 //! Each reading is compared with the model, in constant time:
 //!
@@ -20,21 +21,22 @@
 //! | [`Jumping`](Fault::Jumping) | [`REJECTED`] readings in a row whose deviation exceeds the gate, or which changed abruptly both from the accepted readings and from the reading before | [`REJECTED`] intervals |
 //! | [`OutOfRange`](Fault::OutOfRange) | [`REJECTED`] readings in a row outside the sensor's range | [`REJECTED`] intervals |
 //!
-//! The gate is wide enough for a model that is wrong by up to twice its own movement (a share of 0.25 where it assumes 0.09, with
-//! full overshoot): that is no jump.
+//! The gate is wide enough for a model that is wrong by up to twice its own movement (a share of 0.25 where it assumes
+//! 0.09, with full overshoot): that is no jump.
 //!
-//! Readings with noise of `noise_v` repeat by rounding only. If a sensor rounds to twice its noise, one row of 100 in 10^10 is
-//! identical (0.78^99, starting from the middle of a step); a sensor that rounds more coarsely is rejected as stuck. *Abruptly*
-//! means by more than `9 noise_v` plus what a mode of [`FASTEST_MODE_HZ`] makes of the movement in one interval: a spring that is
-//! late may jump once, but not back and forth.
+//! Readings with noise of `noise_v` repeat by rounding only. If a sensor rounds to twice its noise, one row of 100 in
+//! 10^10 is identical (0.78^99, starting from the middle of a step); a sensor that rounds more coarsely is rejected as
+//! stuck. *Abruptly* means by more than `9 noise_v` plus what a mode of [`FASTEST_MODE_HZ`] makes of the movement in
+//! one interval: a spring that is late may jump once, but not back and forth.
 //!
-//! A single rejected reading is an outlier: it does not correct the model, and it is forgotten after [`GOOD_PER_REJECTED`] good
-//! ones; so more than one outlier in five readings becomes a fault. A sensor is trusted, at the start or again, after [`TRUSTED`]
-//! good readings in a row. After a jump the readings have to return to where they were before it; that level is forgotten with
-//! the time constant [`FORGET_JUMP_S`], because the spring itself may have changed.
+//! A single rejected reading is an outlier: it does not correct the model, and it is forgotten after
+//! [`GOOD_PER_REJECTED`] good ones; so more than one outlier in five readings becomes a fault. A sensor is trusted, at
+//! the start or again, after [`TRUSTED`] good readings in a row. After a jump the readings have to return to where they
+//! were before it; that level is forgotten with the time constant [`FORGET_JUMP_S`], because the spring itself may have
+//! changed.
 //!
-//! Not detectable: a sensor that shifts its readings slowly, or by less than the gate, which is wide while the model moves. A
-//! wrong model, or a spring that is late, gives the same readings.
+//! Not detectable: a sensor that shifts its readings slowly, or by less than the gate, which is wide while the model
+//! moves. A wrong model, or a spring that is late, gives the same readings.
 
 use super::envelope::{self, Envelope};
 use super::settings::{Feedback, Reading};

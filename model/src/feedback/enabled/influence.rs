@@ -5,14 +5,14 @@
 //! - *behind*: the spring has not yet covered the model's recent movement.
 //! - *ahead*: the spring has moved further than the model, in the same direction.
 //!
-//! At rest an innovation is clipped at +-`6 noise_v`. While the model moves, both a wrong model and one that only lacks a lag (a
-//! slew, a delay, a mode) are wrong by much more, but not on the same side:
+//! At rest an innovation is clipped at +-`6 noise_v`. While the model moves, both a wrong model and one that only lacks
+//! a lag (a slew, a delay, a mode) are wrong by much more, but not on the same side:
 //!
-//! - A spring **behind** its model may only be late. A correction for that would drive it too far when it arrives, so the
-//!   bound is the same as at rest: the correction changes by at most `6 noise_v L` per reading.
+//! - A spring **behind** its model may only be late. A correction for that would drive it too far when it arrives, so
+//!   the bound is the same as at rest: the correction changes by at most `6 noise_v L` per reading.
 //! - A spring **ahead** of its model overshoots now and must be corrected now: the bound is wider by the model's recent
-//!   movement. It is not if the spring was behind by more than `6 noise_v` recently: that is an oscillation, which a fast
-//!   correction would excite.
+//!   movement. It is not if the spring was behind by more than `6 noise_v` recently: that is an oscillation, which a
+//!   fast correction would excite.
 //!
 //! ```text
 //! -(6 noise_v + upper - y) <= nu <= 6 noise_v + y - lower      (lower, upper: the model's envelope, y: the model)

@@ -1,7 +1,8 @@
 //! The correction with its settings and state, built with the feature `feedback`.
 //!
-//! Readings come in through [`fault_detection`], which rejects what cannot be true; [`influence`] clips what remains, and
-//! [`oscillation`] reduces the gain if the loop oscillates. What goes out is the corrected target and the corrected estimate.
+//! Readings come in through [`fault_detection`], which rejects what cannot be true; [`influence`] clips what remains,
+//! and [`oscillation`] reduces the gain if the loop oscillates. What goes out is the corrected target and the corrected
+//! estimate.
 
 mod envelope;
 pub mod fault_detection;
@@ -54,8 +55,9 @@ impl Validated<'_, Feedback> {
 }
 
 impl Config {
-    /// First half of a tick, before its voltage: updates the correction with the latest reading, or lets it decay while the
-    /// sensor is not trusted. Returns the stiffness to which the model has to be brought for the spring to reach `target`.
+    /// First half of a tick, before its voltage: updates the correction with the latest reading, or lets it decay while
+    /// the sensor is not trusted. Returns the stiffness to which the model has to be brought for the spring to reach
+    /// `target`.
     #[inline]
     pub(crate) fn update(&self, state: &mut State, target: Volts, reading: Option<Reading>) -> Volts {
         self.oscillation.track_target(&mut state.oscillation, target.0);
@@ -80,8 +82,8 @@ impl Config {
         state.corrected(target)
     }
 
-    /// Second half of a tick, after its voltage was applied: records the model's stiffness. Returns the corrected estimate, and
-    /// whether the sensor is trusted.
+    /// Second half of a tick, after its voltage was applied: records the model's stiffness. Returns the corrected
+    /// estimate, and whether the sensor is trusted.
     #[inline]
     pub(crate) fn estimate(&self, state: &mut State, model: ScaledStiffness) -> (ScaledStiffness, Option<Sensor>) {
         self.detection.track_model(&mut state.detection, model.0);

@@ -6,11 +6,12 @@
 //! - *gate*: `6 noise_v` plus twice the range that the *target* has covered recently, in V.
 //! - *crossing*: the mismatch goes from more than a gate below its mean to more than a gate above it, or back.
 //!
-//! With a spring that has a mode which the model lacks, too large a gain makes an oscillation grow ([`crate::feedback`],
-//! stability). None of its readings is wrong. It is detected by a mismatch that crosses its own mean again and again while the
-//! target rests, and does not decay: after [`SWINGS`] crossings, none later than [`PAUSE_S`] after the previous one, the gain
-//! is divided by four, up to [`MAX_REDUCTIONS`] times. It stays reduced until the next bumpless transfer, because the mode
-//! stays. Hum on the readings has the same effect, and the same remedy.
+//! With a spring that has a mode which the model lacks, too large a gain makes an oscillation grow
+//! ([`crate::feedback`], stability). None of its readings is wrong. It is detected by a mismatch that crosses its own
+//! mean again and again while the target rests, and does not decay: after [`SWINGS`] crossings, none later than
+//! [`PAUSE_S`] after the previous one, the gain is divided by four, up to [`MAX_REDUCTIONS`] times. It stays reduced
+//! until the next bumpless transfer, because the mode stays. Hum on the readings has the same effect, and the same
+//! remedy.
 
 use super::envelope::{self, Envelope};
 use crate::coefficient::{Rate, upper};
@@ -97,8 +98,8 @@ impl State {
 mod tests {
     use super::*;
 
-    /// Returns how often the gain is divided by four for a mismatch that changes its side every `half_s`, each time with
-    /// `ratio` of its previous amplitude.
+    /// Returns how often the gain is divided by four for a mismatch that changes its side every `half_s`, each time
+    /// with `ratio` of its previous amplitude.
     fn reductions(half_s: f64, ratio: f64, sides: u32) -> u8 {
         let config = Config::new(1e-3, SampleTime::from_rate(1000.0).unwrap());
         let mut state = State::default();

@@ -33,13 +33,13 @@ pub const HISTORY: usize = 32;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feedback {
-    /// Standard deviation of one reading including its rounding, 0.001 to 100 V; at least half of the step to which the sensor
-    /// rounds.
+    /// Standard deviation of one reading including its rounding, 0.001 to 100 V; at least half of the step to which the
+    /// sensor rounds.
     pub noise_v: f64,
     /// Standard deviation with which the model's error wanders, 0.001 to 1000 V per root second.
     pub model_uncertainty: f64,
-    /// Shortest time constant of the correction, 0 to 100 s; at least `e` times an unknown delay, and `1 / (2 zeta omega)` of an
-    /// unknown mode.
+    /// Shortest time constant of the correction, 0 to 100 s; at least `e` times an unknown delay, and
+    /// `1 / (2 zeta omega)` of an unknown mode.
     pub fastest_s: f64,
     /// Time between two readings, one sample time to 0.1 s.
     pub interval_s: f64,
@@ -66,8 +66,8 @@ impl Feedback {
         fade_s: 2.0,
     };
 
-    /// Returns the fraction of an innovation that one reading adds to the correction, below 1/2: the Kalman gain, reduced as far
-    /// as [`fastest_s`](Self::fastest_s) demands.
+    /// Returns the fraction of an innovation that one reading adds to the correction, below 1/2: the Kalman gain,
+    /// reduced as far as [`fastest_s`](Self::fastest_s) demands.
     pub fn gain(&self) -> f64 {
         let ratio = self.model_uncertainty / self.noise_v;
         let rho = ratio * ratio * self.interval_s;
@@ -98,14 +98,14 @@ impl Validate for Feedback {
 pub struct Reading {
     /// Measured stiffness, expressed as the equivalent static voltage.
     pub stiffness: ScaledStiffness,
-    /// Whole ticks since the sensor sampled; 0 if it sampled after the last tick's voltage was applied. The same sample may be
-    /// passed again as it ages.
+    /// Whole ticks since the sensor sampled; 0 if it sampled after the last tick's voltage was applied. The same sample
+    /// may be passed again as it ages.
     pub age: u16,
 }
 
 impl Reading {
-    /// Returns a reading of age 0: sampled after the last tick's voltage was applied. `None` where the crate is built without
-    /// the feature `feedback`.
+    /// Returns a reading of age 0: sampled after the last tick's voltage was applied. `None` where the crate is built
+    /// without the feature `feedback`.
     pub fn fresh(stiffness: ScaledStiffness) -> Option<Self> {
         Some(Self { stiffness, age: 0 })
     }

@@ -24,8 +24,9 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
 }
 
 proptest! {
-    /// The output is enabled only in `Armed`, never with the interlock open or a fault reported; `Armed` is entered only from
-    /// `Disarmed` by an arm command; and while the amplifier holds a voltage nothing is armed or acknowledged.
+    /// The output is enabled only in `Armed`, never with the interlock open or a fault reported; `Armed` is entered
+    /// only from `Disarmed` by an arm command; and while the amplifier holds a voltage nothing is armed or
+    /// acknowledged.
     #[test]
     fn no_order_of_events_enables_the_output_outside_armed(events in prop::collection::vec(any_inputs(), 1..400)) {
         let mut supervisor = Supervisor::new(config(), None);

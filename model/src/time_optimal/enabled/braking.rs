@@ -4,22 +4,22 @@
 //!
 //! - *drift*, `A`: the change of the stiffness in one tick while the voltage stays, in V.
 //! - *slew step*, `S`: the largest change of the voltage in one tick, in V.
-//! - *smallest step gain*: `h`, the change of the stiffness by the end of a tick for one volt more; `b`, the change that each
-//!   later tick adds; `rho`, the fraction of its distance that the relaxation covers in a tick. All are the smallest that the
-//!   spring has at any voltage.
+//! - *smallest step gain*: `h`, the change of the stiffness by the end of a tick for one volt more; `b`, the change
+//!   that each later tick adds; `rho`, the fraction of its distance that the relaxation covers in a tick. All are the
+//!   smallest that the spring has at any voltage.
 //!
-//! Bringing the voltage back by `S` per tick takes `h S` off the drift instantaneously and `b S` more with every later tick,
-//! while the relaxation itself takes off a fraction `rho` of what is left. So the stiffness still covers, while braking from a
-//! drift that exceeds `h S` by `p = A - h S`, the distance
+//! Bringing the voltage back by `S` per tick takes `h S` off the drift instantaneously and `b S` more with every later
+//! tick, while the relaxation itself takes off a fraction `rho` of what is left. So the stiffness still covers, while
+//! braking from a drift that exceeds `h S` by `p = A - h S`, the distance
 //!
 //! ```text
 //! sum p = p^2 / (2 c),    c = b S + rho (h S + p / 2)
 //! ```
 //!
-//! and at a distance `R` from the target the excess `p` may be `sqrt(2 c R)` at most. That is the braking parabola of the
-//! proximate time-optimal servomechanism (M. L. Workman, 1987) with the spring's drift in place of a velocity. Once `p <= 0`
-//! the inverse alone is slow enough. `rho` acts on all of `A`; `h S + p / 2` is its mean over the distance, and less than its
-//! effect: the law brakes early rather than late.
+//! and at a distance `R` from the target the excess `p` may be `sqrt(2 c R)` at most. That is the braking parabola of
+//! the proximate time-optimal servomechanism (M. L. Workman, 1987) with the spring's drift in place of a velocity. Once
+//! `p <= 0` the inverse alone is slow enough. `rho` acts on all of `A`; `h S + p / 2` is its mean over the distance,
+//! and less than its effect: the law brakes early rather than late.
 
 use crate::coefficient::WideGain;
 use crate::estimator::{Prediction, StepGain};
@@ -39,7 +39,8 @@ pub(super) struct Braking {
 }
 
 impl Braking {
-    /// Quantizes the brake for a spring of this smallest step gain and a voltage that changes by at most `step_v` per tick.
+    /// Quantizes the brake for a spring of this smallest step gain and a voltage that changes by at most `step_v` per
+    /// tick.
     pub(super) fn new(smallest: &StepGain, step_v: f64) -> Self {
         let StepGain { feedthrough, in_one_tick, relaxation } = *smallest;
         let within = feedthrough + in_one_tick;

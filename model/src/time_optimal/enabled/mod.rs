@@ -32,8 +32,8 @@ const OFFSET_DECAY_S: f64 = 0.1;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approach {
-    /// Time constant of the last part of the way, 0 to 1 s; 0 is dead-beat. A longer one is slower, smoother where the target
-    /// jumps, and needs less voltage.
+    /// Time constant of the last part of the way, 0 to 1 s; 0 is dead-beat. A longer one is slower, smoother where the
+    /// target jumps, and needs less voltage.
     pub time_constant_s: f64,
 }
 
@@ -54,8 +54,8 @@ pub struct TimeOptimal<I> {
     inverse: I,
     /// Fraction of the distance to the target that is covered in a tick.
     approach: Weight,
-    /// Fraction of the last voltage's rounding error that is asked for again: a long approach asks for less than a code in a
-    /// tick, and would otherwise stay where it is.
+    /// Fraction of the last voltage's rounding error that is asked for again: a long approach asks for less than a code
+    /// in a tick, and would otherwise stay where it is.
     rounding: Weight,
     offset_decay: Rate,
     braking: Option<Braking>,
@@ -68,8 +68,8 @@ pub struct State {
 }
 
 impl Validated<'_, Approach> {
-    /// Quantizes the law for a spring with this inverse and largest step gain. `slew` is the spring's smallest step gain and
-    /// the amplifier's largest change in a tick, in V, if the slew is limited.
+    /// Quantizes the law for a spring with this inverse and largest step gain. `slew` is the spring's smallest step
+    /// gain and the amplifier's largest change in a tick, in V, if the slew is limited.
     pub(crate) fn quantize<I>(self, inverse: I, spring: &StepGain, slew: Option<(StepGain, f64)>) -> TimeOptimal<I> {
         let (time_constant, sample_time) = (self.settings().time_constant_s, self.sample_time());
         let approach = if time_constant > 0.0 { sample_time.lag_fraction(time_constant) } else { 1.0 };
@@ -82,8 +82,8 @@ impl Validated<'_, Approach> {
 }
 
 impl<I: Copy> TimeOptimal<I> {
-    /// Returns the voltage that this law asks for, before the amplifier's limits. `driven` is the last voltage after them, and
-    /// `applied` the same rounded to a code.
+    /// Returns the voltage that this law asks for, before the amplifier's limits. `driven` is the last voltage after
+    /// them, and `applied` the same rounded to a code.
     #[inline(always)]
     pub(crate) fn voltage<E: Estimator<Inverse = I>>(
         &self,
