@@ -240,7 +240,7 @@ fn help_shows_examples() {
     assert!(run(folder.path(), &["--version"]).status.success());
 }
 
-/// The pictures and figures of docs/stair and docs/stair.md are those that the command makes today.
+/// The pictures and figures that the README shows are those of today.
 #[test]
 fn the_documentation_shows_what_the_command_prints() {
     let folder = tempdir().unwrap();
