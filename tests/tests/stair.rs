@@ -239,7 +239,7 @@ fn the_help_has_examples() {
     assert!(run(folder.path(), &["--version"]).status.success());
 }
 
-/// The pictures and figures of docs/stair and docs/stair.md are those that the command makes today.
+/// The pictures and figures that the README shows are those of today.
 #[test]
 fn the_documentation_equals_the_output_of_the_command() {
     let folder = tempdir().unwrap();
