@@ -86,15 +86,15 @@ fn every_page_says_what_the_code_says() {
     let mut index = String::from("| cause | what it does | where | parameters |\n| --- | --- | --- | --- |\n");
     for effect in EFFECTS {
         let (cause, parameters) = (effect.cause(), list(&parameters(*effect)));
-        let stage = format!("{:?}", effect.stage()).to_lowercase();
+        let stage = format!("{:?}", effect.location()).to_lowercase();
         let facts = format!(
             "| | |\n| --- | --- |\n| what it does | {} |\n| where it acts | {stage} |\n| parameters | {parameters} |\n\
              | experiment that decides | {} |\n",
-            effect.meaning(),
-            effect.experiment(),
+            effect.description(),
+            effect.isolating_experiment(),
         );
         compare(&format!("{cause}.md"), &facts);
-        index += &format!("| [{cause}]({cause}.md) | {} | {stage} | {parameters} |\n", effect.meaning());
+        index += &format!("| [{cause}]({cause}.md) | {} | {stage} | {parameters} |\n", effect.description());
     }
     compare("README.md", &index);
 }

@@ -3,7 +3,7 @@
 
 use identify::Input;
 use identify::effects::EFFECTS;
-use identify::effects::effect::Scene;
+use identify::effects::effect::FitContext;
 use identify::effects::model::{Block, Model};
 use identify::fit::simulator::Simulator;
 use identify::plant::base::Base;
@@ -70,12 +70,12 @@ fn what_is_written_is_what_was_fitted() {
         Simulator::new(&data, base).run(model, &mut readings);
         readings
     };
-    let scene = Scene { data: &data, residual: &data.reading, sigma: 1.0 };
+    let scene = FitContext { data: &data, residual: &data.reading, sigma: 1.0 };
     for tables in FILES {
         let base = base(tables);
         for (effect, it) in EFFECTS.iter().enumerate() {
             for form in 0..it.forms() {
-                let starts = it.starts(form, &scene);
+                let starts = it.initial_points(form, &scene);
                 let Some(point) = starts.get(starts.len() / 2) else { continue };
                 let model = Model::default().with(Block { effect, form }, point.clone());
                 // A file says what the spring is, not where a record begins.

@@ -8,7 +8,7 @@
 //!
 //! Where a record begins in mid-course, the voltage that a bounded rate has reached by then is one coordinate more.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, logarithms, table};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -45,15 +45,15 @@ impl Effect for AmplifierSlew {
         "amplifier-slew"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Amplifier
+    fn location(&self) -> Location {
+        Location::Amplifier
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the amplifier's voltage changes at a bounded rate"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "single steps of very different heights: a slew lag grows with the step"
     }
 
@@ -68,11 +68,11 @@ impl Effect for AmplifierSlew {
         }
         let (slowest, fastest) = range(data);
         let mut coordinates = vec![Coordinate::log(slowest, fastest); RATES[form]];
-        coordinates.extend(data.begun.then_some(Coordinate::new(-stroke(data), stroke(data))));
+        coordinates.extend(data.initial_state_unknown.then_some(Coordinate::new(-stroke(data), stroke(data))));
         coordinates
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (slowest, fastest) = range(data);
         let rates = (2.0 * slowest, 0.8 * fastest);
         let starts: Vec<Vec<f64>> = match form {
@@ -83,7 +83,7 @@ impl Effect for AmplifierSlew {
                 .collect(),
         };
         // From the command itself no small change would show.
-        let from_v = data.begun.then_some(data.command.before - OFF * stroke(data));
+        let from_v = data.initial_state_unknown.then_some(data.command.before - OFF * stroke(data));
         starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
     }
 
@@ -106,14 +106,14 @@ impl Effect for AmplifierSlew {
         (form != BOTH_WAYS).then(|| table(self, form, point, data))
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         let value = point[0].exp();
         if form == RESISTANCE {
             chain.output_tau_s = value;
             return;
         }
         let falling = point[RATES[form] - 1].exp();
-        chain.from_v = point.get(RATES[form]).copied();
+        chain.initial_v = point.get(RATES[form]).copied();
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);
         chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
     }

@@ -8,13 +8,13 @@
 //! may come in several *forms*: the same cause, another law. A new effect is one file in `effects/` and its line there.
 
 use crate::plant::chain::Chain;
-use crate::plant::start::Start;
+use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::Signal;
 
 /// Where in the chain an effect acts. Two effects of one stage are harder to tell apart than two of different stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Stage {
+pub enum Location {
     /// Between the command and the spring's electrodes.
     Amplifier,
     /// Static law and memory.
@@ -27,17 +27,17 @@ pub enum Stage {
 
 /// What of a run an effect changes. Runs that differ in later things alone share the earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Acts {
-    /// By [`Effect::change`], up to the amplifier's output.
-    OnAmplifier,
-    /// By [`Effect::change`], up to where the stiffness would settle.
-    OnSettled,
-    /// By [`Effect::change`], behind it.
-    OnChain,
-    /// By [`Effect::respond`] alone.
-    OnResponse,
-    /// By [`Effect::read`] alone.
-    OnReadings,
+pub enum Affects {
+    /// By [`Effect::modify_chain`], up to the amplifier's output.
+    Amplifier,
+    /// By [`Effect::modify_chain`], up to where the stiffness would settle.
+    StaticResponse,
+    /// By [`Effect::modify_chain`], behind it.
+    Relaxation,
+    /// By [`Effect::modify_response`] alone.
+    Response,
+    /// By [`Effect::modify_readings`] alone.
+    Readings,
 }
 
 /// A number that the fit moves. Coordinates are chosen so that a fit is well behaved: logarithms where only size counts.
@@ -49,14 +49,12 @@ pub struct Coordinate {
     pub highest: f64,
     /// False for what a fit cannot move.
     pub fitted: bool,
-    /// True for what is found by search alone, such as the rows of a run.
-    pub searched: bool,
 }
 
 impl Coordinate {
     /// One that the fit moves between two bounds.
     pub fn new(lowest: f64, highest: f64) -> Self {
-        Self { lowest, highest, fitted: true, searched: false }
+        Self { lowest, highest, fitted: true }
     }
 
     /// The logarithm of a quantity between two bounds.
@@ -65,13 +63,8 @@ impl Coordinate {
     }
 
     /// One that stays where a start has put it.
-    pub fn kept(lowest: f64, highest: f64) -> Self {
+    pub fn fixed(lowest: f64, highest: f64) -> Self {
         Self { fitted: false, ..Self::new(lowest, highest) }
-    }
-
-    /// One that only [`Effect::polish`] moves.
-    pub fn searched(lowest: f64, highest: f64) -> Self {
-        Self { searched: true, ..Self::kept(lowest, highest) }
     }
 }
 
@@ -94,10 +87,10 @@ impl Quantity {
 }
 
 /// What a search for starting points sees.
-pub struct Scene<'a> {
+pub struct FitContext<'a> {
     /// The record.
     pub data: &'a Data,
-    /// What the model without the effect leaves, in V; NaN in rows that [`Effect::polish`] must not look at.
+    /// What the model without the effect leaves, in V; NaN in rows that [`Effect::refine_searched`] must not look at.
     pub residual: &'a [f64],
     /// The noise's scale, in V.
     pub sigma: f64,
@@ -109,22 +102,22 @@ pub trait Effect: Sync {
     fn cause(&self) -> &'static str;
 
     /// Where it acts.
-    fn stage(&self) -> Stage;
+    fn location(&self) -> Location;
 
     /// What of a run it changes.
-    fn acts(&self) -> Acts {
-        match self.stage() {
-            Stage::Amplifier => Acts::OnAmplifier,
-            Stage::Static => Acts::OnSettled,
-            Stage::Relaxation | Stage::Reading => Acts::OnChain,
+    fn affects(&self) -> Affects {
+        match self.location() {
+            Location::Amplifier => Affects::Amplifier,
+            Location::Static => Affects::StaticResponse,
+            Location::Relaxation | Location::Reading => Affects::Relaxation,
         }
     }
 
     /// What it does, in words that follow "because".
-    fn meaning(&self) -> &'static str;
+    fn description(&self) -> &'static str;
 
     /// The experiment that shows it and nothing else, in words that follow "run".
-    fn experiment(&self) -> &'static str;
+    fn isolating_experiment(&self) -> &'static str;
 
     /// Number of forms that it comes in.
     fn forms(&self) -> usize {
@@ -135,10 +128,15 @@ pub trait Effect: Sync {
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate>;
 
     /// Points from which a fit may find it, for a form.
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>>;
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>>;
 
     /// The user's parameters at a point.
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity>;
+
+    /// True if some coordinates of a form are found by [`Effect::refine_searched`] alone and not by the fit.
+    fn searched(&self, _form: usize) -> bool {
+        false
+    }
 
     /// Causes that contain this one: with one of them in the model, it has nothing to add.
     fn special_case_of(&self) -> &'static [&'static str] {
@@ -146,25 +144,25 @@ pub trait Effect: Sync {
     }
 
     /// How many places a search for a form looks at, as a natural logarithm: what a find by chance is discounted by.
-    fn places(&self, _form: usize, _data: &Data) -> f64 {
+    fn ln_candidates(&self, _form: usize, _data: &Data) -> f64 {
         0.0
     }
 
     /// Moves the searched coordinates to where `residual`, which is without the effect, wants them.
-    fn polish(&self, _form: usize, _point: &mut [f64], _scene: &Scene) {}
+    fn refine_searched(&self, _form: usize, _point: &mut [f64], _scene: &FitContext) {}
 
     /// Of a point between two bounds at which the prediction jumps, one that many `steps` beyond, or before them if negative.
-    fn beyond(&self, _form: usize, _point: &[f64], _steps: f64, _data: &Data) -> Option<Vec<f64>> {
+    fn across_jumps(&self, _form: usize, _point: &[f64], _steps: f64, _data: &Data) -> Option<Vec<f64>> {
         None
     }
 
     /// Lowest and highest of the user's parameters that a search alone has found; others are left to the fit.
-    fn searched_range(&self, _form: usize, _point: &[f64], _scene: &Scene) -> Vec<(String, f64, f64)> {
+    fn searched_range(&self, _form: usize, _point: &[f64], _scene: &FitContext) -> Vec<(String, f64, f64)> {
         Vec::new()
     }
 
     /// Changes the chain, as far as a plant file can say it.
-    fn change<'a>(&self, _form: usize, _point: &'a [f64], _data: &'a Data, _chain: &mut Chain<'a>) {}
+    fn modify_chain<'a>(&self, _form: usize, _point: &'a [f64], _data: &'a Data, _chain: &mut Chain<'a>) {}
 
     /// What no table of a plant file holds of it, for the whole chain that it is in: a table of its own, or a remark.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, _chain: &Chain) -> Option<toml::Value> {
@@ -172,10 +170,10 @@ pub trait Effect: Sync {
     }
 
     /// Acts on the stiffness, in V; its states ask where they start.
-    fn respond(&self, _form: usize, _point: &[f64], _signal: &mut Signal, _start: &mut Start) {}
+    fn modify_response(&self, _form: usize, _point: &[f64], _signal: &mut Signal, _start: &mut InitialState) {}
 
     /// Acts on the readings at each row, in V.
-    fn read(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}
+    fn modify_readings(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}
 }
 
 /// Logarithms of a range, so many, evenly from one end to the other.

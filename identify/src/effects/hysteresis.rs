@@ -1,6 +1,6 @@
 //! Rate-independent memory: the branches up and down differ.
 //!
-//! A [`Bank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
+//! A [`PlayBank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
 //!
 //! | form | plays | coordinates |
 //! | --- | --- | --- |
@@ -12,9 +12,9 @@
 //!
 //! The last begin on the branch that comes down: where the record begins, not what the spring is.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
-use crate::plant::bank::Bank;
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
+use crate::plant::play_bank::PlayBank;
 use crate::record::data::Data;
 
 pub(super) struct Hysteresis;
@@ -35,7 +35,7 @@ const FORMS: [(usize, bool, bool); 7] = [
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
 /// The bank of a form at a point.
-fn bank(form: usize, point: &[f64]) -> Bank {
+fn bank(form: usize, point: &[f64]) -> PlayBank {
     let (count, own_gain, cycled) = FORMS[form];
     let threshold = point[0].exp();
     let plays: Vec<(f64, f64)> = match (form, count) {
@@ -45,7 +45,7 @@ fn bank(form: usize, point: &[f64]) -> Bank {
     };
     let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
     let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();
-    let bank = Bank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
+    let bank = PlayBank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
     if cycled { bank.cycled() } else { bank }
 }
 
@@ -54,15 +54,15 @@ impl Effect for Hysteresis {
         "hysteresis"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Static
+    fn location(&self) -> Location {
+        Location::Static
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the branches up and down differ, however slowly they are run"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "a slow stair up and down again: only under hysteresis the branches stay apart, however long each step is held"
     }
 
@@ -82,7 +82,7 @@ impl Effect for Hysteresis {
         coordinates
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (count, own_gain, _) = FORMS[form];
         let start = |part: f64, weight: f64| {
             let mut point = vec![(part * data.full_scale_v).ln()];
@@ -107,7 +107,7 @@ impl Effect for Hysteresis {
         (!chain.memory.fits()).then(|| table(self, form, point, data))
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.memory = bank(form, point).behind(&chain.memory);
     }
 }

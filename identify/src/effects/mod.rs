@@ -1,9 +1,8 @@
 //! The effects, one file each, in the order in which they act.
 
-use crate::effects::effect::Effect;
-
 mod amplifier_limit;
 mod amplifier_slew;
+mod catalogue;
 mod charge_leakage;
 mod delay;
 mod drift;
@@ -23,34 +22,4 @@ mod static_nonlinearity;
 mod time_constant;
 mod voltage_dependent_time_constant;
 
-/// Every effect, in the order of the chain: each acts on what the ones before it have made.
-pub static EFFECTS: &[&dyn Effect] = &[
-    &amplifier_limit::AmplifierLimit,
-    &amplifier_slew::AmplifierSlew,
-    &delay::Delay,
-    &hysteresis::Hysteresis,
-    &gain_error::GainError,
-    &static_nonlinearity::StaticNonlinearity,
-    &charge_leakage::ChargeLeakage,
-    &instantaneous_share::InstantaneousShare,
-    &time_constant::TimeConstant,
-    &second_relaxation::SecondRelaxation,
-    &voltage_dependent_time_constant::VoltageDependentTimeConstant,
-    &resonance::Resonance,
-    &drift::Drift,
-    &hum::Hum,
-    &reading_offset::ReadingOffset,
-    &sensor_saturation::SensorSaturation,
-    &quantisation::Quantisation,
-    &outliers::Outliers,
-];
-
-/// The place of a cause in [`EFFECTS`].
-pub fn index_of(cause: &str) -> Option<usize> {
-    EFFECTS.iter().position(|effect| effect.cause() == cause)
-}
-
-/// True if a cause contains another, as its special case.
-pub fn contains(effect: usize, other: usize) -> bool {
-    EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause())
-}
+pub use catalogue::{EFFECTS, contains, index_of};

@@ -1,6 +1,6 @@
 //! A model: the paper's chain with some effects in it.
 
-use crate::effects::EFFECTS;
+use crate::effects::catalogue::EFFECTS;
 use crate::effects::effect::{Coordinate, Effect};
 use crate::plant::base::Base;
 use crate::plant::chain::Chain;
@@ -32,9 +32,9 @@ impl Block {
         self.effect().coordinates(self.form, data)
     }
 
-    /// True if a search alone can place it.
-    pub fn searched(&self, data: &Data) -> bool {
-        self.coordinates(data).iter().any(|coordinate| coordinate.searched)
+    /// True if one of its coordinates is found by search alone.
+    pub fn searched(&self) -> bool {
+        self.effect().searched(self.form)
     }
 }
 
@@ -70,8 +70,8 @@ impl Model {
     }
 
     /// True if an effect is in it that only a search can place.
-    pub fn searched(&self, effect: usize, data: &Data) -> bool {
-        self.blocks.iter().any(|(block, _)| block.effect == effect && block.searched(data))
+    pub fn searched(&self, effect: usize) -> bool {
+        self.blocks.iter().any(|(block, _)| block.effect == effect && block.searched())
     }
 
     /// Effects and forms, as a key.
@@ -103,7 +103,7 @@ impl Model {
     pub fn chain<'a>(&'a self, base: &'a Base, data: &'a Data) -> Chain<'a> {
         let mut chain = base.chain();
         for (block, point) in &self.blocks {
-            block.effect().change(block.form, point, data, &mut chain);
+            block.effect().modify_chain(block.form, point, data, &mut chain);
         }
         chain
     }

@@ -5,10 +5,10 @@
 //! | run | one stretch of them |
 //! | whole | all of them: the sensor's zero |
 
-use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
-use crate::stats::median::{deviation, median};
-use crate::stats::scale::bends;
+use crate::stats::median::{median, robust_deviation};
+use crate::stats::scale::second_differences;
 
 pub(super) struct ReadingOffset;
 
@@ -35,16 +35,16 @@ fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, 
 /// False if the sensor's zero is right: a spring that never had a voltage reads it.
 fn shows_at_rest(data: &Data) -> bool {
     let rest = data.voltage_v.iter().take(AT_REST).take_while(|voltage| **voltage == 0.0).count();
-    if data.begun || rest == 0 {
+    if data.initial_state_unknown || rest == 0 {
         return true;
     }
     let zero = median(&mut data.reading[..rest].to_vec()).unwrap_or(0.0);
-    let error = deviation(bends(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
+    let error = robust_deviation(second_differences(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
     zero.abs() > SHOWN * error
 }
 
 /// The run whose shift explains most: by sums over runs of growing length. Unseen rows neither count nor cost.
-fn best_run(Scene { residual, sigma, .. }: &Scene) -> Option<Vec<f64>> {
+fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>> {
     let rows = residual.len();
     let bound = CLIP * sigma;
     let (mut sums, mut counts) = (vec![0.0], vec![0]);
@@ -109,19 +109,19 @@ impl Effect for ReadingOffset {
         "reading-offset"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn location(&self) -> Location {
+        Location::Reading
     }
 
-    fn acts(&self) -> Acts {
-        Acts::OnReadings
+    fn affects(&self) -> Affects {
+        Affects::Readings
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "a stretch of readings, or all, is shifted"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "the same schedule again, from a rest at 0 V: a shift of the sensor shows at rest, or not at the same time again"
     }
 
@@ -134,15 +134,15 @@ impl Effect for ReadingOffset {
         let most = 2.0 * data.full_scale_v.max(1.0);
         let offset = Coordinate::new(-most, most);
         match form {
-            RUN => vec![Coordinate::searched(0.0, rows), Coordinate::searched(0.0, rows), offset],
+            RUN => vec![Coordinate::fixed(0.0, rows), Coordinate::fixed(0.0, rows), offset],
             _ => vec![offset],
         }
     }
 
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         match form {
-            RUN => best_run(scene).into_iter().collect(),
-            _ if shows_at_rest(scene.data) => vec![vec![-scene.sigma], vec![scene.sigma]],
+            RUN => best_run(context).into_iter().collect(),
+            _ if shows_at_rest(context.data) => vec![vec![-context.sigma], vec![context.sigma]],
             _ => Vec::new(),
         }
     }
@@ -157,26 +157,31 @@ impl Effect for ReadingOffset {
         ]
     }
 
-    fn places(&self, form: usize, data: &Data) -> f64 {
+    fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
         // Both edges; neighbouring runs are nearly the same.
         if form == RUN { 1.25 * (data.rows() as f64).max(1.0).ln() } else { 0.0 }
     }
 
-    fn polish(&self, _: usize, point: &mut [f64], scene: &Scene) {
-        if let Some(best) = best_run(scene) {
+    fn searched(&self, form: usize) -> bool {
+        form == RUN
+    }
+
+    fn refine_searched(&self, _: usize, point: &mut [f64], context: &FitContext) {
+        if let Some(best) = best_run(context) {
             point.copy_from_slice(&best);
         }
     }
 
     /// An edge may lie where moving it costs less than 95 % certainty allows, and between two rows.
-    fn searched_range(&self, form: usize, point: &[f64], scene: &Scene) -> Vec<(String, f64, f64)> {
+    fn searched_range(&self, form: usize, point: &[f64], context: &FitContext) -> Vec<(String, f64, f64)> {
         if form != RUN {
             return Vec::new();
         }
-        let (time, rows) = (&scene.data.time_s, scene.data.rows());
+        let (time, rows) = (&context.data.time_s, context.data.rows());
         let (from, to, offset) = (point[0] as usize, (point[1] as usize).min(rows), point[2]);
         // Cost of counting a row of the run as outside, in nats; the opposite is a gain.
-        let cost = |row: usize| (scene.residual[row] * offset - 0.5 * offset * offset) / (scene.sigma * scene.sigma);
+        let cost =
+            |row: usize| (context.residual[row] * offset - 0.5 * offset * offset) / (context.sigma * context.sigma);
         let reach = |outwards: &mut dyn Iterator<Item = usize>, sign: f64| {
             let (mut sum, mut last) = (0.0, None);
             for row in outwards.take(200) {
@@ -198,7 +203,7 @@ impl Effect for ReadingOffset {
         vec![("from_s".into(), at(lower), at(upper)), ("to_s".into(), at(earlier.saturating_sub(1)), at(later))]
     }
 
-    fn read(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+    fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
         let (run, offset) = shifted(form, point, data.rows());
         for reading in &mut readings[run] {
             *reading += offset;

@@ -12,8 +12,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage, logarithms};
-use crate::plant::start::Start;
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms};
+use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece, Signal};
 
@@ -38,19 +38,19 @@ impl Effect for Resonance {
         "resonance"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn acts(&self) -> Acts {
-        Acts::OnResponse
+    fn affects(&self) -> Affects {
+        Affects::Response
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "it swings after a change"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "single steps, read at ten times the frequency in question"
     }
 
@@ -71,7 +71,7 @@ impl Effect for Resonance {
         coordinates
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (lowest, highest) = range(data);
         let frequencies = logarithms((8.0 * lowest, 0.95 * highest), 24);
         let (dampings, rest): (&[f64], &[f64]) = match form {
@@ -87,16 +87,17 @@ impl Effect for Resonance {
         vec![Quantity::new("freq_hz", "Hz", point[0].exp()), Quantity::new("zeta", "", point[1].exp())]
     }
 
-    fn places(&self, _: usize, _: &Data) -> f64 {
+    fn ln_candidates(&self, _: usize, _: &Data) -> f64 {
         10f64.ln()
     }
 
-    fn respond(&self, _: usize, point: &[f64], signal: &mut Signal, start: &mut Start) {
+    fn modify_response(&self, _: usize, point: &[f64], signal: &mut Signal, start: &mut InitialState) {
         let (omega, zeta) = (TAU * point[0].exp(), point[1].exp());
         let part = point.get(2).copied().unwrap_or(1.0);
         // Without a time of its own, nothing is slow.
-        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.ask()));
-        let (mut x, mut v) = (if slow.is_some() { 0.0 } else { signal.before } + start.ask(), omega * start.ask());
+        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.next_offset_v()));
+        let (mut x, mut v) =
+            (if slow.is_some() { 0.0 } else { signal.before } + start.next_offset_v(), omega * start.next_offset_v());
         let mut last = f64::NAN;
         let mut step = [[1.0, 0.0], [0.0, 1.0]];
         signal.pass(|piece| {

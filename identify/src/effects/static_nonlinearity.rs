@@ -10,7 +10,7 @@
 //! Each before the relaxation (Hammerstein's model) or, some, behind it (Wiener's): there `u` is what has relaxed so far.
 //! Settled, both are one curve; what comes at once, and how fast, tells them apart.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -64,15 +64,15 @@ impl Effect for StaticNonlinearity {
         "static-nonlinearity"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Static
+    fn location(&self) -> Location {
+        Location::Static
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the sensitivity depends on the voltage"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "a slow stair over the whole range up and down again: without memory both branches are one curve"
     }
 
@@ -94,8 +94,8 @@ impl Effect for StaticNonlinearity {
     }
 
     /// None in mid-course: where such a form starts is not straight in what it makes.
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
-        if FORMS[form].1 && scene.data.begun {
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && context.data.initial_state_unknown {
             return Vec::new();
         }
         match FORMS[form].0 {
@@ -141,7 +141,7 @@ impl Effect for StaticNonlinearity {
         FORMS[form].1.then(|| "fitted behind the relaxation, written before it".into())
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         let (curve, behind) = FORMS[form];
         let law = if behind { &mut chain.law_behind } else { &mut chain.law };
         law.push(move |voltage| voltage * curve.secant(point, voltage.abs() / data.full_scale_v));

@@ -7,7 +7,7 @@
 
 use model::Plant;
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -21,15 +21,15 @@ impl Effect for VoltageDependentTimeConstant {
         "voltage-dependent-time-constant"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the relaxation time changes with the voltage"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "equal small steps at several voltages, each held for five time constants"
     }
 
@@ -45,8 +45,8 @@ impl Effect for VoltageDependentTimeConstant {
     }
 
     /// None in mid-course: where such a form starts is not straight in what it makes.
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
-        if FORMS[form].1 && scene.data.begun {
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && context.data.initial_state_unknown {
             return Vec::new();
         }
         let start = |(low, high): (f64, f64)| {
@@ -76,7 +76,7 @@ impl Effect for VoltageDependentTimeConstant {
         }
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.relaxation.tau_s = point[0].exp();
         chain.relaxation.tau_high_s = point[1].exp();
         chain.relaxation.geometric = FORMS[form].0;

@@ -3,17 +3,16 @@
 //! Each round takes the noise's weights for the present residual (iteratively reweighted least squares), steps, and keeps
 //! the step only if the likelihood grew. Coordinates stay within their bounds.
 
-use nalgebra::{DMatrix, DVector};
-
-use crate::effects::effect::Scene;
+use crate::effects::effect::FitContext;
 use crate::effects::model::Model;
+use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
 use crate::noise::{Noise, Term};
-use crate::plant::start;
+use crate::plant::base::Base;
+use crate::plant::initial_state;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
-use crate::stats::scale::scale;
-use crate::stats::sums::dot;
+use crate::stats::scale::robust_scale;
 
 /// A model with its points fitted.
 #[derive(Clone, Debug)]
@@ -27,41 +26,32 @@ pub struct Fit {
     /// Log-likelihood under that law, less [`Fit::cost`].
     pub log_likelihood: f64,
     /// Log-likelihood under independent noise: what a memory that is really structure cannot hide.
-    pub plain: f64,
+    pub white_noise_log_likelihood: f64,
     /// What a start in mid-course costs, in nats.
-    pub start_cost: f64,
+    pub initial_state_cost: f64,
 }
 
 /// Errors this many times as large as what of them is new at each reading wander.
-const WANDERS: f64 = 4.0;
+const STRONG_AUTOCORRELATION: f64 = 4.0;
 
 impl Fit {
     /// True if nearly all that is left would be foretold by the noise's memory: what is slow may hide in it.
-    pub fn wanders(&self) -> bool {
-        self.noise.marginal > WANDERS * self.noise.sigma
+    pub fn strongly_autocorrelated(&self) -> bool {
+        self.noise.marginal > STRONG_AUTOCORRELATION * self.noise.sigma
     }
 
     /// What the law of the noise and the start cost, in nats.
     pub fn cost(&self) -> f64 {
-        self.noise.cost(self.residual.len()) + self.start_cost
+        self.noise.cost(self.residual.len()) + self.initial_state_cost
     }
-}
-
-/// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
-#[derive(Clone, Debug)]
-pub struct Jacobian {
-    /// Places of the columns among all coordinates.
-    pub places: Vec<usize>,
-    /// The columns, in V per unit of the coordinate.
-    pub columns: Vec<Vec<f64>>,
 }
 
 /// Rounds of a fit.
 const ROUNDS: usize = 14;
 /// A round that gains less than this, in nats, is the last.
-const ENOUGH: f64 = 0.02;
+const LEAST_GAIN: f64 = 0.02;
 /// A step that promises less is not tried.
-const HOPELESS: f64 = 0.1 * ENOUGH;
+const LEAST_PREDICTED_GAIN: f64 = 0.1 * LEAST_GAIN;
 
 /// Most such bounds that a fit goes beyond, one after the other.
 const MOST_STEPS: usize = 30;
@@ -75,18 +65,24 @@ pub struct Engine<'a> {
     /// Runs the models.
     pub simulator: Simulator<'a>,
     /// Readings less what the simulation without any block predicts, in V.
-    pub simulation: Vec<f64>,
+    pub baseline_residual: Vec<f64>,
     predicted: Vec<f64>,
     kernels: Vec<Vec<f64>>,
 }
 
 impl<'a> Engine<'a> {
-    /// For one record.
-    pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
-        let mut engine =
-            Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new(), kernels: Vec::new() };
-        engine.simulation = engine.residual(&Model::default());
+    /// Prepares fits to one record, of models that extend `base`.
+    pub fn new(data: &'a Data, observed: &'a Observed, base: &'a Base) -> Self {
+        let simulator = Simulator::new(data, base);
+        let (predicted, kernels) = (Vec::new(), Vec::new());
+        let mut engine = Self { data, observed, simulator, baseline_residual: Vec::new(), predicted, kernels };
+        engine.baseline_residual = engine.residual(&Model::default());
         engine
+    }
+
+    /// The plant without any effect.
+    pub fn base(&self) -> &'a Base {
+        self.simulator.base
     }
 
     /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
@@ -96,51 +92,51 @@ impl<'a> Engine<'a> {
 
     /// The same, with what that start costs, in nats.
     fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
-        if self.data.begun {
-            self.simulator.run_begun(model, &mut self.predicted, &mut self.kernels);
+        if self.data.initial_state_unknown {
+            self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
         } else {
             self.simulator.run(model, &mut self.predicted);
         }
-        let cut_v = self.observed.cut_v;
-        let left = |(reading, predicted): (&f64, &f64)| reading + cut_v - predicted;
+        let truncation_v = self.observed.truncation_v;
+        let left = |(reading, predicted): (&f64, &f64)| reading + truncation_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
         let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
-        let start_cost = match self.data.begun {
-            true => start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact),
+        let initial_state_cost = match self.data.initial_state_unknown {
+            true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
         };
-        (residual, start_cost)
+        (residual, initial_state_cost)
     }
 
     /// A model at the point that it has, with the noise that suits it.
-    pub fn at(&mut self, model: Model) -> Fit {
-        let (residual, start_cost) = self.residual_and_start(&model);
+    pub fn evaluate(&mut self, model: Model) -> Fit {
+        let (residual, initial_state_cost) = self.residual_and_start(&model);
         let noise = Noise::fitted(&residual, self.observed);
         let log_likelihood = self.log(&noise, &residual);
-        let plain = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
-        let fit = Fit { model, residual, noise, log_likelihood, plain, start_cost };
+        let white_noise_log_likelihood = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
+        let fit = Fit { model, residual, noise, log_likelihood, white_noise_log_likelihood, initial_state_cost };
         Fit { log_likelihood: log_likelihood - fit.cost(), ..fit }
     }
 
     /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
-        let model = self.polished(model, |_| true);
-        let model = self.descend(model, law);
-        let here = self.at(model);
-        self.gone_on(here, law)
+        let model = self.refine_searched(model, |_| true);
+        let model = self.levenberg_marquardt(model, law);
+        let here = self.evaluate(model);
+        self.across_jumps(here, law)
     }
 
     /// From between bounds at which the prediction jumps, to either side while that is likelier.
-    fn gone_on(&mut self, mut here: Fit, law: &Noise) -> Fit {
+    fn across_jumps(&mut self, mut here: Fit, law: &Noise) -> Fit {
         for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
             let mut steps = side;
             for _ in 0..MOST_STEPS {
                 let (block, point) = &here.model.blocks[index];
-                let Some(point) = block.effect().beyond(block.form, point, steps, self.data) else { break };
+                let Some(point) = block.effect().across_jumps(block.form, point, steps, self.data) else { break };
                 let mut model = here.model.clone();
                 model.blocks[index].1 = point;
-                let model = self.descend(model, law);
-                let there = self.at(model);
+                let model = self.levenberg_marquardt(model, law);
+                let there = self.evaluate(model);
                 if there.log_likelihood > here.log_likelihood {
                     here = there;
                     steps *= 2.0;
@@ -155,30 +151,30 @@ impl<'a> Engine<'a> {
     }
 
     /// Moves what only a search can move, block by block, to where the rest of the model wants it in the rows that are seen.
-    pub fn polished(&mut self, mut model: Model, seen: impl Fn(usize) -> bool) -> Model {
+    pub fn refine_searched(&mut self, mut model: Model, seen: impl Fn(usize) -> bool) -> Model {
         for index in 0..model.blocks.len() {
             let block = model.blocks[index].0;
-            if !block.searched(self.data) {
+            if !block.searched() {
                 continue;
             }
             let mut residual = self.residual(&model.without(block.effect));
             let rows = 0..residual.len();
             let errors: Vec<f64> = rows.clone().filter(|&row| seen(row)).map(|row| residual[row]).collect();
             rows.filter(|&row| !seen(row)).for_each(|row| residual[row] = f64::NAN);
-            let scene = Scene { data: self.data, residual: &residual, sigma: scale(&errors) };
-            block.effect().polish(block.form, &mut model.blocks[index].1, &scene);
+            let context = FitContext { data: self.data, residual: &residual, sigma: robust_scale(&errors) };
+            block.effect().refine_searched(block.form, &mut model.blocks[index].1, &context);
         }
         model
     }
 
     /// First for robust independent noise, then for the law that it leaves.
     pub fn fit_twice(&mut self, model: Model) -> Fit {
-        let first = self.fit(model, &Noise::first_look());
-        self.fit_again(first)
+        let first = self.fit(model, &Noise::default_robust());
+        self.refit(first)
     }
 
     /// For the law that a first fit leaves.
-    pub fn fit_again(&mut self, first: Fit) -> Fit {
+    pub fn refit(&mut self, first: Fit) -> Fit {
         let second = self.fit(first.model.clone(), &first.noise);
         if second.log_likelihood >= first.log_likelihood { second } else { first }
     }
@@ -187,7 +183,7 @@ impl<'a> Engine<'a> {
         noise.log_likelihood(residual, self.observed)
     }
 
-    fn descend(&mut self, mut model: Model, law: &Noise) -> Model {
+    fn levenberg_marquardt(&mut self, mut model: Model, law: &Noise) -> Model {
         let bounds = model.coordinates(self.data);
         let mut points = model.points();
         for (point, bound) in points.iter_mut().zip(&bounds) {
@@ -213,7 +209,7 @@ impl<'a> Engine<'a> {
                 for (&place, step) in jacobian.places.iter().zip(step.iter()) {
                     moved[place] = (moved[place] + step).clamp(bounds[place].lowest, bounds[place].highest);
                 }
-                if promised(&normal, &gradient, &jacobian.places, &points, &moved) < HOPELESS {
+                if predicted_gain(&normal, &gradient, &jacobian.places, &points, &moved) < LEAST_PREDICTED_GAIN {
                     break;
                 }
                 let mut candidate = model.clone();
@@ -228,7 +224,7 @@ impl<'a> Engine<'a> {
                 }
                 damping *= 6.0;
             }
-            if gained < ENOUGH {
+            if gained < LEAST_GAIN {
                 break;
             }
         }
@@ -270,44 +266,4 @@ impl<'a> Engine<'a> {
         let columns = columns.collect();
         Jacobian { places, columns }
     }
-}
-
-/// `J' W J` and `J' W r`.
-pub fn normal_equations(jacobian: &Jacobian, terms: &[Term]) -> (DMatrix<f64>, DVector<f64>) {
-    let size = jacobian.columns.len();
-    let mut normal = DMatrix::zeros(size, size);
-    let mut gradient = DVector::zeros(size);
-    let mut weighted = vec![0.0; terms.len()];
-    let residual: Vec<f64> = terms.iter().map(|term| term.residual).collect();
-    for (i, column) in jacobian.columns.iter().enumerate() {
-        for ((weighted, value), term) in weighted.iter_mut().zip(column).zip(terms) {
-            *weighted = value * term.weight;
-        }
-        gradient[i] = dot(&weighted, &residual);
-        for (j, other) in jacobian.columns.iter().enumerate().skip(i) {
-            let product = dot(&weighted, other);
-            normal[(i, j)] = product;
-            normal[(j, i)] = product;
-        }
-    }
-    (normal, gradient)
-}
-
-/// What the parabola of the normal equations gains between two points, in nats.
-fn promised(normal: &DMatrix<f64>, gradient: &DVector<f64>, places: &[usize], from: &[f64], to: &[f64]) -> f64 {
-    let step = DVector::from_iterator(places.len(), places.iter().map(|&place| to[place] - from[place]));
-    gradient.dot(&step) - 0.5 * (normal * &step).dot(&step)
-}
-
-/// The solution of the damped normal equations, scaled to unit diagonal.
-pub fn damped_step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    let size = normal.nrows();
-    let scale = DVector::from_fn(size, |i, _| 1.0 / normal[(i, i)].max(1e-30).sqrt());
-    let mut scaled = DMatrix::from_fn(size, size, |i, j| normal[(i, j)] * scale[i] * scale[j]);
-    for i in 0..size {
-        scaled[(i, i)] = scaled[(i, i)].max(1e-12) + damping;
-    }
-    let right = gradient.component_mul(&scale);
-    let step = scaled.cholesky()?.solve(&right).component_mul(&scale);
-    step.iter().all(|value| value.is_finite()).then_some(step)
 }

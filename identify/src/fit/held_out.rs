@@ -7,12 +7,13 @@
 //! blocks has seen all rows: the clean split, learnt from the first 60 % and judged on the rest, is `cargo campaign rivals`.
 //!
 //! What only a search can place, a run of shifted readings, may lie within one stretch, which no other stretch foretells.
-//! So there are two judgements. [`Engine::judged_unseen`] chooses between structures: it leaves such a run where all rows
-//! have put it, and the price of the block pays for the places that were looked at. [`Engine::foretold`] is what is
+//! So there are two judgements. [`Engine::held_out_log_likelihood`] chooses between structures: it leaves such a run where all rows
+//! have put it, and the price of the block pays for the places that were looked at. [`Engine::held_out_residual`] is what is
 //! reported as error on unseen stretches: it searches the run anew in the rows that are seen.
 
 use crate::effects::model::Model;
-use crate::fit::engine::{Engine, Fit, Jacobian, damped_step, normal_equations};
+use crate::fit::engine::{Engine, Fit};
+use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations};
 use crate::noise::Term;
 
 /// A coordinate of which the seen rows hold less than this part of all information is not known.
@@ -20,27 +21,27 @@ const KNOWN: f64 = 0.01;
 
 impl Engine<'_> {
     /// Log-likelihood of all rows, each unseen by its fit, places apart.
-    pub fn judged_unseen(&mut self, fit: &Fit) -> f64 {
-        let whole = Whole::new(self, fit);
+    pub fn held_out_log_likelihood(&mut self, fit: &Fit) -> f64 {
+        let whole = FullFit::new(self, fit);
         let mut log_likelihood = 0.0;
         for fold in 0..self.data.folds {
             let model = whole.refitted(self, fold);
             let there = if model == fit.model { fit.residual.clone() } else { self.residual(&model) };
-            let logs = fit.noise.logs(&there, self.observed).zip(&self.data.fold);
+            let logs = fit.noise.row_log_likelihoods(&there, self.observed).zip(&self.data.fold);
             log_likelihood += logs.filter(|(_, of)| usize::from(**of) == fold).map(|(log, _)| log).sum::<f64>();
         }
         log_likelihood - fit.cost()
     }
 
     /// Readings less prediction for each row, in V, by a fit that has not seen the row.
-    pub fn foretold(&mut self, fit: &Fit) -> Vec<f64> {
-        let whole = Whole::new(self, fit);
+    pub fn held_out_residual(&mut self, fit: &Fit) -> Vec<f64> {
+        let whole = FullFit::new(self, fit);
         let data = self.data;
         let mut unseen = fit.residual.clone();
         for fold in 0..data.folds {
             let of_fold = |row: usize| usize::from(data.fold[row]) == fold;
             let model = whole.refitted(self, fold);
-            let model = self.polished(model, |row| !of_fold(row));
+            let model = self.refine_searched(model, |row| !of_fold(row));
             let there = self.residual(&model);
             (0..unseen.len()).filter(|&row| of_fold(row)).for_each(|row| unseen[row] = there[row]);
         }
@@ -49,7 +50,7 @@ impl Engine<'_> {
 }
 
 /// A fit to all rows, ready to be refitted to some.
-struct Whole<'f> {
+struct FullFit<'f> {
     fit: &'f Fit,
     jacobian: Jacobian,
     terms: Vec<Term>,
@@ -57,7 +58,7 @@ struct Whole<'f> {
     known: Vec<f64>,
 }
 
-impl<'f> Whole<'f> {
+impl<'f> FullFit<'f> {
     fn new(engine: &mut Engine, fit: &'f Fit) -> Self {
         let jacobian = engine.jacobian(&fit.model, &fit.noise, &fit.residual);
         let terms = engine.terms(&fit.noise, &fit.residual);
@@ -94,7 +95,7 @@ impl<'f> Whole<'f> {
         model.blocks.retain(|(block, point)| {
             let own = first..first + point.len();
             first = own.end;
-            block.searched(data) || places.iter().any(|place| own.contains(place))
+            block.searched() || places.iter().any(|place| own.contains(place))
         });
         model
     }
@@ -140,10 +141,10 @@ mod tests {
     /// The gain that all rows want, the gain that the rows outside of the fold want, and what is foretold of the fold.
     fn gains(data: &Data) -> (f64, f64, Vec<f64>) {
         let (base, observed) = (Base::paper(), Observed::new(data));
-        let mut engine = Engine::new(data, &observed, Simulator::new(data, &base));
+        let mut engine = Engine::new(data, &observed, &base);
         let fit = engine.fit_twice(of("gain-error", vec![1.0]));
-        let refitted = Whole::new(&mut engine, &fit).refitted(&engine, FOLD);
-        let left = engine.foretold(&fit);
+        let refitted = FullFit::new(&mut engine, &fit).refitted(&engine, FOLD);
+        let left = engine.held_out_residual(&fit);
         let rows = (0..ROWS).filter(|&row| unseen(data, row));
         (fit.model.points()[0], refitted.points()[0], rows.map(|row| data.reading[row] - left[row]).collect())
     }
@@ -164,14 +165,14 @@ mod tests {
     #[test]
     fn a_run_is_searched_in_rows_that_are_seen() {
         let shifted = |row: usize, noise: f64| noise + if (500..640).contains(&row) { 9.0 } else { 0.0 };
-        let plain = data(shifted);
-        let wild = data(|row, noise| if unseen(&plain, row) { 1e3 } else { shifted(row, noise) });
-        let places = [&plain, &wild].map(|data| {
+        let white_noise_log_likelihood = data(shifted);
+        let wild = data(|row, noise| if unseen(&white_noise_log_likelihood, row) { 1e3 } else { shifted(row, noise) });
+        let places = [&white_noise_log_likelihood, &wild].map(|data| {
             let (base, observed) = (Base::paper(), Observed::new(data));
-            let mut engine = Engine::new(data, &observed, Simulator::new(data, &base));
+            let mut engine = Engine::new(data, &observed, &base);
             let run = Block { effect: index_of("reading-offset").unwrap(), form: 0 };
             let model = of("gain-error", vec![GAIN]).with(run, vec![0.0; 3]);
-            engine.polished(model, |row| !unseen(data, row)).points()
+            engine.refine_searched(model, |row| !unseen(data, row)).points()
         });
         assert_eq!(places[0], places[1]);
         // The run ends where a stretch that is not seen begins.

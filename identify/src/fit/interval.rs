@@ -12,9 +12,10 @@
 use nalgebra::DMatrix;
 
 use crate::answer::Parameter;
-use crate::effects::effect::{Quantity, Scene};
+use crate::effects::effect::{FitContext, Quantity};
 use crate::effects::model::Block;
-use crate::fit::engine::{Engine, Fit, normal_equations};
+use crate::fit::engine::{Engine, Fit};
+use crate::fit::normal_equations::normal_equations;
 use crate::record::data::Data;
 use crate::stats::scale::Z;
 
@@ -26,7 +27,7 @@ pub(crate) fn information(engine: &mut Engine, fit: &Fit) -> DMatrix<f64> {
     // Reweighting overstates what a heavy tail tells; the scores' own variance does not.
     let squares: f64 = terms.iter().map(|term| (term.weight * term.residual).powi(2)).sum();
     let weights: f64 = terms.iter().map(|term| term.weight).sum();
-    let heavy = fit.noise.cell == 0.0 && (fit.noise.nu.is_finite() || fit.noise.wide.is_some());
+    let heavy = fit.noise.half_step == 0.0 && (fit.noise.nu.is_finite() || fit.noise.outliers.is_some());
     if heavy { normal * (squares / weights).min(1.0) } else { normal }
 }
 
@@ -74,8 +75,8 @@ pub(crate) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(
                 found.push((name, interval(value, error, unit, reach)));
             }
             let residual = engine.residual(&fit.model.without(effect));
-            let scene = Scene { data, residual: &residual, sigma: fit.noise.sigma };
-            for (name, low, high) in block.effect().searched_range(block.form, point, &scene) {
+            let context = FitContext { data, residual: &residual, sigma: fit.noise.sigma };
+            for (name, low, high) in block.effect().searched_range(block.form, point, &context) {
                 if let Some((_, parameter)) = found.iter_mut().find(|(other, _)| *other == name) {
                     (parameter.low, parameter.high) = (low.min(parameter.value), high.max(parameter.value));
                 }

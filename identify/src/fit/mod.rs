@@ -3,4 +3,5 @@
 pub mod engine;
 pub mod held_out;
 pub mod interval;
+pub mod normal_equations;
 pub mod simulator;

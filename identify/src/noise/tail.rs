@@ -1,7 +1,7 @@
 //! The tail of the innovations: a normal's, Student's t, or a mixture of two normals, by likelihood.
 
-use crate::noise::Noise;
-use crate::stats::scale::{FINEST_V, scale, scale_of_squares};
+use crate::noise::law::Noise;
+use crate::stats::scale::{FINEST_V, robust_scale, root_mean_square};
 use crate::stats::sums::total;
 
 const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];
@@ -17,12 +17,12 @@ const WIDE: f64 = 4.0;
 
 impl Noise {
     fn is_normal(&self) -> bool {
-        self.nu.is_infinite() && self.wide.is_none()
+        self.nu.is_infinite() && self.outliers.is_none()
     }
 
     /// Where a search for the scale of some innovations starts; where it ends if they are normal.
     pub(super) fn first_scale(&self, innovations: &[f64]) -> f64 {
-        if self.is_normal() { scale_of_squares(innovations) } else { scale(innovations) }
+        if self.is_normal() { root_mean_square(innovations) } else { robust_scale(innovations) }
     }
 
     /// The likeliest scale for some innovations, by reweighting; the tail's shape stays. Of each item `of` says its size, and
@@ -45,13 +45,13 @@ impl Noise {
     /// The same shape, of another scale.
     fn scaled_to(&self, sigma: f64) -> Self {
         let scaled = self.with_tail(self.nu, sigma);
-        let wide = self.wide.map(|(fraction, wide)| (fraction, wide * scaled.sigma / self.sigma));
-        Self { wide, ..scaled }
+        let outliers = self.outliers.map(|(fraction, wide)| (fraction, wide * scaled.sigma / self.sigma));
+        Self { outliers, ..scaled }
     }
 
     /// The likeliest tail of some innovations, and its scale.
     pub(super) fn fit_tail(&mut self, innovations: &[f64]) {
-        let start = scale(innovations);
+        let start = robust_scale(innovations);
         let sizes = &*sizes(innovations, start);
         let mut best = f64::NEG_INFINITY;
         let mut consider = |noise: &mut Self, tried: Self, cost: f64| {
@@ -61,7 +61,7 @@ impl Noise {
                 *noise = tried;
             }
         };
-        let normal = self.with_tail(f64::INFINITY, scale_of_squares(innovations));
+        let normal = self.with_tail(f64::INFINITY, root_mean_square(innovations));
         consider(self, normal.clone(), 0.0);
         for nu in TAILS {
             let mut heavy = normal.with_tail(nu, start);
@@ -70,7 +70,7 @@ impl Noise {
         }
         if innovations.len() >= 30 && innovations.iter().any(|e| e.abs() > WIDE * start) {
             let mixture = Self::mixture(sizes, start, &normal);
-            if mixture.wide.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS) {
+            if mixture.outliers.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS) {
                 consider(self, mixture, OUTLIERS);
             }
         }
@@ -97,7 +97,7 @@ impl Noise {
             sigma = (narrow_sum / (count - weight)).sqrt().max(FINEST_V);
             wide = (wide_sum / weight.max(1e-9)).sqrt().max(WIDE * sigma);
         }
-        Self { wide: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }
+        Self { outliers: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }
     }
 }
 
@@ -118,9 +118,4 @@ pub(super) fn sizes(errors: &[f64], scale: f64) -> Vec<(f64, f64)> {
         cells.into_iter().filter(|cell| cell.1 > 0.0).map(|(squares, times)| ((squares / times).sqrt(), times)),
     );
     sizes
-}
-
-/// Logarithm of the t distribution's constant.
-pub(super) fn tail_constant(nu: f64) -> f64 {
-    libm::lgamma(0.5 * (nu + 1.0)) - libm::lgamma(0.5 * nu) - 0.5 * (nu * std::f64::consts::PI).ln()
 }

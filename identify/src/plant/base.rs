@@ -3,8 +3,8 @@
 use anyhow::Result;
 use model::Plant;
 
-use crate::plant::bank::Bank;
 use crate::plant::chain::Chain;
+use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
 use simulation::bad_input;
 use simulation::plant_file::PlantFile;
@@ -29,7 +29,7 @@ impl Base {
     /// # Errors
     /// [`simulation::bad_input::BadInput`] for one with a memory that no other can stand behind.
     pub fn new(file: PlantFile) -> Result<Self> {
-        if !Bank::of(file.memory.as_ref()).rises() {
+        if !PlayBank::of(file.memory.as_ref()).rises() {
             bad_input!(
                 "--plant: memory that falls as the voltage rises; expected direct >= 0, also with the weights added to it"
             );

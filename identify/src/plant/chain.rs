@@ -10,11 +10,11 @@
 //! fitted is what is written: a second limit is the lower one, a second slew the slower, delays add up, memories and laws
 //! stand one behind the other, the relaxation's numbers are replaced.
 
-use crate::plant::bank::Bank;
+use crate::plant::initial_state::InitialState;
 use crate::plant::law::Law;
-use crate::plant::leakage::{Loss, Lost};
+use crate::plant::leakage::{InstantaneousLoss, Loss};
+use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
-use crate::plant::start::Start;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 
@@ -27,13 +27,13 @@ pub struct Chain<'a> {
     /// And fall, in V/s.
     pub falling_v_per_s: f64,
     /// Where it begins, in V, if not at the command.
-    pub from_v: Option<f64>,
+    pub initial_v: Option<f64>,
     /// Time constant of its output's resistance with the spring's capacitance, in s.
     pub output_tau_s: f64,
     /// How late it answers, in s.
     pub delay_s: f64,
     /// Hysteresis.
-    pub memory: Bank,
+    pub memory: PlayBank,
     /// The static law.
     pub law: Law<'a>,
     /// Another one, behind the relaxation.
@@ -61,10 +61,10 @@ impl<'a> Chain<'a> {
             limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
-            from_v: None,
+            initial_v: None,
             output_tau_s: 0.0,
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
-            memory: Bank::of(file.memory.as_ref()),
+            memory: PlayBank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
@@ -84,16 +84,16 @@ impl<'a> Chain<'a> {
         if self.memory.fits() {
             file.memory = self.memory.table();
         }
-        let (gain, relaxation, leakage) = self.passed();
+        let (gain, relaxation, leakage) = self.as_plant_file_tables();
         file.law = self.law.table(gain, &self.law_behind, full_scale_v);
         file.leakage = leakage;
         relaxation.extend(file);
     }
 
     /// Gain, relaxation and loss as a plant file has them.
-    fn passed(&self) -> (f64, Relaxation, Option<Leakage>) {
+    fn as_plant_file_tables(&self) -> (f64, Relaxation, Option<Leakage>) {
         match self.losses.first() {
-            Some(loss) if loss.at_once > 0.0 => match loss.passed(&self.relaxation) {
+            Some(loss) if loss.instantaneous > 0.0 => match loss.equivalent_leakage(&self.relaxation) {
                 Some((gain, share, leakage)) => (gain, Relaxation { share, ..self.relaxation }, Some(leakage)),
                 None => (1.0, self.relaxation, None),
             },
@@ -107,7 +107,7 @@ impl<'a> Chain<'a> {
             signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
         }
         if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {
-            signal.before = self.from_v.unwrap_or(signal.before);
+            signal.before = self.initial_v.unwrap_or(signal.before);
             *signal = signal.slewed(self.rising_v_per_s, self.falling_v_per_s);
         }
         if self.output_tau_s > 0.0 {
@@ -120,7 +120,7 @@ impl<'a> Chain<'a> {
     }
 
     /// From the electrodes to where the stiffness would settle.
-    pub fn settle(&self, signal: &mut Signal) {
+    pub fn static_response(&self, signal: &mut Signal) {
         let mut memory = self.memory.clone();
         if memory.table().is_some() {
             signal.map(|voltage| memory.at(voltage));
@@ -136,15 +136,15 @@ impl<'a> Chain<'a> {
         if self.relaxation.varies() && self.relaxation.by_state.is_none() {
             applied.middles(levels_v);
         }
-        self.follow(signal, &mut Start::at_rest(), levels_v);
+        self.follow(signal, &mut InitialState::at_rest(), levels_v);
         if !self.law_behind.is_none() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }
     }
 
     /// What is linear: from where memory and law would have it settle on.
-    fn follow(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
-        let mut lost = Lost::default();
+    fn follow(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
+        let mut lost = InstantaneousLoss::default();
         self.losses.iter().for_each(|loss| loss.take(signal, start, &mut lost));
         self.relaxation.pass(signal, start, levels_v);
         if !lost.is_none() {
@@ -154,10 +154,10 @@ impl<'a> Chain<'a> {
 
     /// What a start adds to the stiffness under the voltage of `signal` at the electrodes. Behind them, what had been sent
     /// before arrives late, and plays may have been left as the highest voltage leaves them.
-    pub fn begin(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
-        let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.ask() } else { 0.0 });
-        let late = if self.delay_s > 0.0 { [0.0; SENT].map(|_| start.ask()) } else { [0.0; SENT] };
-        let kept = if self.memory.table().is_some() { start.ask() } else { 0.0 };
+    pub fn initial_state_response(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
+        let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.next_offset_v() } else { 0.0 });
+        let late = if self.delay_s > 0.0 { [0.0; SENT].map(|_| start.next_offset_v()) } else { [0.0; SENT] };
+        let kept = if self.memory.table().is_some() { start.next_offset_v() } else { 0.0 };
         let (mut rest, mut above) = (self.memory.clone(), self.memory.clone());
         rest.at(signal.before);
         above.at(HIGHEST_V);

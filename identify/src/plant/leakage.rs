@@ -8,8 +8,8 @@
 //! Behind a relaxation with one time constant, a loss that shows at once is seen from outside as one that passes the
 //! relaxation, with another gain and another part that comes at once ([`Loss::passed`]). So a plant file can hold it.
 
+use crate::plant::initial_state::InitialState;
 use crate::plant::relaxation::Relaxation;
-use crate::plant::start::Start;
 use crate::record::signal::{Lag, Signal};
 use simulation::plant_file::Leakage;
 
@@ -21,12 +21,12 @@ pub struct Loss {
     /// Its time constant, in s.
     pub tau_s: f64,
     /// Part of the loss that does not pass the relaxation.
-    pub at_once: f64,
+    pub instantaneous: f64,
 }
 
 /// What shows at once: before the first piece, and at start and end of each.
 #[derive(Debug, Default)]
-pub struct Lost {
+pub struct InstantaneousLoss {
     before: f64,
     pieces: Vec<(f64, f64)>,
 }
@@ -34,24 +34,24 @@ pub struct Lost {
 impl Loss {
     /// Of a plant file: all of it passes the relaxation.
     pub fn of(&Leakage { share, tau_s }: &Leakage) -> Self {
-        Self { share, tau_s, at_once: 0.0 }
+        Self { share, tau_s, instantaneous: 0.0 }
     }
 
     /// Takes off the charge what passes the relaxation, and adds to `lost` what does not.
-    pub fn take(&self, signal: &mut Signal, start: &mut Start, lost: &mut Lost) {
-        let (passes, at_once) = (self.share * (1.0 - self.at_once), self.share * self.at_once);
-        let mut lag = Lag::at(self.tau_s, signal.before + start.ask());
-        lost.before += at_once * signal.before;
+    pub fn take(&self, signal: &mut Signal, start: &mut InitialState, lost: &mut InstantaneousLoss) {
+        let (passes, instantaneous) = (self.share * (1.0 - self.instantaneous), self.share * self.instantaneous);
+        let mut lag = Lag::at(self.tau_s, signal.before + start.next_offset_v());
+        lost.before += instantaneous * signal.before;
         signal.before *= 1.0 - passes;
         let mut number = 0;
         signal.pass(|piece| {
             let (start, end) = lag.pass(piece);
-            if at_once != 0.0 {
+            if instantaneous != 0.0 {
                 if number == lost.pieces.len() {
                     lost.pieces.push((0.0, 0.0));
                 }
                 let (from, to) = &mut lost.pieces[number];
-                (*from, *to) = (*from + at_once * start, *to + at_once * end);
+                (*from, *to) = (*from + instantaneous * start, *to + instantaneous * end);
                 number += 1;
             }
             (piece.from - passes * start, piece.to - passes * end)
@@ -65,14 +65,14 @@ impl Loss {
     /// in front of its parts, 1, lag(relaxation) and lag(loss), both have the same factors:
     /// gain share' = a      h (1 + loss k) = b      loss (a + h (1 + k)) = c      k = tau_r / (tau - tau_r),  h = gain (1 - share')
     /// ```
-    pub fn passed(&self, relaxation: &Relaxation) -> Option<(f64, f64, Leakage)> {
+    pub fn equivalent_leakage(&self, relaxation: &Relaxation) -> Option<(f64, f64, Leakage)> {
         if relaxation.parts().next().is_some() || relaxation.varies() {
             return None;
         }
-        let (share, passes) = (relaxation.share, self.share * (1.0 - self.at_once));
+        let (share, passes) = (relaxation.share, self.share * (1.0 - self.instantaneous));
         let k = relaxation.tau_s / (self.tau_s - relaxation.tau_s);
         let (a, b) = (share, (1.0 - share) * (1.0 + passes * k));
-        let c = passes * (share + (1.0 - share) * (1.0 + k)) + self.share * self.at_once;
+        let c = passes * (share + (1.0 - share) * (1.0 + k)) + self.share * self.instantaneous;
         // a k loss^2 + (a + b (1 + k) - c k) loss = c
         let middle = a + b * (1.0 + k) - c * k;
         let loss = 2.0 * c / (middle + (middle * middle + 4.0 * a * k * c).sqrt());
@@ -82,7 +82,7 @@ impl Loss {
     }
 }
 
-impl Lost {
+impl InstantaneousLoss {
     /// Takes it off what has passed the relaxation.
     pub fn off(&self, signal: &mut Signal) {
         signal.before -= self.before;

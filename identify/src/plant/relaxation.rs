@@ -8,7 +8,7 @@
 //! follows is the voltage across the spring, or the spring's own state, in volts as well: `lag + part (q - lag)`, with the
 //! first lag's output for a part of 0, the whole stiffness for one of `share`.
 
-use crate::plant::start::Start;
+use crate::plant::initial_state::InitialState;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{self, PlantFile};
 
@@ -106,10 +106,10 @@ impl Relaxation {
 
     /// What becomes of the static stiffness; `levels_v` is the voltage across the spring in the middle of each piece,
     /// needed only if the time constant varies.
-    pub fn pass(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
+    pub fn pass(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
         let before = signal.before;
         let (share, main) = (self.share, self.main());
-        let mut at_first = |tau_s| Lag::at(tau_s, before + start.ask());
+        let mut at_first = |tau_s| Lag::at(tau_s, before + start.next_offset_v());
         let mut lag = at_first(self.tau_s);
         let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, at_first(it.tau_s))).collect();
         if further.is_empty() && !self.varies() {
@@ -129,7 +129,7 @@ impl Relaxation {
                 lag = lag.with_tau(self.tau_at(level));
             }
             let (start, end) = match by_state {
-                Some(at_once) => self.led(at_once, &mut lag, piece),
+                Some(instantaneous) => self.led(instantaneous, &mut lag, piece),
                 None => lag.pass(piece),
             };
             let (mut from, mut to) = (share * piece.from + main * start, share * piece.to + main * end);
@@ -144,7 +144,7 @@ impl Relaxation {
 
     /// Start and end of the first lag over a piece of its input, where the spring's state sets its time constant. Exact for the
     /// time constant that it has in the middle of each step.
-    fn led(&self, at_once: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
+    fn led(&self, instantaneous: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
         let start = lag.value();
         let fastest_s = self.tau_s.min(self.tau_high_s);
         let steps = (piece.duration_s / (STEP * fastest_s)).ceil().clamp(1.0, MOST_STEPS);
@@ -155,7 +155,7 @@ impl Relaxation {
             // Implicitly, so that it lies between the output and what that follows, however long the step.
             let ahead = 0.5 * duration_s / (lag.tau_s() + 0.5 * duration_s);
             let to_come = from + 0.5 * rise - lag.value();
-            let middle = lag.value() + (ahead + at_once * (1.0 - ahead)) * to_come;
+            let middle = lag.value() + (ahead + instantaneous * (1.0 - ahead)) * to_come;
             *lag = lag.with_tau(self.tau_at(middle));
             lag.pass(Piece { duration_s, from, to: from + rise });
             from += rise;

@@ -3,7 +3,7 @@
 //! What a lag makes of a piece is taken as straight by the lag behind it. So pieces are short just after a change of the
 //! voltage, beside the quickest time constants; later, short beside the time since: what bends so late has slow ones.
 
-use crate::record::signal::{Piece, Signal};
+use crate::record::signal::piecewise::{Piece, Signal};
 use simulation::schedule::{Schedule, Stretch};
 
 /// Longer pieces are divided just after a change: a curve of time constant 1 s departs from its chord by 1/800 of its change
@@ -35,7 +35,7 @@ impl Signal {
         let mut signal = Self { before, ..Self::default() };
         let mut reader = schedule.reader();
         let mut stretches = Vec::new();
-        let mut course = Course::new(schedule);
+        let mut course = LastChange::new(schedule);
         for pair in times_s.windows(2) {
             signal.start_row();
             reader.at(pair[0]);
@@ -74,14 +74,14 @@ impl Signal {
 }
 
 /// The straight line that a voltage has followed since it last changed.
-struct Course {
+struct LastChange {
     since_s: f64,
     from_v: f64,
     slope: f64,
     still_v: f64,
 }
 
-impl Course {
+impl LastChange {
     fn new(schedule: &Schedule) -> Self {
         let full_scale_v = schedule.pieces().iter().fold(0.0, |most: f64, piece| most.max(piece.from_v.abs()));
         Self { since_s: f64::NEG_INFINITY, from_v: f64::NAN, slope: 0.0, still_v: STILL * full_scale_v }
@@ -120,7 +120,7 @@ fn chord(stretches: &[Stretch], blur_v: f64) -> Option<Piece> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::signal::Lag;
+    use crate::record::signal::lag::Lag;
     use simulation::record::Record;
     use simulation::schedule::Between;
 

@@ -9,14 +9,14 @@
 //! fractional difference has just that memory, `1/f^(2 power)` (Granger and Joyeux 1980). It is run as first-order sections
 //! with zeros and poles in turn (Oustaloup 2000), from the record's length up to half a row.
 
-use crate::noise::octaves::Octaves;
-use crate::stats::median::running;
-use crate::stats::scale::scale as robust_scale;
+use crate::noise::band_spectrum::BandSpectrum;
+use crate::stats::median::running_median;
+use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
 
 /// A filter that turns noise with a memory into independent innovations.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Memory {
+pub struct Autocorrelation {
     /// Autoregression, lag 1 first.
     pub ar: Vec<f64>,
     /// Order of the fractional difference, 0 for none.
@@ -46,47 +46,47 @@ const PRICE_OF_POWER: f64 = 8.0;
 /// What the spectrum may misjudge, in nats.
 const UNSURE: f64 = 10.0;
 
-impl Memory {
+impl Autocorrelation {
     /// Of a residual with a robust scale.
     pub fn fitted(residual: &[f64], scale: f64) -> Self {
         if residual.len() < ROWS {
             return Self::default();
         }
         let clipped: Vec<f64> =
-            without_wild(residual).into_iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
+            without_outliers(residual).into_iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
         let rows = residual.len();
         let (ar, cost) = autoregression(&correlation(&clipped, LONGEST.min(rows / ROWS_PER_LAG)), rows);
         let alone = Self { ar, ..Self::default() };
-        if alone.is_none() || rows < ROWS_FOR_POWER {
+        if alone.is_white() || rows < ROWS_FOR_POWER {
             return alone;
         }
         // The power by the spectrum, which is quick; its price by what it really leaves.
-        let (by_spectrum, power) = likeliest_power(&Octaves::of(&clipped, 0.0), rows);
+        let (by_spectrum, power) = likeliest_power(&BandSpectrum::of(&clipped, 0.0), rows);
         if by_spectrum + PRICE_OF_POWER > cost + UNSURE {
             return alone;
         }
-        let mut memory = Self { power, ar: Vec::new(), sections: sections(power, rows) };
-        let (ar, with_power) = autoregression(&correlation(&memory.whitened(&clipped), LONGEST_BESIDE), rows);
-        memory.ar = ar;
-        if with_power + PRICE_OF_POWER < cost { memory } else { alone }
+        let mut filter = Self { power, ar: Vec::new(), sections: sections(power, rows) };
+        let (ar, with_power) = autoregression(&correlation(&filter.whitened(&clipped), LONGEST_BESIDE), rows);
+        filter.ar = ar;
+        if with_power + PRICE_OF_POWER < cost { filter } else { alone }
     }
 
     /// True if errors foretell nothing.
-    pub fn is_none(&self) -> bool {
+    pub fn is_white(&self) -> bool {
         self.ar.is_empty() && self.power == 0.0
     }
 
     /// Numbers that were fitted.
-    pub fn parameters(&self) -> usize {
+    pub fn parameter_count(&self) -> usize {
         self.ar.len() + usize::from(self.power > 0.0)
     }
 
     /// What the memory does not foretell of values with outliers, which foretell nothing: those are off by all that they are.
     pub fn innovations(&self, values: &[f64]) -> Vec<f64> {
-        if self.is_none() {
+        if self.is_white() {
             return values.to_vec();
         }
-        let tame = without_wild(values);
+        let tame = without_outliers(values);
         let white = self.whitened(&tame);
         white.into_iter().zip(values.iter().zip(tame)).map(|(white, (value, tame))| white + (value - tame)).collect()
     }
@@ -127,8 +127,8 @@ impl Memory {
 
 /// Values of which those wild beside their neighbours are their neighbours' median: an outlier has no memory, and many of
 /// them hide that of the noise (the cleaner of Martin and Thomson, *Proceedings of the IEEE* 70, 1982, in its simplest form).
-fn without_wild(values: &[f64]) -> Vec<f64> {
-    let medians = running(values);
+fn without_outliers(values: &[f64]) -> Vec<f64> {
+    let medians = running_median(values);
     let off: Vec<f64> = values.iter().zip(&medians).map(|(value, median)| value - median).collect();
     let wild = CLIP * robust_scale(&off);
     let tame = |((value, median), off): ((&f64, f64), &f64)| if off.abs() > wild { median } else { *value };
@@ -155,16 +155,16 @@ fn correlation(values: &[f64], longest: usize) -> Vec<f64> {
 }
 
 /// What a signal in independent noise of a scale costs, in nats, when nothing but a memory is there to foretell it.
-pub fn price(signal: &[f64], scale: f64) -> f64 {
+pub fn coding_cost(signal: &[f64], scale: f64) -> f64 {
     let (rows, noise) = (signal.len(), scale * scale);
-    let spectrum = Octaves::of(signal, noise);
+    let spectrum = BandSpectrum::of(signal, noise);
     let alone = autoregression(&spectrum.correlation(0.0, LONGEST.min(rows / ROWS_PER_LAG)), rows).1;
     let with_power = if rows < ROWS_FOR_POWER { alone } else { likeliest_power(&spectrum, rows).0 + PRICE_OF_POWER };
     (alone.min(with_power) - 0.5 * rows as f64 * noise.ln()).max(0.0)
 }
 
 /// The order of the fractional difference that suits a spectrum, an autoregression behind it, and the price of both in nats.
-fn likeliest_power(spectrum: &Octaves, rows: usize) -> (f64, f64) {
+fn likeliest_power(spectrum: &BandSpectrum, rows: usize) -> (f64, f64) {
     let cost = |power: f64| autoregression(&spectrum.correlation(power, LONGEST_BESIDE), rows).1;
     let mut best = (f64::INFINITY, 0.0);
     let mut step = 0.2;
@@ -218,10 +218,10 @@ mod tests {
         for row in 2..values.len() {
             values[row] += 1.2 * values[row - 1] - 0.5 * values[row - 2];
         }
-        let memory = Memory::fitted(&values, 2.0);
-        assert!(memory.power == 0.0 && memory.ar.len() == 2, "{memory:?}");
-        assert!((memory.ar[0] - 1.2).abs() < 0.05 && (memory.ar[1] + 0.5).abs() < 0.05, "{memory:?}");
-        assert!(Memory::fitted(&normals(4000), 1.0).is_none());
+        let filter = Autocorrelation::fitted(&values, 2.0);
+        assert!(filter.power == 0.0 && filter.ar.len() == 2, "{filter:?}");
+        assert!((filter.ar[0] - 1.2).abs() < 0.05 && (filter.ar[1] + 0.5).abs() < 0.05, "{filter:?}");
+        assert!(Autocorrelation::fitted(&normals(4000), 1.0).is_white());
     }
 
     #[test]
@@ -232,11 +232,11 @@ mod tests {
         }
         let tame = values.clone();
         values.iter_mut().skip(7).step_by(31).for_each(|value| *value += 40.0);
-        let memory = Memory::fitted(&values, 2.3);
-        assert!((memory.ar[0] - 0.9).abs() < 0.05 && memory.power == 0.0, "{memory:?}");
+        let filter = Autocorrelation::fitted(&values, 2.3);
+        assert!((filter.ar[0] - 0.9).abs() < 0.05 && filter.power == 0.0, "{filter:?}");
         let wild = |white: Vec<f64>| white.iter().filter(|white| white.abs() > 8.0).count();
-        assert_eq!(wild(memory.innovations(&values)), 2993usize.div_ceil(31));
-        assert!(wild(memory.whitened(&values)) > 180 && wild(memory.innovations(&tame)) == 0);
+        assert_eq!(wild(filter.innovations(&values)), 2993usize.div_ceil(31));
+        assert!(wild(filter.whitened(&values)) > 180 && wild(filter.innovations(&tame)) == 0);
     }
 
     /// Fractional noise by its definition: `(1 - B)^-d = sum psi_k B^k, psi_k = psi_(k-1) (k - 1 + d) / k`.
@@ -250,9 +250,9 @@ mod tests {
         }
         let value = |row: usize| psi.iter().enumerate().map(|(k, psi)| psi * innovations[row - k]).sum::<f64>();
         let values: Vec<f64> = (rows..2 * rows).map(value).collect();
-        let memory = Memory::fitted(&values, 1.5);
-        assert!((memory.power - power).abs() < 0.1, "{} {:?}", memory.power, memory.ar);
-        let left = memory.whitened(&values);
+        let filter = Autocorrelation::fitted(&values, 1.5);
+        assert!((filter.power - power).abs() < 0.1, "{} {:?}", filter.power, filter.ar);
+        let left = filter.whitened(&values);
         let off: f64 = left.iter().zip(&innovations[rows..]).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / rows as f64;
         assert!(off < 0.05, "{off}");
     }
@@ -261,9 +261,9 @@ mod tests {
     fn blocks_leave_no_seams() {
         let values = normals(3 * BLOCK + 7);
         let ar: Vec<f64> = (1..=LONGEST).map(|lag| (lag as f64).cos() / 50.0).collect();
-        let memory = Memory { ar, ..Memory::default() };
-        for (row, white) in memory.whitened(&values).into_iter().enumerate() {
-            let earlier = (1..).zip(&memory.ar).map(|(lag, phi)| phi * values[row.saturating_sub(lag)]);
+        let filter = Autocorrelation { ar, ..Autocorrelation::default() };
+        for (row, white) in filter.whitened(&values).into_iter().enumerate() {
+            let earlier = (1..).zip(&filter.ar).map(|(lag, phi)| phi * values[row.saturating_sub(lag)]);
             let exact = values[row] - earlier.sum::<f64>();
             assert!((white - exact).abs() < 1e-12, "{row}: {white} {exact}");
         }
@@ -271,8 +271,8 @@ mod tests {
 
     #[test]
     fn a_level_from_before_the_record_is_no_event() {
-        let memory = Memory { ar: vec![0.5, 0.2], power: 0.4, sections: sections(0.4, 500) };
-        let level = memory.whitened(&[1.0; 500]);
+        let filter = Autocorrelation { ar: vec![0.5, 0.2], power: 0.4, sections: sections(0.4, 500) };
+        let level = filter.whitened(&[1.0; 500]);
         assert!(level.iter().all(|value| (value - level[499]).abs() < 1e-9 && value.abs() < 0.1), "{:?}", &level[..9]);
     }
 
@@ -281,11 +281,11 @@ mod tests {
     fn a_signal_costs_what_a_memory_pays() {
         let weak: Vec<f64> = normals(3000).iter().map(|value| 0.2 * value).collect();
         let power = 0.5 * dot(&weak, &weak);
-        assert!((0.9..1.01).contains(&(price(&weak, 1.0) / power)), "{} {power}", price(&weak, 1.0));
+        assert!((0.9..1.01).contains(&(coding_cost(&weak, 1.0) / power)), "{} {power}", coding_cost(&weak, 1.0));
         let strong = |rows: u32| -> Vec<f64> {
             (0..rows).map(|row| 5.0 * (f64::from(row) / f64::from(rows) * std::f64::consts::TAU).sin()).collect()
         };
-        let [few, many] = [3000, 30_000].map(|rows| price(&strong(rows), 1.0));
+        let [few, many] = [3000, 30_000].map(|rows| coding_cost(&strong(rows), 1.0));
         let power = 0.5 * dot(&strong(3000), &strong(3000));
         assert!(few < 0.03 * power && many < 5.0 * few, "{few} {many} {power}");
     }

@@ -17,7 +17,7 @@ use simulation::plant_file::Memory;
 
 /// A bank of play operators; without plays and with `direct = 1`, no memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bank {
+pub struct PlayBank {
     /// Weight of the input itself.
     pub direct: f64,
     plays: Vec<Play>,
@@ -32,7 +32,7 @@ struct Play {
     value: f64,
 }
 
-impl Bank {
+impl PlayBank {
     /// Of plays with their thresholds, in V, and weights; those without weight are left out.
     pub fn new(direct: f64, plays: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let plays = plays.into_iter().filter(|(_, weight)| *weight != 0.0);
@@ -184,14 +184,14 @@ mod tests {
     /// One play of weight 1 lags by its threshold on both branches.
     #[test]
     fn a_whole_play_is_twice_its_threshold_wide() {
-        let width = Bank::new(0.0, [(20.0, 1.0)]).width(500.0);
+        let width = PlayBank::new(0.0, [(20.0, 1.0)]).width(500.0);
         assert!((width - 40.0).abs() < 0.5, "{width}");
     }
 
     /// The second time up is the same for both: the first has then been cycled too.
     #[test]
     fn a_cycled_bank_begins_where_a_large_voltage_leaves_it() {
-        let mut fresh = Bank::new(0.6, [(20.0, 0.1), (60.0, 0.3)]);
+        let mut fresh = PlayBank::new(0.6, [(20.0, 0.1), (60.0, 0.3)]);
         let mut cycled = fresh.clone().cycled();
         assert_eq!(cycled.clone().at_rest(), fresh);
         assert_eq!(cycled.clone().at(0.0), 0.0);
@@ -204,11 +204,13 @@ mod tests {
 
     #[test]
     fn a_bank_behind_a_bank_is_one_bank() {
-        let first = Bank::new(0.5, [(20.0, 0.3), (45.0, 0.4)]);
-        let none = Bank::new(1.0, []);
+        let first = PlayBank::new(0.5, [(20.0, 0.3), (45.0, 0.4)]);
+        let none = PlayBank::new(1.0, []);
         assert_eq!(first.behind(&none), first);
-        let whole = Bank::new(0.0, [(15.0, 0.5), (15.0, 0.5)]);
-        for second in [whole, Bank::new(0.0, [(30.0, 1.0)]), Bank::new(-0.3, [(10.0, 0.9), (30.0, 0.2), (90.0, 0.4)])] {
+        let whole = PlayBank::new(0.0, [(15.0, 0.5), (15.0, 0.5)]);
+        for second in
+            [whole, PlayBank::new(0.0, [(30.0, 1.0)]), PlayBank::new(-0.3, [(10.0, 0.9), (30.0, 0.2), (90.0, 0.4)])]
+        {
             let mut both = second.behind(&first);
             let (mut first, mut second) = (first.clone(), second.clone());
             for step in 0..4000 {

@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::stats::scale::scale;
+use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
 
 /// Errors this many scales large count as that large.
@@ -21,12 +21,12 @@ const FADED: f64 = 0.05;
 
 /// The states of a chain, in the order in which they ask: all at rest, or one of them 1 V off.
 #[derive(Debug, Default)]
-pub struct Start {
+pub struct InitialState {
     asked: usize,
     off: Option<usize>,
 }
 
-impl Start {
+impl InitialState {
     /// All at rest.
     pub fn at_rest() -> Self {
         Self::default()
@@ -38,7 +38,7 @@ impl Start {
     }
 
     /// How far the next state is off its rest, in V.
-    pub fn ask(&mut self) -> f64 {
+    pub fn next_offset_v(&mut self) -> f64 {
         self.asked += 1;
         f64::from(u8::from(self.off == Some(self.asked - 1)))
     }
@@ -51,7 +51,7 @@ impl Start {
 
 /// Takes the likeliest start off a residual, by what `counts` of its rows; states are off by about `reach_v`. What that start
 /// costs, in nats: each state by Schwarz's criterion, and what the prior says against it.
-pub(crate) fn take_off(
+pub(crate) fn subtract_estimate(
     residual: &mut [f64],
     kernels: &[Vec<f64>],
     reach_v: f64,
@@ -64,7 +64,7 @@ pub(crate) fn take_off(
     let mut start = DVector::zeros(kernels.len());
     let mut left = read.clone();
     let mut weighted = left.clone();
-    let (mut usual, mut far) = (scale(&left), f64::INFINITY);
+    let (mut usual, mut far) = (robust_scale(&left), f64::INFINITY);
     for round in 1..=ROUNDS {
         let prior = (usual / reach_v).powi(2);
         let mut normal = DMatrix::from_diagonal_element(kernels.len(), kernels.len(), prior);
@@ -80,7 +80,7 @@ pub(crate) fn take_off(
         if round < ROUNDS {
             left.clone_from(&read);
             take(&start, &told, &mut left);
-            usual = scale(&left);
+            usual = robust_scale(&left);
             far = FAR * usual;
         }
     }
@@ -142,10 +142,10 @@ mod tests {
             Simulator::new(&whole, &base).run(&model, &mut readings);
             let data = Data::new(&record(CUT..ROWS, |row| readings[row]), Input::Hold);
             let observed = Observed::new(&data);
-            let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &base));
+            let mut engine = Engine::new(&data, &observed, &base);
             let residual = engine.residual(&model);
             let left = residual.iter().fold(0.0f64, |far, left| far.max(left.abs()));
-            assert!(data.begun && left < 0.01, "{blocks:?}: {left} V");
+            assert!(data.initial_state_unknown && left < 0.01, "{blocks:?}: {left} V");
         }
     }
 }

@@ -14,11 +14,11 @@ const RELATIVE: f64 = 0.02;
 const WIDEST: f64 = PI / 300.0;
 
 /// Mean frequency, in radians a row, and power of each band.
-pub(super) struct Octaves {
+pub(super) struct BandSpectrum {
     bands: Vec<(f64, f64)>,
 }
 
-impl Octaves {
+impl BandSpectrum {
     /// Of some values, and independent noise of this variance beside them; their mean counts as the lowest frequency.
     pub(super) fn of(values: &[f64], variance: f64) -> Self {
         let powers = powers(values);
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn without_a_difference_it_is_the_correlation_itself() {
         let values = normals(3000);
-        let of_bands = Octaves::of(&values, 0.0).correlation(0.0, 12);
+        let of_bands = BandSpectrum::of(&values, 0.0).correlation(0.0, 12);
         for (lag, of_bands) in of_bands.into_iter().enumerate() {
             let exact: f64 = values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / 3000.0;
             assert!((of_bands - exact).abs() < 2e-3, "{lag}: {of_bands} {exact}");
@@ -80,7 +80,7 @@ mod tests {
         let values = normals(3000);
         let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let exact: f64 = steps.iter().map(|step| step * step).sum::<f64>() / 3000.0;
-        let of_bands = Octaves::of(&values, 0.0).correlation(1.0, 12)[0];
+        let of_bands = BandSpectrum::of(&values, 0.0).correlation(1.0, 12)[0];
         assert!((of_bands - exact).abs() < 5e-3, "{of_bands} {exact}");
     }
 }
