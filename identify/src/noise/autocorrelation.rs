@@ -1,53 +1,54 @@
-//! What earlier errors foretell of the next.
+//! Autocorrelated noise: the filter that turns it into independent innovations.
 //!
 //! ```text
-//! phi(B) (1 - B)^power r = e,      B: one row back
+//! phi(B) (1 - B)^power r = e,      B: shift by one row back
 //! ```
 //!
-//! The autoregression `phi` is chosen by Schwarz's criterion (Levinson's recursion). Noise as strong in every octave (1/f, a
-//! sensor's flicker) has no finite autoregression: what is left of its slow swings passes for a drift or a shift. The
-//! fractional difference has just that memory, `1/f^(2 power)` (Granger and Joyeux 1980). It is run as first-order sections
-//! with zeros and poles in turn (Oustaloup 2000), from the record's length up to half a row.
+//! The order of the autoregression `phi` is chosen by Schwarz's criterion (Levinson's recursion). 1/f noise, the
+//! flicker noise of sensors, has no finite autoregression; its slow components would be taken for a drift or an offset.
+//! A fractional difference has exactly the spectrum `1/f^(2 power)` (Granger and Joyeux 1980). It is implemented as
+//! first-order sections with alternating zeros and poles (Oustaloup 2000), from one period per record up to half a
+//! cycle per row.
 
 use crate::noise::band_spectrum::BandSpectrum;
 use crate::stats::median::running_median;
 use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
 
-/// A filter that turns noise with a memory into independent innovations.
+/// A filter from autocorrelated noise to independent innovations; the default passes every value unchanged.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Autocorrelation {
-    /// Autoregression, lag 1 first.
+    /// Coefficients of the autoregression, lag 1 first.
     pub ar: Vec<f64>,
     /// Order of the fractional difference, 0 for none.
     pub power: f64,
-    /// Zero and pole of each section.
+    /// Zero and pole of each section of the fractional difference.
     sections: Vec<(f64, f64)>,
 }
 
-/// Longest autoregression, in rows, and rows of the record for each.
+/// Largest order of the autoregression, in rows, and number of rows that each lag needs.
 const LONGEST: usize = 50;
 const ROWS_PER_LAG: usize = 12;
-/// And behind a fractional difference, which has the rest.
+/// Largest order of the autoregression behind a fractional difference.
 const LONGEST_BESIDE: usize = 12;
-/// Shorter records have no memory that could be told from structure.
+/// In records with fewer rows autocorrelation cannot be distinguished from structure.
 const ROWS: usize = 24;
-/// Nor a power law in these.
+/// In records with fewer rows a fractional difference is not tried.
 const ROWS_FOR_POWER: usize = 150;
-/// A section spans this ratio of frequencies.
+/// Ratio of the frequencies that one section spans.
 const SPAN: f64 = 4.0;
-/// Rows that are whitened at a time.
+/// Number of rows that are whitened at a time.
 const BLOCK: usize = 1024;
-/// Beyond these, in robust scales, a residual does not teach the memory.
+/// Residuals are clipped at this many robust scales before the filter is fitted.
 const CLIP: f64 = 4.0;
-/// What a fractional difference must be likelier by than an autoregression alone, in nats: structure that is not yet
-/// explained looks like it too.
+/// Gain in nats by which a fractional difference must exceed an autoregression alone; unexplained structure has a
+/// similar spectrum.
 const PRICE_OF_POWER: f64 = 8.0;
-/// What the spectrum may misjudge, in nats.
+/// Error of a likelihood that is computed from the spectrum, in nats.
 const UNSURE: f64 = 10.0;
 
 impl Autocorrelation {
-    /// Of a residual with a robust scale.
+    /// Fits the filter to a residual with the given robust scale, in V.
     pub fn fitted(residual: &[f64], scale: f64) -> Self {
         if residual.len() < ROWS {
             return Self::default();
@@ -60,7 +61,8 @@ impl Autocorrelation {
         if alone.is_white() || rows < ROWS_FOR_POWER {
             return alone;
         }
-        // The power by the spectrum, which is quick; its price by what it really leaves.
+        // The order is estimated from the spectrum, which is fast; whether it pays is decided with the whitened
+        // residual.
         let (by_spectrum, power) = likeliest_power(&BandSpectrum::of(&clipped, 0.0), rows);
         if by_spectrum + PRICE_OF_POWER > cost + UNSURE {
             return alone;
@@ -71,17 +73,18 @@ impl Autocorrelation {
         if with_power + PRICE_OF_POWER < cost { filter } else { alone }
     }
 
-    /// True if errors foretell nothing.
+    /// Returns true if the noise is not autocorrelated.
     pub fn is_white(&self) -> bool {
         self.ar.is_empty() && self.power == 0.0
     }
 
-    /// Numbers that were fitted.
+    /// Returns the number of fitted parameters.
     pub fn parameter_count(&self) -> usize {
         self.ar.len() + usize::from(self.power > 0.0)
     }
 
-    /// What the memory does not foretell of values with outliers, which foretell nothing: those are off by all that they are.
+    /// Returns the innovations of values with outliers: outliers do not affect the innovations of later rows, and keep
+    /// their whole size in their own.
     pub fn innovations(&self, values: &[f64]) -> Vec<f64> {
         if self.is_white() {
             return values.to_vec();
@@ -91,10 +94,11 @@ impl Autocorrelation {
         white.into_iter().zip(values.iter().zip(tame)).map(|(white, (value, tame))| white + (value - tame)).collect()
     }
 
-    /// What the memory does not foretell. Before the first row, everything is taken to have been as it is there.
+    /// Returns the innovations of a residual; all rows before the first are taken to have had its value.
     pub fn whitened(&self, residual: &[f64]) -> Vec<f64> {
         let mut rough = residual.to_vec();
-        // Value before and after each section. All sections in one pass over the rows: they do not wait for each other.
+        // Input and output of each section at the previous row. All sections share one pass over the rows, so their
+        // operations overlap.
         let mut first = rough.first().copied().unwrap_or(0.0);
         let at_rest = |&(zero, pole): &(f64, f64)| {
             let before = first;
@@ -110,7 +114,7 @@ impl Autocorrelation {
             }
         }
         let mut white = rough.clone();
-        // Block by block, so that a block stays in the cache while all lags pass over it.
+        // A block stays in the cache while all lags pass over it.
         for (block, white) in white.chunks_mut(BLOCK).enumerate() {
             let first = block * BLOCK;
             for (lag, phi) in (1usize..).zip(&self.ar) {
@@ -125,8 +129,9 @@ impl Autocorrelation {
     }
 }
 
-/// Values of which those wild beside their neighbours are their neighbours' median: an outlier has no memory, and many of
-/// them hide that of the noise (the cleaner of Martin and Thomson, *Proceedings of the IEEE* 70, 1982, in its simplest form).
+/// Returns the values with outliers replaced by the median of their neighbours. Outliers are independent, and many of
+/// them hide the autocorrelation of the noise (the cleaner of Martin and Thomson, *Proceedings of the IEEE* 70, 1982,
+/// in its simplest form).
 fn without_outliers(values: &[f64]) -> Vec<f64> {
     let medians = running_median(values);
     let off: Vec<f64> = values.iter().zip(&medians).map(|(value, median)| value - median).collect();
@@ -135,7 +140,7 @@ fn without_outliers(values: &[f64]) -> Vec<f64> {
     values.iter().zip(medians).zip(&off).map(tame).collect()
 }
 
-/// Zeros and poles of `(1 - B)^power`.
+/// Returns zeros and poles of the sections that approximate `(1 - B)^power`.
 fn sections(power: f64, rows: usize) -> Vec<(f64, f64)> {
     let (lowest, highest) = (std::f64::consts::TAU / rows as f64, std::f64::consts::PI);
     let count = ((highest / lowest).ln() / SPAN.ln()).ceil().max(1.0);
@@ -148,13 +153,14 @@ fn sections(power: f64, rows: usize) -> Vec<(f64, f64)> {
     (0..count as u32).map(section).collect()
 }
 
-/// Correlation of values with those of up to `longest` rows before.
+/// Returns the autocovariances at lags 0 to `longest`.
 fn correlation(values: &[f64], longest: usize) -> Vec<f64> {
     let at = |lag: usize| dot(&values[..values.len() - lag], &values[lag..]) / values.len() as f64;
     (0..=longest).map(at).collect()
 }
 
-/// What a signal in independent noise of a scale costs, in nats, when nothing but a memory is there to foretell it.
+/// Returns the cost of a signal in nats: by how much it reduces the log-likelihood under independent noise of the given
+/// scale, in V, if only an autocorrelation filter may describe it.
 pub fn coding_cost(signal: &[f64], scale: f64) -> f64 {
     let (rows, noise) = (signal.len(), scale * scale);
     let spectrum = BandSpectrum::of(signal, noise);
@@ -163,7 +169,8 @@ pub fn coding_cost(signal: &[f64], scale: f64) -> f64 {
     (alone.min(with_power) - 0.5 * rows as f64 * noise.ln()).max(0.0)
 }
 
-/// The order of the fractional difference that suits a spectrum, an autoregression behind it, and the price of both in nats.
+/// Returns the cost in nats of the most likely fractional difference with an autoregression behind it, and the order of
+/// the difference.
 fn likeliest_power(spectrum: &BandSpectrum, rows: usize) -> (f64, f64) {
     let cost = |power: f64| autoregression(&spectrum.correlation(power, LONGEST_BESIDE), rows).1;
     let mut best = (f64::INFINITY, 0.0);
@@ -182,8 +189,8 @@ fn likeliest_power(spectrum: &BandSpectrum, rows: usize) -> (f64, f64) {
     best
 }
 
-/// Autoregression of as many rows as there are lags at most, and the negative log-likelihood it leaves, its own price in it,
-/// in nats.
+/// Returns the autoregression of the order that Schwarz's criterion chooses, and its negative log-likelihood in nats,
+/// with the cost of its parameters.
 fn autoregression(correlation: &[f64], rows: usize) -> (Vec<f64>, f64) {
     let rows = rows as f64;
     let mut error = correlation[0];
@@ -239,7 +246,8 @@ mod tests {
         assert!(wild(filter.whitened(&values)) > 180 && wild(filter.innovations(&tame)) == 0);
     }
 
-    /// Fractional noise by its definition: `(1 - B)^-d = sum psi_k B^k, psi_k = psi_(k-1) (k - 1 + d) / k`.
+    /// Fractional noise is generated by its definition: `(1 - B)^-d = sum psi_k B^k, psi_k = psi_(k-1) (k - 1 + d) /
+    /// k`.
     #[test]
     fn a_power_law_is_recovered_and_whitened() {
         let (rows, power) = (3000, 0.45);
@@ -276,7 +284,8 @@ mod tests {
         assert!(level.iter().all(|value| (value - level[499]).abs() < 1e-9 && value.abs() < 0.1), "{:?}", &level[..9]);
     }
 
-    /// Weak or quick, it costs its power beside the noise's; slow and strong, a few numbers that foretell it.
+    /// A weak or fast signal costs its power relative to the noise; a strong slow one costs the few parameters that
+    /// predict it.
     #[test]
     fn a_signal_costs_what_a_memory_pays() {
         let weak: Vec<f64> = normals(3000).iter().map(|value| 0.2 * value).collect();

@@ -1,4 +1,5 @@
-//! A spectrum in bands, narrow where frequencies are low: what a fractional difference would leave, without running it.
+//! A power spectrum in bands of constant relative width, from which the autocovariance after a fractional difference
+//! follows without filtering.
 //!
 //! ```text
 //! correlation(k) = sum_bands power |1 - exp(-i w)|^(2 d) cos(k w)
@@ -8,25 +9,26 @@ use std::f64::consts::{PI, TAU};
 
 use crate::stats::periodogram::powers;
 
-/// Width of a band beside its frequency.
+/// Width of a band relative to its frequency.
 const RELATIVE: f64 = 0.02;
-/// And at most, in radians a row: short beside a period of the longest lag.
+/// Largest width of a band, in radians per row: short compared with a period of the longest lag.
 const WIDEST: f64 = PI / 300.0;
 
-/// Mean frequency, in radians a row, and power of each band.
+/// Mean frequency, in radians per row, and power of each band.
 pub(super) struct BandSpectrum {
     bands: Vec<(f64, f64)>,
 }
 
 impl BandSpectrum {
-    /// Of some values, and independent noise of this variance beside them; their mean counts as the lowest frequency.
+    /// Returns the spectrum of values in additional independent noise of the given variance; the mean counts as half of
+    /// the lowest frequency.
     pub(super) fn of(values: &[f64], variance: f64) -> Self {
         let powers = powers(values);
         let length = 2 * (powers.len() - 1);
         let line = TAU / length as f64;
         let mut bands: Vec<(f64, f64)> = Vec::new();
         let mut end = 0.0;
-        // Sums of power, and of power times frequency.
+        // Each band holds the sum of power times frequency, and the sum of power.
         for (index, of_values) in powers.into_iter().enumerate() {
             let sides = if index == 0 || 2 * index == length { 1.0 } else { 2.0 };
             let power = sides * (of_values / values.len() as f64 + variance) / length as f64;
@@ -42,12 +44,12 @@ impl BandSpectrum {
         Self { bands: bands.into_iter().map(|(sum, power)| (sum / power.max(1e-300), power)).collect() }
     }
 
-    /// Correlations of up to `longest` rows after a fractional difference of order `power`.
+    /// Returns the autocovariances at lags 0 to `longest` after a fractional difference of order `power`.
     pub(super) fn correlation(&self, power: f64, longest: usize) -> Vec<f64> {
         let mut correlation = vec![0.0; longest + 1];
         for &(frequency, of_band) in &self.bands {
             let left = of_band * (2.0 * (frequency / 2.0).sin()).powf(2.0 * power);
-            // cos((k + 1) w) = 2 cos(w) cos(k w) - cos((k - 1) w)
+            // The recurrence is cos((k + 1) w) = 2 cos(w) cos(k w) - cos((k - 1) w).
             let (mut before, mut now) = (frequency.cos(), 1.0);
             let twice = 2.0 * before;
             for sum in &mut correlation {
@@ -74,7 +76,7 @@ mod tests {
         }
     }
 
-    /// An order of 1 is the difference of neighbours.
+    /// A fractional difference of order 1 is the difference of neighbours.
     #[test]
     fn a_whole_difference_is_that_of_neighbours() {
         let values = normals(3000);

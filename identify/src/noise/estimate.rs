@@ -7,7 +7,7 @@ use crate::record::quantisation_grid::QuantisationGrid;
 use crate::stats::scale::{FINEST_V, negligible, robust_scale, root_mean_square};
 
 impl Noise {
-    /// The law that suits what a model leaves.
+    /// Returns the law of the noise that fits a residual, in V.
     pub fn fitted(residual: &[f64], observed: &Observed) -> Self {
         let residual = &*observed.errors(residual);
         let mut noise = Self::robust(&observed.uncensored(residual));
@@ -33,13 +33,13 @@ impl Noise {
         noise.fit_tail(&observed.uncensored(&innovations));
         if noise.outliers.is_none() {
             let white = noise.whitened(residual);
-            // Mostly nothing is wild, and they are the same.
+            // Both are the same unless there are outliers.
             if white != innovations {
                 noise.fit_tail(&observed.uncensored(&white));
             }
         }
         if !noise.autocorrelation.is_white() && noise.nu.is_finite() {
-            // Squares chose it, of errors that were clipped; where the tail is heavy, the likelihood may not want it.
+            // The filter was chosen by least squares of clipped errors; under a heavy tail it may lower the likelihood.
             let mut alone = Self { autocorrelation: Autocorrelation::default(), ..noise.clone() };
             alone.fit_tail(&observed.uncensored(&even));
             let worth = |noise: &Self| noise.log_likelihood(residual, observed) - noise.cost(residual.len());
@@ -51,7 +51,7 @@ impl Noise {
         noise
     }
 
-    /// The same law with the scale that suits a residual, and the log-likelihood of all rows under it.
+    /// Returns the same law with the scale fitted to a residual, and the log-likelihood of all rows under it.
     pub fn rescaled(&self, residual: &[f64], observed: &Observed) -> (Self, f64) {
         let errors = &*observed.errors(residual);
         let white = self.innovations(errors);
@@ -68,7 +68,7 @@ impl Noise {
     }
 }
 
-/// What is left of a scale when rounding to a step is taken off, in V.
+/// Returns the scale that remains after the variance of rounding to a step, `step^2 / 12`, is subtracted, in V.
 fn rest_of(scale: f64, step: f64) -> f64 {
     (scale * scale - step * step / 12.0).max(0.0).sqrt()
 }
@@ -91,13 +91,13 @@ mod tests {
         }
     }
 
-    /// A normal over the root of a chi-square over its four degrees of freedom: Student's t.
+    /// Returns numbers of Student's t distribution with four degrees of freedom.
     fn heavy(rows: usize) -> Vec<f64> {
         let student = |five: &[f64]| five[0] / (five[1..].iter().map(|x| x * x).sum::<f64>() / 4.0).sqrt();
         normals(5 * rows).chunks(5).map(student).collect()
     }
 
-    /// A memory that squares see by chance would make room for whatever does without it.
+    /// A spurious autocorrelation would also absorb structure, so it must be rare.
     #[test]
     fn independent_noise_of_a_heavy_tail_remembers_nothing() {
         let remembers = |rows: &&[f64]| !Noise::fitted(rows, &as_read(rows.len())).autocorrelation.is_white();
@@ -134,7 +134,7 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(row, noise)| {
-                // Wherever in a cell the truth lies.
+                // The true value may lie anywhere in a cell.
                 let truth = 0.37 * row as f64;
                 ((truth + noise) / step).round() * step - truth
             })

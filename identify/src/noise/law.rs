@@ -19,29 +19,29 @@ use crate::stats::sums::dot;
 pub struct Noise {
     /// Scale of the innovations, in V.
     pub sigma: f64,
-    /// Degrees of freedom of the tail.
+    /// Degrees of freedom of Student's t distribution; infinite for a normal one.
     pub nu: f64,
-    /// What earlier errors foretell.
+    /// Autocorrelation of the residual.
     pub autocorrelation: Autocorrelation,
-    /// Fraction of outliers, and their scale in V.
+    /// Fraction of outliers, and their scale in V; `None` without outliers.
     pub outliers: Option<(f64, f64)>,
-    /// Half of the readings' step, where it is coarse beside the noise, in V.
+    /// Half of the quantisation step if that is coarse compared with the noise, in V, else 0.
     pub half_step: f64,
-    /// Scale of the residual itself, in V.
+    /// Scale of the residual itself, autocorrelated part included, in V.
     pub marginal: f64,
-    /// One over each row's scale, their geometric mean 1.
+    /// Reciprocal scale of each row, with a geometric mean of 1; `None` if the scale is constant.
     pub(super) weights: Option<Arc<[f64]>>,
-    /// What of a row's log-density its residual does not change.
+    /// Part of the log-density that does not depend on the residual.
     pub(super) constant: f64,
 }
 
 impl Noise {
-    /// Independent, with a moderately heavy tail, of any scale: for a first look at anything.
+    /// Returns the law for first fits: independent noise with a moderately heavy tail, and a scale of 1 V.
     pub fn default_robust() -> Self {
         Self::robust(&[1.0])
     }
 
-    /// As [`Noise::default_robust`], with the scale of a residual.
+    /// Returns the law of [`Noise::default_robust`] with the robust scale of a residual, in V.
     pub fn robust(residual: &[f64]) -> Self {
         let sigma = robust_scale(residual);
         let noise = Self {
@@ -57,24 +57,24 @@ impl Noise {
         noise.with_tail(5.0, sigma)
     }
 
-    /// The same with another tail and scale, [`FINEST_V`] at least.
+    /// Returns the same law with another tail and scale, at least [`FINEST_V`].
     pub(super) fn with_tail(&self, nu: f64, sigma: f64) -> Self {
         let sigma = sigma.max(FINEST_V);
         let shape = if nu.is_finite() { tail_constant(nu) } else { -HALF_LN_TAU };
         Self { nu, sigma, constant: shape - sigma.ln(), ..self.clone() }
     }
 
-    /// What is not seen in it, in V, however many rows show it.
+    /// Returns the size, in V, below which a misfit is hidden by the noise, however many rows show it.
     pub fn floor_v(&self) -> f64 {
         self.marginal.max(self.half_step)
     }
 
-    /// What the noise's memory does not foretell.
+    /// Returns the innovations of a change of the prediction, in V: weighted, and filtered by the autocorrelation.
     pub fn whitened(&self, change: &[f64]) -> Vec<f64> {
         self.autocorrelation.whitened(&self.weighted(change))
     }
 
-    /// The same of a residual: its outliers foretell nothing.
+    /// Returns the innovations of a residual, in V; outliers do not affect later rows.
     pub fn innovations(&self, residual: &[f64]) -> Vec<f64> {
         if self.outliers.is_some() {
             self.autocorrelation.innovations(&self.weighted(residual))
@@ -83,7 +83,7 @@ impl Noise {
         }
     }
 
-    /// As if the noise were even.
+    /// Returns the values multiplied by the weights of their rows, so that their noise has a constant scale.
     pub fn weighted<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
         match &self.weights {
             None => Cow::Borrowed(values),
@@ -91,10 +91,10 @@ impl Noise {
         }
     }
 
-    /// The part of a row in a fit: `residual` as it is, `innovation` whitened.
+    /// Returns the contribution of a row to a fit, from its residual and its innovation, in V.
     pub fn term(&self, kind: Kind, residual: f64, innovation: f64) -> Term {
         match kind {
-            // What is rounded comes to a bound from half a step before it.
+            // Rounded readings reach a bound half a step before it.
             Kind::AtLeast => stopped(residual - self.half_step, self.marginal),
             Kind::AtMost => {
                 let term = stopped(-residual - self.half_step, self.marginal);
@@ -114,7 +114,7 @@ impl Noise {
         Term { log, residual: e, weight: self.weight(e) }
     }
 
-    /// Minus the slope of the log-density over the innovation, in 1/V^2.
+    /// Returns minus the derivative of the log-density divided by the innovation, in 1/V^2.
     pub(super) fn weight(&self, e: f64) -> f64 {
         let variance = self.sigma * self.sigma;
         if let Some((_, wide)) = self.outliers {
@@ -127,19 +127,19 @@ impl Noise {
         (self.nu + 1.0) / (self.nu * variance + e * e)
     }
 
-    /// Of a usual reading and of an outlier, less a constant.
+    /// Returns the densities of a regular reading and of an outlier, without the factor `1 / sqrt(2 pi)`.
     fn densities(&self, e: f64) -> [f64; 2] {
         let (fraction, wide) = self.outliers.unwrap_or((0.0, self.sigma));
         let normal = |scale: f64| (-0.5 * (e / scale).powi(2)).exp() / scale;
         [(1.0 - fraction) * normal(self.sigma), fraction * normal(wide)]
     }
 
-    /// Log-likelihood of all rows.
+    /// Returns the log-likelihood of all rows, in nats.
     pub fn log_likelihood(&self, residual: &[f64], observed: &Observed) -> f64 {
         self.log_likelihood_of(residual, &self.innovations(&observed.errors(residual)), observed)
     }
 
-    /// The same, of a residual that is whitened already.
+    /// Returns the same for a residual whose innovations are known.
     pub(super) fn log_likelihood_of(&self, residual: &[f64], white: &[f64], observed: &Observed) -> f64 {
         let plain = self.half_step == 0.0 && self.outliers.is_none() && observed.all_exact();
         if !plain {
@@ -151,14 +151,14 @@ impl Noise {
         if self.nu.is_infinite() {
             return count - 0.5 * dot(white, white) / variance;
         }
-        // The logarithm of a product is dear once, not eight times; eight factors cannot overflow below 1e38 each.
+        // One logarithm of a product replaces eight; eight factors below 1e38 cannot overflow.
         let narrow = 1.0 / (self.nu * variance);
         let factor = |e: &f64| (1.0 + e * e * narrow).min(1e38);
         let logs: f64 = white.chunks(8).map(|chunk| chunk.iter().map(factor).product::<f64>().ln()).sum();
         count - 0.5 * (self.nu + 1.0) * logs
     }
 
-    /// Log-likelihood of each row.
+    /// Returns the log-likelihood of each row, in nats.
     pub fn row_log_likelihoods<'a>(
         &'a self,
         residual: &'a [f64],
@@ -168,14 +168,14 @@ impl Noise {
         (0..residual.len()).map(move |row| self.term(observed.kinds[row], residual[row], white[row]).log)
     }
 
-    /// What its parameters cost by Schwarz's criterion, in nats.
+    /// Returns the cost of the law's parameters by Schwarz's criterion, in nats.
     pub fn cost(&self, rows: usize) -> f64 {
         let parameters = (self.autocorrelation.parameter_count() + usize::from(self.nu.is_finite())) as f64;
         0.5 * (rows.max(2) as f64).ln() * parameters
     }
 }
 
-/// Logarithm of the t distribution's constant.
+/// Returns the logarithm of the normalising constant of Student's t distribution.
 fn tail_constant(nu: f64) -> f64 {
     libm::lgamma(0.5 * (nu + 1.0)) - libm::lgamma(0.5 * nu) - 0.5 * (nu * std::f64::consts::PI).ln()
 }
@@ -185,7 +185,7 @@ mod tests {
     use super::*;
     use crate::stats::scale::normals;
 
-    /// A spring at 98 V reads 100 V in steps of 5 V, whether or not it stops there.
+    /// A spring at 98 V reads 100 V in steps of 5 V, whether there is a bound at 100 V or not.
     #[test]
     fn what_is_rounded_comes_to_a_bound_from_half_a_step_before_it() {
         let noise = Noise { half_step: 2.5, sigma: 0.2, marginal: 0.2, ..Noise::robust(&normals(100)) };
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// The weight is minus the slope of the log-density over the innovation.
+    /// The weight is minus the derivative of the log-density divided by the innovation.
     #[test]
     fn a_weight_is_the_slope_of_its_density() {
         let mut mixture = Noise::robust(&normals(100));

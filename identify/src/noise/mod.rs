@@ -7,15 +7,15 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | [`term`] | log-probability and weight of one reading |
+//! | `term` | log-probability and weight of one reading |
 //! | [`autocorrelation`] | the filter that turns autocorrelated noise into independent innovations |
-//! | [`law`] | autocorrelation, scale and tail together, and the likelihood of a record |
-//! | [`tail`] | fit of scale and tail to innovations |
-//! | [`rounding`] | fit of the scale to rounded readings |
-//! | [`estimate`] | all of these fitted to a residual |
+//! | `law` | autocorrelation, scale and tail together, and the likelihood of a record |
+//! | `tail` | fit of scale and tail to innovations |
+//! | `rounding` | fit of the scale to rounded readings |
+//! | `estimate` | all of these fitted to a residual |
 //!
-//! A model of independent errors would report autocorrelated noise as structure; a model of normal errors would let a few
-//! outliers decide.
+//! Without autocorrelation in the model, coloured noise would be reported as structure; without a heavy tail, a few
+//! outliers would decide the fit.
 
 pub mod autocorrelation;
 mod band_spectrum;

@@ -8,7 +8,7 @@ use crate::stats::scale::{FINEST_V, root_mean_square};
 use crate::stats::sums::total;
 
 impl Noise {
-    /// The scale under which rounded readings are likeliest: golden section on its logarithm.
+    /// Sets the scale under which rounded readings are most likely, by golden-section search on its logarithm.
     pub(super) fn rescale_cells(&mut self, residual: &[f64], observed: &Observed) {
         let in_cells = sizes(&observed.uncensored(residual), 0.5 * self.half_step.max(root_mean_square(residual)));
         let rows = || residual.iter().zip(&observed.kinds);

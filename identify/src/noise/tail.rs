@@ -1,18 +1,18 @@
-//! The tail of the innovations: a normal's, Student's t, or a mixture of two normals, by likelihood.
+//! The tail of the innovations: normal, Student's t, or a mixture of two normals, chosen by likelihood.
 
 use crate::noise::law::Noise;
 use crate::stats::scale::{FINEST_V, robust_scale, root_mean_square};
 use crate::stats::sums::total;
 
 const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];
-/// What a mixture must be better by than one heavy tail, in nats, to be outliers.
+/// Gain in nats by which a mixture must exceed one heavy tail to count as outliers.
 const OUTLIERS: f64 = 7.0;
-/// Where more readings than this part are off, they are no outliers.
+/// A mixture with a larger fraction of the wider normal is not taken for outliers.
 const MOST_OUTLIERS: f64 = 0.25;
-/// So few errors are taken one by one; of more, sizes are alike in cells, so many for each scale.
+/// Up to this many errors are used one by one; more are grouped into cells by size, [`CELLS`] for each scale.
 const FEW: usize = 1_000;
 const CELLS: f64 = 100.0;
-/// Scale of outliers in the noise's scales, at least.
+/// Smallest scale of outliers relative to that of the noise.
 const WIDE: f64 = 4.0;
 
 impl Noise {
@@ -20,13 +20,13 @@ impl Noise {
         self.nu.is_infinite() && self.outliers.is_none()
     }
 
-    /// Where a search for the scale of some innovations starts; where it ends if they are normal.
+    /// Returns the scale of innovations, in V: the start of an iteration, and the result under a normal tail.
     pub(super) fn first_scale(&self, innovations: &[f64]) -> f64 {
         if self.is_normal() { root_mean_square(innovations) } else { robust_scale(innovations) }
     }
 
-    /// The likeliest scale for some innovations, by reweighting; the tail's shape stays. Of each item `of` says its size, and
-    /// how many have it.
+    /// Sets the most likely scale by iterative reweighting from `start`, in V, with the shape of the tail unchanged.
+    /// `of` returns the size of an item, in V, and its multiplicity.
     pub(super) fn fit_scale<T>(&mut self, start: f64, items: &[T], of: impl Fn(&T) -> (f64, f64), rounds: usize) {
         *self = self.scaled_to(start);
         if self.is_normal() {
@@ -42,14 +42,14 @@ impl Noise {
         }
     }
 
-    /// The same shape, of another scale.
+    /// Returns the same shape of the tail with another scale, in V.
     fn scaled_to(&self, sigma: f64) -> Self {
         let scaled = self.with_tail(self.nu, sigma);
         let outliers = self.outliers.map(|(fraction, wide)| (fraction, wide * scaled.sigma / self.sigma));
         Self { outliers, ..scaled }
     }
 
-    /// The likeliest tail of some innovations, and its scale.
+    /// Sets the most likely tail of some innovations and its scale.
     pub(super) fn fit_tail(&mut self, innovations: &[f64]) {
         let start = robust_scale(innovations);
         let sizes = &*sizes(innovations, start);
@@ -76,7 +76,7 @@ impl Noise {
         }
     }
 
-    /// Expectation-maximisation of two normals around zero.
+    /// Returns the mixture of two zero-mean normals found by expectation-maximisation.
     fn mixture(sizes: &[(f64, f64)], start: f64, normal: &Self) -> Self {
         let sums = |sum: (f64, f64), &(e, times): &(f64, f64)| (sum.0 + times, sum.1 + times * (e * e));
         let (count, _) = sizes.iter().fold((0.0, 0.0), sums);
@@ -101,7 +101,7 @@ impl Noise {
     }
 }
 
-/// Errors, each so many times: where only their sizes matter, many of nearly the same size count as one.
+/// Returns sizes of errors with their multiplicities; many errors are grouped into cells of nearly equal size.
 pub(super) fn sizes(errors: &[f64], scale: f64) -> Vec<(f64, f64)> {
     if errors.len() <= FEW {
         return errors.iter().map(|&e| (e, 1.0)).collect();

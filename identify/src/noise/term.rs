@@ -8,14 +8,15 @@ pub(super) const HALF_LN_TAU: f64 = 0.918_938_533_204_672_7;
 /// Half-width of a cell, in standard deviations of the noise, below which the density is taken as constant across the cell.
 const NARROW: f64 = 0.05;
 
-/// One row's part in a fit: `weight (residual - J delta)^2`.
+/// The contribution of one row to a fit: a log-probability, and the term `weight (residual - J delta)^2` of the normal
+/// equations.
 #[derive(Clone, Copy, Debug)]
 pub struct Term {
-    /// Log-probability, up to what no parameter changes.
+    /// Log-probability of the reading, up to a constant.
     pub log: f64,
     /// Working residual, in V.
     pub residual: f64,
-    /// 1/V^2
+    /// Weight, in 1/V^2.
     pub weight: f64,
 }
 
@@ -23,16 +24,16 @@ fn density(z: f64) -> f64 {
     (-0.5 * z * z - HALF_LN_TAU).exp()
 }
 
-/// Probability above `z`.
+/// Returns the probability that a standard normal variable exceeds `z`.
 fn above(z: f64) -> f64 {
     0.5 * libm::erfc(z / std::f64::consts::SQRT_2)
 }
 
-/// A reading that stopped at a bound, which is `residual` above the prediction.
+/// Returns the term of a reading that stopped at an upper bound, `residual` above the prediction, in V.
 pub(super) fn stopped(residual: f64, sigma: f64) -> Term {
     let z = residual / sigma;
     if z > 6.0 {
-        // Far below the bound the tail is nearly a normal's own.
+        // The tail probability approaches the density divided by `z`.
         return Term { log: -0.5 * z * z - z.ln(), residual, weight: 1.0 / (sigma * sigma) };
     }
     let tail = above(z);
@@ -41,14 +42,14 @@ pub(super) fn stopped(residual: f64, sigma: f64) -> Term {
     Term { log: tail.ln(), residual: sigma * hazard / information, weight: information / (sigma * sigma) }
 }
 
-/// A reading that was rounded to a cell.
+/// Returns the term of a reading that was rounded to a cell of the given half-width, in V.
 pub(super) fn in_cell(residual: f64, sigma: f64, half_step: f64) -> Term {
     if half_step < NARROW * sigma {
-        // The density hardly changes across it.
+        // The density is nearly constant across the cell.
         let log = -0.5 * (residual / sigma).powi(2) - HALF_LN_TAU + (2.0 * half_step / sigma).ln();
         return Term { log, residual, weight: 1.0 / (sigma * sigma) };
     }
-    // A cell is as likely on either side.
+    // The probability is symmetric.
     let side = if residual < 0.0 { -1.0 } else { 1.0 };
     let (a, b) = ((residual.abs() - half_step) / sigma, (residual.abs() + half_step) / sigma);
     if a > 6.0 {

@@ -1,19 +1,22 @@
-//! The commanded voltage as a signal: which pieces it is divided into.
+//! Division of the commanded voltage into pieces.
 //!
-//! What a lag makes of a piece is taken as straight by the lag behind it. So pieces are short just after a change of the
-//! voltage, beside the quickest time constants; later, short beside the time since: what bends so late has slow ones.
+//! The output of a lag over a piece is taken as straight by the next lag. So pieces are short compared with the fastest
+//! time constants just after a change of the voltage, and later short compared with the time since that change, when
+//! only slow transients are left.
 
 use crate::record::signal::piecewise::{Piece, Signal};
 use simulation::schedule::{Schedule, Stretch};
 
-/// Longer pieces are divided just after a change: a curve of time constant 1 s departs from its chord by 1/800 of its change
-/// at most.
+/// Maximum length of a piece just after a change, in s: a transient with a time constant of 1 s departs from its chord
+/// by at most 1/800 of its amplitude.
 const SHORTEST_PIECE_S: f64 = 0.1;
-/// Later, longer than this part of the time since: whatever the time constant, by 1/6000 of its change.
+/// Maximum length of a later piece relative to the time since the last change: a transient of any time constant departs
+/// from its chord by at most 1/6000 of its amplitude.
 const GROWTH: f64 = 0.05;
-/// What changes by less is still, as a part of the full scale.
+/// Changes below this fraction of the full scale do not count.
 const STILL: f64 = 1e-4;
-/// Unless that would make more pieces than this for each row; coarse records keep coarse pieces.
+/// Upper limit for the number of pieces that the shortest length may lead to; records with coarse rows keep coarse
+/// pieces.
 const MOST_PIECES: usize = 20_000;
 
 impl From<&Stretch> for Piece {
@@ -23,12 +26,14 @@ impl From<&Stretch> for Piece {
 }
 
 impl Signal {
-    /// The schedule's voltage, divided at `times_s`, in V.
+    /// Returns the voltage of a schedule, in V, with a piece starting at each of `times_s`; `before` is the voltage
+    /// before the first.
     pub fn new(schedule: &Schedule, times_s: &[f64], before: f64) -> Self {
         Self::coarse(schedule, times_s, before, MOST_PIECES, 0.0)
     }
 
-    /// The same in about so many pieces where more would be finer, and where a chord is off by `blur_v` at most.
+    /// Returns the same with pieces no shorter than the duration divided by `pieces`, and with neighbouring pieces
+    /// replaced by a chord where that changes the voltage by `blur_v` or less.
     pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize, blur_v: f64) -> Self {
         let duration = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
         let shortest = SHORTEST_PIECE_S.max(duration / pieces as f64);
@@ -42,7 +47,7 @@ impl Signal {
             let changed_s = course.changed_s(pair[0], reader.clone().stretches(pair[0], pair[1]));
             let longest = shortest.max(GROWTH * (pair[0] - changed_s));
             let parts = ((pair[1] - pair[0]) / longest * (1.0 - 1e-9)).ceil().max(1.0);
-            // The last ends with the row, to the bit: a voltage may jump there.
+            // The last part ends exactly at the row, where the voltage may jump.
             let start = |part: usize| match part as f64 / parts {
                 1.0 => pair[1],
                 of => pair[0] + (pair[1] - pair[0]) * of,
@@ -62,7 +67,8 @@ impl Signal {
         signal
     }
 
-    /// What follows without a jump as one piece if that is off by `blur_v` at most, else one by one.
+    /// Appends stretches that follow each other without a jump as one chord if its error is at most `blur_v`, else one
+    /// by one.
     fn push(&mut self, stretches: &[Stretch], blur_v: f64) {
         for stretches in stretches.chunk_by(|a, b| (b.from_v - a.to_v()).abs() <= 2.0 * blur_v) {
             match chord(stretches, blur_v) {
@@ -73,7 +79,7 @@ impl Signal {
     }
 }
 
-/// The straight line that a voltage has followed since it last changed.
+/// The straight line that the voltage has followed since its last change, and the tolerance for leaving it.
 struct LastChange {
     since_s: f64,
     from_v: f64,
@@ -87,7 +93,7 @@ impl LastChange {
         Self { since_s: f64::NEG_INFINITY, from_v: f64::NAN, slope: 0.0, still_v: STILL * full_scale_v }
     }
 
-    /// When the voltage last changed, in s, after some more stretches of it.
+    /// Advances over stretches that begin at `time_s` and returns the time of the last change, in s.
     fn changed_s(&mut self, mut time_s: f64, stretches: impl Iterator<Item = Stretch>) -> f64 {
         for stretch in stretches {
             let end_s = time_s + stretch.duration_s;
@@ -102,7 +108,8 @@ impl LastChange {
     }
 }
 
-/// One piece instead of several, if it is off by `blur_v` at most.
+/// Returns one straight piece that replaces the stretches with an error of at most `blur_v`, in V; `None` if there is
+/// none.
 fn chord(stretches: &[Stretch], blur_v: f64) -> Option<Piece> {
     let (first, last) = (stretches.first()?, stretches.last()?);
     let duration_s: f64 = stretches.iter().map(|stretch| stretch.duration_s).sum();
@@ -124,7 +131,7 @@ mod tests {
     use simulation::record::Record;
     use simulation::schedule::Between;
 
-    /// A schedule with a row a second.
+    /// Returns a schedule with one row per second, and the times of the rows.
     fn every_second(volts: impl Iterator<Item = f64>) -> (Schedule, Vec<f64>) {
         let rows: Vec<String> = volts.enumerate().map(|(row, volts)| format!("{row},{volts}\n")).collect();
         let text = format!("time_s,voltage_v\n{}", rows.concat());
@@ -132,7 +139,7 @@ mod tests {
         (schedule, (0..rows.len()).map(|row| row as f64).collect())
     }
 
-    /// Beside pieces that are as short everywhere.
+    /// The reference is the same chain with pieces of 1/60 s everywhere.
     #[test]
     fn pieces_grow_while_the_voltage_stays_and_two_lags_do_not_feel_it() {
         let (schedule, times) = every_second((0..600).map(|row| 100.0 * f64::from((row / 60) % 3)));
@@ -150,12 +157,12 @@ mod tests {
             let apart = pairs.map(|(grown, fine)| (grown - fine).abs()).fold(0.0, f64::max);
             assert!(apart < 0.025, "{taus_s:?}: {apart} V of 200");
         }
-        // A voltage that never stays leaves no time to grow.
+        // If the voltage never rests, pieces do not grow.
         let (schedule, times) = every_second((0..600).map(f64::from));
         assert_eq!(Signal::new(&schedule, &times, 0.0).pieces.len(), 10 * 599 + 1);
     }
 
-    /// 1 V every 10 ms, then a jump back, in steps of 0.5 s.
+    /// The voltage rises by 1 V every 10 ms, then drops to 0 V; rows are 0.5 s apart.
     #[test]
     fn a_first_look_takes_small_steps_for_a_ramp_and_no_jump() {
         let row = |row: usize| format!("{},{}\n", 0.01 * row as f64, if row < 130 { row } else { 0 });
@@ -168,7 +175,7 @@ mod tests {
         assert_eq!(coarse[1].from, 50.0);
         let ends: Vec<(f64, f64)> = coarse[2..].iter().map(|piece| (piece.from, piece.to)).collect();
         assert_eq!(ends, [(100.0, 129.0), (0.0, 0.0), (0.0, 0.0)]);
-        // Without blur what stays the same is one piece still.
+        // Without a tolerance only equal voltages are joined.
         assert_eq!(fine.len(), 130 + 2);
     }
 }

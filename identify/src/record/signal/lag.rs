@@ -2,46 +2,46 @@
 
 use crate::record::signal::piecewise::Piece;
 
-/// A first-order low-pass of unit gain, `tau dx/dt = u - x`, exact for straight pieces.
+/// A first-order low-pass filter of unit gain, `tau dx/dt = u - x`, exact for straight pieces of the input `u`.
 #[derive(Clone, Copy, Debug)]
 pub struct Lag {
     tau_s: f64,
     value: f64,
-    /// Duration that the next two are for.
+    /// Duration of a piece for which the following three factors hold, in s.
     duration_s: f64,
-    /// exp(-duration / tau)
+    /// Weight of the state: `exp(-duration / tau)`.
     kept: f64,
-    /// 1 - tau / duration (1 - kept): what is followed of a ramp, which is the weight of its end.
+    /// Weight of the input at the end of the piece: `1 - tau / duration (1 - kept)`.
     ramp: f64,
-    /// Weight of its start.
+    /// Weight of the input at the start of the piece.
     held: f64,
 }
 
 impl Lag {
-    /// At rest at `value`.
+    /// Returns a filter whose output has settled at `value`.
     pub fn at(tau_s: f64, value: f64) -> Self {
         Self { tau_s, value, duration_s: 0.0, kept: 1.0, ramp: 0.0, held: 0.0 }
     }
 
-    /// Where it is.
+    /// Returns the present output.
     pub fn value(&self) -> f64 {
         self.value
     }
 
-    /// Its time constant, in s.
+    /// Returns the time constant, in s.
     pub fn tau_s(&self) -> f64 {
         self.tau_s
     }
 
-    /// From here on with another time constant.
+    /// Returns the same filter with another time constant, in s, and the same output.
     pub fn with_tau(self, tau_s: f64) -> Self {
         Self { value: self.value, ..Self::at(tau_s, 0.0) }
     }
 
-    /// Start and end of the lag over a piece of its input.
+    /// Advances over one piece of the input and returns the output at its start and end.
     pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
         let start = self.value;
-        // Durations of a regular record differ by rounding alone.
+        // Durations of a uniformly sampled record differ by rounding only.
         if (duration_s - self.duration_s).abs() > 1e-9 * duration_s {
             let x = duration_s / self.tau_s;
             self.duration_s = duration_s;
@@ -50,7 +50,7 @@ impl Lag {
             self.held = 1.0 - self.kept - self.ramp;
         }
         if duration_s > 0.0 {
-            // Only the first product waits for the piece before.
+            // Only the first product depends on the previous piece, so the others can be computed ahead.
             self.value = self.kept * start + (self.held * from + self.ramp * to);
         }
         (start, self.value)

@@ -1,26 +1,26 @@
-//! A signal of straight pieces with jumps between them, and what blocks without an own state make of it.
+//! A signal of straight pieces with jumps between them, and the blocks that map one such signal to another.
 
-/// What is shorter, in s, is numerical dust.
+/// Durations up to this, in s, are rounding errors.
 const DUST_S: f64 = 1e-9;
 
-/// One straight piece.
+/// One straight piece of a signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Piece {
-    /// How long it lasts, in s; 0 for the last row's.
+    /// Duration, in s; 0 for the piece of the last row.
     pub duration_s: f64,
-    /// Value at its start.
+    /// Value at the start.
     pub from: f64,
-    /// Value towards its end.
+    /// Limit of the value at the end.
     pub to: f64,
 }
 
-/// Adjoining pieces.
+/// A signal over time: contiguous straight pieces, which may jump at their borders.
 #[derive(Debug, Default)]
 pub struct Signal {
-    /// The value for ever before the first piece.
+    /// Constant value before the first piece.
     pub before: f64,
     pub(super) pieces: Vec<Piece>,
-    /// The piece that starts with each row.
+    /// Index of the piece that starts at each row.
     pub(super) rows: Vec<u32>,
 }
 
@@ -37,20 +37,21 @@ impl Clone for Signal {
 }
 
 impl Signal {
-    /// The value just after each row's moment.
+    /// Returns the value just after the time of each row.
     pub fn at_rows(&self) -> impl Iterator<Item = f64> {
         self.rows.iter().map(|&piece| self.pieces[piece as usize].from)
     }
 
-    /// The value in the middle of each piece.
+    /// Replaces the contents of `middles` by the value in the middle of each piece.
     pub fn middles(&self, middles: &mut Vec<f64>) {
         middles.clear();
         middles.extend(self.pieces.iter().map(|piece| (piece.from + piece.to) / 2.0));
     }
 
-    /// Each value in turn, by a law that makes the same of one that stays.
+    /// Applies a law to start and end of every piece, in order of time; the law must return the same for a value that
+    /// repeats.
     pub fn map(&mut self, mut law: impl FnMut(f64) -> f64) {
-        // Most pieces are flat and go on from the last, and laws are dear.
+        // Most pieces are constant and continue the previous one, and laws are expensive.
         let (mut last, mut made) = (self.before, law(self.before));
         let mut law = |value: f64| {
             if value != last {
@@ -65,20 +66,20 @@ impl Signal {
         }
     }
 
-    /// Piece by piece, in order: duration, start and end to start and end.
+    /// Replaces start and end of each piece, in order of time, by what a block returns for it.
     pub fn pass(&mut self, mut block: impl FnMut(Piece) -> (f64, f64)) {
         for piece in &mut self.pieces {
             (piece.from, piece.to) = block(*piece);
         }
     }
 
-    /// The same signal, `delay_s` later.
+    /// Returns the signal delayed by `delay_s`, in s; rows keep their times.
     pub fn delayed(&self, delay_s: f64) -> Self {
         let mut later = self.emptied();
         let constant = Piece { duration_s: delay_s, from: self.before, to: self.before };
         let all = std::iter::once(constant).chain(self.pieces.iter().copied()).filter(|p| p.duration_s > DUST_S);
         let mut source = all.peekable();
-        // What stays is one piece, whatever rows it had: not cut where those come to lie.
+        // Constant pieces are joined, so that they are not divided where their rows were.
         let mut next = || {
             let mut piece = source.next()?;
             let stays = |to: &Piece| [piece.from, to.from, to.to] == [piece.to; 3];
@@ -113,7 +114,7 @@ impl Signal {
         later
     }
 
-    /// The signal followed at no more than these rates, in V/s.
+    /// Returns a signal that follows this one at rates of at most `rising` and `falling`, in V/s, both positive.
     pub fn slewed(&self, rising: f64, falling: f64) -> Self {
         let mut slewed = self.emptied();
         let mut now = self.before;
@@ -127,7 +128,7 @@ impl Signal {
             if from != now || slope > rising || -slope > falling {
                 let ahead = if from == now { slope } else { from - now };
                 let rate = if ahead > 0.0 { rising } else { -falling };
-                // Until the straight line of the input is met.
+                // Time until the output meets the line of the input.
                 let closing = rate - slope;
                 let meets = if closing * ahead > 0.0 { (from - now) / closing } else { f64::INFINITY };
                 let taken = meets.clamp(0.0, left);
