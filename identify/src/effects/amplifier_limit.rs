@@ -1,4 +1,4 @@
-//! The real voltage stops below the commanded one: `|u| = min(|command|, limit)`.
+//! The amplifier's voltage saturates below the command: `|u| = min(|command|, limit)`.
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;

@@ -7,7 +7,7 @@ use crate::effects::{
     time_constant, voltage_dependent_time_constant,
 };
 
-/// Every effect, in the order of the chain: each acts on what the ones before it have made.
+/// Every effect, in the order of the chain: each acts on the result of those before it.
 pub static EFFECTS: &[&dyn Effect] = &[
     &amplifier_limit::AmplifierLimit,
     &amplifier_slew::AmplifierSlew,
@@ -29,12 +29,12 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &outliers::Outliers,
 ];
 
-/// The place of a cause in [`EFFECTS`].
+/// Returns the index of a cause in [`EFFECTS`]; `None` for an unknown name.
 pub fn index_of(cause: &str) -> Option<usize> {
     EFFECTS.iter().position(|effect| effect.cause() == cause)
 }
 
-/// True if a cause contains another, as its special case.
+/// Returns true if the effect `other` is a special case of `effect`.
 pub fn contains(effect: usize, other: usize) -> bool {
     EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause())
 }

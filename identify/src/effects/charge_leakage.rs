@@ -1,12 +1,12 @@
-//! Stiffness falls back while the voltage stays: a part of it leaks away with a time constant of its own.
+//! Charge leakage: a fraction of the stiffness decays with a time constant of its own while the voltage is constant.
 //!
 //! ```text
-//! q = f - (1 - at_once) share lag(tau; f)        y = relaxation(q) - at_once share lag(tau; f)
+//! q = f - (1 - instantaneous) share lag(tau; f)        y = relaxation(q) - instantaneous share lag(tau; f)
 //! ```
 //!
-//! In one form all of the loss passes the relaxation, in the other a part of it shows at once.
+//! In one form all of the loss passes the relaxation, in the other a part of it is instantaneous.
 //!
-//! Leakage lowers the settled value by `share`; creep keeps it, and drift follows the clock.
+//! Leakage lowers the settled value by `share`; creep does not change it, and drift depends on time alone.
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
@@ -15,7 +15,7 @@ use crate::record::data::Data;
 
 pub(super) struct ChargeLeakage;
 
-/// What leaks faster than the spring relaxes is never seen to fall back: it is a gain.
+/// Smallest time constant, in s; a faster loss hardly lets the stiffness fall and looks like a gain.
 const FASTEST_S: f64 = 3.5;
 
 const WITH_INSTANTANEOUS_PART: usize = 1;
@@ -65,7 +65,7 @@ impl Effect for ChargeLeakage {
         vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
     }
 
-    /// A plant file holds one, and one that passes the relaxation.
+    /// A plant file represents one loss, all of which passes the relaxation.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
         let passes = loss(point).instantaneous == 0.0 || loss(point).equivalent_leakage(&chain.relaxation).is_some();
         (chain.losses.len() > 1 || !passes).then(|| table(self, form, point, data))

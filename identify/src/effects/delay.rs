@@ -1,9 +1,10 @@
-//! The response starts late: `u(t) = command(t - delay)`.
+//! The response is delayed: `u(t) = command(t - delay)`.
 //!
-//! Of an even record, the rows see a jump of the command later by a whole row where the delay passes a multiple of their
-//! distance: there the prediction jumps, in between it is smooth. So the delay is whole rows, which a start chooses, and
-//! a part above 0 and up to 1 row, which a fit moves; a delay of whole rows, the usual one, is an end that it reaches. The
-//! rows are those of the command, also where only some of the readings are looked at.
+//! In a uniformly sampled record the prediction jumps where the delay passes a multiple of the sample time, because the
+//! rows see a step of the command one row later; in between it is smooth. So the first coordinate is a whole number of
+//! rows, which the initial point sets, and the second a fraction above 0 and up to 1 row, which the fit moves. A delay
+//! of whole rows, the usual one, is at the upper bound. Rows are those of the whole record, also if only some of them
+//! are in use.
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
@@ -15,7 +16,7 @@ fn longest(data: &Data) -> f64 {
     (0.1 * data.duration_s()).max(2.0 * data.record_sample_s)
 }
 
-/// Whole rows, and what is left above 0, in s.
+/// Returns a delay as whole rows and the rest above 0, both in s.
 fn split(data: &Data, delay_s: f64) -> Vec<f64> {
     let rows = if data.uniform { (delay_s / data.record_sample_s - 1e-6).ceil() - 1.0 } else { 0.0 };
     let whole = rows.max(0.0) * data.record_sample_s;
@@ -54,7 +55,7 @@ impl Effect for Delay {
         starts
     }
 
-    /// A promise is a poor judge of rows, and a fit moves within one.
+    /// A linear prediction cannot compare different numbers of rows, and a fit keeps its number.
     fn across_jumps(&self, _: usize, point: &[f64], rows: f64, data: &Data) -> Option<Vec<f64>> {
         let to_s = point[0] + (0.5 + rows) * data.record_sample_s;
         (data.uniform && (0.0..longest(data)).contains(&to_s)).then(|| split(data, to_s))
@@ -90,9 +91,9 @@ mod tests {
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 
-    /// Whole rows and a part of one, from starts on either side.
+    /// The delay is a whole number of rows, or not; fits start on either side of it.
     #[test]
-    fn a_fit_goes_from_row_to_row() {
+    fn fit_crosses_from_row_to_row() {
         let volts = |row: usize| [0.0, 300.0, 100.0, 500.0, 200.0][row / 90 % 5];
         let row = |row| Row { line: 0, time_s: 0.1 * row as f64, voltage_v: volts(row), measured: Some(0.0) };
         let record = Record { name: String::new(), rows: (0..900).map(row).collect() };

@@ -1,4 +1,4 @@
-//! The whole response grows or fades with time, counted from the first reading.
+//! The response drifts with time, counted from the first reading.
 //!
 //! | form | |
 //! | --- | --- |

@@ -1,4 +1,4 @@
-//! A periodic disturbance rides on the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
+//! A periodic disturbance is added to the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
 
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
@@ -6,9 +6,9 @@ use crate::record::spectrum;
 
 pub(super) struct Hum;
 
-/// Peaks of the spectrum that are tried.
+/// Number of spectral peaks that are tried.
 const PEAKS: usize = 3;
-/// Fewest periods in a record.
+/// Smallest number of periods in the record.
 const FEWEST: f64 = spectrum::FEWEST_PERIODS as f64;
 
 impl Effect for Hum {
@@ -51,7 +51,7 @@ impl Effect for Hum {
     }
 
     fn ln_candidates(&self, _: usize, data: &Data) -> f64 {
-        // As many lines as half the rows; its three coordinates are charged already.
+        // There are half as many independent frequencies as rows; 4.5 nats are paid with the three coordinates.
         ((data.rows() as f64 / 2.0).max(1.0).ln() - 4.5).max(0.0)
     }
 

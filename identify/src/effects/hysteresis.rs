@@ -1,4 +1,4 @@
-//! Rate-independent memory: the branches up and down differ.
+//! Rate-independent hysteresis: the ascending and descending branches differ.
 //!
 //! A [`PlayBank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
 //!
@@ -8,9 +8,9 @@
 //! | part | one | r, weight |
 //! | bank | five, at r / 5 to r | r, weights |
 //! | part with gain, bank with gain | the same, with the gain of the loop's mean line | and the gain |
-//! | cycled part, cycled bank | the same, of a spring that comes from a large voltage | the same |
+//! | cycled part, cycled bank | the same, with the initial condition on the descending branch | the same |
 //!
-//! The last begin on the branch that comes down: where the record begins, not what the spring is.
+//! The initial condition belongs to the record, not to the spring.
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
@@ -21,7 +21,7 @@ pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
 
-/// Number of plays, own gain, and whether they begin on the branch that comes down, by form.
+/// Number of plays, own gain, and initial condition on the descending branch, for each form.
 const FORMS: [(usize, bool, bool); 7] = [
     (1, false, false),
     (1, false, false),
@@ -31,10 +31,10 @@ const FORMS: [(usize, bool, bool); 7] = [
     (1, true, true),
     (5, true, true),
 ];
-/// Thresholds of a bank, as parts of r.
+/// Thresholds of a bank relative to `r`.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// The bank of a form at a point.
+/// Returns the bank of a form at a point.
 fn bank(form: usize, point: &[f64]) -> PlayBank {
     let (count, own_gain, cycled) = FORMS[form];
     let threshold = point[0].exp();
@@ -102,7 +102,7 @@ impl Effect for Hysteresis {
         vec![Quantity::new("width_v", "V", bank(form, point).width(data.full_scale_v))]
     }
 
-    /// A plant file holds so many plays.
+    /// A plant file holds a limited number of plays.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
         (!chain.memory.fits()).then(|| table(self, form, point, data))
     }

@@ -1,4 +1,4 @@
-//! The immediate part of a step is not 1/11.
+//! The feedthrough, the part of a step that is reached without delay, is not 1/11.
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;

@@ -1,4 +1,10 @@
-//! The effects, one file each, in the order in which they act.
+//! The effects that may explain a difference between simulation and readings, one file each: bounds and initial points
+//! go out, and each effect modifies the chain, the stiffness or the readings.
+//!
+//! - *Cause*: the name of an effect in reports, e.g. `gain-error`.
+//! - *Form*: one of several laws of the same cause.
+//! - *Block*: an effect in one form; *point*: the values of its coordinates.
+//! - *Model*: a set of blocks, applied to the chain of a plant file.
 
 mod amplifier_limit;
 mod amplifier_slew;

@@ -1,5 +1,5 @@
-//! Single readings are far off. Not a part of the chain but of the noise: a mixture of two scales against one heavy tail
-//! ([`crate::noise`]).
+//! Single readings are outliers. This is a property of the noise and not of the chain: a mixture of two scales instead
+//! of one heavy tail ([`crate::noise`]).
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;

@@ -1,4 +1,5 @@
-//! Readings come in coarse steps. Found from the readings' exact lattice ([`crate::record::observed`]), not by a fit.
+//! Readings are coarsely quantised. The step is found in the readings themselves ([`crate::record::observed`]), not by
+//! a fit.
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;

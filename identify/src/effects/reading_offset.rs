@@ -2,7 +2,7 @@
 //!
 //! | form | |
 //! | --- | --- |
-//! | run | one stretch of them |
+//! | run | one interval of them |
 //! | whole | all of them: the sensor's zero |
 
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
@@ -15,15 +15,17 @@ pub(super) struct ReadingOffset;
 const RUN: usize = 0;
 const WHOLE: usize = 1;
 
-/// Shortest run that is one, in rows; a run that is longer than half of the record is the rest's offset.
+/// Shortest run, in rows; for a run longer than half of the record, the other rows count as shifted.
 const SHORTEST: usize = 5;
-/// A single reading counts for no more than this many of the noise's scales.
+/// Readings are clipped at this many scales of the noise in the search.
 const CLIP: f64 = 6.0;
-/// First rows that tell the sensor's zero, and how many of their errors it is off if it is.
+/// Number of first rows from which the sensor's zero is estimated, and number of standard errors from which on it is
+/// wrong.
 const AT_REST: usize = 10;
 const SHOWN: f64 = 3.0;
 
-/// Which rows are shifted, and by what: from `point[0]` up to but not including `point[1]` by `point[2]`; all by `point[0]`.
+/// Returns the rows that are shifted and the shift, in V: rows from `point[0]` up to but not including `point[1]` by
+/// `point[2]`, or all by `point[0]`.
 fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, f64) {
     if form == WHOLE {
         return (0..rows, point[0]);
@@ -32,7 +34,7 @@ fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, 
     ((point[0] as usize).min(to)..to, point[2])
 }
 
-/// False if the sensor's zero is right: a spring that never had a voltage reads it.
+/// Returns false if the readings before the first voltage show that the sensor's zero is right.
 fn shows_at_rest(data: &Data) -> bool {
     let rest = data.voltage_v.iter().take(AT_REST).take_while(|voltage| **voltage == 0.0).count();
     if data.initial_state_unknown || rest == 0 {
@@ -43,7 +45,8 @@ fn shows_at_rest(data: &Data) -> bool {
     zero.abs() > SHOWN * error
 }
 
-/// The run whose shift explains most: by sums over runs of growing length. Unseen rows neither count nor cost.
+/// Returns the run whose shift reduces the squared error most, among runs of growing length; NaN rows count neither for
+/// nor against it.
 fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>> {
     let rows = residual.len();
     let bound = CLIP * sigma;
@@ -70,13 +73,13 @@ fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>>
         length += (length / 5).max(1);
     }
     let (_, from, to) = refined(best.1, best.2, rows, &gain)?;
-    // A typical reading, not the mean: it may hold an outlier.
+    // The median is not affected by an outlier in the run.
     let mut run: Vec<f64> = residual[from..to].iter().copied().filter(|value| !value.is_nan()).collect();
     run.sort_by(f64::total_cmp);
     Some(vec![from as f64, to as f64, run[run.len() / 2]])
 }
 
-/// The best run with its edges near those of another.
+/// Returns the best run whose edges are close to those of the given one.
 fn refined(from: usize, to: usize, rows: usize, gain: &impl Fn(usize, usize) -> f64) -> Option<(f64, usize, usize)> {
     if to <= from {
         return None;
@@ -158,7 +161,7 @@ impl Effect for ReadingOffset {
     }
 
     fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
-        // Both edges; neighbouring runs are nearly the same.
+        // Both edges are searched; neighbouring runs are nearly equivalent.
         if form == RUN { 1.25 * (data.rows() as f64).max(1.0).ln() } else { 0.0 }
     }
 
@@ -172,14 +175,14 @@ impl Effect for ReadingOffset {
         }
     }
 
-    /// An edge may lie where moving it costs less than 95 % certainty allows, and between two rows.
+    /// An edge may move as long as that costs less than 2 nats (95 %), and lies between two rows.
     fn searched_range(&self, form: usize, point: &[f64], context: &FitContext) -> Vec<(String, f64, f64)> {
         if form != RUN {
             return Vec::new();
         }
         let (time, rows) = (&context.data.time_s, context.data.rows());
         let (from, to, offset) = (point[0] as usize, (point[1] as usize).min(rows), point[2]);
-        // Cost of counting a row of the run as outside, in nats; the opposite is a gain.
+        // Cost of excluding a row from the run, in nats; including one costs the negative.
         let cost =
             |row: usize| (context.residual[row] * offset - 0.5 * offset * offset) / (context.sigma * context.sigma);
         let reach = |outwards: &mut dyn Iterator<Item = usize>, sign: f64| {

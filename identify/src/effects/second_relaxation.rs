@@ -1,4 +1,4 @@
-//! Part of the response relaxes with another, slower time constant (creep); the settled value stays.
+//! A part of the response relaxes with a second, slower time constant (creep); the settled value does not change.
 //!
 //! | form | what relaxes |
 //! | --- | --- |
@@ -17,7 +17,7 @@ pub(super) struct SecondRelaxation;
 const OF_THE_REST: usize = 0;
 const OF_EVERYTHING: usize = 1;
 const BY_DECADES: usize = 2;
-/// It is the slower one.
+/// Smallest time constant of the creep, in s: the paper's time constant.
 const FASTEST_S: f64 = 5.5;
 
 impl Effect for SecondRelaxation {
@@ -34,7 +34,7 @@ impl Effect for SecondRelaxation {
     }
 
     fn isolating_experiment(&self) -> &'static str {
-        "one step, held for minutes: creep goes on rising to the same static_response value"
+        "one step, held for minutes: creep goes on rising to the same settled value"
     }
 
     fn forms(&self) -> usize {

@@ -1,7 +1,7 @@
-//! Readings stop at a bound: `reading = min(y, limit)`, or `max` at a lower bound.
+//! Readings saturate at a bound: `reading = min(y, limit)`, or `max` at a lower bound.
 //!
-//! Where several readings are exactly the extreme, the bound is known and [`crate::record::observed`] treats those rows as
-//! "at least this much". These forms are for a bound that comes before the noise.
+//! Where several readings are exactly the extreme, the bound is known and [`crate::record::observed`] treats those rows
+//! as censored. These forms are for a bound in front of the noise.
 
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;

@@ -1,4 +1,4 @@
-//! The relaxation time is not 5.5 s.
+//! The time constant of the relaxation is not 5.5 s.
 
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;

@@ -1,7 +1,7 @@
-//! Fits of a model's points to a record: Levenberg and Marquardt's method on the noise's log-likelihood.
+//! Fits of a model's points to a record: the Levenberg-Marquardt method on the log-likelihood of the noise.
 //!
-//! Each round takes the noise's weights for the present residual (iteratively reweighted least squares), steps, and keeps
-//! the step only if the likelihood grew. Coordinates stay within their bounds.
+//! Each round computes the weights of the rows for the present residual (iteratively reweighted least squares) and
+//! takes the step only if the likelihood increases. Coordinates stay within their bounds.
 
 use crate::effects::effect::FitContext;
 use crate::effects::model::Model;
@@ -14,64 +14,97 @@ use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::stats::scale::robust_scale;
 
-/// A model with its points fitted.
+/// A model with fitted points.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The model at its best point.
+    /// The model at its most likely points.
     pub model: Model,
-    /// Readings less prediction, in V.
+    /// Reading minus prediction of each row, in V.
     pub residual: Vec<f64>,
-    /// The noise's law for this residual.
+    /// The law of the noise for this residual.
     pub noise: Noise,
-    /// Log-likelihood under that law, less [`Fit::cost`].
+    /// Log-likelihood under that law minus [`Fit::cost`], in nats.
     pub log_likelihood: f64,
-    /// Log-likelihood under independent noise: what a memory that is really structure cannot hide.
+    /// Log-likelihood under independent noise, in nats, where autocorrelation cannot hide structure.
     pub white_noise_log_likelihood: f64,
-    /// What a start in mid-course costs, in nats.
+    /// Cost of the estimated initial state, in nats.
     pub initial_state_cost: f64,
 }
 
-/// Errors this many times as large as what of them is new at each reading wander.
+/// Ratio of the scales of residual and innovations from which on the autocorrelation is strong.
 const STRONG_AUTOCORRELATION: f64 = 4.0;
 
 impl Fit {
-    /// True if nearly all that is left would be foretold by the noise's memory: what is slow may hide in it.
+    /// Returns true if the autocorrelation of the noise predicts nearly all of the residual, so that slow structure may
+    /// be hidden in it.
     pub fn strongly_autocorrelated(&self) -> bool {
         self.noise.marginal > STRONG_AUTOCORRELATION * self.noise.sigma
     }
 
-    /// What the law of the noise and the start cost, in nats.
+    /// Returns the cost of the law of the noise and of the initial state, in nats.
     pub fn cost(&self) -> f64 {
         self.noise.cost(self.residual.len()) + self.initial_state_cost
     }
 }
 
-/// Rounds of a fit.
+/// Largest number of rounds of a fit.
 const ROUNDS: usize = 14;
-/// A round that gains less than this, in nats, is the last.
+/// The fit ends with a round that gains less than this, in nats.
 const LEAST_GAIN: f64 = 0.02;
-/// A step that promises less is not tried.
+/// A step with a smaller predicted gain, in nats, is not tried.
 const LEAST_PREDICTED_GAIN: f64 = 0.1 * LEAST_GAIN;
 
-/// Most such bounds that a fit goes beyond, one after the other.
+/// Largest number of discontinuities of the prediction that a fit crosses one after the other.
 const MOST_STEPS: usize = 30;
 
 /// Fits models to one record.
+///
+/// ```
+/// use identify::Input;
+/// use identify::effects::index_of;
+/// use identify::effects::model::{Block, Model};
+/// use identify::fit::engine::Engine;
+/// use identify::fit::interval;
+/// use identify::plant::base::Base;
+/// use identify::record::data::Data;
+/// use identify::record::observed::Observed;
+/// use simulation::record::Record;
+///
+/// // A step of 300 V at 1 s, read once per second from a spring with a time constant of 8 s instead of 5.5 s.
+/// let stiffness = |time_s: f64| 300.0 * (1.0 - (1.0 - 1.0 / 11.0) * f64::exp(-(time_s - 1.0) / 8.0));
+/// let row = |second: i32| match second {
+///     0 => "0,0,0\n".to_string(),
+///     _ => format!("{second},300,{:.1}\n", stiffness(f64::from(second))),
+/// };
+/// let text = format!("time_s,voltage_v,stiffness\n{}", (0..60).map(row).collect::<String>());
+/// let record = Record::parse("step", &text, "stiffness")?;
+///
+/// let (data, base) = (Data::new(&record, Input::Hold), Base::paper());
+/// let observed = Observed::new(&data);
+/// let mut engine = Engine::new(&data, &observed, &base);
+/// let effect = index_of("time-constant").expect("a cause");
+/// let model = Model::default().with(Block { effect, form: 0 }, vec![5.5f64.ln()]);
+/// let fit = engine.fit_twice(model);
+/// let (name, tau) = &interval::parameters(&mut engine, &fit, effect)[0];
+/// assert_eq!((name.as_str(), tau.unit), ("tau_s", "s"));
+/// assert!((tau.value - 8.0).abs() < 0.01 && tau.low < tau.value && tau.value < tau.high);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 pub struct Engine<'a> {
     /// The record.
     pub data: &'a Data,
-    /// What its readings say.
+    /// Properties of its readings.
     pub observed: &'a Observed,
     /// Runs the models.
     pub simulator: Simulator<'a>,
-    /// Readings less what the simulation without any block predicts, in V.
+    /// Reading minus prediction of the plant without any effect, in V.
     pub baseline_residual: Vec<f64>,
     predicted: Vec<f64>,
     kernels: Vec<Vec<f64>>,
 }
 
 impl<'a> Engine<'a> {
-    /// Prepares fits to one record, of models that extend `base`.
+    /// Prepares fits to one record, of models that extend the plant `base`.
     pub fn new(data: &'a Data, observed: &'a Observed, base: &'a Base) -> Self {
         let simulator = Simulator::new(data, base);
         let (predicted, kernels) = (Vec::new(), Vec::new());
@@ -80,17 +113,17 @@ impl<'a> Engine<'a> {
         engine
     }
 
-    /// The plant without any effect.
+    /// Returns the plant without any effect.
     pub fn base(&self) -> &'a Base {
         self.simulator.base
     }
 
-    /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
+    /// Returns reading minus prediction of each row, in V, with the most likely initial state if that is unknown.
     pub fn residual(&mut self, model: &Model) -> Vec<f64> {
         self.residual_and_start(model).0
     }
 
-    /// The same, with what that start costs, in nats.
+    /// Returns the same, and the cost of that initial state in nats.
     fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
         if self.data.initial_state_unknown {
             self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
@@ -108,7 +141,7 @@ impl<'a> Engine<'a> {
         (residual, initial_state_cost)
     }
 
-    /// A model at the point that it has, with the noise that suits it.
+    /// Evaluates a model at its present points, with the law of the noise fitted to its residual.
     pub fn evaluate(&mut self, model: Model) -> Fit {
         let (residual, initial_state_cost) = self.residual_and_start(&model);
         let noise = Noise::fitted(&residual, self.observed);
@@ -118,7 +151,8 @@ impl<'a> Engine<'a> {
         Fit { log_likelihood: log_likelihood - fit.cost(), ..fit }
     }
 
-    /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.
+    /// Fits the points of a model under a given law of the noise, whose scale is fitted as well, then the law to the
+    /// residual.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
         let model = self.refine_searched(model, |_| true);
         let model = self.levenberg_marquardt(model, law);
@@ -126,7 +160,7 @@ impl<'a> Engine<'a> {
         self.across_jumps(here, law)
     }
 
-    /// From between bounds at which the prediction jumps, to either side while that is likelier.
+    /// Continues fits beyond discontinuities of the prediction on either side as long as the likelihood increases.
     fn across_jumps(&mut self, mut here: Fit, law: &Noise) -> Fit {
         for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
             let mut steps = side;
@@ -150,7 +184,8 @@ impl<'a> Engine<'a> {
         here
     }
 
-    /// Moves what only a search can move, block by block, to where the rest of the model wants it in the rows that are seen.
+    /// Moves the coordinates that need a search, block by block, given the residual of the other blocks in the rows
+    /// that `seen` selects.
     pub fn refine_searched(&mut self, mut model: Model, seen: impl Fn(usize) -> bool) -> Model {
         for index in 0..model.blocks.len() {
             let block = model.blocks[index].0;
@@ -167,13 +202,13 @@ impl<'a> Engine<'a> {
         model
     }
 
-    /// First for robust independent noise, then for the law that it leaves.
+    /// Fits first under robust independent noise, then under the law of the noise of the first fit.
     pub fn fit_twice(&mut self, model: Model) -> Fit {
         let first = self.fit(model, &Noise::default_robust());
         self.refit(first)
     }
 
-    /// For the law that a first fit leaves.
+    /// Fits again under the law of the noise of a first fit; returns the more likely of both.
     pub fn refit(&mut self, first: Fit) -> Fit {
         let second = self.fit(first.model.clone(), &first.noise);
         if second.log_likelihood >= first.log_likelihood { second } else { first }
@@ -231,13 +266,13 @@ impl<'a> Engine<'a> {
         model
     }
 
-    /// Every row's part in the fit.
+    /// Returns the contribution of each row to the fit.
     pub fn terms(&self, noise: &Noise, residual: &[f64]) -> Vec<Term> {
         let white = noise.innovations(&self.observed.errors(residual));
         (0..residual.len()).map(|row| noise.term(self.observed.kinds[row], residual[row], white[row])).collect()
     }
 
-    /// Forward differences, from the bounds inwards.
+    /// Returns the derivatives of the prediction by forward differences, or backward differences at upper bounds.
     pub fn jacobian(&mut self, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
         let bounds = model.coordinates(self.data);
         let points = model.points();
@@ -254,7 +289,7 @@ impl<'a> Engine<'a> {
             nudged.set_points(&moved);
             let there = self.residual(&nudged);
             let column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
-            // Rows that stopped at a bound are taken one by one, the others whitened.
+            // Rows that stopped at a bound are not whitened.
             let mut white = noise.whitened(&column);
             for (row, kind) in self.observed.kinds.iter().enumerate() {
                 if *kind != Kind::Exact {

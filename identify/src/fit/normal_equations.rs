@@ -9,16 +9,16 @@ use nalgebra::{DMatrix, DVector};
 use crate::noise::Term;
 use crate::stats::sums::dot;
 
-/// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
+/// Derivatives of the prediction by the fitted coordinates, whitened as the residual is.
 #[derive(Clone, Debug)]
 pub struct Jacobian {
-    /// Places of the columns among all coordinates.
+    /// Index of each column's coordinate among all coordinates.
     pub places: Vec<usize>,
-    /// The columns, in V per unit of the coordinate.
+    /// Columns, in V per unit of the coordinate.
     pub columns: Vec<Vec<f64>>,
 }
 
-/// `J' W J` and `J' W r`.
+/// Returns the matrix `J' W J` and the vector `J' W r`.
 pub fn normal_equations(jacobian: &Jacobian, terms: &[Term]) -> (DMatrix<f64>, DVector<f64>) {
     let size = jacobian.columns.len();
     let mut normal = DMatrix::zeros(size, size);
@@ -39,7 +39,7 @@ pub fn normal_equations(jacobian: &Jacobian, terms: &[Term]) -> (DMatrix<f64>, D
     (normal, gradient)
 }
 
-/// What the parabola of the normal equations gains between two points, in nats.
+/// Returns the increase of the log-likelihood, in nats, that the quadratic approximation predicts between two points.
 pub(crate) fn predicted_gain(
     normal: &DMatrix<f64>,
     gradient: &DVector<f64>,
@@ -51,7 +51,8 @@ pub(crate) fn predicted_gain(
     gradient.dot(&step) - 0.5 * (normal * &step).dot(&step)
 }
 
-/// The solution of the damped normal equations, scaled to unit diagonal.
+/// Returns the solution of the normal equations, scaled to unit diagonal, with `damping` added to the diagonal; `None`
+/// if the matrix is not positive definite.
 pub fn damped_step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
     let size = normal.nrows();
     let scale = DVector::from_fn(size, |i, _| 1.0 / normal[(i, i)].max(1e-30).sqrt());

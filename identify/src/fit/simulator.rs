@@ -1,4 +1,4 @@
-//! What a model predicts for a record. Runs that differ in later things alone share the earlier ones.
+//! Simulation of models on a record; simulations that differ only in later blocks reuse the earlier results.
 
 use crate::effects::effect::Affects;
 use crate::effects::model::Model;
@@ -7,28 +7,29 @@ use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::Signal;
 
-/// Runs models on a record.
+/// Simulates models under the command of one record.
 #[derive(Clone, Debug)]
 pub struct Simulator<'a> {
     /// The record.
     pub data: &'a Data,
-    /// The simulation without any effect.
+    /// The plant without any effect.
     pub base: &'a Base,
     signal: Signal,
     levels_v: Vec<f64>,
-    /// What the last amplifier made of the command, the last memory and law of that, and the last relaxation of that.
+    /// Results of the last simulation: the voltage on the electrodes, the settled stiffness, and the stiffness behind
+    /// the relaxation.
     amplified: Cached<Signal>,
     static_response: Cached<Signal>,
     chained: Cached<Signal>,
-    /// Readings before any effect on them, of the last response.
+    /// Stiffness at each row, before any effect on the readings.
     response: Cached<Vec<f64>>,
-    /// What each state adds to them.
+    /// Response of the stiffness to each initial state.
     kernels: Cached<Vec<Vec<f64>>>,
-    /// Runs so far.
+    /// Number of simulations so far.
     pub runs: usize,
 }
 
-/// What a part of a run made, and of what.
+/// A result, and the blocks that it was computed from.
 #[derive(Clone, Debug, Default)]
 struct Cached<T> {
     key: Option<Model>,
@@ -36,7 +37,8 @@ struct Cached<T> {
 }
 
 impl<T> Cached<T> {
-    /// True if it was made by the same blocks as far as `last`; else it is said to be from now on.
+    /// Returns true if the result was computed from the same blocks up to `last`; otherwise sets the key to the blocks
+    /// of the model.
     fn update_key(&mut self, model: &Model, last: Affects) -> bool {
         let blocks = || model.blocks.iter().filter(|(block, _)| block.effect().affects() <= last);
         if self.key.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks())) {
@@ -48,7 +50,7 @@ impl<T> Cached<T> {
 }
 
 impl<'a> Simulator<'a> {
-    /// For one record.
+    /// Prepares simulations of one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
         Self {
             data,
@@ -64,7 +66,7 @@ impl<'a> Simulator<'a> {
         }
     }
 
-    /// What a model predicts for each row, in V.
+    /// Computes the prediction of a model for each row, in V.
     pub fn run(&mut self, model: &Model, readings: &mut Vec<f64>) {
         self.runs += 1;
         if !self.response.update_key(model, Affects::Response) {
@@ -83,7 +85,8 @@ impl<'a> Simulator<'a> {
         }
     }
 
-    /// The same, and what each state that is 1 V off its rest at the first row adds to it.
+    /// Computes the same, and the change of the prediction for each initial state that is 1 V away from rest at the
+    /// first row.
     pub fn run_with_initial_states(&mut self, model: &Model, readings: &mut Vec<f64>, kernels: &mut Vec<Vec<f64>>) {
         self.run(model, readings);
         if !self.kernels.update_key(model, Affects::Response) {
@@ -98,7 +101,7 @@ impl<'a> Simulator<'a> {
                     block.effect().modify_response(block.form, point, &mut self.signal, &mut start);
                 }
                 (state, states) = (state + 1, start.states());
-                // What no row sees is no unknown.
+                // A state that changes no row is not estimated.
                 if self.signal.at_rows().any(|value| value != 0.0) {
                     self.kernels.value.push(self.signal.at_rows().collect());
                 }
@@ -114,7 +117,7 @@ impl<'a> Simulator<'a> {
         }
     }
 
-    /// The stiffness that a model's chain and response make of the command.
+    /// Returns the stiffness for the command, with the effects on the chain and on the stiffness.
     fn responded(&mut self, model: &Model) -> &Signal {
         let data = self.data;
         let known = self.chained.update_key(model, Affects::Relaxation);
@@ -151,9 +154,9 @@ mod tests {
     use crate::record::data::Input;
     use simulation::record::Record;
 
-    /// Whatever ran before: a run is what it is for a new simulator.
+    /// A simulation gives the same result as in a new simulator, whatever was simulated before.
     #[test]
-    fn what_is_kept_changes_no_run() {
+    fn cached_results_do_not_change_a_simulation() {
         let rows = (0..60).map(|row| format!("{row},{},0\n", 100 * (row / 20 % 2)));
         let text = format!("time_s,voltage_v,stiffness\n{}", rows.collect::<String>());
         let (data, base) = (Data::new(&Record::parse("r", &text, "stiffness").unwrap(), Input::Hold), Base::paper());

@@ -67,7 +67,7 @@ mod tests {
     use crate::stats::scale::normals;
 
     #[test]
-    fn without_a_difference_it_is_the_correlation_itself() {
+    fn order_0_gives_the_autocovariance_of_the_values() {
         let values = normals(3000);
         let of_bands = BandSpectrum::of(&values, 0.0).correlation(0.0, 12);
         for (lag, of_bands) in of_bands.into_iter().enumerate() {
@@ -78,7 +78,7 @@ mod tests {
 
     /// A fractional difference of order 1 is the difference of neighbours.
     #[test]
-    fn a_whole_difference_is_that_of_neighbours() {
+    fn order_1_gives_the_variance_of_first_differences() {
         let values = normals(3000);
         let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let exact: f64 = steps.iter().map(|step| step * step).sum::<f64>() / 3000.0;

@@ -99,14 +99,14 @@ mod tests {
 
     /// A spurious autocorrelation would also absorb structure, so it must be rare.
     #[test]
-    fn independent_noise_of_a_heavy_tail_remembers_nothing() {
+    fn heavy_tailed_independent_noise_gets_no_autocorrelation() {
         let remembers = |rows: &&[f64]| !Noise::fitted(rows, &as_read(rows.len())).autocorrelation.is_white();
         let count = heavy(60_000).chunks(600).filter(remembers).count();
         assert!(count < 2, "{count} of 100");
     }
 
     #[test]
-    fn a_tail_is_recovered() {
+    fn tail_is_recovered() {
         let normal = normals(4000);
         let noise = Noise::fitted(&normal, &as_read(4000));
         assert!(noise.nu.is_infinite() && (noise.sigma - 1.0).abs() < 0.05, "{noise:?}");
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn outliers_are_a_mixture_and_one_wild_reading_is_one() {
+    fn outliers_are_found_as_a_mixture_down_to_one_reading() {
         let mut readings = normals(2000);
         readings[700] = 1e6;
         let noise = Noise::fitted(&readings, &as_read(2000));
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_is_taken_off_the_scale() {
+    fn variance_of_rounding_is_subtracted() {
         let step = 5.0;
         let off: Vec<f64> = normals(3000)
             .iter()

@@ -187,7 +187,7 @@ mod tests {
 
     /// A spring at 98 V reads 100 V in steps of 5 V, whether there is a bound at 100 V or not.
     #[test]
-    fn what_is_rounded_comes_to_a_bound_from_half_a_step_before_it() {
+    fn rounded_reading_reaches_a_bound_half_a_step_before_it() {
         let noise = Noise { half_step: 2.5, sigma: 0.2, marginal: 0.2, ..Noise::robust(&normals(100)) };
         for (kind, side) in [(Kind::AtLeast, 1.0), (Kind::AtMost, -1.0)] {
             let log = |residual: f64| noise.term(kind, side * residual, side * residual).log;
@@ -198,7 +198,7 @@ mod tests {
 
     /// The weight is minus the derivative of the log-density divided by the innovation.
     #[test]
-    fn a_weight_is_the_slope_of_its_density() {
+    fn weight_is_the_slope_of_the_log_density() {
         let mut mixture = Noise::robust(&normals(100));
         mixture.outliers = Some((0.05, 8.0));
         for noise in [Noise::robust(&normals(100)), mixture] {

@@ -32,7 +32,7 @@ impl Base {
     pub fn new(file: PlantFile) -> Result<Self> {
         if !PlayBank::of(file.memory.as_ref()).rises() {
             bad_input!(
-                "--plant: memory that falls as the voltage rises; expected direct >= 0, also with the weights added to it"
+                "--plant: [memory] with a decreasing loading curve; expected direct >= 0, also after adding the weights in order"
             );
         }
         let relaxation = Relaxation::of(&file.relaxation);

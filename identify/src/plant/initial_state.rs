@@ -61,7 +61,7 @@ pub(crate) fn subtract_estimate(
     let early = kernels.iter().map(|kernel| faded(kernel)).max().unwrap_or(0);
     let counted = |values: &[f64]| (0..early).filter(|&row| counts(row)).map(|row| values[row]).collect::<Vec<f64>>();
     let read = counted(residual);
-    let told: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
+    let used: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
     let mut start = DVector::zeros(kernels.len());
     let mut left = read.clone();
     let mut weighted = left.clone();
@@ -69,18 +69,18 @@ pub(crate) fn subtract_estimate(
     for round in 1..=ROUNDS {
         let prior = (usual / reach_v).powi(2);
         let mut normal = DMatrix::from_diagonal_element(kernels.len(), kernels.len(), prior);
-        for (i, kernel) in told.iter().enumerate() {
+        for (i, kernel) in used.iter().enumerate() {
             let weights = left.iter().map(|left| (far / left.abs()).min(1.0));
             weighted.iter_mut().zip(kernel).zip(weights).for_each(|((to, kernel), weight)| *to = weight * kernel);
             start[i] = dot(&weighted, &read);
             // The Cholesky decomposition reads the lower triangle only.
-            told[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted, other));
+            used[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted, other));
         }
         let Some(cholesky) = normal.cholesky() else { return 0.0 };
         cholesky.solve_mut(&mut start);
         if round < ROUNDS {
             left.clone_from(&read);
-            take(&start, &told, &mut left);
+            take(&start, &used, &mut left);
             usual = robust_scale(&left);
             far = FAR * usual;
         }
@@ -124,7 +124,7 @@ mod tests {
 
     /// The readings of a spring from any row on are explained without residual by the model of that spring.
     #[test]
-    fn a_start_makes_up_for_all_that_was_before() {
+    fn initial_state_explains_a_record_cut_from_a_longer_one() {
         let springs: [&[(&str, usize, &[f64])]; 6] = [
             &[("time-constant", 0, &[2.0])],
             &[("charge-leakage", 1, &[0.2, 3.0, 0.4]), ("second-relaxation", 1, &[0.2, 3.6])],

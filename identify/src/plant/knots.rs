@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parabola_gets_even_knots() {
+    fn knots_of_a_parabola_are_equidistant() {
         let curve = curve(|x| x * x / 500.0);
         let knots = knots(&curve, 9, 1e-6);
         assert!(knots.len() == 9 && knots.iter().enumerate().all(|(k, knot)| (knot.0 - 62.5 * k as f64).abs() < 8.0));
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn knots_lie_where_the_curve_bends() {
+    fn knots_are_dense_where_curvature_is_large() {
         let curve = curve(|x| 100.0 * (1.0 - (-x / 40.0).exp()));
         let even: Vec<Point> = curve.iter().step_by(125).copied().collect();
         let knots = knots(&curve, 9, 1e-6);
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kink_is_met_and_a_line_needs_no_knots() {
+    fn kink_is_a_knot_and_a_line_has_none() {
         let kinked = curve(|x| x.min(200.0) + 0.5 * (x - 200.0).max(0.0));
         assert_eq!(knots(&kinked, 9, 1e-6), [(0.0, 0.0), (200.0, 200.0), (500.0, 350.0)]);
         assert_eq!(knots(&curve(|x| 2.0 * x), 9, 1e-6), [(0.0, 0.0), (500.0, 1000.0)]);

@@ -186,14 +186,14 @@ mod tests {
 
     /// A play of weight 1 lags by its threshold on both branches.
     #[test]
-    fn a_whole_play_is_twice_its_threshold_wide() {
+    fn loop_of_one_play_is_twice_its_threshold_wide() {
         let width = PlayBank::new(0.0, [(20.0, 1.0)]).width(500.0);
         assert!((width - 40.0).abs() < 0.5, "{width}");
     }
 
     /// After one large voltage, both initial conditions give the same changes of the output.
     #[test]
-    fn a_cycled_bank_begins_where_a_large_voltage_leaves_it() {
+    fn cycled_bank_starts_on_the_descending_branch() {
         let mut fresh = PlayBank::new(0.6, [(20.0, 0.1), (60.0, 0.3)]);
         let mut cycled = fresh.clone().cycled();
         assert_eq!(cycled.clone().at_rest(), fresh);
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bank_behind_a_bank_is_one_bank() {
+    fn composition_of_two_banks_is_one_bank() {
         let first = PlayBank::new(0.5, [(20.0, 0.3), (45.0, 0.4)]);
         let none = PlayBank::new(1.0, []);
         assert_eq!(first.behind(&none), first);

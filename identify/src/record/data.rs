@@ -208,7 +208,7 @@ mod tests {
     use simulation::record::Row;
 
     #[test]
-    fn few_rows_are_held_out_stair_by_stair_if_they_are_stairs() {
+    fn short_records_are_held_out_stair_by_stair_if_they_have_stairs() {
         let stair: Vec<f64> = (0..18).map(|row| f64::from(row / 3)).collect();
         let expected: Vec<u8> = (0..18).map(|row| row / 3).collect();
         assert_eq!(folds(&stair), expected);
@@ -222,7 +222,7 @@ mod tests {
 
     /// A decay that only all rows together show is also assumed for every subset of the rows.
     #[test]
-    fn a_part_of_the_rows_begins_as_all_of_them_do() {
+    fn subset_of_rows_has_the_same_initial_state_flag() {
         let noise = normals(4000);
         let row = |row: usize, start_v: f64| {
             let time_s = 0.01 * row as f64;
@@ -245,7 +245,7 @@ mod tests {
     /// Autocorrelated noise is not taken for a decay; a decay faster or slower than the paper's time constant is
     /// recognised.
     #[test]
-    fn noise_that_remembers_does_not_fall() {
+    fn autocorrelated_noise_is_not_taken_for_a_decay() {
         let record = |row: &dyn Fn(f64, f64) -> f64, at_rest: usize, seed: usize| {
             let noise = normals(3000 + seed).split_off(seed);
             let remembered = noise.iter().scan(0.0, |last, noise| {
@@ -266,8 +266,8 @@ mod tests {
         };
         // In 1.5 s the spring hardly relaxes, so slow noise may be taken for a decay in up to 20 % of the records.
         for (at_rest, most) in [(60, 3), (16, 20)] {
-            let wanders = (0..100).filter(|seed| record(&|_, noise| noise, at_rest, *seed)).count();
-            assert!(wanders < most, "{at_rest} rows: {wanders} of 100");
+            let mistaken = (0..100).filter(|seed| record(&|_, noise| noise, at_rest, *seed)).count();
+            assert!(mistaken < most, "{at_rest} rows: {mistaken} of 100");
             for tau_s in [2.0, 3.5, 8.0, 15.0] {
                 let decay = |time: f64, noise| 60.0 * (-time / tau_s).exp() + noise;
                 let falls = (0..100).filter(|seed| record(&decay, at_rest, *seed));
@@ -278,7 +278,7 @@ mod tests {
 
     /// For no period of a schedule, in segments, does one fold hold out all of its steps.
     #[test]
-    fn no_fold_has_every_step() {
+    fn no_fold_holds_out_every_step() {
         let fold = folds(&[0.0; 60 * STRETCHES]);
         for period in 2..=STRETCHES / 4 {
             for phase in 0..period {

@@ -35,12 +35,12 @@ pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
         return None;
     }
     let reading = &data.reading;
-    let bends: Vec<f64> = second_differences(reading).collect();
+    let differences: Vec<f64> = second_differences(reading).collect();
     let level = running_median(&reading.iter().map(|reading| reading.abs()).collect::<Vec<_>>());
     rows.sort_by(|a, b| level[*a].total_cmp(&level[*b]));
     let of_group = |rows: &[usize]| {
         let middle = rows.iter().map(|row| level[*row]).sum::<f64>() / rows.len() as f64;
-        let scale = robust_scale(&rows.iter().map(|row| bends[row - 1]).collect::<Vec<_>>());
+        let scale = robust_scale(&rows.iter().map(|row| differences[row - 1]).collect::<Vec<_>>());
         // The mean level, the scale, and the weight of the group, which is one over the variance of its scale.
         (middle, scale, rows.len() as f64 / (ERROR * scale).powi(2))
     };
@@ -80,11 +80,11 @@ mod tests {
     }
 
     #[test]
-    fn a_scale_that_grows_is_recovered() {
+    fn growing_noise_scale_is_recovered() {
         let weights = of(|level| 0.2 + 0.004 * level).unwrap();
         // The levels are 50 V and 500 V.
         let ratio = weights[900] / weights[0];
-        assert!((4.5..6.5).contains(&ratio), "{ratio} beside 5.5");
+        assert!((4.5..6.5).contains(&ratio), "{ratio} instead of 5.5");
         let mean = weights.iter().map(|weight| weight.ln()).sum::<f64>();
         assert!(mean.abs() < 1e-9, "{mean}");
         assert!(of(|_| 1.0).is_none());

@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lattice_is_found_through_its_gaps() {
+    fn grid_is_found_with_values_missing() {
         let values: Vec<f64> = [0, 2, 5, 6, 11, 12, 20].iter().map(|&k| 3.7 + 2.5 * f64::from(k)).collect();
         assert!((QuantisationGrid::of(&values).unwrap().step - 2.5).abs() < 1e-9);
         let values: Vec<f64> = (1..200).map(|k| f64::from(k).sqrt()).collect();
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_found_behind_the_digits_that_were_printed() {
+    fn step_is_found_in_values_rounded_to_printed_digits() {
         let printed = |step: f64, digits: i32| {
             let unit = 10f64.powi(digits);
             let value = |k: i32| (f64::from(k) * step * unit).round() / unit;
@@ -119,6 +119,6 @@ mod tests {
         assert!((QuantisationGrid::of(&dense).unwrap().step - 0.1).abs() < 1e-9);
         // These levels have no common step.
         let levels = [0.0, 12.3, 31.9, 44.4, 58.2, 77.7, 93.1, 120.9, 141.6, 160.2];
-        assert!(QuantisationGrid::of(&levels).is_none_or(|lattice| lattice.step < 0.2));
+        assert!(QuantisationGrid::of(&levels).is_none_or(|grid| grid.step < 0.2));
     }
 }

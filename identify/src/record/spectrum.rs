@@ -145,7 +145,7 @@ mod tests {
     use simulation::record::{Record, Row};
 
     #[test]
-    fn a_turned_oscillation_is_the_computed_one() {
+    fn rotated_oscillation_equals_the_computed_one() {
         for jitter in [0.0, 0.3] {
             let time = |row: usize| 5.0 + 0.01 * (row as f64 + jitter * ((row * row % 7) as f64 / 7.0));
             let row = |row: usize| Row { line: row, time_s: time(row), voltage_v: 0.0, measured: Some(0.0) };

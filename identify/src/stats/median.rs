@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn far_values_move_no_median() {
+    fn outliers_do_not_change_medians() {
         assert_eq!(median(&mut []), None);
         assert_eq!(median(&mut [3.0, 1e9, 1.0]), Some(3.0));
         assert_eq!(robust_deviation([-0.6745, 1e9, 0.1].into_iter()), Some(1.0));

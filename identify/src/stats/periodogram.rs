@@ -32,7 +32,7 @@ mod tests {
 
     /// The signal is `3 cos(2 pi 100 n / 2048)`; lengths that share a plan are mixed.
     #[test]
-    fn a_line_has_its_power() {
+    fn spectral_line_has_expected_power() {
         for rows in [1024usize, 700, 1024] {
             let turn = std::f64::consts::TAU * 100.0 / 2048.0;
             let power = powers(&(0..rows).map(|row| 3.0 * (turn * row as f64).cos()).collect::<Vec<_>>());

@@ -141,7 +141,7 @@ mod tests {
 
     /// The reference is the same chain with pieces of 1/60 s everywhere.
     #[test]
-    fn pieces_grow_while_the_voltage_stays_and_two_lags_do_not_feel_it() {
+    fn growing_pieces_change_two_lags_in_series_by_less_than_25_mv() {
         let (schedule, times) = every_second((0..600).map(|row| 100.0 * f64::from((row / 60) % 3)));
         let fine_times: Vec<f64> = (0..60 * times.len() - 59).map(|part| part as f64 / 60.0).collect();
         let [mut grown, mut fine] = [&times, &fine_times].map(|times| Signal::new(&schedule, times, 0.0));
@@ -164,7 +164,7 @@ mod tests {
 
     /// The voltage rises by 1 V every 10 ms, then drops to 0 V; rows are 0.5 s apart.
     #[test]
-    fn a_first_look_takes_small_steps_for_a_ramp_and_no_jump() {
+    fn coarse_signal_joins_small_steps_but_not_jumps() {
         let row = |row: usize| format!("{},{}\n", 0.01 * row as f64, if row < 130 { row } else { 0 });
         let text = format!("time_s,voltage_v\n{}", (0..200).map(row).collect::<String>());
         let schedule = Schedule::from_record(&Record::parse("r", &text, "stiffness").unwrap(), Between::Hold);

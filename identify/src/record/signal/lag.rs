@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lag_is_exact_for_steps_and_ramps() {
+    fn lag_is_exact_for_steps_and_ramps() {
         let mut lag = Lag::at(5.5, 0.0);
         assert!(
             (lag.pass(Piece { duration_s: 2.0, from: 3.0, to: 3.0 }).1 - 3.0 * (1.0 - (-2.0f64 / 5.5).exp())).abs()

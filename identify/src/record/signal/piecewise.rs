@@ -174,19 +174,19 @@ mod tests {
     }
 
     #[test]
-    fn a_row_sees_the_voltage_just_after_its_jump() {
+    fn row_at_a_jump_has_the_voltage_after_it() {
         assert_eq!(rows(&step()), [0.0, 100.0, 100.0, 100.0, 0.0]);
     }
 
     #[test]
-    fn a_delay_moves_jumps_between_and_onto_rows() {
+    fn delay_moves_jumps_between_and_onto_rows() {
         assert_eq!(rows(&step().delayed(0.5)), [0.0, 0.0, 100.0, 100.0, 100.0]);
         assert_eq!(rows(&step().delayed(1.5)), [0.0, 0.0, 0.0, 100.0, 100.0]);
         assert_eq!(rows(&step().delayed(9.0)), [0.0; 5]);
     }
 
     #[test]
-    fn a_slew_limit_arrives_when_it_must() {
+    fn slew_limited_step_has_the_expected_ramp() {
         let got = rows(&step().slewed(40.0, 40.0));
         for (got, expected) in got.iter().zip([0.0, 0.0, 40.0, 80.0, 100.0]) {
             assert!((got - expected).abs() < 1e-9, "{got} {expected}");
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn rise_and_fall_have_their_own_rates() {
+    fn rising_and_falling_slew_rates_are_independent() {
         let mut up_and_down = step();
         let falls = up_and_down.rows[3] as usize;
         up_and_down.pieces[falls..].iter_mut().for_each(|piece| (piece.from, piece.to) = (0.0, 0.0));
