@@ -104,7 +104,7 @@ fn on_uniform_grid(residual: &[f64], data: &Data) -> Vec<f64> {
 }
 
 /// Returns sine and cosine of a frequency at each row, with time counted from the first reading. Over equal time steps
-/// they are rotated, which is faster than computing them; every [`TURNS`] rows they are computed afresh to limit
+/// they are rotated, which is faster than computing them; every 64 rows they are computed afresh to limit
 /// rounding errors.
 pub fn oscillation(frequency_hz: f64, data: &Data) -> impl Iterator<Item = (f64, f64)> {
     let start = data.time_s.first().copied().unwrap_or(0.0);
