@@ -23,9 +23,9 @@ const RATES: [usize; 2] = [1, 2];
 /// Largest time constant of the output, in s; a larger one could not be distinguished from the spring's.
 const SLOWEST_OUTPUT_S: f64 = 1.0;
 /// Ratio of the two rates at initial points.
-const APART: f64 = 3.0;
+const INITIAL_RATIO: f64 = 3.0;
 /// Distance of the initial voltage from the command at initial points, as a fraction of the full scale.
-const OFF: f64 = 0.2;
+const INITIAL_DISTANCE: f64 = 0.2;
 
 fn stroke(data: &Data) -> f64 {
     data.full_scale_v.max(1e-6)
@@ -80,11 +80,11 @@ impl Effect for AmplifierSlew {
             BOTH_WAYS => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
             RESISTANCE => return logarithms(taus(data), 10).map(|tau| vec![tau]).collect(),
             _ => logarithms(rates, 10)
-                .flat_map(|rate| [APART.ln(), -APART.ln()].map(|apart| vec![rate, rate + apart]))
+                .flat_map(|rate| [INITIAL_RATIO.ln(), -INITIAL_RATIO.ln()].map(|apart| vec![rate, rate + apart]))
                 .collect(),
         };
         // At an amplifier voltage equal to the command the derivative would vanish.
-        let from_v = data.initial_state_unknown.then_some(data.command.before - OFF * stroke(data));
+        let from_v = data.initial_state_unknown.then_some(data.command.before - INITIAL_DISTANCE * stroke(data));
         starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
     }
 

@@ -104,10 +104,10 @@ impl Effect for Hysteresis {
 
     /// A plant file holds a limited number of plays.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
-        (!chain.memory.fits()).then(|| table(self, form, point, data))
+        (!chain.memory.fits_plant_file()).then(|| table(self, form, point, data))
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        chain.memory = bank(form, point).behind(&chain.memory);
+        chain.memory = bank(form, point).composed_with(&chain.memory);
     }
 }

@@ -16,13 +16,13 @@ const RUN: usize = 0;
 const WHOLE: usize = 1;
 
 /// Shortest run, in rows; for a run longer than half of the record, the other rows count as shifted.
-const SHORTEST: usize = 5;
+const SHORTEST_RUN: usize = 5;
 /// Readings are clipped at this many scales of the noise in the search.
 const CLIP: f64 = 6.0;
-/// Number of first rows from which the sensor's zero is estimated, and number of standard errors from which on it is
-/// wrong.
-const AT_REST: usize = 10;
-const SHOWN: f64 = 3.0;
+/// Number of first rows from which the sensor's zero is estimated.
+const ROWS_AT_REST: usize = 10;
+/// The sensor's zero is wrong if it is this many standard errors away from 0.
+const SIGNIFICANT_ZERO: f64 = 3.0;
 
 /// Returns the rows that are shifted and the shift, in V: rows from `point[0]` up to but not including `point[1]` by
 /// `point[2]`, or all by `point[0]`.
@@ -36,13 +36,13 @@ fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, 
 
 /// Returns false if the readings before the first voltage show that the sensor's zero is right.
 fn shows_at_rest(data: &Data) -> bool {
-    let rest = data.voltage_v.iter().take(AT_REST).take_while(|voltage| **voltage == 0.0).count();
+    let rest = data.voltage_v.iter().take(ROWS_AT_REST).take_while(|voltage| **voltage == 0.0).count();
     if data.initial_state_unknown || rest == 0 {
         return true;
     }
     let zero = median(&mut data.reading[..rest].to_vec()).unwrap_or(0.0);
     let error = robust_deviation(second_differences(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
-    zero.abs() > SHOWN * error
+    zero.abs() > SIGNIFICANT_ZERO * error
 }
 
 /// Returns the run whose shift reduces the squared error most, among runs of growing length; NaN rows count neither for
@@ -57,12 +57,12 @@ fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>>
         counts.push(counts[row] + usize::from(!value.is_nan()));
     }
     let gain = |from: usize, to: usize| match counts[to] - counts[from] {
-        seen if seen < SHORTEST => 0.0,
+        seen if seen < SHORTEST_RUN => 0.0,
         seen => (sums[to] - sums[from]).powi(2) / seen as f64,
     };
     let longest = rows / 2;
     let mut best = (0.0, 0, 0);
-    let mut length = SHORTEST;
+    let mut length = SHORTEST_RUN;
     while length <= longest {
         for from in 0..=rows - length {
             let found = gain(from, from + length);
@@ -88,13 +88,13 @@ fn refined(from: usize, to: usize, rows: usize, gain: &impl Fn(usize, usize) -> 
     let mut best = (gain(from, to), from, to);
     for _ in 0..3 {
         let before = best;
-        for edge in best.1.saturating_sub(reach)..=(best.1 + reach).min(best.2 - SHORTEST.min(best.2 - best.1)) {
+        for edge in best.1.saturating_sub(reach)..=(best.1 + reach).min(best.2 - SHORTEST_RUN.min(best.2 - best.1)) {
             let found = gain(edge, best.2);
-            if found > best.0 && best.2 - edge >= SHORTEST {
+            if found > best.0 && best.2 - edge >= SHORTEST_RUN {
                 best = (found, edge, best.2);
             }
         }
-        for edge in (best.1 + SHORTEST).max(best.2.saturating_sub(reach))..=(best.2 + reach).min(rows) {
+        for edge in (best.1 + SHORTEST_RUN).max(best.2.saturating_sub(reach))..=(best.2 + reach).min(rows) {
             let found = gain(best.1, edge);
             if found > best.0 {
                 best = (found, best.1, edge);

@@ -55,7 +55,7 @@ const LEAST_GAIN: f64 = 0.02;
 const LEAST_PREDICTED_GAIN: f64 = 0.1 * LEAST_GAIN;
 
 /// Largest number of discontinuities of the prediction that a fit crosses one after the other.
-const MOST_STEPS: usize = 30;
+const MOST_JUMPS: usize = 30;
 
 /// Fits models to one record.
 ///
@@ -96,7 +96,7 @@ pub struct Engine<'a> {
     /// Properties of its readings.
     pub observed: &'a Observed,
     /// Runs the models.
-    pub simulator: Simulator<'a>,
+    simulator: Simulator<'a>,
     /// Reading minus prediction of the plant without any effect, in V.
     pub baseline_residual: Vec<f64>,
     predicted: Vec<f64>,
@@ -164,7 +164,7 @@ impl<'a> Engine<'a> {
     fn across_jumps(&mut self, mut here: Fit, law: &Noise) -> Fit {
         for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
             let mut steps = side;
-            for _ in 0..MOST_STEPS {
+            for _ in 0..MOST_JUMPS {
                 let (block, point) = &here.model.blocks[index];
                 let Some(point) = block.effect().across_jumps(block.form, point, steps, self.data) else { break };
                 let mut model = here.model.clone();
@@ -264,6 +264,11 @@ impl<'a> Engine<'a> {
             }
         }
         model
+    }
+
+    /// Returns the derivatives of the prediction and the contribution of each row at a fit.
+    pub fn linearised(&mut self, fit: &Fit) -> (Jacobian, Vec<Term>) {
+        (self.jacobian(&fit.model, &fit.noise, &fit.residual), self.terms(&fit.noise, &fit.residual))
     }
 
     /// Returns the contribution of each row to the fit.

@@ -18,7 +18,7 @@ use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations};
 use crate::noise::Term;
 
 /// A coordinate is unknown if the rows outside the fold hold less than this fraction of its information.
-const KNOWN: f64 = 0.01;
+const LEAST_INFORMATION: f64 = 0.01;
 
 impl Engine<'_> {
     /// Returns the log-likelihood of all rows, each predicted by a fit without its fold, minus the cost of the fit, in
@@ -62,8 +62,7 @@ struct FullFit<'f> {
 
 impl<'f> FullFit<'f> {
     fn new(engine: &mut Engine, fit: &'f Fit) -> Self {
-        let jacobian = engine.jacobian(&fit.model, &fit.noise, &fit.residual);
-        let terms = engine.terms(&fit.noise, &fit.residual);
+        let (jacobian, terms) = engine.linearised(fit);
         let (normal, _) = normal_equations(&jacobian, &terms);
         Self { fit, jacobian, terms, known: normal.diagonal().iter().copied().collect() }
     }
@@ -79,7 +78,7 @@ impl<'f> FullFit<'f> {
             .map(|(term, &of)| Term { weight: if unseen(of) { 0.0 } else { term.weight }, ..*term })
             .collect();
         let (normal, gradient) = normal_equations(&self.jacobian, &seen);
-        let knows = |column: &usize| normal[(*column, *column)] > KNOWN * self.known[*column];
+        let knows = |column: &usize| normal[(*column, *column)] > LEAST_INFORMATION * self.known[*column];
         let columns: Vec<usize> = (0..self.known.len()).filter(knows).collect();
         let (normal, gradient) =
             (normal.select_columns(&columns).select_rows(&columns), gradient.select_rows(&columns));

@@ -22,8 +22,7 @@ use crate::stats::scale::Z;
 
 /// Returns the information matrix of the fitted coordinates.
 pub(crate) fn information(engine: &mut Engine, fit: &Fit) -> DMatrix<f64> {
-    let jacobian = engine.jacobian(&fit.model, &fit.noise, &fit.residual);
-    let terms = engine.terms(&fit.noise, &fit.residual);
+    let (jacobian, terms) = engine.linearised(fit);
     let (normal, _) = normal_equations(&jacobian, &terms);
     // Reweighting overstates the information under a heavy tail; the variance of the scores corrects it.
     let squares: f64 = terms.iter().map(|term| (term.weight * term.residual).powi(2)).sum();

@@ -11,9 +11,9 @@ use crate::record::signal::Signal;
 #[derive(Clone, Debug)]
 pub struct Simulator<'a> {
     /// The record.
-    pub data: &'a Data,
+    data: &'a Data,
     /// The plant without any effect.
-    pub base: &'a Base,
+    pub(super) base: &'a Base,
     signal: Signal,
     levels_v: Vec<f64>,
     /// Results of the last simulation: the voltage on the electrodes, the settled stiffness, and the stiffness behind
@@ -25,8 +25,6 @@ pub struct Simulator<'a> {
     response: Cached<Vec<f64>>,
     /// Response of the stiffness to each initial state.
     kernels: Cached<Vec<Vec<f64>>>,
-    /// Number of simulations so far.
-    pub runs: usize,
 }
 
 /// A result, and the blocks that it was computed from.
@@ -62,13 +60,11 @@ impl<'a> Simulator<'a> {
             chained: Cached::default(),
             response: Cached::default(),
             kernels: Cached::default(),
-            runs: 0,
         }
     }
 
     /// Computes the prediction of a model for each row, in V.
     pub fn run(&mut self, model: &Model, readings: &mut Vec<f64>) {
-        self.runs += 1;
         if !self.response.update_key(model, Affects::Response) {
             let mut value = std::mem::take(&mut self.response.value);
             value.clear();

@@ -26,51 +26,53 @@ pub struct Autocorrelation {
     sections: Vec<(f64, f64)>,
 }
 
-/// Largest order of the autoregression, in rows, and number of rows that each lag needs.
-const LONGEST: usize = 50;
+/// Largest order of the autoregression, in rows.
+const LARGEST_ORDER: usize = 50;
+/// Smallest number of rows for each lag of the autoregression.
 const ROWS_PER_LAG: usize = 12;
 /// Largest order of the autoregression behind a fractional difference.
-const LONGEST_BESIDE: usize = 12;
+const LARGEST_ORDER_WITH_DIFFERENCE: usize = 12;
 /// In records with fewer rows autocorrelation cannot be distinguished from structure.
-const ROWS: usize = 24;
+const FEWEST_ROWS: usize = 24;
 /// In records with fewer rows a fractional difference is not tried.
-const ROWS_FOR_POWER: usize = 150;
+const FEWEST_ROWS_FOR_DIFFERENCE: usize = 150;
 /// Ratio of the frequencies that one section spans.
-const SPAN: f64 = 4.0;
+const SECTION_RATIO: f64 = 4.0;
 /// Number of rows that are whitened at a time.
 const BLOCK: usize = 1024;
 /// Residuals are clipped at this many robust scales before the filter is fitted.
 const CLIP: f64 = 4.0;
 /// Gain in nats by which a fractional difference must exceed an autoregression alone; unexplained structure has a
 /// similar spectrum.
-const PRICE_OF_POWER: f64 = 8.0;
+const COST_OF_DIFFERENCE: f64 = 8.0;
 /// Error of a likelihood that is computed from the spectrum, in nats.
-const UNSURE: f64 = 10.0;
+const SPECTRUM_ERROR: f64 = 10.0;
 
 impl Autocorrelation {
     /// Fits the filter to a residual with the given robust scale, in V.
     pub fn fitted(residual: &[f64], scale: f64) -> Self {
-        if residual.len() < ROWS {
+        if residual.len() < FEWEST_ROWS {
             return Self::default();
         }
         let clipped: Vec<f64> =
             without_outliers(residual).into_iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
         let rows = residual.len();
-        let (ar, cost) = autoregression(&correlation(&clipped, LONGEST.min(rows / ROWS_PER_LAG)), rows);
+        let (ar, cost) = autoregression(&correlation(&clipped, LARGEST_ORDER.min(rows / ROWS_PER_LAG)), rows);
         let alone = Self { ar, ..Self::default() };
-        if alone.is_white() || rows < ROWS_FOR_POWER {
+        if alone.is_white() || rows < FEWEST_ROWS_FOR_DIFFERENCE {
             return alone;
         }
         // The order is estimated from the spectrum, which is fast; whether it pays is decided with the whitened
         // residual.
         let (by_spectrum, power) = likeliest_power(&BandSpectrum::of(&clipped, 0.0), rows);
-        if by_spectrum + PRICE_OF_POWER > cost + UNSURE {
+        if by_spectrum + COST_OF_DIFFERENCE > cost + SPECTRUM_ERROR {
             return alone;
         }
         let mut filter = Self { power, ar: Vec::new(), sections: sections(power, rows) };
-        let (ar, with_power) = autoregression(&correlation(&filter.whitened(&clipped), LONGEST_BESIDE), rows);
+        let (ar, with_power) =
+            autoregression(&correlation(&filter.whitened(&clipped), LARGEST_ORDER_WITH_DIFFERENCE), rows);
         filter.ar = ar;
-        if with_power + PRICE_OF_POWER < cost { filter } else { alone }
+        if with_power + COST_OF_DIFFERENCE < cost { filter } else { alone }
     }
 
     /// Returns true if the noise is not autocorrelated.
@@ -143,7 +145,7 @@ fn without_outliers(values: &[f64]) -> Vec<f64> {
 /// Returns zeros and poles of the sections that approximate `(1 - B)^power`.
 fn sections(power: f64, rows: usize) -> Vec<(f64, f64)> {
     let (lowest, highest) = (std::f64::consts::TAU / rows as f64, std::f64::consts::PI);
-    let count = ((highest / lowest).ln() / SPAN.ln()).ceil().max(1.0);
+    let count = ((highest / lowest).ln() / SECTION_RATIO.ln()).ceil().max(1.0);
     let span = (highest / lowest).powf(1.0 / count);
     let section = |index: u32| {
         let middle = lowest * span.powf(f64::from(index) + 0.5);
@@ -164,15 +166,16 @@ fn correlation(values: &[f64], longest: usize) -> Vec<f64> {
 pub fn coding_cost(signal: &[f64], scale: f64) -> f64 {
     let (rows, noise) = (signal.len(), scale * scale);
     let spectrum = BandSpectrum::of(signal, noise);
-    let alone = autoregression(&spectrum.correlation(0.0, LONGEST.min(rows / ROWS_PER_LAG)), rows).1;
-    let with_power = if rows < ROWS_FOR_POWER { alone } else { likeliest_power(&spectrum, rows).0 + PRICE_OF_POWER };
+    let alone = autoregression(&spectrum.correlation(0.0, LARGEST_ORDER.min(rows / ROWS_PER_LAG)), rows).1;
+    let with_power =
+        if rows < FEWEST_ROWS_FOR_DIFFERENCE { alone } else { likeliest_power(&spectrum, rows).0 + COST_OF_DIFFERENCE };
     (alone.min(with_power) - 0.5 * rows as f64 * noise.ln()).max(0.0)
 }
 
 /// Returns the cost in nats of the most likely fractional difference with an autoregression behind it, and the order of
 /// the difference.
 fn likeliest_power(spectrum: &BandSpectrum, rows: usize) -> (f64, f64) {
-    let cost = |power: f64| autoregression(&spectrum.correlation(power, LONGEST_BESIDE), rows).1;
+    let cost = |power: f64| autoregression(&spectrum.correlation(power, LARGEST_ORDER_WITH_DIFFERENCE), rows).1;
     let mut best = (f64::INFINITY, 0.0);
     let mut step = 0.2;
     let mut tried: Vec<f64> = (1..=5).map(|part| step * f64::from(part)).collect();
@@ -268,7 +271,7 @@ mod tests {
     #[test]
     fn whitening_in_blocks_equals_direct_whitening() {
         let values = normals(3 * BLOCK + 7);
-        let ar: Vec<f64> = (1..=LONGEST).map(|lag| (lag as f64).cos() / 50.0).collect();
+        let ar: Vec<f64> = (1..=LARGEST_ORDER).map(|lag| (lag as f64).cos() / 50.0).collect();
         let filter = Autocorrelation { ar, ..Autocorrelation::default() };
         for (row, white) in filter.whitened(&values).into_iter().enumerate() {
             let earlier = (1..).zip(&filter.ar).map(|(lag, phi)| phi * values[row.saturating_sub(lag)]);

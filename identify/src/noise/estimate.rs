@@ -13,11 +13,11 @@ impl Noise {
         let mut noise = Self::robust(&observed.uncensored(residual));
         if let Some(QuantisationGrid { step, .. }) = observed.grid
             && (observed.step_beyond(COARSE).is_some()
-                || step >= COARSE * rest_of(root_mean_square(residual), step).max(FINEST_V))
+                || step >= COARSE * without_rounding(root_mean_square(residual), step).max(FINEST_V))
         {
             noise.half_step = step / 2.0;
             noise.nu = f64::INFINITY;
-            noise.sigma = rest_of(root_mean_square(residual), step).max(0.05 * step).max(FINEST_V);
+            noise.sigma = without_rounding(root_mean_square(residual), step).max(0.05 * step).max(FINEST_V);
             noise.rescale_cells(residual, observed);
             noise.marginal = noise.sigma;
             return noise;
@@ -69,7 +69,7 @@ impl Noise {
 }
 
 /// Returns the scale that remains after the variance of rounding to a step, `step^2 / 12`, is subtracted, in V.
-fn rest_of(scale: f64, step: f64) -> f64 {
+fn without_rounding(scale: f64, step: f64) -> f64 {
     (scale * scale - step * step / 12.0).max(0.0).sqrt()
 }
 

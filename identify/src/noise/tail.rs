@@ -4,16 +4,18 @@ use crate::noise::law::Noise;
 use crate::stats::scale::{FINEST_V, robust_scale, root_mean_square};
 use crate::stats::sums::total;
 
+/// Degrees of freedom that are tried.
 const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];
 /// Gain in nats by which a mixture must exceed one heavy tail to count as outliers.
-const OUTLIERS: f64 = 7.0;
+const COST_OF_OUTLIERS: f64 = 7.0;
 /// A mixture with a larger fraction of the wider normal is not taken for outliers.
 const MOST_OUTLIERS: f64 = 0.25;
-/// Up to this many errors are used one by one; more are grouped into cells by size, [`CELLS`] for each scale.
-const FEW: usize = 1_000;
-const CELLS: f64 = 100.0;
+/// Up to this many errors are used one by one; more are grouped into cells by size.
+const MOST_SINGLE_ERRORS: usize = 1_000;
+/// Number of cells in one scale of the errors.
+const CELLS_PER_SCALE: f64 = 100.0;
 /// Smallest scale of outliers relative to that of the noise.
-const WIDE: f64 = 4.0;
+const LEAST_OUTLIER_SCALE: f64 = 4.0;
 
 impl Noise {
     fn is_normal(&self) -> bool {
@@ -68,10 +70,10 @@ impl Noise {
             heavy.fit_scale(start, sizes, |&size| size, 8);
             consider(self, heavy, 2.0);
         }
-        if innovations.len() >= 30 && innovations.iter().any(|e| e.abs() > WIDE * start) {
+        if innovations.len() >= 30 && innovations.iter().any(|e| e.abs() > LEAST_OUTLIER_SCALE * start) {
             let mixture = Self::mixture(sizes, start, &normal);
             if mixture.outliers.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS) {
-                consider(self, mixture, OUTLIERS);
+                consider(self, mixture, COST_OF_OUTLIERS);
             }
         }
     }
@@ -80,8 +82,8 @@ impl Noise {
     fn mixture(sizes: &[(f64, f64)], start: f64, normal: &Self) -> Self {
         let sums = |sum: (f64, f64), &(e, times): &(f64, f64)| (sum.0 + times, sum.1 + times * (e * e));
         let (count, _) = sizes.iter().fold((0.0, 0.0), sums);
-        let (far, squares) = sizes.iter().filter(|(e, _)| e.abs() > WIDE * start).fold((0.0, 0.0), sums);
-        let (mut sigma, mut wide) = (start, (squares / f64::max(far, 1.0)).sqrt().max(WIDE * start));
+        let (far, squares) = sizes.iter().filter(|(e, _)| e.abs() > LEAST_OUTLIER_SCALE * start).fold((0.0, 0.0), sums);
+        let (mut sigma, mut wide) = (start, (squares / f64::max(far, 1.0)).sqrt().max(LEAST_OUTLIER_SCALE * start));
         let mut fraction = far / count;
         for _ in 0..25 {
             let (mut weight, mut narrow_sum, mut wide_sum) = (0.0, 0.0, 0.0);
@@ -95,7 +97,7 @@ impl Noise {
             }
             fraction = (weight / count).clamp(1e-6, 0.5);
             sigma = (narrow_sum / (count - weight)).sqrt().max(FINEST_V);
-            wide = (wide_sum / weight.max(1e-9)).sqrt().max(WIDE * sigma);
+            wide = (wide_sum / weight.max(1e-9)).sqrt().max(LEAST_OUTLIER_SCALE * sigma);
         }
         Self { outliers: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }
     }
@@ -103,13 +105,13 @@ impl Noise {
 
 /// Returns sizes of errors with their multiplicities; many errors are grouped into cells of nearly equal size.
 pub(super) fn sizes(errors: &[f64], scale: f64) -> Vec<(f64, f64)> {
-    if errors.len() <= FEW {
+    if errors.len() <= MOST_SINGLE_ERRORS {
         return errors.iter().map(|&e| (e, 1.0)).collect();
     }
-    let mut cells = vec![(0.0, 0.0); (2.0 * WIDE * CELLS) as usize];
+    let mut cells = vec![(0.0, 0.0); (2.0 * LEAST_OUTLIER_SCALE * CELLS_PER_SCALE) as usize];
     let mut sizes = Vec::new();
     for &e in errors {
-        match cells.get_mut((e.abs() / scale * CELLS) as usize) {
+        match cells.get_mut((e.abs() / scale * CELLS_PER_SCALE) as usize) {
             Some((squares, times)) => (*squares, *times) = (*squares + e * e, *times + 1.0),
             None => sizes.push((e, 1.0)),
         }

@@ -30,7 +30,7 @@ impl Base {
     /// [`simulation::bad_input::BadInput`] if the loading curve of the file's hysteresis decreases anywhere, for which
     /// no second bank of play operators can be composed with it.
     pub fn new(file: PlantFile) -> Result<Self> {
-        if !PlayBank::of(file.memory.as_ref()).rises() {
+        if !PlayBank::of(file.memory.as_ref()).is_monotonic() {
             bad_input!(
                 "--plant: [memory] with a decreasing loading curve; expected direct >= 0, also after adding the weights in order"
             );

@@ -49,9 +49,9 @@ pub struct Chain<'a> {
 
 /// Fraction by which a delay is shortened, so that a jump that falls on the time of a row is before that row however
 /// sums of times are rounded.
-const ROUNDING: f64 = 1e-5;
+const DELAY_ROUNDING: f64 = 1e-5;
 /// Number of intervals of the delay in which the voltage sent before the first row may have had different values.
-const SENT: usize = 6;
+const DELAY_INTERVALS: usize = 6;
 /// A voltage above that of any record, in V.
 const HIGHEST_V: f64 = 1e6;
 
@@ -85,7 +85,7 @@ impl<'a> Chain<'a> {
             delay_s: Some(self.delay_s).filter(|delay| *delay > 0.0),
         };
         file.amplifier = (amplifier != Amplifier::default()).then_some(amplifier);
-        if self.memory.fits() {
+        if self.memory.fits_plant_file() {
             file.memory = self.memory.table();
         }
         let (gain, relaxation, leakage) = self.as_plant_file_tables();
@@ -119,7 +119,7 @@ impl<'a> Chain<'a> {
             signal.pass(|piece| output.pass(piece));
         }
         if self.delay_s > 0.0 {
-            *signal = signal.delayed(self.delay_s * (1.0 - ROUNDING));
+            *signal = signal.delayed(self.delay_s * (1.0 - DELAY_ROUNDING));
         }
     }
 
@@ -129,7 +129,7 @@ impl<'a> Chain<'a> {
         if memory.table().is_some() {
             signal.map(|voltage| memory.at(voltage));
         }
-        if !self.law.is_none() {
+        if !self.law.is_identity() {
             signal.map(|voltage| self.law.at(voltage));
         }
     }
@@ -141,7 +141,7 @@ impl<'a> Chain<'a> {
             applied.middles(levels_v);
         }
         self.follow(signal, &mut InitialState::at_rest(), levels_v);
-        if !self.law_behind.is_none() {
+        if !self.law_behind.is_identity() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }
     }
@@ -149,10 +149,10 @@ impl<'a> Chain<'a> {
     /// Applies the linear part of the chain: leakage and relaxation.
     fn follow(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
         let mut lost = InstantaneousLoss::default();
-        self.losses.iter().for_each(|loss| loss.take(signal, start, &mut lost));
+        self.losses.iter().for_each(|loss| loss.apply(signal, start, &mut lost));
         self.relaxation.pass(signal, start, levels_v);
         if !lost.is_none() {
-            lost.off(signal);
+            lost.subtract_from(signal);
         }
     }
 
@@ -161,7 +161,11 @@ impl<'a> Chain<'a> {
     /// the states of the lags.
     pub fn initial_state_response(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
         let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.next_offset_v() } else { 0.0 });
-        let late = if self.delay_s > 0.0 { [0.0; SENT].map(|_| start.next_offset_v()) } else { [0.0; SENT] };
+        let late = if self.delay_s > 0.0 {
+            [0.0; DELAY_INTERVALS].map(|_| start.next_offset_v())
+        } else {
+            [0.0; DELAY_INTERVALS]
+        };
         let kept = if self.memory.table().is_some() { start.next_offset_v() } else { 0.0 };
         let (mut rest, mut above) = (self.memory.clone(), self.memory.clone());
         rest.at(signal.before);
@@ -172,12 +176,12 @@ impl<'a> Chain<'a> {
         };
         let mut at_s = 0.0;
         signal.before = 0.0;
-        let at_rest = output.value() == 0.0 && kept == 0.0 && late == [0.0; SENT];
+        let at_rest = output.value() == 0.0 && kept == 0.0 && late == [0.0; DELAY_INTERVALS];
         signal.pass(|piece| {
             if at_rest {
                 return (0.0, 0.0);
             }
-            let part = (at_s + piece.duration_s / 2.0) / self.delay_s * SENT as f64;
+            let part = (at_s + piece.duration_s / 2.0) / self.delay_s * DELAY_INTERVALS as f64;
             at_s += piece.duration_s;
             let sent = late.get(part as usize).copied().unwrap_or(0.0);
             let (from, to) = output.pass(Piece { from: 0.0, to: 0.0, ..piece });

@@ -13,11 +13,11 @@ use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
 
 /// Errors beyond this many scales are weighted down (Huber's threshold).
-const FAR: f64 = 3.0;
+const HUBER_THRESHOLD: f64 = 3.0;
 /// Number of reweighting rounds.
 const ROUNDS: usize = 4;
 /// Rows in which all kernels are below this fraction of their maximum do not contribute to the estimate.
-const FADED: f64 = 0.05;
+const NEGLIGIBLE: f64 = 0.05;
 
 /// The initial offsets of a chain's states, requested one after the other: all 0, or one of them 1 V.
 #[derive(Debug, Default)]
@@ -58,7 +58,7 @@ pub(crate) fn subtract_estimate(
     reach_v: f64,
     counts: impl Fn(usize) -> bool,
 ) -> f64 {
-    let early = kernels.iter().map(|kernel| faded(kernel)).max().unwrap_or(0);
+    let early = kernels.iter().map(|kernel| decay_end(kernel)).max().unwrap_or(0);
     let counted = |values: &[f64]| (0..early).filter(|&row| counts(row)).map(|row| values[row]).collect::<Vec<f64>>();
     let read = counted(residual);
     let used: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
@@ -80,25 +80,25 @@ pub(crate) fn subtract_estimate(
         cholesky.solve_mut(&mut start);
         if round < ROUNDS {
             left.clone_from(&read);
-            take(&start, &used, &mut left);
+            subtract(&start, &used, &mut left);
             usual = robust_scale(&left);
-            far = FAR * usual;
+            far = HUBER_THRESHOLD * usual;
         }
     }
-    take(&start, kernels, residual);
+    subtract(&start, kernels, residual);
     0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * start.norm_squared() / reach_v.powi(2)
 }
 
-fn take(start: &DVector<f64>, kernels: &[Vec<f64>], from: &mut [f64]) {
+fn subtract(start: &DVector<f64>, kernels: &[Vec<f64>], from: &mut [f64]) {
     for (start, kernel) in start.iter().zip(kernels) {
         from.iter_mut().zip(kernel).for_each(|(left, kernel)| *left -= start * kernel);
     }
 }
 
-/// Returns the first row from which on a kernel stays below [`FADED`] of its maximum.
-fn faded(kernel: &[f64]) -> usize {
+/// Returns the first row from which on a kernel stays below [`NEGLIGIBLE`] of its maximum.
+fn decay_end(kernel: &[f64]) -> usize {
     let most = kernel.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    kernel.iter().rposition(|value| value.abs() > FADED * most).map_or(0, |last| last + 1)
+    kernel.iter().rposition(|value| value.abs() > NEGLIGIBLE * most).map_or(0, |last| last + 1)
 }
 
 #[cfg(test)]

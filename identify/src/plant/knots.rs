@@ -9,7 +9,7 @@
 pub(crate) type Point = (f64, f64);
 
 /// Number of bisections of the logarithm of the error bound.
-const HALVINGS: usize = 30;
+const BISECTIONS: usize = 30;
 
 /// Returns at most `most` knots of a curve, including its ends, and no more than a maximum chord error of `enough`
 /// requires. The curve needs two points or more, in ascending order; its first point stays.
@@ -19,7 +19,7 @@ pub(crate) fn knots(curve: &[Point], most: usize, enough: f64) -> Vec<Point> {
     }
     let mut best = vec![0, curve.len() - 1];
     let (mut low, mut high) = (enough, curve.iter().fold(enough, |range, (_, value)| range.max(2.0 * value.abs())));
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTIONS {
         let bound = (low * high).sqrt();
         match chords(curve, most, bound) {
             Some(knots) => (best, high) = (knots, bound),

@@ -13,7 +13,7 @@ pub struct Law<'a> {
 }
 
 /// Largest error of a chord, as a fraction of the full scale, that counts as none.
-const STRAIGHT: f64 = 1e-7;
+const STRAIGHT_TOLERANCE: f64 = 1e-7;
 /// Number of intervals of the full scale at which a law is evaluated for its table.
 const STEPS: usize = 1000;
 
@@ -29,7 +29,7 @@ impl<'a> Law<'a> {
     }
 
     /// Returns true if the law is the identity.
-    pub fn is_none(&self) -> bool {
+    pub fn is_identity(&self) -> bool {
         self.table.is_none() && self.behind.is_empty()
     }
 
@@ -42,7 +42,7 @@ impl<'a> Law<'a> {
     /// Returns the table for a plant file, of this law multiplied by `gain` and followed by the law `behind`, up to
     /// `full_scale_v` or the end of the file's own table; `None` for the identity.
     pub fn table(&self, gain: f64, behind: &Law, full_scale_v: f64) -> Option<plant_file::Law> {
-        if self.behind.is_empty() && gain == 1.0 && behind.is_none() {
+        if self.behind.is_empty() && gain == 1.0 && behind.is_identity() {
             return self.table.cloned();
         }
         let mut voltage_v: Vec<f64> = (0..=STEPS).map(|step| full_scale_v * step as f64 / STEPS as f64).collect();
@@ -51,7 +51,7 @@ impl<'a> Law<'a> {
         voltage_v.dedup_by(|b, a| *b - *a < 1e-3 * full_scale_v / STEPS as f64);
         let curve: Vec<Point> =
             voltage_v.into_iter().map(|voltage| (voltage, behind.at(gain * self.at(voltage)))).collect();
-        let (voltage_v, stiffness) = knots(&curve, MOST_POINTS, STRAIGHT * full_scale_v).into_iter().unzip();
+        let (voltage_v, stiffness) = knots(&curve, MOST_POINTS, STRAIGHT_TOLERANCE * full_scale_v).into_iter().unzip();
         Some(plant_file::Law { voltage_v, stiffness })
     }
 }

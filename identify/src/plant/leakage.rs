@@ -39,7 +39,7 @@ impl Loss {
     }
 
     /// Subtracts from the signal the part of the loss that passes the relaxation, and adds the rest to `lost`.
-    pub fn take(&self, signal: &mut Signal, start: &mut InitialState, lost: &mut InstantaneousLoss) {
+    pub fn apply(&self, signal: &mut Signal, start: &mut InitialState, lost: &mut InstantaneousLoss) {
         let (passes, instantaneous) = (self.share * (1.0 - self.instantaneous), self.share * self.instantaneous);
         let mut lag = Lag::at(self.tau_s, signal.before + start.next_offset_v());
         lost.before += instantaneous * signal.before;
@@ -85,7 +85,7 @@ impl Loss {
 
 impl InstantaneousLoss {
     /// Subtracts the instantaneous part from a signal that has passed the relaxation.
-    pub fn off(&self, signal: &mut Signal) {
+    pub fn subtract_from(&self, signal: &mut Signal) {
         signal.before -= self.before;
         let mut lost = self.pieces.iter();
         signal.pass(|piece| {

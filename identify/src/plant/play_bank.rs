@@ -76,18 +76,18 @@ impl PlayBank {
     }
 
     /// Returns true if a plant file can hold the number of plays.
-    pub fn fits(&self) -> bool {
+    pub fn fits_plant_file(&self) -> bool {
         self.plays.len() <= MOST_PLAYS
     }
 
     /// Returns true if the loading curve does not decrease anywhere.
-    pub fn rises(&self) -> bool {
+    pub fn is_monotonic(&self) -> bool {
         self.lines().iter().all(|line| line.slope >= -1e-9)
     }
 
     /// Returns the composition of this bank with `first`, which acts before it and whose loading curve must not
     /// decrease.
-    pub fn behind(&self, first: &Self) -> Self {
+    pub fn composed_with(&self, first: &Self) -> Self {
         if *first == Self::new(1.0, []) {
             return self.clone();
         }
@@ -209,12 +209,12 @@ mod tests {
     fn composition_of_two_banks_is_one_bank() {
         let first = PlayBank::new(0.5, [(20.0, 0.3), (45.0, 0.4)]);
         let none = PlayBank::new(1.0, []);
-        assert_eq!(first.behind(&none), first);
+        assert_eq!(first.composed_with(&none), first);
         let whole = PlayBank::new(0.0, [(15.0, 0.5), (15.0, 0.5)]);
         for second in
             [whole, PlayBank::new(0.0, [(30.0, 1.0)]), PlayBank::new(-0.3, [(10.0, 0.9), (30.0, 0.2), (90.0, 0.4)])]
         {
-            let mut both = second.behind(&first);
+            let mut both = second.composed_with(&first);
             let (mut first, mut second) = (first.clone(), second.clone());
             for step in 0..4000 {
                 let voltage = 300.0 * (0.01 * f64::from(step)).sin() + 200.0 * (0.0371 * f64::from(step)).sin();

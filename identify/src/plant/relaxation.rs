@@ -73,7 +73,7 @@ impl Relaxation {
     }
 
     /// Returns the weight of the first lag.
-    fn main(&self) -> f64 {
+    fn first_weight(&self) -> f64 {
         1.0 - self.share - self.parts().map(|part| part.part).sum::<f64>()
     }
 
@@ -83,7 +83,7 @@ impl Relaxation {
         tau_s.extend(self.parts().map(|part| part.tau_s));
         let weights = match tau_s.len() {
             1 => Vec::new(),
-            _ => std::iter::once(self.main()).chain(self.parts().map(|part| part.part)).collect(),
+            _ => std::iter::once(self.first_weight()).chain(self.parts().map(|part| part.part)).collect(),
         };
         let tau_high_s = self.varies().then_some(self.tau_high_s);
         file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s };
@@ -109,7 +109,7 @@ impl Relaxation {
     /// piece, in V; it is needed only if the time constant depends on it.
     pub fn pass(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
         let before = signal.before;
-        let (share, main) = (self.share, self.main());
+        let (share, main) = (self.share, self.first_weight());
         let mut at_first = |tau_s| Lag::at(tau_s, before + start.next_offset_v());
         let mut lag = at_first(self.tau_s);
         let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, at_first(it.tau_s))).collect();
@@ -130,7 +130,7 @@ impl Relaxation {
                 lag = lag.with_tau(self.tau_at(level));
             }
             let (start, end) = match by_state {
-                Some(instantaneous) => self.led(instantaneous, &mut lag, piece),
+                Some(instantaneous) => self.follow_state(instantaneous, &mut lag, piece),
                 None => lag.pass(piece),
             };
             let (mut from, mut to) = (share * piece.from + main * start, share * piece.to + main * end);
@@ -145,7 +145,7 @@ impl Relaxation {
 
     /// Returns start and end of the first lag over a piece of its input, where the spring's state sets its time
     /// constant. The solution is exact for the time constant in the middle of each integration step.
-    fn led(&self, instantaneous: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
+    fn follow_state(&self, instantaneous: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
         let start = lag.value();
         let fastest_s = self.tau_s.min(self.tau_high_s);
         let steps = (piece.duration_s / (STEP * fastest_s)).ceil().clamp(1.0, MOST_STEPS);

@@ -27,28 +27,29 @@ pub enum Input {
 pub const FOLDS: usize = 5;
 /// Number of segments of a long record: short compared with the extent of most effects, long compared with the noise's
 /// autocorrelation.
-const STRETCHES: usize = 40;
+const SEGMENTS: usize = 40;
 /// Length of the shortest segment, in rows.
-const SHORTEST_STRETCH: usize = 3;
+const SHORTEST_SEGMENT: usize = 3;
 /// Records with fewer rows than this are held out stair by stair, if they have at least [`FEWEST_STAIRS`] stairs.
 const FEW_ROWS: usize = 200;
+/// Smallest number of stairs of a short record that is held out stair by stair.
 const FEWEST_STAIRS: usize = 4;
 
-/// Number of pieces of the command when only some rows of a long record are used, and the error that their chords may
-/// have, as a fraction of the full scale.
+/// Number of pieces of the command if only some rows of a long record are used.
 const THINNED_PIECES: usize = 8_000;
-const THINNED_BLUR: f64 = 1e-3;
+/// Largest error of the chords of those pieces, as a fraction of the full scale.
+const THINNED_CHORD_ERROR: f64 = 1e-3;
 
 /// Smallest number of readings before the first voltage that can show a decay.
 const FEWEST_AT_REST: usize = 4;
 /// A rest shorter than this fraction of the time constant is too short to show a decay.
-const SHORT: f64 = 0.3;
+const SHORT_REST: f64 = 0.3;
 /// A decay is significant if its amplitude is this many standard deviations.
-const CLEAR: f64 = 5.0;
+const SIGNIFICANT_DECAY: f64 = 5.0;
 /// Time constants of the decays that are tried, relative to the paper's.
-const TAUS: [f64; 3] = [0.5, 1.0, 2.0];
+const DECAY_TIMES: [f64; 3] = [0.5, 1.0, 2.0];
 /// Largest lag-1 correlation of the noise that is assumed.
-const LONGEST: f64 = 0.98;
+const LARGEST_CORRELATION: f64 = 0.98;
 
 /// A record in the form that every fit uses; all vectors have one element per reading.
 #[derive(Clone, Debug)]
@@ -116,7 +117,7 @@ impl Data {
         let before = if stepped { 0.0 } else { first_v };
         let command = match every {
             1 => Signal::new(&schedule, &time_s, before),
-            _ => Signal::coarse(&schedule, &time_s, before, THINNED_PIECES, THINNED_BLUR * full_scale_v),
+            _ => Signal::coarse(&schedule, &time_s, before, THINNED_PIECES, THINNED_CHORD_ERROR * full_scale_v),
         };
         let fold = folds(&voltage_v);
         let folds = fold.iter().max().map_or(1, |&last| usize::from(last) + 1);
@@ -155,7 +156,7 @@ fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], reading: &[f64]
     }
     let (time_s, at_rest) = (&time_s[..rest], &reading[..rest]);
     let tau_s = Plant::PAPER.time_constant_s;
-    let short = rest < FEWEST_AT_REST || time_s[rest - 1] - time_s[0] < SHORT * tau_s;
+    let short = rest < FEWEST_AT_REST || time_s[rest - 1] - time_s[0] < SHORT_REST * tau_s;
     let new_v = robust_scale(&second_differences(reading).collect::<Vec<_>>());
     let falls = |tau_s: f64| {
         let decay: Vec<f64> = time_s.iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
@@ -166,17 +167,17 @@ fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], reading: &[f64]
         let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
         let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
         let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
-        height.abs() * power.sqrt() > CLEAR * new_v.max(deviation_of_mean_times_root_rows(&left))
+        height.abs() * power.sqrt() > SIGNIFICANT_DECAY * new_v.max(scaled_deviation_of_sum(&left))
     };
-    TAUS.iter().any(|times| falls(times * tau_s))
+    DECAY_TIMES.iter().any(|times| falls(times * tau_s))
 }
 
 /// Returns the standard deviation of the sum of autocorrelated noise over `n` rows, divided by `sqrt(n)`: `sigma
 /// sqrt((1 + rho) / (1 - rho))` for a first-order autoregression with lag-1 correlation `rho`.
-fn deviation_of_mean_times_root_rows(noise: &[f64]) -> f64 {
+fn scaled_deviation_of_sum(noise: &[f64]) -> f64 {
     let power: f64 = noise.iter().map(|value| value * value).sum();
     let memory = noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / power.max(f64::MIN_POSITIVE);
-    let memory = memory.clamp(0.0, LONGEST);
+    let memory = memory.clamp(0.0, LARGEST_CORRELATION);
     (power / noise.len() as f64 * (1.0 + memory) / (1.0 - memory)).sqrt()
 }
 
@@ -194,7 +195,7 @@ fn folds(voltage_v: &[f64]) -> Vec<u8> {
             return stairs.iter().enumerate().flat_map(of_stair).collect();
         }
     }
-    let length = rows.div_ceil(STRETCHES).max(SHORTEST_STRETCH);
+    let length = rows.div_ceil(SEGMENTS).max(SHORTEST_SEGMENT);
     // Each round begins with another fold; otherwise one fold would hold out all steps of a stair whose period is one
     // round.
     let fold_of = |stretch: usize| (stretch + 2 * (stretch / FOLDS)) % FOLDS;
@@ -215,7 +216,7 @@ mod tests {
         // A sweep and a single step are divided into segments of equal length.
         for record in [(0..60).map(f64::from).collect::<Vec<_>>(), [[0.0; 10], [1.0; 10], [1.0; 10]].concat()] {
             let fold = folds(&record);
-            assert!(fold.chunk_by(|a, b| a == b).all(|stretch| stretch.len() == SHORTEST_STRETCH), "{fold:?}");
+            assert!(fold.chunk_by(|a, b| a == b).all(|stretch| stretch.len() == SHORTEST_SEGMENT), "{fold:?}");
             assert_eq!(fold.iter().max(), Some(&(FOLDS as u8 - 1)));
         }
     }
@@ -279,8 +280,8 @@ mod tests {
     /// For no period of a schedule, in segments, does one fold hold out all of its steps.
     #[test]
     fn no_fold_holds_out_every_step() {
-        let fold = folds(&[0.0; 60 * STRETCHES]);
-        for period in 2..=STRETCHES / 4 {
+        let fold = folds(&[0.0; 60 * SEGMENTS]);
+        for period in 2..=SEGMENTS / 4 {
             for phase in 0..period {
                 let steps: Vec<u8> = fold.iter().copied().step_by(60).skip(phase).step_by(period).collect();
                 let most = (0..FOLDS).map(|of| steps.iter().filter(|step| usize::from(**step) == of).count()).max();

@@ -18,20 +18,20 @@ use crate::stats::scale::second_differences;
 /// Number of groups of similar level.
 const GROUPS: usize = 10;
 /// Smallest number of rows in a group.
-const FEWEST: usize = 20;
+const FEWEST_ROWS: usize = 20;
 /// Relative standard error of a scale estimated from one second difference; neighbouring differences are correlated.
-const ERROR: f64 = 1.5;
+const RELATIVE_ERROR: f64 = 1.5;
 /// Growth is significant if the slope is this many standard errors,
-const CERTAIN: f64 = 6.0;
+const SIGNIFICANT_SLOPE: f64 = 6.0;
 /// and relevant if the scale at the highest level is this many times the scale at the lowest.
-const RATIO: f64 = 1.3;
+const RELEVANT_RATIO: f64 = 1.3;
 
 /// Returns the reciprocal scale of each row, normalised to a geometric mean of 1; `None` if the scale does not grow
 /// significantly. Rows for which `counts` is false are not used for the estimate.
 pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc<[f64]>> {
     let mut rows: Vec<usize> =
         (1..data.rows().saturating_sub(1)).filter(|row| (row - 1..=row + 1).all(&counts)).collect();
-    if rows.len() < GROUPS * FEWEST {
+    if rows.len() < GROUPS * FEWEST_ROWS {
         return None;
     }
     let reading = &data.reading;
@@ -42,7 +42,7 @@ pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
         let middle = rows.iter().map(|row| level[*row]).sum::<f64>() / rows.len() as f64;
         let scale = robust_scale(&rows.iter().map(|row| differences[row - 1]).collect::<Vec<_>>());
         // The mean level, the scale, and the weight of the group, which is one over the variance of its scale.
-        (middle, scale, rows.len() as f64 / (ERROR * scale).powi(2))
+        (middle, scale, rows.len() as f64 / (RELATIVE_ERROR * scale).powi(2))
     };
     let groups: Vec<(f64, f64, f64)> = rows.chunks(rows.len().div_ceil(GROUPS)).map(of_group).collect();
     let worth: f64 = groups.iter().map(|group| group.2).sum();
@@ -54,7 +54,7 @@ pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
     let least = groups.iter().map(|group| group.1).fold(f64::INFINITY, f64::min);
     let of_level = |level: f64| (mean_scale + slope * (level - mean_level)).max(least / 2.0);
     let (lowest, highest) = (of_level(groups.first()?.0), of_level(groups.last()?.0));
-    if slope * spread.sqrt() < CERTAIN || highest < RATIO * lowest {
+    if slope * spread.sqrt() < SIGNIFICANT_SLOPE || highest < RELEVANT_RATIO * lowest {
         return None;
     }
     let scales: Vec<f64> = level.into_iter().map(of_level).collect();

@@ -47,11 +47,11 @@ const FEWEST_TIES: usize = 3;
 /// Steps larger than this many scales of the noise are treated as quantisation cells, smaller ones as noise.
 pub const COARSE: f64 = 2.0;
 /// Truncation is considered if half a step is at least this fraction of the noise's scale.
-const SEEN: f64 = 0.5;
+const LEAST_TRUNCATION: f64 = 0.5;
 /// A reading further from the bound than this many scales of the noise is not close to it.
-const FAR: f64 = 30.0;
+const CLOSE_TO_BOUND: f64 = 30.0;
 /// Factor by which readings at a bound must outnumber those at the next step of a quantisation grid.
-const PILE: usize = 6;
+const BOUND_TO_NEXT_STEP: usize = 6;
 
 impl Observed {
     /// Examines the readings of a record.
@@ -73,10 +73,11 @@ impl Observed {
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
         let scatter_v = scatter(&data.reading).max(FINEST_V);
-        let far = FAR * scatter_v;
+        let far = CLOSE_TO_BOUND * scatter_v;
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
             let (value, count) = *extreme?;
-            let piled = count >= FEWEST_TIES && (continuous || count >= PILE * next.map_or(1, |next| next.1));
+            let piled =
+                count >= FEWEST_TIES && (continuous || count >= BOUND_TO_NEXT_STEP * next.map_or(1, |next| next.1));
             // A spring at rest reads exactly zero many times.
             (piled && count < data.rows() && value != 0.0 && stays(&data.reading, value, far)).then_some(value)
         };
@@ -122,7 +123,7 @@ impl Observed {
 
     /// Returns the same for a converter that truncates instead of rounding; `None` if the step is too small to matter.
     pub fn truncated(&self) -> Option<Self> {
-        let step = self.step_beyond(SEEN)?;
+        let step = self.step_beyond(LEAST_TRUNCATION)?;
         Some(Self { truncation_v: step / 2.0, ..self.clone() })
     }
 

@@ -19,20 +19,25 @@ pub struct QuantisationGrid {
 }
 
 /// Relative uncertainty of a step that is not limited by printed digits.
-const EXACT: f64 = 1e-6;
+const RELATIVE_ERROR: f64 = 1e-6;
 /// A step finer than this many units of the last digit is attributed to the digits.
-const UNITS: f64 = 4.0;
+const FEWEST_UNITS: f64 = 4.0;
 /// Largest number of decimals that is taken for deliberate rounding.
-const DIGITS: i32 = 9;
+const MOST_DECIMALS: i32 = 9;
 /// The differences agree with a common step by chance with a probability below `exp` of minus this.
-const SURE: f64 = 12.0;
+const CHANCE_NATS: f64 = 12.0;
 
 impl QuantisationGrid {
     /// Returns the coarsest grid that contains all values, which must be distinct and in ascending order; `None` if
     /// there is none.
     pub fn of(values: &[f64]) -> Option<Self> {
-        printed(values)
-            .or_else(|| common(values).map(|step| Self { step, low: step * (1.0 - EXACT), high: step * (1.0 + EXACT) }))
+        printed(values).or_else(|| {
+            common(values).map(|step| Self {
+                step,
+                low: step * (1.0 - RELATIVE_ERROR),
+                high: step * (1.0 + RELATIVE_ERROR),
+            })
+        })
     }
 }
 
@@ -64,7 +69,7 @@ fn printed(values: &[f64]) -> Option<QuantisationGrid> {
     differences.sort_by(f64::total_cmp);
     let least = *differences.first()?;
     let chance = (2.0 * unit / least).ln() * (differences.len() as f64 - 1.0);
-    if least < UNITS * unit || chance > -SURE {
+    if least < FEWEST_UNITS * unit || chance > -CHANCE_NATS {
         return None;
     }
     let (mut low, mut high) = (least - unit, least + unit);
@@ -82,10 +87,10 @@ fn printed(values: &[f64]) -> Option<QuantisationGrid> {
     (low <= high).then(|| QuantisationGrid { step: (low + high) / 2.0, low, high })
 }
 
-/// Returns the unit of the last printed digit, if there are at most [`DIGITS`] decimals.
+/// Returns the unit of the last printed digit, if there are at most [`MOST_DECIMALS`] decimals.
 fn unit(values: &[f64]) -> Option<f64> {
-    let is_whole = |value: f64| (value - value.round()).abs() < EXACT * value.abs().max(1.0).sqrt();
-    (0..DIGITS)
+    let is_whole = |value: f64| (value - value.round()).abs() < RELATIVE_ERROR * value.abs().max(1.0).sqrt();
+    (0..MOST_DECIMALS)
         .find(|&digits| values.iter().all(|value| is_whole(value * 10f64.powi(digits))))
         .map(|digits| 10f64.powi(-digits))
 }

@@ -20,10 +20,10 @@ pub struct Peak {
 /// A line with fewer periods in the record may be a harmonic of the schedule that a nonlinear spring makes.
 pub const FEWEST_PERIODS: usize = 10;
 /// Number of rows after which the recursive oscillation is computed afresh.
-const TURNS: usize = 64;
+const ROTATIONS: usize = 64;
 
 /// Records with fewer rows have no lines.
-const ROWS: usize = 16;
+const FEWEST_ROWS: usize = 16;
 /// Number of line widths on each side that count as neighbours of a line.
 const NEIGHBOURS: usize = 16;
 
@@ -49,7 +49,7 @@ pub struct Line {
 
 /// Returns the most prominent line with at least [`FEWEST_PERIODS`] periods in the record; `None` for short records.
 pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
-    if residual.len() < ROWS {
+    if residual.len() < FEWEST_ROWS {
         return None;
     }
     let (power, width) = powers(residual, data);
@@ -74,7 +74,7 @@ pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
 /// Returns the `count` strongest lines in descending order; bins around a line found are left out of the search for the
 /// next.
 pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
-    if residual.len() < ROWS {
+    if residual.len() < FEWEST_ROWS {
         return Vec::new();
     }
     let (mut power, width) = powers(residual, data);
@@ -118,7 +118,7 @@ pub fn oscillation(frequency_hz: f64, data: &Data) -> impl Iterator<Item = (f64,
             step = since;
             turn = (omega * step).sin_cos();
         }
-        now = if steady && row % TURNS != 0 {
+        now = if steady && row % ROTATIONS != 0 {
             (now.0 * turn.1 + now.1 * turn.0, now.1 * turn.1 - now.0 * turn.0)
         } else {
             (omega * (time - start)).sin_cos()

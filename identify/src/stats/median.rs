@@ -1,9 +1,9 @@
 //! Medians and scales derived from them, which outliers hardly change.
 
 /// Median of the absolute value of a standard normal variable.
-const NORMAL: f64 = 0.6745;
+const NORMAL_MEDIAN_SIZE: f64 = 0.6745;
 /// Number of neighbours on each side of a row in a running median.
-const AROUND: usize = 2;
+const NEIGHBOURS: usize = 2;
 
 /// Returns the upper median of the values, and reorders them; `None` if there are none.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
@@ -15,16 +15,16 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
 /// values, in their unit; `None` if there are none.
 pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut sizes: Vec<f64> = values.map(f64::abs).collect();
-    median(&mut sizes).map(|size| size / NORMAL)
+    median(&mut sizes).map(|size| size / NORMAL_MEDIAN_SIZE)
 }
 
 /// Returns the median of each row and its two neighbours on each side; the first two rows take the median of the first
 /// five values, the last two that of the last five. Needs at least five values.
 pub(crate) fn running_median(values: &[f64]) -> Vec<f64> {
     let of_row = |row: usize| {
-        let first = row.saturating_sub(AROUND).min(values.len() - 2 * AROUND - 1);
-        let mut around: [f64; 2 * AROUND + 1] = std::array::from_fn(|k| values[first + k]);
-        *around.select_nth_unstable_by(AROUND, f64::total_cmp).1
+        let first = row.saturating_sub(NEIGHBOURS).min(values.len() - 2 * NEIGHBOURS - 1);
+        let mut around: [f64; 2 * NEIGHBOURS + 1] = std::array::from_fn(|k| values[first + k]);
+        *around.select_nth_unstable_by(NEIGHBOURS, f64::total_cmp).1
     };
     (0..values.len()).map(of_row).collect()
 }

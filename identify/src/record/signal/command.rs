@@ -14,7 +14,7 @@ const SHORTEST_PIECE_S: f64 = 0.1;
 /// from its chord by at most 1/6000 of its amplitude.
 const GROWTH: f64 = 0.05;
 /// Changes below this fraction of the full scale do not count.
-const STILL: f64 = 1e-4;
+const STILL_FRACTION: f64 = 1e-4;
 /// Upper limit for the number of pieces that the shortest length may lead to; records with coarse rows keep coarse
 /// pieces.
 const MOST_PIECES: usize = 20_000;
@@ -90,7 +90,7 @@ struct LastChange {
 impl LastChange {
     fn new(schedule: &Schedule) -> Self {
         let full_scale_v = schedule.pieces().iter().fold(0.0, |most: f64, piece| most.max(piece.from_v.abs()));
-        Self { since_s: f64::NEG_INFINITY, from_v: f64::NAN, slope: 0.0, still_v: STILL * full_scale_v }
+        Self { since_s: f64::NEG_INFINITY, from_v: f64::NAN, slope: 0.0, still_v: STILL_FRACTION * full_scale_v }
     }
 
     /// Advances over stretches that begin at `time_s` and returns the time of the last change, in s.

@@ -1,7 +1,7 @@
 //! A signal of straight pieces with jumps between them, and the blocks that map one such signal to another.
 
 /// Durations up to this, in s, are rounding errors.
-const DUST_S: f64 = 1e-9;
+const ROUNDING_S: f64 = 1e-9;
 
 /// One straight piece of a signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -77,7 +77,7 @@ impl Signal {
     pub fn delayed(&self, delay_s: f64) -> Self {
         let mut later = self.emptied();
         let constant = Piece { duration_s: delay_s, from: self.before, to: self.before };
-        let all = std::iter::once(constant).chain(self.pieces.iter().copied()).filter(|p| p.duration_s > DUST_S);
+        let all = std::iter::once(constant).chain(self.pieces.iter().copied()).filter(|p| p.duration_s > ROUNDING_S);
         let mut source = all.peekable();
         // Constant pieces are joined, so that they are not divided where their rows were.
         let mut next = || {
@@ -96,7 +96,7 @@ impl Signal {
             }
             let mut left = piece.duration_s;
             loop {
-                if rest.duration_s <= DUST_S {
+                if rest.duration_s <= ROUNDING_S {
                     let end = Piece { duration_s: f64::INFINITY, from: rest.to, to: rest.to };
                     rest = next().unwrap_or(end);
                 }
@@ -106,7 +106,7 @@ impl Signal {
                 later.pieces.push(Piece { duration_s: taken, from: rest.from, to: until });
                 rest = Piece { duration_s: rest.duration_s - taken, from: until, ..rest };
                 left -= taken;
-                if left <= DUST_S {
+                if left <= ROUNDING_S {
                     break;
                 }
             }
@@ -136,7 +136,7 @@ impl Signal {
                 now += rate * taken;
                 left -= taken;
             }
-            if left > DUST_S || duration_s == 0.0 && from == now {
+            if left > ROUNDING_S || duration_s == 0.0 && from == now {
                 slewed.pieces.push(Piece { duration_s: left, from: now, to: now + slope * left });
                 now += slope * left;
             }
