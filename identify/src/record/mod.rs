@@ -9,6 +9,8 @@
 //! - *Censored reading*: one that stopped at a bound of the sensor.
 
 pub mod data;
+mod decay;
+mod folds;
 pub mod heteroscedasticity;
 pub mod observed;
 pub mod quantisation_grid;
