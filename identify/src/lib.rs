@@ -1,7 +1,40 @@
-//! What a simulation gets wrong on a measured record, why, and the held-out improvement of the extended model.
+//! Diagnosis of a measured record: what a simulation gets wrong, the cause, and the held-out improvement of the extended model.
+//!
+//! - *Record*: rows of time in s, commanded voltage in V, and measured stiffness, expressed as the equivalent static voltage in V.
+//! - *Cause*: a named physical effect that may be missing in the simulation, e.g. `gain-error` or `hysteresis`.
+//! - *Finding*: a cause that the record supports, with its parameters and their 95 % intervals.
+//! - *Held-out error*: the error of a prediction by a fit that did not use the predicted segment of the record.
 //!
 //! ```text
 //! record -> Data -> Observed -> Search (Engine: Simulator, Noise; held-out score) -> Diagnosis -> Report
+//! ```
+//!
+//! The simulation assumes a gain of 1; the gain of this spring is 1.1:
+//!
+//! ```
+//! use identify::{Options, Verdict, diagnose};
+//! use simulation::record::{Record, Row};
+//!
+//! // One row per 0.2 s, steps every 20 s. The stiffness relaxes with 5.5 s after a feedthrough of 1/11; its noise is 0.6 V RMS.
+//! let (gain, share, tau_s, sample_s) = (1.1, 1.0 / 11.0, 5.5, 0.2);
+//! let (mut lag_v, mut state) = (0.0, 1u32);
+//! let mut row = |index: usize| {
+//!     let voltage_v = [0.0, 200.0, 400.0, 100.0][index / 100];
+//!     state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+//!     let noise_v = 2.0 * (f64::from(state >> 8) / f64::from(1 << 24) - 0.5);
+//!     let stiffness_v = gain * (share * voltage_v + (1.0 - share) * lag_v) + noise_v;
+//!     lag_v = voltage_v + (lag_v - voltage_v) * f64::exp(-sample_s / tau_s);
+//!     Row { line: index + 2, time_s: sample_s * index as f64, voltage_v, measured: Some(stiffness_v) }
+//! };
+//! let record = Record { name: "stair".into(), rows: (0..400).map(&mut row).collect() };
+//!
+//! let report = diagnose(&record, &Options::default())?;
+//! assert_eq!(report.verdict, Verdict::Explained);
+//! assert_eq!(report.findings[0].cause, "gain-error");
+//! let (name, found) = &report.findings[0].parameters[0];
+//! assert_eq!(name, "gain");
+//! assert!(found.low < gain && gain < found.high && found.high - found.low < 0.01);
+//! # Ok::<(), anyhow::Error>(())
 //! ```
 //!
 //! Each folder imports only from those above it in this table:
@@ -18,7 +51,7 @@
 //! | [`adequacy`] | a fit | what is left that no effect explains, and where |
 //! | [`search`] | a record | which effects |
 //! | [`verdict`] | a search | what is reported |
-//! | [`examine`] | a record, options | the diagnosis: all passes in order |
+//! | [`mod@examine`] | a record, options | the diagnosis: all passes in order |
 
 pub mod adequacy;
 pub mod answer;

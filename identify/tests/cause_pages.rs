@@ -1,4 +1,4 @@
-//! docs/causes says of each cause what the code says.
+//! The pages in `docs/causes` agree with the effects' descriptions, experiments and parameters.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,10 +11,11 @@ use identify::record::data::Data;
 use identify::{Input, Options, diagnose};
 use simulation::record::{Record, Row};
 
-/// What stands between these is the code's.
+/// Marks around the part of a page that is generated from the code.
 const MARKS: [&str; 2] = ["<!-- facts -->\n\n", "\n<!-- /facts -->\n"];
 
-/// A stair of 100 V each 10 s up to 500 V and down again; the readings are the simulation's, changed by `read`.
+/// Returns a record of a stair of 100 V every 10 s up to 500 V and down again, with readings that `read` makes of row
+/// and simulated reading.
 fn record(read: impl Fn(usize, f64) -> f64) -> Record {
     let row = |index: usize| {
         let level = (index / 100).min(10);
@@ -26,7 +27,7 @@ fn record(read: impl Fn(usize, f64) -> f64) -> Record {
     let (mut simulated, mut state) = (Vec::new(), 1u32);
     Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulated);
     for (index, (row, simulated)) in record.rows.iter_mut().zip(simulated).enumerate() {
-        // Noise of 0.3 V RMS that is the same everywhere and comes back to nothing.
+        // Reproducible uniform noise of 0.3 V RMS.
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let noise = f64::from(state >> 8) / f64::from(1 << 24) - 0.5;
         row.measured = Some(read(index, simulated + noise));
@@ -34,7 +35,8 @@ fn record(read: impl Fn(usize, f64) -> f64) -> Record {
     record
 }
 
-/// Names and units of a cause's parameters, from the effect, or from a finding where the readings alone show it.
+/// Returns names and units of a cause's parameters, from the effect, or from a finding if a property of the readings
+/// shows it.
 fn parameters(effect: &dyn Effect) -> Vec<(String, &'static str)> {
     let shown = match effect.cause() {
         "quantisation" => record(|_, reading| (reading / 12.0).round() * 12.0),
@@ -60,7 +62,7 @@ fn list(parameters: &[(String, &str)]) -> String {
     parameters.iter().map(with_unit).collect::<Vec<_>>().join(", ")
 }
 
-/// The page with what the code says between its marks.
+/// Returns the page with the generated part replaced.
 fn renewed(page: &str, facts: &str) -> String {
     let (before, rest) = page.split_once(MARKS[0]).expect("a mark where the facts begin");
     let (_, after) = rest.split_once(MARKS[1]).expect("a mark where they end");
@@ -82,25 +84,25 @@ fn compare(name: &str, facts: &str) {
 }
 
 #[test]
-fn every_page_says_what_the_code_says() {
+fn every_page_agrees_with_the_code() {
     let mut index = String::from("| cause | what it does | where | parameters |\n| --- | --- | --- | --- |\n");
     for effect in EFFECTS {
         let (cause, parameters) = (effect.cause(), list(&parameters(*effect)));
-        let stage = format!("{:?}", effect.stage()).to_lowercase();
+        let stage = format!("{:?}", effect.location()).to_lowercase();
         let facts = format!(
             "| | |\n| --- | --- |\n| what it does | {} |\n| where it acts | {stage} |\n| parameters | {parameters} |\n\
              | experiment that decides | {} |\n",
-            effect.meaning(),
-            effect.experiment(),
+            effect.description(),
+            effect.isolating_experiment(),
         );
         compare(&format!("{cause}.md"), &facts);
-        index += &format!("| [{cause}]({cause}.md) | {} | {stage} | {parameters} |\n", effect.meaning());
+        index += &format!("| [{cause}]({cause}.md) | {} | {stage} | {parameters} |\n", effect.description());
     }
     compare("README.md", &index);
 }
 
 #[test]
-fn every_page_is_whole_and_no_page_is_left_over() {
+fn every_cause_has_a_complete_page_and_no_other_page_exists() {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs/causes");
     let mut names: Vec<String> = fs::read_dir(&folder)
         .expect("docs/causes")
@@ -127,10 +129,10 @@ fn every_page_is_whole_and_no_page_is_left_over() {
             assert!(page.contains(part), "{cause} has no {part:?}");
         }
         // Every parameter is explained, and every link leads to a page.
-        let (_, told) = page.split_once("## Parameters\n").expect("parameters");
+        let (_, explanations) = page.split_once("## Parameters\n").expect("parameters");
         for (name, _) in parameters(*effect) {
             let family = if name.starts_with("at_") { "at_..._v" } else { &name };
-            assert!(told.contains(&format!("`{family}`")), "{cause} does not explain {name}");
+            assert!(explanations.contains(&format!("`{family}`")), "{cause} does not explain {name}");
         }
         for link in page.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(link, _)| link) {
             assert!(folder.join(link).is_file(), "{cause}: {link} leads nowhere");

@@ -1,9 +1,9 @@
-//! What a diagnosis writes is what it fitted: a plant file with any of its tables, extended by any effect in any form,
-//! written, read and run anew, gives the same readings. Some 170 pairs, under a second when optimised.
+//! The plant file that a diagnosis writes simulates the same readings as the fitted model, for a plant file with any of
+//! its tables and any effect in any form (about 170 pairs, less than a second in release mode).
 
 use identify::Input;
 use identify::effects::EFFECTS;
-use identify::effects::effect::Scene;
+use identify::effects::effect::FitContext;
 use identify::effects::model::{Block, Model};
 use identify::fit::simulator::Simulator;
 use identify::plant::base::Base;
@@ -12,7 +12,7 @@ use identify::verdict::export;
 use simulation::plant_file;
 use simulation::record::{Record, Row};
 
-/// The relaxation alone, with each other table, with three kinds of relaxation, with all.
+/// The relaxation alone, with each other table, with three kinds of relaxation, and all tables together.
 const FILES: [&str; 10] = [
     "",
     "[memory]\ndirect = 0.5\nthresholds_v = [20.0, 45.0]\nweights = [0.3, 0.2]\n",
@@ -37,7 +37,7 @@ fn base(tables: &str) -> Base {
     Base::new(plant_file::parse("base", &text).expect("a plant file")).expect("a base")
 }
 
-/// Up to 500 V in steps of 100 V, down to 150 V, up again and down.
+/// Returns a record of up to 500 V in steps of 100 V, down to 150 V, up again and down.
 fn record() -> Record {
     let level = |step: usize| [0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 350.0, 150.0, 320.0, 480.0, 0.0][step.min(10)];
     let row = |index: usize| Row {
@@ -49,7 +49,7 @@ fn record() -> Record {
     Record { name: "stair".into(), rows: (0..660).map(row).collect() }
 }
 
-/// The model with the same spring, before any voltage.
+/// Returns the model of the same spring before any voltage.
 fn from_rest(base: &Base, data: &Data, model: &Model) -> Model {
     let memory = |model: &Model| model.chain(base, data).memory;
     let at_rest = memory(model).at_rest();
@@ -63,22 +63,22 @@ fn from_rest(base: &Base, data: &Data, model: &Model) -> Model {
 }
 
 #[test]
-fn what_is_written_is_what_was_fitted() {
+fn written_plant_file_simulates_the_fitted_model() {
     let data = Data::new(&record(), Input::Hold);
     let run = |base: &Base, model: &Model| {
         let mut readings = Vec::new();
         Simulator::new(&data, base).run(model, &mut readings);
         readings
     };
-    let scene = Scene { data: &data, residual: &data.reading, sigma: 1.0 };
+    let scene = FitContext { data: &data, residual: &data.reading, sigma: 1.0 };
     for tables in FILES {
         let base = base(tables);
         for (effect, it) in EFFECTS.iter().enumerate() {
             for form in 0..it.forms() {
-                let starts = it.starts(form, &scene);
+                let starts = it.initial_points(form, &scene);
                 let Some(point) = starts.get(starts.len() / 2) else { continue };
                 let model = Model::default().with(Block { effect, form }, point.clone());
-                // A file says what the spring is, not where a record begins.
+                // A plant file describes the spring and not the initial state of a record.
                 let rests = from_rest(&base, &data, &model);
                 let fitted = run(&base, &rests);
                 let file = model.extend(&base, &data);
@@ -89,13 +89,13 @@ fn what_is_written_is_what_was_fitted() {
                 let written = run(&Base::new(file).expect("a base"), &model.unmodelled(&base, &data));
                 let off = fitted.iter().zip(&written).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 let allowed = match it.cause() {
-                    // A curve is written as 9 points.
+                    // A curve is written as nine points.
                     "static-nonlinearity" => export::SMALL_ERROR_V,
-                    // A loss that shows at once is written as one that the relaxation delays, solved in pieces of 0.1 s.
+                    // An instantaneous loss is written as one that the relaxation delays, solved in pieces of 0.1 s.
                     "charge-leakage" => 1e-4,
                     _ => 1e-6,
                 };
-                // A form that no file holds is written as the nearest one, and the file says so.
+                // A form that no file can represent is written as the nearest one, with a remark in the file.
                 if remarked {
                     assert!(off > 1e-3, "{} in form {form} is written as it was fitted: off by {off} V", it.cause());
                     continue;

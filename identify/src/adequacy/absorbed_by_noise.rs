@@ -15,10 +15,10 @@
 
 use crate::adequacy::localisation::whereabouts;
 use crate::adequacy::unmodelled::Leftover;
-use crate::noise::memory::Memory;
+use crate::noise::autocorrelation::Autocorrelation;
 use crate::record::data::Data;
 use crate::record::spectrum;
-use crate::stats::scale::{scale, scale_of_squares};
+use crate::stats::scale::{robust_scale, root_mean_square};
 
 /// Long parts of the record.
 const PARTS: usize = 8;
@@ -35,14 +35,14 @@ const ALONE: f64 = 30.0;
 const CLIP: f64 = 4.0;
 
 /// Tests what a model leaves, where that has a memory.
-pub fn test(data: &Data, errors: &[f64], memory: &Memory) -> Option<Leftover> {
-    if errors.len() < FEWEST_ROWS || memory.is_none() {
+pub fn test(data: &Data, errors: &[f64], memory: &Autocorrelation) -> Option<Leftover> {
+    if errors.len() < FEWEST_ROWS || memory.is_white() {
         return None;
     }
     let found = |place: &str, share: f64| Leftover {
         place: place.to_owned() + &whereabouts(data, errors),
         share,
-        rms: share.sqrt() * scale_of_squares(errors),
+        rms: share.sqrt() * root_mean_square(errors),
         significant: true,
         doubtful: true,
     };
@@ -52,27 +52,27 @@ pub fn test(data: &Data, errors: &[f64], memory: &Memory) -> Option<Leftover> {
     }
     let changed = changed(errors);
     if changed > CHANGED.max(CHANGED_PER_ROW * errors.len() as f64) {
-        let new = scale_of_squares(&memory.whitened(errors)) / scale_of_squares(errors);
+        let new = root_mean_square(&memory.whitened(errors)) / root_mean_square(errors);
         return Some(found("as a rhythm that changes along the record", (1.0 - new * new).max(0.0)));
     }
-    let line = spectrum::loneliest(errors, data).filter(|line| line.alone > ALONE)?;
+    let line = spectrum::most_prominent_line(errors, data).filter(|line| line.prominence > ALONE)?;
     Some(found(&format!("at a frequency of {:.3} Hz", line.frequency_hz), line.share))
 }
 
 fn slow(errors: &[f64]) -> f64 {
     let parts = errors.chunks_exact(errors.len() / PARTS).take(PARTS);
     let means = parts.map(|part| (part.iter().sum::<f64>() / part.len() as f64).powi(2));
-    means.sum::<f64>() / PARTS as f64 / scale_of_squares(errors).powi(2)
+    means.sum::<f64>() / PARTS as f64 / root_mean_square(errors).powi(2)
 }
 
 fn changed(errors: &[f64]) -> f64 {
     let (early, late) = errors.split_at(errors.len() / 2);
-    let [of_early, of_late] = [early, late].map(|half| Memory::fitted(half, scale(half)));
-    let loss = |half: &[f64], own: &Memory, other: &Memory| {
+    let [of_early, of_late] = [early, late].map(|half| Autocorrelation::fitted(half, robust_scale(half)));
+    let loss = |half: &[f64], own: &Autocorrelation, other: &Autocorrelation| {
         let own = own.whitened(half);
-        let bound = CLIP * scale(&own);
+        let bound = CLIP * robust_scale(&own);
         let size =
-            |white: Vec<f64>| scale_of_squares(&white.iter().map(|e| e.clamp(-bound, bound)).collect::<Vec<_>>());
+            |white: Vec<f64>| root_mean_square(&white.iter().map(|e| e.clamp(-bound, bound)).collect::<Vec<_>>());
         half.len() as f64 * (size(other.whitened(half)) / size(own)).ln()
     };
     loss(early, &of_early, &of_late) + loss(late, &of_late, &of_early)
@@ -103,7 +103,7 @@ mod tests {
     fn tested(errors: &[f64]) -> Option<Leftover> {
         let row = |row: usize| Row { line: row, time_s: 0.1 * row as f64, voltage_v: 0.0, measured: Some(0.0) };
         let record = Record { name: String::new(), rows: (0..errors.len()).map(row).collect() };
-        test(&Data::new(&record, Input::Hold), errors, &Memory::fitted(errors, scale(errors)))
+        test(&Data::new(&record, Input::Hold), errors, &Autocorrelation::fitted(errors, robust_scale(errors)))
     }
 
     #[test]

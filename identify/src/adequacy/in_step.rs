@@ -14,7 +14,7 @@
 
 use crate::adequacy::unmodelled::Leftover;
 use crate::fit::engine::{Engine, Fit};
-use crate::stats::scale::scale_of_squares;
+use crate::stats::scale::root_mean_square;
 use crate::stats::sums::dot;
 
 /// Parts of the record: many show quick changes, few those in loud noise.
@@ -29,7 +29,7 @@ const FAR: f64 = 2.0;
 /// Tests the free-running error of a fit.
 pub(crate) fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
     // The error of rounding goes with the spring, and is no more than that.
-    if fit.noise.cell > 0.0 {
+    if fit.noise.half_step > 0.0 {
         return None;
     }
     let stiffness: Vec<f64> = engine.data.reading.iter().zip(&fit.residual).map(|(read, left)| read - left).collect();
@@ -45,7 +45,7 @@ fn in_parts(parts: usize, errors: &[f64], stiffness: &[f64]) -> Option<Leftover>
     if length < SHORTEST {
         return None;
     }
-    let error = scale_of_squares(errors);
+    let error = root_mean_square(errors);
     let share = 1.0 - (scatter(errors, length) / error.max(f64::MIN_POSITIVE)).powi(2);
     let [of_error, of_stiffness] = [errors, stiffness].map(|values| scores(&changes(values, length)));
     let surprise = correlation(&of_error, &of_stiffness) * (of_error.len() as f64 - 1.0).sqrt();

@@ -73,12 +73,12 @@ pub(crate) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
         let far = beside.simulated[1] - beside.simulated[0] > FAR_V;
         return Some(if far { Silent::Sensor(beside.still()) } else { Silent::Excitation });
     }
-    let start = of_both(engine.simulator.base.relaxation.tau_s);
-    let mut best = engine.fit(start.clone(), &Noise::first_look());
+    let start = of_both(engine.base().relaxation.tau_s);
+    let mut best = engine.fit(start.clone(), &Noise::default_robust());
     // A simulation may be so far off that no way leads from there.
     let paper = of_both(Plant::PAPER.time_constant_s);
     if paper != start {
-        let other = engine.fit(paper, &Noise::first_look());
+        let other = engine.fit(paper, &Noise::default_robust());
         best = if other.log_likelihood > best.log_likelihood { other } else { best };
     }
     let [gain, _] = gain_and_time_constant();

@@ -29,12 +29,12 @@ const IN_RUNS: f64 = 0.2;
 
 /// What far readings tell, if they are just after changes of the voltage, or in runs, too often to be outliers.
 pub fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
-    fit.noise.wide?;
+    fit.noise.outliers?;
     let data = engine.data;
     let errors = engine.observed.errors(&fit.residual);
     let white = fit.noise.innovations(&errors);
     let far = far_off(&fit.noise, &white);
-    let after = after_changes(data, fit.model.chain(engine.simulator.base, data).delay_s);
+    let after = after_changes(data, fit.model.chain(engine.base(), data).delay_s);
     let count = in_time(&far, &after);
     let place = match count {
         Some(count) => format!("in {count} readings far off just after changes of the voltage"),
@@ -117,9 +117,9 @@ mod tests {
         let rows = readings.into_iter().zip(normals(ROWS)).enumerate();
         data.reading = rows.map(|(row, (reading, noise))| reading + noise + spike(row)).collect();
         let observed = Observed::new(&data);
-        let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &base));
-        let fit = engine.at(Model::default());
-        assert!(fit.noise.wide.is_some(), "{:?}", fit.noise);
+        let mut engine = Engine::new(&data, &observed, &base);
+        let fit = engine.evaluate(Model::default());
+        assert!(fit.noise.outliers.is_some(), "{:?}", fit.noise);
         test(&engine, &fit)
     }
 

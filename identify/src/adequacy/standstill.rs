@@ -12,7 +12,7 @@ use crate::effects::model::Model;
 use crate::fit::engine::Engine;
 use crate::noise::Noise;
 use crate::stats::median::median;
-use crate::stats::scale::scale;
+use crate::stats::scale::robust_scale;
 
 /// What is added to readings, whatever is read.
 const ADDED: [&str; 2] = ["hum", "reading-offset"];
@@ -36,5 +36,6 @@ pub(crate) fn as_likely(engine: &mut Engine, model: &Model, score: f64) -> bool 
     let around: Vec<f64> = reading.iter().map(|reading| reading - constant).collect();
     let noise = Noise::fitted(&around, engine.observed);
     let likelihood = noise.log_likelihood(&around, engine.observed) - noise.cost(around.len());
-    likelihood >= score && scale(&engine.observed.errors(&left)) > MOVES * scale(&engine.observed.errors(&around))
+    likelihood >= score
+        && robust_scale(&engine.observed.errors(&left)) > MOVES * robust_scale(&engine.observed.errors(&around))
 }

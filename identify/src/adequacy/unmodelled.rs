@@ -7,7 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::adequacy::localisation::whereabouts;
-use crate::fit::engine::{Engine, Fit, Jacobian};
+use crate::fit::engine::{Engine, Fit};
+use crate::fit::normal_equations::Jacobian;
 use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece};
 use crate::record::spectrum;
@@ -69,7 +70,7 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     let gain = explained(&everything, &target) - before;
     let total: f64 = target.iter().map(|value| value * value).sum();
     let mut variance = (total - before - gain) / (data.rows() - everything.len()) as f64;
-    if fit.noise.cell > 0.0 {
+    if fit.noise.half_step > 0.0 {
         // Few rounded rows lie near an edge and tell anything; the others only lower the mean.
         variance = variance.max(1.0);
     }
@@ -86,7 +87,7 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     let leftover = Leftover {
         place: most.place.clone(),
         // What rounding hides is no matter.
-        share: if fit.noise.cell > 0.0 { share.min((rms / fit.noise.cell).powi(2) * 3.0) } else { share },
+        share: if fit.noise.half_step > 0.0 { share.min((rms / fit.noise.half_step).powi(2) * 3.0) } else { share },
         rms,
         significant: surprise > RARE,
         doubtful: surprise > DOUBTFUL,

@@ -1,6 +1,6 @@
-//! The real voltage stops below the commanded one: `|u| = min(|command|, limit)`.
+//! The amplifier's voltage saturates below the command: `|u| = min(|command|, limit)`.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -11,15 +11,15 @@ impl Effect for AmplifierLimit {
         "amplifier-limit"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Amplifier
+    fn location(&self) -> Location {
+        Location::Amplifier
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the amplifier's voltage stops below the commanded one"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "a stair in small steps up to the full voltage: above the limit nothing moves any more, not even at once"
     }
 
@@ -27,7 +27,7 @@ impl Effect for AmplifierLimit {
         vec![Coordinate::new(0.05 * data.full_scale_v, data.full_scale_v)]
     }
 
-    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         (1..20)
             .map(|part| vec![data.full_scale_v * (1.0 - 0.04 * f64::from(part))])
             .chain([vec![0.985 * data.full_scale_v]])
@@ -42,7 +42,7 @@ impl Effect for AmplifierLimit {
         None
     }
 
-    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.limit_v = chain.limit_v.min(point[0]);
     }
 }

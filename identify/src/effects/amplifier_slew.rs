@@ -1,4 +1,4 @@
-//! The real voltage follows the command slowly. Its lag grows with the step; a delay's does not.
+//! The amplifier's voltage follows the command at a bounded rate; unlike a delay, its lag grows with the step.
 //!
 //! | form | law |
 //! | --- | --- |
@@ -6,9 +6,10 @@
 //! | two rates | `-falling <= du/dt <= slew` |
 //! | output resistance | `tau du/dt = command - u`: a full stroke starts at `slew = full / tau` |
 //!
-//! Where a record begins in mid-course, the voltage that a bounded rate has reached by then is one coordinate more.
+//! If the record may not begin at rest, the voltage of a rate-limited amplifier before the first row is a further
+//! coordinate.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, logarithms, table};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -17,25 +18,25 @@ pub(super) struct AmplifierSlew;
 const BOTH_WAYS: usize = 0;
 const TWO_RATES: usize = 1;
 const RESISTANCE: usize = 2;
-/// Rates of a form.
+/// Number of rates of a form.
 const RATES: [usize; 2] = [1, 2];
-/// Slower outputs would be taken for the spring, in s.
+/// Largest time constant of the output, in s; a larger one could not be distinguished from the spring's.
 const SLOWEST_OUTPUT_S: f64 = 1.0;
-/// Of two rates, how far apart they are looked for.
-const APART: f64 = 3.0;
-/// How far off the command an amplifier in mid-course is looked for, as a part of the stroke.
-const OFF: f64 = 0.2;
+/// Ratio of the two rates at initial points.
+const INITIAL_RATIO: f64 = 3.0;
+/// Distance of the initial voltage from the command at initial points, as a fraction of the full scale.
+const INITIAL_DISTANCE: f64 = 0.2;
 
 fn stroke(data: &Data) -> f64 {
     data.full_scale_v.max(1e-6)
 }
 
-/// Rates, in V/s, at which a full stroke takes the whole record or a tenth of a sample.
+/// Returns the rates, in V/s, at which a change by the full scale takes the whole record, and a tenth of a sample.
 fn range(data: &Data) -> (f64, f64) {
     (stroke(data) / data.duration_s().max(1e-6), 10.0 * stroke(data) / data.sample_s)
 }
 
-/// Time constants of the output, in s: shorter ones are a delay to the rows.
+/// Returns the bounds of the output's time constant, in s; a shorter one looks like a delay.
 fn taus(data: &Data) -> (f64, f64) {
     (data.sample_s, SLOWEST_OUTPUT_S.max(2.0 * data.sample_s))
 }
@@ -45,15 +46,15 @@ impl Effect for AmplifierSlew {
         "amplifier-slew"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Amplifier
+    fn location(&self) -> Location {
+        Location::Amplifier
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the amplifier's voltage changes at a bounded rate"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "single steps of very different heights: a slew lag grows with the step"
     }
 
@@ -68,22 +69,22 @@ impl Effect for AmplifierSlew {
         }
         let (slowest, fastest) = range(data);
         let mut coordinates = vec![Coordinate::log(slowest, fastest); RATES[form]];
-        coordinates.extend(data.begun.then_some(Coordinate::new(-stroke(data), stroke(data))));
+        coordinates.extend(data.initial_state_unknown.then_some(Coordinate::new(-stroke(data), stroke(data))));
         coordinates
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (slowest, fastest) = range(data);
         let rates = (2.0 * slowest, 0.8 * fastest);
         let starts: Vec<Vec<f64>> = match form {
             BOTH_WAYS => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
             RESISTANCE => return logarithms(taus(data), 10).map(|tau| vec![tau]).collect(),
             _ => logarithms(rates, 10)
-                .flat_map(|rate| [APART.ln(), -APART.ln()].map(|apart| vec![rate, rate + apart]))
+                .flat_map(|rate| [INITIAL_RATIO.ln(), -INITIAL_RATIO.ln()].map(|apart| vec![rate, rate + apart]))
                 .collect(),
         };
-        // From the command itself no small change would show.
-        let from_v = data.begun.then_some(data.command.before - OFF * stroke(data));
+        // At an amplifier voltage equal to the command the derivative would vanish.
+        let from_v = data.initial_state_unknown.then_some(data.command.before - INITIAL_DISTANCE * stroke(data));
         starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
     }
 
@@ -106,14 +107,14 @@ impl Effect for AmplifierSlew {
         (form != BOTH_WAYS).then(|| table(self, form, point, data))
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         let value = point[0].exp();
         if form == RESISTANCE {
             chain.output_tau_s = value;
             return;
         }
         let falling = point[RATES[form] - 1].exp();
-        chain.from_v = point.get(RATES[form]).copied();
+        chain.initial_v = point.get(RATES[form]).copied();
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);
         chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
     }

@@ -1,27 +1,27 @@
-//! Stiffness falls back while the voltage stays: a part of it leaks away with a time constant of its own.
+//! Charge leakage: a fraction of the stiffness decays with a time constant of its own while the voltage is constant.
 //!
 //! ```text
-//! q = f - (1 - at_once) share lag(tau; f)        y = relaxation(q) - at_once share lag(tau; f)
+//! q = f - (1 - instantaneous) share lag(tau; f)        y = relaxation(q) - instantaneous share lag(tau; f)
 //! ```
 //!
-//! In one form all of the loss passes the relaxation, in the other a part of it shows at once.
+//! In one form all of the loss passes the relaxation, in the other a part of it is instantaneous.
 //!
-//! Leakage lowers the settled value by `share`; creep keeps it, and drift follows the clock.
+//! Leakage lowers the settled value by `share`; creep does not change it, and drift depends on time alone.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
 use crate::plant::leakage::Loss;
 use crate::record::data::Data;
 
 pub(super) struct ChargeLeakage;
 
-/// What leaks faster than the spring relaxes is never seen to fall back: it is a gain.
+/// Smallest time constant, in s; a faster loss hardly lets the stiffness fall and looks like a gain.
 const FASTEST_S: f64 = 3.5;
 
-const AT_ONCE: usize = 1;
+const WITH_INSTANTANEOUS_PART: usize = 1;
 
 fn loss(point: &[f64]) -> Loss {
-    Loss { share: point[0], tau_s: point[1].exp(), at_once: point.get(2).copied().unwrap_or(0.0) }
+    Loss { share: point[0], tau_s: point[1].exp(), instantaneous: point.get(2).copied().unwrap_or(0.0) }
 }
 
 impl Effect for ChargeLeakage {
@@ -29,15 +29,15 @@ impl Effect for ChargeLeakage {
         "charge-leakage"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "stiffness falls back while the voltage stays"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "one step, held for minutes: only leakage lets the stiffness fall while the voltage stays"
     }
 
@@ -48,16 +48,16 @@ impl Effect for ChargeLeakage {
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let longest = 10.0 * data.duration_s().max(FASTEST_S);
         let mut coordinates = vec![Coordinate::new(0.0, 1.0), Coordinate::log(FASTEST_S, longest)];
-        coordinates.extend((form == AT_ONCE).then_some(Coordinate::new(0.0, 1.0)));
+        coordinates.extend((form == WITH_INSTANTANEOUS_PART).then_some(Coordinate::new(0.0, 1.0)));
         coordinates
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let longest = data.duration_s();
         [4.0, 8.0, 16.0, 32.0, 64.0, 128.0]
             .into_iter()
             .filter(|&tau: &f64| tau < longest)
-            .map(|tau| [0.1, tau.ln()].into_iter().chain((form == AT_ONCE).then_some(0.5)).collect())
+            .map(|tau| [0.1, tau.ln()].into_iter().chain((form == WITH_INSTANTANEOUS_PART).then_some(0.5)).collect())
             .collect()
     }
 
@@ -65,13 +65,13 @@ impl Effect for ChargeLeakage {
         vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
     }
 
-    /// A plant file holds one, and one that passes the relaxation.
+    /// A plant file represents one loss, all of which passes the relaxation.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
-        let passes = loss(point).at_once == 0.0 || loss(point).passed(&chain.relaxation).is_some();
+        let passes = loss(point).instantaneous == 0.0 || loss(point).equivalent_leakage(&chain.relaxation).is_some();
         (chain.losses.len() > 1 || !passes).then(|| table(self, form, point, data))
     }
 
-    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.losses.push(loss(point));
     }
 }

@@ -1,24 +1,25 @@
-//! The response starts late: `u(t) = command(t - delay)`.
+//! The response is delayed: `u(t) = command(t - delay)`.
 //!
-//! Of an even record, the rows see a jump of the command later by a whole row where the delay passes a multiple of their
-//! distance: there the prediction jumps, in between it is smooth. So the delay is whole rows, which a start chooses, and
-//! a part above 0 and up to 1 row, which a fit moves; a delay of whole rows, the usual one, is an end that it reaches. The
-//! rows are those of the command, also where only some of the readings are looked at.
+//! In a uniformly sampled record the prediction jumps where the delay passes a multiple of the sample time, because the
+//! rows see a step of the command one row later; in between it is smooth. So the first coordinate is a whole number of
+//! rows, which the initial point sets, and the second a fraction above 0 and up to 1 row, which the fit moves. A delay
+//! of whole rows, the usual one, is at the upper bound. Rows are those of the whole record, also if only some of them
+//! are in use.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct Delay;
 
 fn longest(data: &Data) -> f64 {
-    (0.1 * data.duration_s()).max(2.0 * data.command_s)
+    (0.1 * data.duration_s()).max(2.0 * data.record_sample_s)
 }
 
-/// Whole rows, and what is left above 0, in s.
+/// Returns a delay as whole rows and the rest above 0, both in s.
 fn split(data: &Data, delay_s: f64) -> Vec<f64> {
-    let rows = if data.even { (delay_s / data.command_s - 1e-6).ceil() - 1.0 } else { 0.0 };
-    let whole = rows.max(0.0) * data.command_s;
+    let rows = if data.uniform { (delay_s / data.record_sample_s - 1e-6).ceil() - 1.0 } else { 0.0 };
+    let whole = rows.max(0.0) * data.record_sample_s;
     vec![whole, delay_s - whole]
 }
 
@@ -27,52 +28,52 @@ impl Effect for Delay {
         "delay"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Amplifier
+    fn location(&self) -> Location {
+        Location::Amplifier
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the response starts late"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "single steps of very different heights: a delay is the same for all"
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        let most = if data.even { data.command_s } else { longest(data) };
-        vec![Coordinate::kept(0.0, longest(data)), Coordinate::new(1e-3 * data.command_s, most)]
+        let most = if data.uniform { data.record_sample_s } else { longest(data) };
+        vec![Coordinate::fixed(0.0, longest(data)), Coordinate::new(1e-3 * data.record_sample_s, most)]
     }
 
-    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let mut whole = 0.0;
         let mut starts = Vec::new();
-        while whole * data.command_s < longest(data) {
-            starts.extend([0.5, 1.0].map(|part| split(data, (whole + part) * data.command_s)));
+        while whole * data.record_sample_s < longest(data) {
+            starts.extend([0.5, 1.0].map(|part| split(data, (whole + part) * data.record_sample_s)));
             whole += f64::max(1.0, (0.08 * whole).floor());
         }
         starts
     }
 
-    /// A promise is a poor judge of rows, and a fit moves within one.
-    fn beyond(&self, _: usize, point: &[f64], rows: f64, data: &Data) -> Option<Vec<f64>> {
-        let to_s = point[0] + (0.5 + rows) * data.command_s;
-        (data.even && (0.0..longest(data)).contains(&to_s)).then(|| split(data, to_s))
+    /// A linear prediction cannot compare different numbers of rows, and a fit keeps its number.
+    fn across_jumps(&self, _: usize, point: &[f64], rows: f64, data: &Data) -> Option<Vec<f64>> {
+        let to_s = point[0] + (0.5 + rows) * data.record_sample_s;
+        (data.uniform && (0.0..longest(data)).contains(&to_s)).then(|| split(data, to_s))
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         vec![Quantity::new("delay_s", "s", point[0] + point[1])]
     }
 
-    fn places(&self, _: usize, data: &Data) -> f64 {
-        (longest(data) / data.command_s).clamp(1.0, 5.0).ln()
+    fn ln_candidates(&self, _: usize, data: &Data) -> f64 {
+        (longest(data) / data.record_sample_s).clamp(1.0, 5.0).ln()
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
         None
     }
 
-    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.delay_s += point[0] + point[1];
     }
 }
@@ -90,9 +91,9 @@ mod tests {
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 
-    /// Whole rows and a part of one, from starts on either side.
+    /// The delay is a whole number of rows, or not; fits start on either side of it.
     #[test]
-    fn a_fit_goes_from_row_to_row() {
+    fn fit_crosses_from_row_to_row() {
         let volts = |row: usize| [0.0, 300.0, 100.0, 500.0, 200.0][row / 90 % 5];
         let row = |row| Row { line: 0, time_s: 0.1 * row as f64, voltage_v: volts(row), measured: Some(0.0) };
         let record = Record { name: String::new(), rows: (0..900).map(row).collect() };
@@ -107,7 +108,7 @@ mod tests {
             Simulator::new(&data, &base).run(&of(&data, delay_s), &mut readings);
             data.reading = readings.iter().zip(normals(900)).map(|(reading, noise)| reading + noise).collect();
             let observed = Observed::new(&data);
-            let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &base));
+            let mut engine = Engine::new(&data, &observed, &base);
             for start_s in [-0.2, -0.1, 0.25].map(|off_s| delay_s + off_s) {
                 let fit = engine.fit_twice(of(&data, start_s));
                 let found_s: f64 = fit.model.points().iter().sum();

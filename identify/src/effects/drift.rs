@@ -1,4 +1,4 @@
-//! The whole response grows or fades with time, counted from the first reading.
+//! The response drifts with time, counted from the first reading.
 //!
 //! | form | |
 //! | --- | --- |
@@ -6,7 +6,7 @@
 //! | exponential | `y exp(rate t)` |
 //! | added | `y + rate t full scale` |
 
-use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 
 pub(super) struct Drift;
@@ -19,19 +19,19 @@ impl Effect for Drift {
         "drift"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn acts(&self) -> Acts {
-        Acts::OnReadings
+    fn affects(&self) -> Affects {
+        Affects::Readings
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the response changes with the clock, not with the voltage"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "the same step again after a long time"
     }
 
@@ -44,7 +44,7 @@ impl Effect for Drift {
         vec![Coordinate::new(-most, most)]
     }
 
-    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let rate = 0.05 / data.duration_s().max(1e-9);
         vec![vec![-rate], vec![rate]]
     }
@@ -53,7 +53,7 @@ impl Effect for Drift {
         vec![Quantity::new("per_s", "1/s", point[0])]
     }
 
-    fn read(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+    fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
         let start = data.time_s.first().copied().unwrap_or(0.0);
         for (reading, time) in readings.iter_mut().zip(&data.time_s) {
             let grown = point[0] * (time - start);

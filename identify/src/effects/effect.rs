@@ -1,190 +1,195 @@
-//! What an effect is: a physical block along the chain from command to reading.
+//! The interface of an effect: a physical cause, as a block of the chain from command to reading.
 //!
 //! ```text
-//! command -> amplifier -> static law and memory -> relaxation -> response -> reading
+//! command -> amplifier -> static law and hysteresis -> relaxation -> response -> reading
 //! ```
 //!
-//! An effect acts at one place of the chain (it overrides one of the hooks below), by parameters that a fit may move. It
-//! may come in several *forms*: the same cause, another law. A new effect is one file in `effects/` and its line there.
+//! An effect acts at one location of the chain by overriding one of the `modify_` functions, with parameters that a fit
+//! moves. It may have several *forms*: different laws of the same cause. A new effect is one file in `effects/` and one
+//! line in the catalogue.
 
 use crate::plant::chain::Chain;
-use crate::plant::start::Start;
+use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::Signal;
 
-/// Where in the chain an effect acts. Two effects of one stage are harder to tell apart than two of different stages.
+/// Location of an effect in the chain; two effects at the same location are harder to isolate than two at different
+/// ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Stage {
+pub enum Location {
     /// Between the command and the spring's electrodes.
     Amplifier,
-    /// Static law and memory.
+    /// Between the electrodes and the settled stiffness: static law and hysteresis.
     Static,
-    /// How the stiffness follows in time.
+    /// Between the settled stiffness and the stiffness, over time.
     Relaxation,
-    /// How it is read.
+    /// Between the stiffness and the reading.
     Reading,
 }
 
-/// What of a run an effect changes. Runs that differ in later things alone share the earlier ones.
+/// The first intermediate result of a simulation that an effect changes; simulations that differ only in later ones
+/// share the earlier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Acts {
-    /// By [`Effect::change`], up to the amplifier's output.
-    OnAmplifier,
-    /// By [`Effect::change`], up to where the stiffness would settle.
-    OnSettled,
-    /// By [`Effect::change`], behind it.
-    OnChain,
-    /// By [`Effect::respond`] alone.
-    OnResponse,
-    /// By [`Effect::read`] alone.
-    OnReadings,
+pub enum Affects {
+    /// The voltage on the electrodes, by [`Effect::modify_chain`].
+    Amplifier,
+    /// The settled stiffness, by [`Effect::modify_chain`].
+    StaticResponse,
+    /// The stiffness, by [`Effect::modify_chain`].
+    Relaxation,
+    /// The stiffness, by [`Effect::modify_response`] alone.
+    Response,
+    /// The readings, by [`Effect::modify_readings`] alone.
+    Readings,
 }
 
-/// A number that the fit moves. Coordinates are chosen so that a fit is well behaved: logarithms where only size counts.
+/// Bounds of a number that a fit moves; the number is the logarithm of a quantity where that makes the fit better
+/// conditioned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
-    /// Smallest value allowed.
+    /// Smallest value.
     pub lowest: f64,
-    /// Largest value allowed.
+    /// Largest value.
     pub highest: f64,
-    /// False for what a fit cannot move.
+    /// True if the fit moves it, false if it keeps its initial value.
     pub fitted: bool,
-    /// True for what is found by search alone, such as the rows of a run.
-    pub searched: bool,
 }
 
 impl Coordinate {
-    /// One that the fit moves between two bounds.
+    /// Returns a coordinate that the fit moves between two bounds.
     pub fn new(lowest: f64, highest: f64) -> Self {
-        Self { lowest, highest, fitted: true, searched: false }
+        Self { lowest, highest, fitted: true }
     }
 
-    /// The logarithm of a quantity between two bounds.
+    /// Returns the logarithm of a quantity between two positive bounds.
     pub fn log(lowest: f64, highest: f64) -> Self {
         Self::new(lowest.ln(), highest.ln())
     }
 
-    /// One that stays where a start has put it.
-    pub fn kept(lowest: f64, highest: f64) -> Self {
+    /// Returns a coordinate that keeps its value in a fit.
+    pub fn fixed(lowest: f64, highest: f64) -> Self {
         Self { fitted: false, ..Self::new(lowest, highest) }
-    }
-
-    /// One that only [`Effect::polish`] moves.
-    pub fn searched(lowest: f64, highest: f64) -> Self {
-        Self { searched: true, ..Self::kept(lowest, highest) }
     }
 }
 
-/// A parameter as the user reads it.
+/// A parameter as it is reported.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quantity {
-    /// Its name in the report.
+    /// Name in the report.
     pub name: String,
     /// SI unit, or "" for a ratio.
     pub unit: &'static str,
-    /// Its value.
+    /// Value in that unit.
     pub value: f64,
 }
 
 impl Quantity {
-    /// A named value.
+    /// Returns a named value.
     pub fn new(name: impl Into<String>, unit: &'static str, value: f64) -> Self {
         Self { name: name.into(), unit, value }
     }
 }
 
-/// What a search for starting points sees.
-pub struct Scene<'a> {
+/// What initial points and searches are derived from.
+pub struct FitContext<'a> {
     /// The record.
     pub data: &'a Data,
-    /// What the model without the effect leaves, in V; NaN in rows that [`Effect::polish`] must not look at.
+    /// Residual of the model without the effect, in V; NaN in rows that [`Effect::refine_searched`] must not use.
     pub residual: &'a [f64],
-    /// The noise's scale, in V.
+    /// Scale of the noise, in V.
     pub sigma: f64,
 }
 
-/// A cause, as a block of the chain.
+/// A cause of a difference between simulation and readings.
 pub trait Effect: Sync {
-    /// Its name in reports.
+    /// Returns the name of the cause in reports.
     fn cause(&self) -> &'static str;
 
-    /// Where it acts.
-    fn stage(&self) -> Stage;
+    /// Returns the location in the chain.
+    fn location(&self) -> Location;
 
-    /// What of a run it changes.
-    fn acts(&self) -> Acts {
-        match self.stage() {
-            Stage::Amplifier => Acts::OnAmplifier,
-            Stage::Static => Acts::OnSettled,
-            Stage::Relaxation | Stage::Reading => Acts::OnChain,
+    /// Returns the first intermediate result of a simulation that the effect changes.
+    fn affects(&self) -> Affects {
+        match self.location() {
+            Location::Amplifier => Affects::Amplifier,
+            Location::Static => Affects::StaticResponse,
+            Location::Relaxation | Location::Reading => Affects::Relaxation,
         }
     }
 
-    /// What it does, in words that follow "because".
-    fn meaning(&self) -> &'static str;
+    /// Returns what the effect does, as a clause that can follow "because".
+    fn description(&self) -> &'static str;
 
-    /// The experiment that shows it and nothing else, in words that follow "run".
-    fn experiment(&self) -> &'static str;
+    /// Returns the experiment that isolates the effect, as a clause that can follow "run".
+    fn isolating_experiment(&self) -> &'static str;
 
-    /// Number of forms that it comes in.
+    /// Returns the number of forms.
     fn forms(&self) -> usize {
         1
     }
 
-    /// The coordinates of a form.
+    /// Returns the coordinates of a form.
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate>;
 
-    /// Points from which a fit may find it, for a form.
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>>;
+    /// Returns the initial points for fits of a form.
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>>;
 
-    /// The user's parameters at a point.
+    /// Returns the reported parameters at a point.
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity>;
 
-    /// Causes that contain this one: with one of them in the model, it has nothing to add.
+    /// Returns true if [`Effect::refine_searched`] finds some coordinates of a form, which the fit does not move.
+    fn searched(&self, _form: usize) -> bool {
+        false
+    }
+
+    /// Returns the causes of which this one is a special case; in a model with one of them it is redundant.
     fn special_case_of(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// How many places a search for a form looks at, as a natural logarithm: what a find by chance is discounted by.
-    fn places(&self, _form: usize, _data: &Data) -> f64 {
+    /// Returns the logarithm of the number of independent candidates that a search for a form compares; the likelihood
+    /// gain is reduced by this, in nats.
+    fn ln_candidates(&self, _form: usize, _data: &Data) -> f64 {
         0.0
     }
 
-    /// Moves the searched coordinates to where `residual`, which is without the effect, wants them.
-    fn polish(&self, _form: usize, _point: &mut [f64], _scene: &Scene) {}
+    /// Moves the searched coordinates to their most likely place, given the residual of the model without the effect.
+    fn refine_searched(&self, _form: usize, _point: &mut [f64], _scene: &FitContext) {}
 
-    /// Of a point between two bounds at which the prediction jumps, one that many `steps` beyond, or before them if negative.
-    fn beyond(&self, _form: usize, _point: &[f64], _steps: f64, _data: &Data) -> Option<Vec<f64>> {
+    /// Returns the point across `steps` discontinuities of the prediction, backwards if negative; `None` if there is no
+    /// such point.
+    fn across_jumps(&self, _form: usize, _point: &[f64], _steps: f64, _data: &Data) -> Option<Vec<f64>> {
         None
     }
 
-    /// Lowest and highest of the user's parameters that a search alone has found; others are left to the fit.
-    fn searched_range(&self, _form: usize, _point: &[f64], _scene: &Scene) -> Vec<(String, f64, f64)> {
+    /// Returns names and bounds of the reported parameters that only a search finds; the fit bounds the others.
+    fn searched_range(&self, _form: usize, _point: &[f64], _scene: &FitContext) -> Vec<(String, f64, f64)> {
         Vec::new()
     }
 
-    /// Changes the chain, as far as a plant file can say it.
-    fn change<'a>(&self, _form: usize, _point: &'a [f64], _data: &'a Data, _chain: &mut Chain<'a>) {}
+    /// Applies the effect to the chain, as far as a plant file can represent it.
+    fn modify_chain<'a>(&self, _form: usize, _point: &'a [f64], _data: &'a Data, _chain: &mut Chain<'a>) {}
 
-    /// What no table of a plant file holds of it, for the whole chain that it is in: a table of its own, or a remark.
+    /// Returns what a plant file cannot represent of the effect, given the whole chain: its parameters as a table, or a
+    /// remark; `None` if nothing is lost.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, _chain: &Chain) -> Option<toml::Value> {
         Some(table(self, form, point, data))
     }
 
-    /// Acts on the stiffness, in V; its states ask where they start.
-    fn respond(&self, _form: usize, _point: &[f64], _signal: &mut Signal, _start: &mut Start) {}
+    /// Applies the effect to the stiffness, in V; every state takes its initial offset from `start`.
+    fn modify_response(&self, _form: usize, _point: &[f64], _signal: &mut Signal, _start: &mut InitialState) {}
 
-    /// Acts on the readings at each row, in V.
-    fn read(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}
+    /// Applies the effect to the reading of each row, in V.
+    fn modify_readings(&self, _form: usize, _point: &[f64], _data: &Data, _readings: &mut [f64]) {}
 }
 
-/// Logarithms of a range, so many, evenly from one end to the other.
+/// Returns `count` logarithms from the first to the second number, equally spaced.
 pub fn logarithms((from, to): (f64, f64), count: u32) -> impl Iterator<Item = f64> {
     let (from, to) = (from.ln(), to.ln());
     (0..count).map(move |part| from + (to - from) * f64::from(part) / f64::from(count - 1))
 }
 
-/// The user's parameters, as a plant file keeps what it does not model.
+/// Returns the reported parameters as a table of a plant file.
 pub fn table<E: Effect + ?Sized>(effect: &E, form: usize, point: &[f64], data: &Data) -> toml::Value {
     let quantities = effect.quantities(form, point, data).into_iter();
     toml::Value::Table(quantities.map(|quantity| (quantity.name, quantity.value.into())).collect())

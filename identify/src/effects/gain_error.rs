@@ -1,6 +1,6 @@
 //! The static gain is not 1: `f = gain u`.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -11,15 +11,15 @@ impl Effect for GainError {
         "gain-error"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Static
+    fn location(&self) -> Location {
+        Location::Static
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the static gain is not 1"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "one step, held for ten time constants: the settled value tells the gain"
     }
 
@@ -31,7 +31,7 @@ impl Effect for GainError {
         vec![Coordinate::new(0.02, 50.0)]
     }
 
-    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
         vec![vec![0.9], vec![1.1]]
     }
 
@@ -43,7 +43,7 @@ impl Effect for GainError {
         None
     }
 
-    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.law.push(|voltage| point[0] * voltage);
     }
 }

@@ -1,14 +1,14 @@
-//! A periodic disturbance rides on the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
+//! A periodic disturbance is added to the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
 
-use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 use crate::record::spectrum;
 
 pub(super) struct Hum;
 
-/// Peaks of the spectrum that are tried.
+/// Number of spectral peaks that are tried.
 const PEAKS: usize = 3;
-/// Fewest periods in a record.
+/// Smallest number of periods in the record.
 const FEWEST: f64 = spectrum::FEWEST_PERIODS as f64;
 
 impl Effect for Hum {
@@ -16,19 +16,19 @@ impl Effect for Hum {
         "hum"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn location(&self) -> Location {
+        Location::Reading
     }
 
-    fn acts(&self) -> Acts {
-        Acts::OnReadings
+    fn affects(&self) -> Affects {
+        Affects::Readings
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "a periodic disturbance rides on the readings"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "readings at constant voltage, at another sample time: a line that is an alias moves"
     }
 
@@ -38,7 +38,7 @@ impl Effect for Hum {
         vec![frequency, Coordinate::new(-most, most), Coordinate::new(-most, most)]
     }
 
-    fn starts(&self, _: usize, Scene { data, residual, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, FitContext { data, residual, .. }: &FitContext) -> Vec<Vec<f64>> {
         spectrum::peaks(residual, data, PEAKS)
             .into_iter()
             .filter(|peak| peak.frequency_hz > FEWEST / data.duration_s())
@@ -50,12 +50,12 @@ impl Effect for Hum {
         vec![Quantity::new("amplitude", "V", point[1].hypot(point[2])), Quantity::new("freq_hz", "Hz", point[0])]
     }
 
-    fn places(&self, _: usize, data: &Data) -> f64 {
-        // As many lines as half the rows; its three coordinates are charged already.
+    fn ln_candidates(&self, _: usize, data: &Data) -> f64 {
+        // There are half as many independent frequencies as rows; 4.5 nats are paid with the three coordinates.
         ((data.rows() as f64 / 2.0).max(1.0).ln() - 4.5).max(0.0)
     }
 
-    fn read(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+    fn modify_readings(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
         for (reading, (sin, cos)) in readings.iter_mut().zip(spectrum::oscillation(point[0], data)) {
             *reading += point[1] * cos + point[2] * sin;
         }

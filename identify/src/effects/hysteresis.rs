@@ -1,6 +1,6 @@
-//! Rate-independent memory: the branches up and down differ.
+//! Rate-independent hysteresis: the ascending and descending branches differ.
 //!
-//! A [`Bank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
+//! A [`PlayBank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
 //!
 //! | form | plays | coordinates |
 //! | --- | --- | --- |
@@ -8,20 +8,20 @@
 //! | part | one | r, weight |
 //! | bank | five, at r / 5 to r | r, weights |
 //! | part with gain, bank with gain | the same, with the gain of the loop's mean line | and the gain |
-//! | cycled part, cycled bank | the same, of a spring that comes from a large voltage | the same |
+//! | cycled part, cycled bank | the same, with the initial condition on the descending branch | the same |
 //!
-//! The last begin on the branch that comes down: where the record begins, not what the spring is.
+//! The initial condition belongs to the record, not to the spring.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage, table};
-use crate::plant::bank::Bank;
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
+use crate::plant::play_bank::PlayBank;
 use crate::record::data::Data;
 
 pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
 
-/// Number of plays, own gain, and whether they begin on the branch that comes down, by form.
+/// Number of plays, own gain, and initial condition on the descending branch, for each form.
 const FORMS: [(usize, bool, bool); 7] = [
     (1, false, false),
     (1, false, false),
@@ -31,11 +31,11 @@ const FORMS: [(usize, bool, bool); 7] = [
     (1, true, true),
     (5, true, true),
 ];
-/// Thresholds of a bank, as parts of r.
+/// Thresholds of a bank relative to `r`.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// The bank of a form at a point.
-fn bank(form: usize, point: &[f64]) -> Bank {
+/// Returns the bank of a form at a point.
+fn bank(form: usize, point: &[f64]) -> PlayBank {
     let (count, own_gain, cycled) = FORMS[form];
     let threshold = point[0].exp();
     let plays: Vec<(f64, f64)> = match (form, count) {
@@ -45,7 +45,7 @@ fn bank(form: usize, point: &[f64]) -> Bank {
     };
     let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
     let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();
-    let bank = Bank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
+    let bank = PlayBank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
     if cycled { bank.cycled() } else { bank }
 }
 
@@ -54,15 +54,15 @@ impl Effect for Hysteresis {
         "hysteresis"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Static
+    fn location(&self) -> Location {
+        Location::Static
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the branches up and down differ, however slowly they are run"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "a slow stair up and down again: only under hysteresis the branches stay apart, however long each step is held"
     }
 
@@ -82,7 +82,7 @@ impl Effect for Hysteresis {
         coordinates
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (count, own_gain, _) = FORMS[form];
         let start = |part: f64, weight: f64| {
             let mut point = vec![(part * data.full_scale_v).ln()];
@@ -102,12 +102,12 @@ impl Effect for Hysteresis {
         vec![Quantity::new("width_v", "V", bank(form, point).width(data.full_scale_v))]
     }
 
-    /// A plant file holds so many plays.
+    /// A plant file holds a limited number of plays.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
-        (!chain.memory.fits()).then(|| table(self, form, point, data))
+        (!chain.memory.fits_plant_file()).then(|| table(self, form, point, data))
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        chain.memory = bank(form, point).behind(&chain.memory);
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.memory = bank(form, point).composed_with(&chain.memory);
     }
 }

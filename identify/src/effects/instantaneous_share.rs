@@ -1,6 +1,6 @@
-//! The immediate part of a step is not 1/11.
+//! The feedthrough, the part of a step that is reached without delay, is not 1/11.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -11,15 +11,15 @@ impl Effect for InstantaneousShare {
         "instantaneous-share"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the part of a step that comes at once is another"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "steps read within a hundredth of the time constant"
     }
 
@@ -27,7 +27,7 @@ impl Effect for InstantaneousShare {
         vec![Coordinate::new(-0.2, 1.0)]
     }
 
-    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
         vec![vec![0.04], vec![0.2]]
     }
 
@@ -39,7 +39,7 @@ impl Effect for InstantaneousShare {
         None
     }
 
-    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.relaxation.share = point[0];
     }
 }

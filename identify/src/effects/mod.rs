@@ -1,9 +1,14 @@
-//! The effects, one file each, in the order in which they act.
-
-use crate::effects::effect::Effect;
+//! The effects that may explain a difference between simulation and readings, one file each: bounds and initial points
+//! go out, and each effect modifies the chain, the stiffness or the readings.
+//!
+//! - *Cause*: the name of an effect in reports, e.g. `gain-error`.
+//! - *Form*: one of several laws of the same cause.
+//! - *Block*: an effect in one form; *point*: the values of its coordinates.
+//! - *Model*: a set of blocks, applied to the chain of a plant file.
 
 mod amplifier_limit;
 mod amplifier_slew;
+mod catalogue;
 mod charge_leakage;
 mod delay;
 mod drift;
@@ -23,34 +28,4 @@ mod static_nonlinearity;
 mod time_constant;
 mod voltage_dependent_time_constant;
 
-/// Every effect, in the order of the chain: each acts on what the ones before it have made.
-pub static EFFECTS: &[&dyn Effect] = &[
-    &amplifier_limit::AmplifierLimit,
-    &amplifier_slew::AmplifierSlew,
-    &delay::Delay,
-    &hysteresis::Hysteresis,
-    &gain_error::GainError,
-    &static_nonlinearity::StaticNonlinearity,
-    &charge_leakage::ChargeLeakage,
-    &instantaneous_share::InstantaneousShare,
-    &time_constant::TimeConstant,
-    &second_relaxation::SecondRelaxation,
-    &voltage_dependent_time_constant::VoltageDependentTimeConstant,
-    &resonance::Resonance,
-    &drift::Drift,
-    &hum::Hum,
-    &reading_offset::ReadingOffset,
-    &sensor_saturation::SensorSaturation,
-    &quantisation::Quantisation,
-    &outliers::Outliers,
-];
-
-/// The place of a cause in [`EFFECTS`].
-pub fn index_of(cause: &str) -> Option<usize> {
-    EFFECTS.iter().position(|effect| effect.cause() == cause)
-}
-
-/// True if a cause contains another, as its special case.
-pub fn contains(effect: usize, other: usize) -> bool {
-    EFFECTS[other].special_case_of().contains(&EFFECTS[effect].cause())
-}
+pub use catalogue::{EFFECTS, contains, index_of};

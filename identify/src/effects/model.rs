@@ -1,6 +1,6 @@
-//! A model: the paper's chain with some effects in it.
+//! A model: the chain of a plant file with effects applied to it.
 
-use crate::effects::EFFECTS;
+use crate::effects::catalogue::EFFECTS;
 use crate::effects::effect::{Coordinate, Effect};
 use crate::plant::base::Base;
 use crate::plant::chain::Chain;
@@ -10,43 +10,43 @@ use simulation::plant_file::PlantFile;
 /// One effect in one form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Block {
-    /// Its place in [`EFFECTS`], which is the chain's order.
+    /// Index in [`EFFECTS`], which is the order of the chain.
     pub effect: usize,
-    /// Its form.
+    /// Index of the form.
     pub form: usize,
 }
 
 impl Block {
-    /// The effect itself.
+    /// Returns the effect.
     pub fn effect(&self) -> &'static dyn Effect {
         EFFECTS[self.effect]
     }
 
-    /// The cause's name.
+    /// Returns the name of the cause.
     pub fn cause(&self) -> &'static str {
         self.effect().cause()
     }
 
-    /// The coordinates of its form.
+    /// Returns the coordinates of the form.
     pub fn coordinates(&self, data: &Data) -> Vec<Coordinate> {
         self.effect().coordinates(self.form, data)
     }
 
-    /// True if a search alone can place it.
-    pub fn searched(&self, data: &Data) -> bool {
-        self.coordinates(data).iter().any(|coordinate| coordinate.searched)
+    /// Returns true if some coordinates are found by search alone.
+    pub fn searched(&self) -> bool {
+        self.effect().searched(self.form)
     }
 }
 
-/// Blocks in the chain's order, each with its point.
+/// A model: blocks in the order of the chain, each with its point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Model {
-    /// The blocks.
+    /// The blocks, and the coordinates' values of each.
     pub blocks: Vec<(Block, Vec<f64>)>,
 }
 
 impl Model {
-    /// The model with one more block.
+    /// Returns the model with one more block.
     pub fn with(&self, block: Block, point: Vec<f64>) -> Self {
         let mut blocks = self.blocks.clone();
         let at = blocks.partition_point(|(other, _)| *other < block);
@@ -54,42 +54,42 @@ impl Model {
         Self { blocks }
     }
 
-    /// The model without one of its effects.
+    /// Returns the model without an effect.
     pub fn without(&self, effect: usize) -> Self {
         Self { blocks: self.blocks.iter().filter(|(block, _)| block.effect != effect).cloned().collect() }
     }
 
-    /// True if an effect is in it, in any form.
+    /// Returns true if an effect is in the model, in any form.
     pub fn has(&self, effect: usize) -> bool {
         self.blocks.iter().any(|(block, _)| block.effect == effect)
     }
 
-    /// The point of an effect, if it is there.
+    /// Returns the point of an effect; `None` if it is not in the model.
     pub fn point(&self, effect: usize) -> Option<&[f64]> {
         self.blocks.iter().find(|(block, _)| block.effect == effect).map(|(_, point)| point.as_slice())
     }
 
-    /// True if an effect is in it that only a search can place.
-    pub fn searched(&self, effect: usize, data: &Data) -> bool {
-        self.blocks.iter().any(|(block, _)| block.effect == effect && block.searched(data))
+    /// Returns true if an effect is in the model in a form that needs a search.
+    pub fn searched(&self, effect: usize) -> bool {
+        self.blocks.iter().any(|(block, _)| block.effect == effect && block.searched())
     }
 
-    /// Effects and forms, as a key.
+    /// Returns effects and forms without their points.
     pub fn structure(&self) -> Vec<Block> {
         self.blocks.iter().map(|(block, _)| *block).collect()
     }
 
-    /// Coordinates of all blocks, one after the other.
+    /// Returns the coordinates of all blocks in order.
     pub fn coordinates(&self, data: &Data) -> Vec<Coordinate> {
         self.blocks.iter().flat_map(|(block, _)| block.coordinates(data)).collect()
     }
 
-    /// All points, one after the other.
+    /// Returns the points of all blocks in order.
     pub fn points(&self) -> Vec<f64> {
         self.blocks.iter().flat_map(|(_, point)| point.iter().copied()).collect()
     }
 
-    /// Sets all points from one vector.
+    /// Replaces the points of all blocks, which must be in order.
     pub fn set_points(&mut self, points: &[f64]) {
         let mut rest = points;
         for (_, point) in &mut self.blocks {
@@ -99,16 +99,16 @@ impl Model {
         }
     }
 
-    /// The base's chain, changed by the model's blocks.
+    /// Returns the chain of a plant with the effects of the model.
     pub fn chain<'a>(&'a self, base: &'a Base, data: &'a Data) -> Chain<'a> {
         let mut chain = base.chain();
         for (block, point) in &self.blocks {
-            block.effect().change(block.form, point, data, &mut chain);
+            block.effect().modify_chain(block.form, point, data, &mut chain);
         }
         chain
     }
 
-    /// The base with the model's blocks in it, as a plant file.
+    /// Returns the plant file of a plant with the effects of the model.
     pub fn extend(&self, base: &Base, data: &Data) -> PlantFile {
         let mut file = base.file().clone();
         let chain = self.chain(base, data);
@@ -121,7 +121,7 @@ impl Model {
         file
     }
 
-    /// The blocks that the model's plant file only mentions.
+    /// Returns the blocks that the plant file does not represent.
     pub fn unmodelled(&self, base: &Base, data: &Data) -> Self {
         let chain = self.chain(base, data);
         let mentioned = |(block, point): &&(Block, Vec<f64>)| {

@@ -1,7 +1,7 @@
-//! Single readings are far off. Not a part of the chain but of the noise: a mixture of two scales against one heavy tail
-//! ([`crate::noise`]).
+//! Single readings are outliers. This is a property of the noise and not of the chain: a mixture of two scales instead
+//! of one heavy tail ([`crate::noise`]).
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 
 pub(super) struct Outliers;
@@ -11,15 +11,15 @@ impl Effect for Outliers {
         "outliers"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn location(&self) -> Location {
+        Location::Reading
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "single readings are far off"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "readings at constant voltage: outliers come without any change"
     }
 
@@ -31,7 +31,7 @@ impl Effect for Outliers {
         Vec::new()
     }
 
-    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
         Vec::new()
     }
 

@@ -1,6 +1,7 @@
-//! Readings come in coarse steps. Found from the readings' exact lattice ([`crate::record::observed`]), not by a fit.
+//! Readings are coarsely quantised. The step is found in the readings themselves ([`crate::record::observed`]), not by
+//! a fit.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 
 pub(super) struct Quantisation;
@@ -10,15 +11,15 @@ impl Effect for Quantisation {
         "quantisation"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn location(&self) -> Location {
+        Location::Reading
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "readings come in coarse steps"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "readings at constant voltage with the sensor on a finer range"
     }
 
@@ -30,7 +31,7 @@ impl Effect for Quantisation {
         Vec::new()
     }
 
-    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
         Vec::new()
     }
 

@@ -2,28 +2,30 @@
 //!
 //! | form | |
 //! | --- | --- |
-//! | run | one stretch of them |
+//! | run | one interval of them |
 //! | whole | all of them: the sensor's zero |
 
-use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
-use crate::stats::median::{deviation, median};
-use crate::stats::scale::bends;
+use crate::stats::median::{median, robust_deviation};
+use crate::stats::scale::second_differences;
 
 pub(super) struct ReadingOffset;
 
 const RUN: usize = 0;
 const WHOLE: usize = 1;
 
-/// Shortest run that is one, in rows; a run that is longer than half of the record is the rest's offset.
-const SHORTEST: usize = 5;
-/// A single reading counts for no more than this many of the noise's scales.
+/// Shortest run, in rows; for a run longer than half of the record, the other rows count as shifted.
+const SHORTEST_RUN: usize = 5;
+/// Readings are clipped at this many scales of the noise in the search.
 const CLIP: f64 = 6.0;
-/// First rows that tell the sensor's zero, and how many of their errors it is off if it is.
-const AT_REST: usize = 10;
-const SHOWN: f64 = 3.0;
+/// Number of first rows from which the sensor's zero is estimated.
+const ROWS_AT_REST: usize = 10;
+/// The sensor's zero is wrong if it is this many standard errors away from 0.
+const SIGNIFICANT_ZERO: f64 = 3.0;
 
-/// Which rows are shifted, and by what: from `point[0]` up to but not including `point[1]` by `point[2]`; all by `point[0]`.
+/// Returns the rows that are shifted and the shift, in V: rows from `point[0]` up to but not including `point[1]` by
+/// `point[2]`, or all by `point[0]`.
 fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, f64) {
     if form == WHOLE {
         return (0..rows, point[0]);
@@ -32,19 +34,20 @@ fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, 
     ((point[0] as usize).min(to)..to, point[2])
 }
 
-/// False if the sensor's zero is right: a spring that never had a voltage reads it.
+/// Returns false if the readings before the first voltage show that the sensor's zero is right.
 fn shows_at_rest(data: &Data) -> bool {
-    let rest = data.voltage_v.iter().take(AT_REST).take_while(|voltage| **voltage == 0.0).count();
-    if data.begun || rest == 0 {
+    let rest = data.voltage_v.iter().take(ROWS_AT_REST).take_while(|voltage| **voltage == 0.0).count();
+    if data.initial_state_unknown || rest == 0 {
         return true;
     }
     let zero = median(&mut data.reading[..rest].to_vec()).unwrap_or(0.0);
-    let error = deviation(bends(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
-    zero.abs() > SHOWN * error
+    let error = robust_deviation(second_differences(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
+    zero.abs() > SIGNIFICANT_ZERO * error
 }
 
-/// The run whose shift explains most: by sums over runs of growing length. Unseen rows neither count nor cost.
-fn best_run(Scene { residual, sigma, .. }: &Scene) -> Option<Vec<f64>> {
+/// Returns the run whose shift reduces the squared error most, among runs of growing length; NaN rows count neither for
+/// nor against it.
+fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>> {
     let rows = residual.len();
     let bound = CLIP * sigma;
     let (mut sums, mut counts) = (vec![0.0], vec![0]);
@@ -54,12 +57,12 @@ fn best_run(Scene { residual, sigma, .. }: &Scene) -> Option<Vec<f64>> {
         counts.push(counts[row] + usize::from(!value.is_nan()));
     }
     let gain = |from: usize, to: usize| match counts[to] - counts[from] {
-        seen if seen < SHORTEST => 0.0,
+        seen if seen < SHORTEST_RUN => 0.0,
         seen => (sums[to] - sums[from]).powi(2) / seen as f64,
     };
     let longest = rows / 2;
     let mut best = (0.0, 0, 0);
-    let mut length = SHORTEST;
+    let mut length = SHORTEST_RUN;
     while length <= longest {
         for from in 0..=rows - length {
             let found = gain(from, from + length);
@@ -70,13 +73,13 @@ fn best_run(Scene { residual, sigma, .. }: &Scene) -> Option<Vec<f64>> {
         length += (length / 5).max(1);
     }
     let (_, from, to) = refined(best.1, best.2, rows, &gain)?;
-    // A typical reading, not the mean: it may hold an outlier.
+    // The median is not affected by an outlier in the run.
     let mut run: Vec<f64> = residual[from..to].iter().copied().filter(|value| !value.is_nan()).collect();
     run.sort_by(f64::total_cmp);
     Some(vec![from as f64, to as f64, run[run.len() / 2]])
 }
 
-/// The best run with its edges near those of another.
+/// Returns the best run whose edges are close to those of the given one.
 fn refined(from: usize, to: usize, rows: usize, gain: &impl Fn(usize, usize) -> f64) -> Option<(f64, usize, usize)> {
     if to <= from {
         return None;
@@ -85,13 +88,13 @@ fn refined(from: usize, to: usize, rows: usize, gain: &impl Fn(usize, usize) -> 
     let mut best = (gain(from, to), from, to);
     for _ in 0..3 {
         let before = best;
-        for edge in best.1.saturating_sub(reach)..=(best.1 + reach).min(best.2 - SHORTEST.min(best.2 - best.1)) {
+        for edge in best.1.saturating_sub(reach)..=(best.1 + reach).min(best.2 - SHORTEST_RUN.min(best.2 - best.1)) {
             let found = gain(edge, best.2);
-            if found > best.0 && best.2 - edge >= SHORTEST {
+            if found > best.0 && best.2 - edge >= SHORTEST_RUN {
                 best = (found, edge, best.2);
             }
         }
-        for edge in (best.1 + SHORTEST).max(best.2.saturating_sub(reach))..=(best.2 + reach).min(rows) {
+        for edge in (best.1 + SHORTEST_RUN).max(best.2.saturating_sub(reach))..=(best.2 + reach).min(rows) {
             let found = gain(best.1, edge);
             if found > best.0 {
                 best = (found, best.1, edge);
@@ -109,19 +112,19 @@ impl Effect for ReadingOffset {
         "reading-offset"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn location(&self) -> Location {
+        Location::Reading
     }
 
-    fn acts(&self) -> Acts {
-        Acts::OnReadings
+    fn affects(&self) -> Affects {
+        Affects::Readings
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "a stretch of readings, or all, is shifted"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "the same schedule again, from a rest at 0 V: a shift of the sensor shows at rest, or not at the same time again"
     }
 
@@ -134,15 +137,15 @@ impl Effect for ReadingOffset {
         let most = 2.0 * data.full_scale_v.max(1.0);
         let offset = Coordinate::new(-most, most);
         match form {
-            RUN => vec![Coordinate::searched(0.0, rows), Coordinate::searched(0.0, rows), offset],
+            RUN => vec![Coordinate::fixed(0.0, rows), Coordinate::fixed(0.0, rows), offset],
             _ => vec![offset],
         }
     }
 
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         match form {
-            RUN => best_run(scene).into_iter().collect(),
-            _ if shows_at_rest(scene.data) => vec![vec![-scene.sigma], vec![scene.sigma]],
+            RUN => best_run(context).into_iter().collect(),
+            _ if shows_at_rest(context.data) => vec![vec![-context.sigma], vec![context.sigma]],
             _ => Vec::new(),
         }
     }
@@ -157,26 +160,31 @@ impl Effect for ReadingOffset {
         ]
     }
 
-    fn places(&self, form: usize, data: &Data) -> f64 {
-        // Both edges; neighbouring runs are nearly the same.
+    fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
+        // Both edges are searched; neighbouring runs are nearly equivalent.
         if form == RUN { 1.25 * (data.rows() as f64).max(1.0).ln() } else { 0.0 }
     }
 
-    fn polish(&self, _: usize, point: &mut [f64], scene: &Scene) {
-        if let Some(best) = best_run(scene) {
+    fn searched(&self, form: usize) -> bool {
+        form == RUN
+    }
+
+    fn refine_searched(&self, _: usize, point: &mut [f64], context: &FitContext) {
+        if let Some(best) = best_run(context) {
             point.copy_from_slice(&best);
         }
     }
 
-    /// An edge may lie where moving it costs less than 95 % certainty allows, and between two rows.
-    fn searched_range(&self, form: usize, point: &[f64], scene: &Scene) -> Vec<(String, f64, f64)> {
+    /// An edge may move as long as that costs less than 2 nats (95 %), and lies between two rows.
+    fn searched_range(&self, form: usize, point: &[f64], context: &FitContext) -> Vec<(String, f64, f64)> {
         if form != RUN {
             return Vec::new();
         }
-        let (time, rows) = (&scene.data.time_s, scene.data.rows());
+        let (time, rows) = (&context.data.time_s, context.data.rows());
         let (from, to, offset) = (point[0] as usize, (point[1] as usize).min(rows), point[2]);
-        // Cost of counting a row of the run as outside, in nats; the opposite is a gain.
-        let cost = |row: usize| (scene.residual[row] * offset - 0.5 * offset * offset) / (scene.sigma * scene.sigma);
+        // Cost of excluding a row from the run, in nats; including one costs the negative.
+        let cost =
+            |row: usize| (context.residual[row] * offset - 0.5 * offset * offset) / (context.sigma * context.sigma);
         let reach = |outwards: &mut dyn Iterator<Item = usize>, sign: f64| {
             let (mut sum, mut last) = (0.0, None);
             for row in outwards.take(200) {
@@ -198,7 +206,7 @@ impl Effect for ReadingOffset {
         vec![("from_s".into(), at(lower), at(upper)), ("to_s".into(), at(earlier.saturating_sub(1)), at(later))]
     }
 
-    fn read(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+    fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
         let (run, offset) = shifted(form, point, data.rows());
         for reading in &mut readings[run] {
             *reading += offset;

@@ -1,4 +1,4 @@
-//! Underdamped oscillation after a change, with the natural frequency `w = 2 pi freq`:
+//! An underdamped oscillation after a change, with the natural frequency `w = 2 pi freq`:
 //!
 //! ```text
 //! x'' + 2 zeta w x' + w^2 x = w^2 e        y' = y + part (x - e)
@@ -8,27 +8,27 @@
 //! | --- | --- | --- |
 //! | whole | the response, `e = y` | 1 |
 //! | in part | the response | fitted |
-//! | quick | what changes quickly, `e = y - lag(T; y)` | fitted |
+//! | quick | its fast changes, `e = y - lag(T; y)` | fitted |
 
 use std::f64::consts::TAU;
 
-use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage, logarithms};
-use crate::plant::start::Start;
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms};
+use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece, Signal};
 
 pub(super) struct Resonance;
 
-/// A polymer damps its swings by no less; what rings on for longer is the schedule's own rhythm.
+/// Smallest damping ratio; an oscillation that a polymer damps less is a periodicity of the schedule.
 const LEAST_DAMPED: f64 = 5e-3;
-/// What overshoots a step by less than a sixth is a lag, and no swing to be seen.
+/// Largest damping ratio; with an overshoot below a sixth, an oscillation cannot be distinguished from a lag.
 const MOST_DAMPED: f64 = 0.5;
 const WHOLE: usize = 0;
 const QUICK: usize = 2;
-/// From where on a quick change is looked for, in s.
+/// Time constant `T` of the high-pass filter at initial points, in s.
 const QUICK_S: f64 = 0.5;
 
-/// Frequencies, in Hz, from a period of the whole record to what two samples show.
+/// Returns the range of frequencies, in Hz, from one period per record to half a cycle per sample.
 fn range(data: &Data) -> (f64, f64) {
     (1.0 / data.duration_s().max(1e-6), 0.5 / data.sample_s)
 }
@@ -38,19 +38,19 @@ impl Effect for Resonance {
         "resonance"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn acts(&self) -> Acts {
-        Acts::OnResponse
+    fn affects(&self) -> Affects {
+        Affects::Response
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "it swings after a change"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "single steps, read at ten times the frequency in question"
     }
 
@@ -71,7 +71,7 @@ impl Effect for Resonance {
         coordinates
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (lowest, highest) = range(data);
         let frequencies = logarithms((8.0 * lowest, 0.95 * highest), 24);
         let (dampings, rest): (&[f64], &[f64]) = match form {
@@ -87,16 +87,17 @@ impl Effect for Resonance {
         vec![Quantity::new("freq_hz", "Hz", point[0].exp()), Quantity::new("zeta", "", point[1].exp())]
     }
 
-    fn places(&self, _: usize, _: &Data) -> f64 {
+    fn ln_candidates(&self, _: usize, _: &Data) -> f64 {
         10f64.ln()
     }
 
-    fn respond(&self, _: usize, point: &[f64], signal: &mut Signal, start: &mut Start) {
+    fn modify_response(&self, _: usize, point: &[f64], signal: &mut Signal, start: &mut InitialState) {
         let (omega, zeta) = (TAU * point[0].exp(), point[1].exp());
         let part = point.get(2).copied().unwrap_or(1.0);
-        // Without a time of its own, nothing is slow.
-        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.ask()));
-        let (mut x, mut v) = (if slow.is_some() { 0.0 } else { signal.before } + start.ask(), omega * start.ask());
+        // Without a high-pass filter the whole response excites the oscillation.
+        let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.next_offset_v()));
+        let (mut x, mut v) =
+            (if slow.is_some() { 0.0 } else { signal.before } + start.next_offset_v(), omega * start.next_offset_v());
         let mut last = f64::NAN;
         let mut step = [[1.0, 0.0], [0.0, 1.0]];
         signal.pass(|piece| {
@@ -109,7 +110,7 @@ impl Effect for Resonance {
                     last = duration_s;
                     step = transition(omega, zeta, duration_s);
                 }
-                // Around the straight line that the oscillator would follow in the end.
+                // The oscillation is around the straight line that the oscillator would settle on.
                 let slope = (to - from) / duration_s;
                 let lag = 2.0 * zeta / omega * slope;
                 let (dx, dv) = (x - (from - lag), v - slope);
@@ -121,7 +122,7 @@ impl Effect for Resonance {
     }
 }
 
-/// What a free oscillation makes of displacement and speed in a time.
+/// Returns the state-transition matrix of the free oscillation over a time, in s, for displacement and velocity.
 fn transition(omega: f64, zeta: f64, time_s: f64) -> [[f64; 2]; 2] {
     let damped = omega * (1.0 - zeta * zeta).sqrt();
     let decay = (-zeta * omega * time_s).exp();

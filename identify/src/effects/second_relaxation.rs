@@ -1,4 +1,4 @@
-//! Part of the response relaxes with another, slower time constant (creep); the settled value stays.
+//! A part of the response relaxes with a second, slower time constant (creep); the settled value does not change.
 //!
 //! | form | what relaxes |
 //! | --- | --- |
@@ -7,7 +7,7 @@
 //! | by decades | as of everything, in three equal parts: `slow / 10`, `slow`, `10 slow` (logarithmic creep) |
 //! | spread | of the rest, in two equal parts, to both sides: `slow` and `tau^2 / slow` (a broad relaxation) |
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::plant::relaxation::Part;
 use crate::record::data::Data;
@@ -17,7 +17,7 @@ pub(super) struct SecondRelaxation;
 const OF_THE_REST: usize = 0;
 const OF_EVERYTHING: usize = 1;
 const BY_DECADES: usize = 2;
-/// It is the slower one.
+/// Smallest time constant of the creep, in s: the paper's time constant.
 const FASTEST_S: f64 = 5.5;
 
 impl Effect for SecondRelaxation {
@@ -25,15 +25,15 @@ impl Effect for SecondRelaxation {
         "second-relaxation"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "part of the response creeps with a slower time constant"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "one step, held for minutes: creep goes on rising to the same settled value"
     }
 
@@ -45,7 +45,7 @@ impl Effect for SecondRelaxation {
         vec![Coordinate::new(0.0, 0.9), Coordinate::log(FASTEST_S, 10.0 * data.duration_s().max(FASTEST_S))]
     }
 
-    fn starts(&self, _: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         [9.0, 15.0, 25.0, 45.0, 80.0, 150.0, 300.0]
             .into_iter()
             .filter(|&tau: &f64| tau < 3.0 * data.duration_s())
@@ -61,7 +61,7 @@ impl Effect for SecondRelaxation {
         None
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         let (creep, slow_s) = (point[0], point[1].exp());
         let relaxation = &mut chain.relaxation;
         let parts = |times: &[f64]| {

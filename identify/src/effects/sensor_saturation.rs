@@ -1,9 +1,9 @@
-//! Readings stop at a bound: `reading = min(y, limit)`, or `max` at a lower bound.
+//! Readings saturate at a bound: `reading = min(y, limit)`, or `max` at a lower bound.
 //!
-//! Where several readings are exactly the extreme, the bound is known and [`crate::record::observed`] treats those rows as
-//! "at least this much". These forms are for a bound that comes before the noise.
+//! Where several readings are exactly the extreme, the bound is known and [`crate::record::observed`] treats those rows
+//! as censored. These forms are for a bound in front of the noise.
 
-use crate::effects::effect::{Acts, Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 
 pub(super) struct SensorSaturation;
@@ -15,19 +15,19 @@ impl Effect for SensorSaturation {
         "sensor-saturation"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Reading
+    fn location(&self) -> Location {
+        Location::Reading
     }
 
-    fn acts(&self) -> Acts {
-        Acts::OnReadings
+    fn affects(&self) -> Affects {
+        Affects::Readings
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "readings stop at a bound"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "a slow stair beyond the bound, with the sensor on another range"
     }
 
@@ -40,7 +40,7 @@ impl Effect for SensorSaturation {
         vec![Coordinate::new(lowest, highest)]
     }
 
-    fn starts(&self, form: usize, Scene { data, .. }: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (lowest, highest) = extremes(data);
         [0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.45, 0.6]
             .map(|part| {
@@ -54,11 +54,11 @@ impl Effect for SensorSaturation {
         vec![Quantity::new("limit", "V", point[0])]
     }
 
-    fn places(&self, _: usize, _: &Data) -> f64 {
+    fn ln_candidates(&self, _: usize, _: &Data) -> f64 {
         10f64.ln()
     }
 
-    fn read(&self, form: usize, point: &[f64], _: &Data, readings: &mut [f64]) {
+    fn modify_readings(&self, form: usize, point: &[f64], _: &Data, readings: &mut [f64]) {
         for reading in readings {
             *reading = if form == UPPER { reading.min(point[0]) } else { reading.max(point[0]) };
         }

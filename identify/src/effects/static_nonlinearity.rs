@@ -1,28 +1,28 @@
-//! The sensitivity depends on the voltage, without memory: `f = f(u)`, with `x = |u| / full scale`.
+//! The sensitivity depends on the voltage, without hysteresis: `f = f(u)`, with `x = |u| / full scale`.
 //!
 //! | curve | `f / u` |
 //! | --- | --- |
-//! | bend | `1 + a (x - 1)`: the ends stay |
-//! | exponential | `(1 - exp(-k x)) / (x (1 - exp(-k)))`: the ends stay |
+//! | bend | `1 + a (x - 1)`, fixed at both ends |
+//! | exponential | `(1 - exp(-k x)) / (x (1 - exp(-k)))`, fixed at both ends |
 //! | exponential with gain | `g` times that |
-//! | quadratic, cubic, quintic | `g + a x`, `+ b x^2`, `+ c x^3 + d x^4`: the gain is its own |
+//! | quadratic, cubic, quintic | `g + a x`, `+ b x^2`, `+ c x^3 + d x^4`, with a gain of its own |
 //!
-//! Each before the relaxation (Hammerstein's model) or, some, behind it (Wiener's): there `u` is what has relaxed so far.
-//! Settled, both are one curve; what comes at once, and how fast, tells them apart.
+//! The curve is in front of the relaxation (Hammerstein model), or in some forms behind it (Wiener model), where `u` is
+//! the relaxed value. The settled curve is the same; the instantaneous part and the speed of a step distinguish both.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct StaticNonlinearity;
 
-/// `f / u` as a curve over `x`.
+/// The curve of `f / u` over `x`.
 #[derive(Clone, Copy)]
 enum Curve {
     Bend,
     Exponential,
     ExponentialWithGain,
-    /// Of so many coefficients.
+    /// A polynomial with this number of coefficients.
     Polynomial(usize),
 }
 use Curve::{Bend, Exponential, ExponentialWithGain, Polynomial};
@@ -41,11 +41,11 @@ const FORMS: [(Curve, bool); 10] = [
     (Polynomial(5), true),
 ];
 
-/// Points of the curve that are reported.
+/// Number of points of the curve that are reported.
 const POINTS: u32 = 5;
 
 impl Curve {
-    /// `f / u` at `x`.
+    /// Returns `f / u` at `x`.
     fn secant(self, point: &[f64], x: f64) -> f64 {
         match self {
             Bend => 1.0 + point[0] * (x - 1.0),
@@ -64,15 +64,15 @@ impl Effect for StaticNonlinearity {
         "static-nonlinearity"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Static
+    fn location(&self) -> Location {
+        Location::Static
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the sensitivity depends on the voltage"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "a slow stair over the whole range up and down again: without memory both branches are one curve"
     }
 
@@ -93,9 +93,10 @@ impl Effect for StaticNonlinearity {
         }
     }
 
-    /// None in mid-course: where such a form starts is not straight in what it makes.
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
-        if FORMS[form].1 && scene.data.begun {
+    /// Forms behind the relaxation are not tried with an unknown initial state, in which their prediction is not
+    /// linear.
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && context.data.initial_state_unknown {
             return Vec::new();
         }
         match FORMS[form].0 {
@@ -108,7 +109,7 @@ impl Effect for StaticNonlinearity {
                     start.resize(coefficients, 0.0);
                     start
                 };
-                // An S is no bend: its ends stay, and its middle, and no step along a bend promises anything.
+                // An S-shaped curve is zero at both ends and in the middle, so no gradient leads to it from a bend.
                 let s = |size: f64| {
                     let mut start = vec![1.0 + size, -3.0 * size, 2.0 * size];
                     start.resize(coefficients, 0.0);
@@ -124,7 +125,7 @@ impl Effect for StaticNonlinearity {
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        // At voltages of two digits' steps, so that the name says where exactly.
+        // Voltages are rounded to two digits of their step, so that names give them exactly.
         let step = data.full_scale_v / f64::from(POINTS);
         let decimals = (1.0 - step.log10().floor()).clamp(-300.0, 300.0) as i32;
         let unit = 10f64.powi(-decimals);
@@ -136,12 +137,12 @@ impl Effect for StaticNonlinearity {
         (1..=POINTS).map(at).collect()
     }
 
-    /// The tick's law is before the relaxation.
+    /// In the fixed-point tick the law is in front of the relaxation.
     fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
         FORMS[form].1.then(|| "fitted behind the relaxation, written before it".into())
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         let (curve, behind) = FORMS[form];
         let law = if behind { &mut chain.law_behind } else { &mut chain.law };
         law.push(move |voltage| voltage * curve.secant(point, voltage.abs() / data.full_scale_v));

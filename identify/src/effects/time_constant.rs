@@ -1,6 +1,6 @@
-//! The relaxation time is not 5.5 s.
+//! The time constant of the relaxation is not 5.5 s.
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -11,15 +11,15 @@ impl Effect for TimeConstant {
         "time-constant"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the relaxation takes another time"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "a step that is read densely for ten time constants"
     }
 
@@ -31,7 +31,7 @@ impl Effect for TimeConstant {
         vec![Coordinate::log(0.2 * data.sample_s, 10.0 * data.duration_s())]
     }
 
-    fn starts(&self, _: usize, _: &Scene) -> Vec<Vec<f64>> {
+    fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
         [1.0, 2.5, 4.0, 5.0, 6.0, 8.0, 14.0, 30.0].map(|tau: f64| vec![tau.ln()]).to_vec()
     }
 
@@ -43,7 +43,7 @@ impl Effect for TimeConstant {
         None
     }
 
-    fn change<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         let factor = point[0].exp() / chain.relaxation.tau_s;
         chain.relaxation.tau_s *= factor;
         chain.relaxation.tau_high_s *= factor;

@@ -1,19 +1,20 @@
-//! The relaxation time changes with the voltage: straight or geometric from `tau_low` at 0 V to `tau_high` at 500 V.
+//! The time constant of the relaxation depends on the voltage: linearly or geometrically from `tau_low` at 0 V to
+//! `tau_high` at 500 V.
 //!
-//! | form | between its ends | follows |
+//! | form | interpolation | depends on |
 //! | --- | --- | --- |
-//! | 0, 1 | straight, geometric | the voltage across the spring |
-//! | 2, 3 | straight, geometric | the spring's own state: what has relaxed so far, and a part of what is still to come |
+//! | 0, 1 | linear, geometric | the voltage across the spring |
+//! | 2, 3 | linear, geometric | the spring's own state: the relaxed part, and a fraction of the remaining change |
 
 use model::Plant;
 
-use crate::effects::effect::{Coordinate, Effect, Quantity, Scene, Stage};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct VoltageDependentTimeConstant;
 
-/// Geometric, by the spring's own state.
+/// Each form: geometric interpolation, and dependence on the spring's own state.
 const FORMS: [(bool, bool); 4] = [(false, false), (true, false), (false, true), (true, true)];
 
 impl Effect for VoltageDependentTimeConstant {
@@ -21,15 +22,15 @@ impl Effect for VoltageDependentTimeConstant {
         "voltage-dependent-time-constant"
     }
 
-    fn stage(&self) -> Stage {
-        Stage::Relaxation
+    fn location(&self) -> Location {
+        Location::Relaxation
     }
 
-    fn meaning(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "the relaxation time changes with the voltage"
     }
 
-    fn experiment(&self) -> &'static str {
+    fn isolating_experiment(&self) -> &'static str {
         "equal small steps at several voltages, each held for five time constants"
     }
 
@@ -44,9 +45,10 @@ impl Effect for VoltageDependentTimeConstant {
         coordinates
     }
 
-    /// None in mid-course: where such a form starts is not straight in what it makes.
-    fn starts(&self, form: usize, scene: &Scene) -> Vec<Vec<f64>> {
-        if FORMS[form].1 && scene.data.begun {
+    /// Forms that depend on the state are not tried with an unknown initial state, in which their prediction is not
+    /// linear.
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
+        if FORMS[form].1 && context.data.initial_state_unknown {
             return Vec::new();
         }
         let start = |(low, high): (f64, f64)| {
@@ -63,7 +65,7 @@ impl Effect for VoltageDependentTimeConstant {
         vec![Quantity::new("tau_low_s", "s", point[0].exp()), Quantity::new("tau_high_s", "s", point[1].exp())]
     }
 
-    /// The tick's time constant is straight between both ends, and follows the voltage.
+    /// In the fixed-point tick the time constant is linear in the voltage.
     fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
         match FORMS[form] {
             (false, false) => None,
@@ -76,7 +78,7 @@ impl Effect for VoltageDependentTimeConstant {
         }
     }
 
-    fn change<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.relaxation.tau_s = point[0].exp();
         chain.relaxation.tau_high_s = point[1].exp();
         chain.relaxation.geometric = FORMS[form].0;

@@ -8,7 +8,6 @@ use simulation::record::Record;
 use crate::answer::Report;
 use crate::effects::index_of;
 use crate::fit::engine::Engine;
-use crate::fit::simulator::Simulator;
 use crate::plant::base::Base;
 use crate::record::data::{Data, Input};
 use crate::record::observed::Observed;
@@ -78,7 +77,7 @@ fn read(record: &Record, options: &Options, data: &Data, progress: &mut impl FnM
     let observed = Observed::new(data);
     let rounded = judged(record, options, data, &observed, None, progress);
     // No reading tells whether it was rounded or cut off; a spring tells.
-    let found = match observed.cut().filter(|cut| suits(options, data, cut, &rounded)) {
+    let found = match observed.truncated().filter(|cut| suits(options, data, cut, &rounded)) {
         None => rounded,
         Some(cut) => {
             let cut = judged(record, options, data, &cut, rounded.lead.clone(), progress);
@@ -99,7 +98,7 @@ fn suits(options: &Options, data: &Data, cut: &Observed, found: &Diagnosis) -> b
     let shift = index_of("reading-offset").expect("an effect");
     let model = found.extended.model.without(shift);
     let likelihood = |observed| {
-        let mut engine = Engine::new(data, observed, Simulator::new(data, &options.base));
+        let mut engine = Engine::new(data, observed, &options.base);
         engine.fit_twice(model.clone()).log_likelihood
     };
     likelihood(cut) > likelihood(&found.observed)
@@ -117,14 +116,14 @@ fn judged(
     let every = if data.rows() > LONG { data.rows().div_ceil(ROWS_TO_SEARCH) } else { 1 };
     let searched = || {
         let thinned = Data::thinned(record, options.input, every);
-        let observed = Observed::new(&thinned).like(observed);
-        let mut engine = Engine::new(&thinned, &observed, Simulator::new(&thinned, &options.base));
+        let observed = Observed::new(&thinned).with_conclusions_of(observed);
+        let mut engine = Engine::new(&thinned, &observed, &options.base);
         let mut search = Search::new(&mut engine);
         search.run(&mut *progress);
         search.lead()
     };
     let given = given.or_else(|| (every > 1).then(searched));
-    let mut engine = Engine::new(data, observed, Simulator::new(data, &options.base));
+    let mut engine = Engine::new(data, observed, &options.base);
     let held = options.input == Input::Hold;
     diagnosis::diagnose(data.clone(), observed, &mut engine, held, given, progress)
 }

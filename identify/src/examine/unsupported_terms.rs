@@ -11,7 +11,6 @@
 use crate::answer::Verdict;
 use crate::examine::{CLEARLY, Options, read};
 use crate::fit::engine::Engine;
-use crate::fit::simulator::Simulator;
 use crate::plant::base::Base;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
@@ -49,7 +48,7 @@ pub(crate) fn taken_out(
 
 /// Of a search from what another has found.
 fn best(base: &Base, data: &Data, observed: &Observed, lead: Lead, progress: &mut impl FnMut(&Scored)) -> (f64, Lead) {
-    let mut engine = Engine::new(data, observed, Simulator::new(data, base));
+    let mut engine = Engine::new(data, observed, base);
     let mut search = Search::new(&mut engine);
     let best = search.from(lead, progress);
     (best.score, search.lead())

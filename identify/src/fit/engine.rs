@@ -1,146 +1,176 @@
-//! Fits of a model's points to a record: Levenberg and Marquardt's method on the noise's log-likelihood.
+//! Fits of a model's points to a record: the Levenberg-Marquardt method on the log-likelihood of the noise.
 //!
-//! Each round takes the noise's weights for the present residual (iteratively reweighted least squares), steps, and keeps
-//! the step only if the likelihood grew. Coordinates stay within their bounds.
+//! Each round computes the weights of the rows for the present residual (iteratively reweighted least squares) and
+//! takes the step only if the likelihood increases. Coordinates stay within their bounds.
 
-use nalgebra::{DMatrix, DVector};
-
-use crate::effects::effect::Scene;
+use crate::effects::effect::FitContext;
 use crate::effects::model::Model;
+use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
 use crate::noise::{Noise, Term};
-use crate::plant::start;
+use crate::plant::base::Base;
+use crate::plant::initial_state;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
-use crate::stats::scale::scale;
-use crate::stats::sums::dot;
+use crate::stats::scale::robust_scale;
 
-/// A model with its points fitted.
+/// A model with fitted points.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The model at its best point.
+    /// The model at its most likely points.
     pub model: Model,
-    /// Readings less prediction, in V.
+    /// Reading minus prediction of each row, in V.
     pub residual: Vec<f64>,
-    /// The noise's law for this residual.
+    /// The law of the noise for this residual.
     pub noise: Noise,
-    /// Log-likelihood under that law, less [`Fit::cost`].
+    /// Log-likelihood under that law minus [`Fit::cost`], in nats.
     pub log_likelihood: f64,
-    /// Log-likelihood under independent noise: what a memory that is really structure cannot hide.
-    pub plain: f64,
-    /// What a start in mid-course costs, in nats.
-    pub start_cost: f64,
+    /// Log-likelihood under independent noise, in nats, where autocorrelation cannot hide structure.
+    pub white_noise_log_likelihood: f64,
+    /// Cost of the estimated initial state, in nats.
+    pub initial_state_cost: f64,
 }
 
-/// Errors this many times as large as what of them is new at each reading wander.
-const WANDERS: f64 = 4.0;
+/// Ratio of the scales of residual and innovations from which on the autocorrelation is strong.
+const STRONG_AUTOCORRELATION: f64 = 4.0;
 
 impl Fit {
-    /// True if nearly all that is left would be foretold by the noise's memory: what is slow may hide in it.
-    pub fn wanders(&self) -> bool {
-        self.noise.marginal > WANDERS * self.noise.sigma
+    /// Returns true if the autocorrelation of the noise predicts nearly all of the residual, so that slow structure may
+    /// be hidden in it.
+    pub fn strongly_autocorrelated(&self) -> bool {
+        self.noise.marginal > STRONG_AUTOCORRELATION * self.noise.sigma
     }
 
-    /// What the law of the noise and the start cost, in nats.
+    /// Returns the cost of the law of the noise and of the initial state, in nats.
     pub fn cost(&self) -> f64 {
-        self.noise.cost(self.residual.len()) + self.start_cost
+        self.noise.cost(self.residual.len()) + self.initial_state_cost
     }
 }
 
-/// How a prediction depends on each fitted coordinate: one column each, whitened as the residual is.
-#[derive(Clone, Debug)]
-pub struct Jacobian {
-    /// Places of the columns among all coordinates.
-    pub places: Vec<usize>,
-    /// The columns, in V per unit of the coordinate.
-    pub columns: Vec<Vec<f64>>,
-}
-
-/// Rounds of a fit.
+/// Largest number of rounds of a fit.
 const ROUNDS: usize = 14;
-/// A round that gains less than this, in nats, is the last.
-const ENOUGH: f64 = 0.02;
-/// A step that promises less is not tried.
-const HOPELESS: f64 = 0.1 * ENOUGH;
+/// The fit ends with a round that gains less than this, in nats.
+const LEAST_GAIN: f64 = 0.02;
+/// A step with a smaller predicted gain, in nats, is not tried.
+const LEAST_PREDICTED_GAIN: f64 = 0.1 * LEAST_GAIN;
 
-/// Most such bounds that a fit goes beyond, one after the other.
-const MOST_STEPS: usize = 30;
+/// Largest number of discontinuities of the prediction that a fit crosses one after the other.
+const MOST_JUMPS: usize = 30;
 
 /// Fits models to one record.
+///
+/// ```
+/// use identify::Input;
+/// use identify::effects::index_of;
+/// use identify::effects::model::{Block, Model};
+/// use identify::fit::engine::Engine;
+/// use identify::fit::interval;
+/// use identify::plant::base::Base;
+/// use identify::record::data::Data;
+/// use identify::record::observed::Observed;
+/// use simulation::record::Record;
+///
+/// // A step of 300 V at 1 s, read once per second from a spring with a time constant of 8 s instead of 5.5 s.
+/// let stiffness = |time_s: f64| 300.0 * (1.0 - (1.0 - 1.0 / 11.0) * f64::exp(-(time_s - 1.0) / 8.0));
+/// let row = |second: i32| match second {
+///     0 => "0,0,0\n".to_string(),
+///     _ => format!("{second},300,{:.1}\n", stiffness(f64::from(second))),
+/// };
+/// let text = format!("time_s,voltage_v,stiffness\n{}", (0..60).map(row).collect::<String>());
+/// let record = Record::parse("step", &text, "stiffness")?;
+///
+/// let (data, base) = (Data::new(&record, Input::Hold), Base::paper());
+/// let observed = Observed::new(&data);
+/// let mut engine = Engine::new(&data, &observed, &base);
+/// let effect = index_of("time-constant").expect("a cause");
+/// let model = Model::default().with(Block { effect, form: 0 }, vec![5.5f64.ln()]);
+/// let fit = engine.fit_twice(model);
+/// let (name, tau) = &interval::parameters(&mut engine, &fit, effect)[0];
+/// assert_eq!((name.as_str(), tau.unit), ("tau_s", "s"));
+/// assert!((tau.value - 8.0).abs() < 0.01 && tau.low < tau.value && tau.value < tau.high);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 pub struct Engine<'a> {
     /// The record.
     pub data: &'a Data,
-    /// What its readings say.
+    /// Properties of its readings.
     pub observed: &'a Observed,
     /// Runs the models.
-    pub simulator: Simulator<'a>,
-    /// Readings less what the simulation without any block predicts, in V.
-    pub simulation: Vec<f64>,
+    simulator: Simulator<'a>,
+    /// Reading minus prediction of the plant without any effect, in V.
+    pub baseline_residual: Vec<f64>,
     predicted: Vec<f64>,
     kernels: Vec<Vec<f64>>,
 }
 
 impl<'a> Engine<'a> {
-    /// For one record.
-    pub fn new(data: &'a Data, observed: &'a Observed, simulator: Simulator<'a>) -> Self {
-        let mut engine =
-            Self { data, observed, simulator, simulation: Vec::new(), predicted: Vec::new(), kernels: Vec::new() };
-        engine.simulation = engine.residual(&Model::default());
+    /// Prepares fits to one record, of models that extend the plant `base`.
+    pub fn new(data: &'a Data, observed: &'a Observed, base: &'a Base) -> Self {
+        let simulator = Simulator::new(data, base);
+        let (predicted, kernels) = (Vec::new(), Vec::new());
+        let mut engine = Self { data, observed, simulator, baseline_residual: Vec::new(), predicted, kernels };
+        engine.baseline_residual = engine.residual(&Model::default());
         engine
     }
 
-    /// Readings less a model's prediction, in V; from the likeliest start where the record begins in mid-course.
+    /// Returns the plant without any effect.
+    pub fn base(&self) -> &'a Base {
+        self.simulator.base
+    }
+
+    /// Returns reading minus prediction of each row, in V, with the most likely initial state if that is unknown.
     pub fn residual(&mut self, model: &Model) -> Vec<f64> {
         self.residual_and_start(model).0
     }
 
-    /// The same, with what that start costs, in nats.
+    /// Returns the same, and the cost of that initial state in nats.
     fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
-        if self.data.begun {
-            self.simulator.run_begun(model, &mut self.predicted, &mut self.kernels);
+        if self.data.initial_state_unknown {
+            self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
         } else {
             self.simulator.run(model, &mut self.predicted);
         }
-        let cut_v = self.observed.cut_v;
-        let left = |(reading, predicted): (&f64, &f64)| reading + cut_v - predicted;
+        let truncation_v = self.observed.truncation_v;
+        let left = |(reading, predicted): (&f64, &f64)| reading + truncation_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
         let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
-        let start_cost = match self.data.begun {
-            true => start::take_off(&mut residual, &self.kernels, self.data.full_scale_v, exact),
+        let initial_state_cost = match self.data.initial_state_unknown {
+            true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
         };
-        (residual, start_cost)
+        (residual, initial_state_cost)
     }
 
-    /// A model at the point that it has, with the noise that suits it.
-    pub fn at(&mut self, model: Model) -> Fit {
-        let (residual, start_cost) = self.residual_and_start(&model);
+    /// Evaluates a model at its present points, with the law of the noise fitted to its residual.
+    pub fn evaluate(&mut self, model: Model) -> Fit {
+        let (residual, initial_state_cost) = self.residual_and_start(&model);
         let noise = Noise::fitted(&residual, self.observed);
         let log_likelihood = self.log(&noise, &residual);
-        let plain = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
-        let fit = Fit { model, residual, noise, log_likelihood, plain, start_cost };
+        let white_noise_log_likelihood = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
+        let fit = Fit { model, residual, noise, log_likelihood, white_noise_log_likelihood, initial_state_cost };
         Fit { log_likelihood: log_likelihood - fit.cost(), ..fit }
     }
 
-    /// The likeliest point near the model's own, for a law of the noise whose scale is fitted along; then the law.
+    /// Fits the points of a model under a given law of the noise, whose scale is fitted as well, then the law to the
+    /// residual.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
-        let model = self.polished(model, |_| true);
-        let model = self.descend(model, law);
-        let here = self.at(model);
-        self.gone_on(here, law)
+        let model = self.refine_searched(model, |_| true);
+        let model = self.levenberg_marquardt(model, law);
+        let here = self.evaluate(model);
+        self.across_jumps(here, law)
     }
 
-    /// From between bounds at which the prediction jumps, to either side while that is likelier.
-    fn gone_on(&mut self, mut here: Fit, law: &Noise) -> Fit {
+    /// Continues fits beyond discontinuities of the prediction on either side as long as the likelihood increases.
+    fn across_jumps(&mut self, mut here: Fit, law: &Noise) -> Fit {
         for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
             let mut steps = side;
-            for _ in 0..MOST_STEPS {
+            for _ in 0..MOST_JUMPS {
                 let (block, point) = &here.model.blocks[index];
-                let Some(point) = block.effect().beyond(block.form, point, steps, self.data) else { break };
+                let Some(point) = block.effect().across_jumps(block.form, point, steps, self.data) else { break };
                 let mut model = here.model.clone();
                 model.blocks[index].1 = point;
-                let model = self.descend(model, law);
-                let there = self.at(model);
+                let model = self.levenberg_marquardt(model, law);
+                let there = self.evaluate(model);
                 if there.log_likelihood > here.log_likelihood {
                     here = there;
                     steps *= 2.0;
@@ -154,31 +184,32 @@ impl<'a> Engine<'a> {
         here
     }
 
-    /// Moves what only a search can move, block by block, to where the rest of the model wants it in the rows that are seen.
-    pub fn polished(&mut self, mut model: Model, seen: impl Fn(usize) -> bool) -> Model {
+    /// Moves the coordinates that need a search, block by block, given the residual of the other blocks in the rows
+    /// that `seen` selects.
+    pub fn refine_searched(&mut self, mut model: Model, seen: impl Fn(usize) -> bool) -> Model {
         for index in 0..model.blocks.len() {
             let block = model.blocks[index].0;
-            if !block.searched(self.data) {
+            if !block.searched() {
                 continue;
             }
             let mut residual = self.residual(&model.without(block.effect));
             let rows = 0..residual.len();
             let errors: Vec<f64> = rows.clone().filter(|&row| seen(row)).map(|row| residual[row]).collect();
             rows.filter(|&row| !seen(row)).for_each(|row| residual[row] = f64::NAN);
-            let scene = Scene { data: self.data, residual: &residual, sigma: scale(&errors) };
-            block.effect().polish(block.form, &mut model.blocks[index].1, &scene);
+            let context = FitContext { data: self.data, residual: &residual, sigma: robust_scale(&errors) };
+            block.effect().refine_searched(block.form, &mut model.blocks[index].1, &context);
         }
         model
     }
 
-    /// First for robust independent noise, then for the law that it leaves.
+    /// Fits first under robust independent noise, then under the law of the noise of the first fit.
     pub fn fit_twice(&mut self, model: Model) -> Fit {
-        let first = self.fit(model, &Noise::first_look());
-        self.fit_again(first)
+        let first = self.fit(model, &Noise::default_robust());
+        self.refit(first)
     }
 
-    /// For the law that a first fit leaves.
-    pub fn fit_again(&mut self, first: Fit) -> Fit {
+    /// Fits again under the law of the noise of a first fit; returns the more likely of both.
+    pub fn refit(&mut self, first: Fit) -> Fit {
         let second = self.fit(first.model.clone(), &first.noise);
         if second.log_likelihood >= first.log_likelihood { second } else { first }
     }
@@ -187,7 +218,7 @@ impl<'a> Engine<'a> {
         noise.log_likelihood(residual, self.observed)
     }
 
-    fn descend(&mut self, mut model: Model, law: &Noise) -> Model {
+    fn levenberg_marquardt(&mut self, mut model: Model, law: &Noise) -> Model {
         let bounds = model.coordinates(self.data);
         let mut points = model.points();
         for (point, bound) in points.iter_mut().zip(&bounds) {
@@ -213,7 +244,7 @@ impl<'a> Engine<'a> {
                 for (&place, step) in jacobian.places.iter().zip(step.iter()) {
                     moved[place] = (moved[place] + step).clamp(bounds[place].lowest, bounds[place].highest);
                 }
-                if promised(&normal, &gradient, &jacobian.places, &points, &moved) < HOPELESS {
+                if predicted_gain(&normal, &gradient, &jacobian.places, &points, &moved) < LEAST_PREDICTED_GAIN {
                     break;
                 }
                 let mut candidate = model.clone();
@@ -228,20 +259,25 @@ impl<'a> Engine<'a> {
                 }
                 damping *= 6.0;
             }
-            if gained < ENOUGH {
+            if gained < LEAST_GAIN {
                 break;
             }
         }
         model
     }
 
-    /// Every row's part in the fit.
+    /// Returns the derivatives of the prediction and the contribution of each row at a fit.
+    pub fn linearised(&mut self, fit: &Fit) -> (Jacobian, Vec<Term>) {
+        (self.jacobian(&fit.model, &fit.noise, &fit.residual), self.terms(&fit.noise, &fit.residual))
+    }
+
+    /// Returns the contribution of each row to the fit.
     pub fn terms(&self, noise: &Noise, residual: &[f64]) -> Vec<Term> {
         let white = noise.innovations(&self.observed.errors(residual));
         (0..residual.len()).map(|row| noise.term(self.observed.kinds[row], residual[row], white[row])).collect()
     }
 
-    /// Forward differences, from the bounds inwards.
+    /// Returns the derivatives of the prediction by forward differences, or backward differences at upper bounds.
     pub fn jacobian(&mut self, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
         let bounds = model.coordinates(self.data);
         let points = model.points();
@@ -258,7 +294,7 @@ impl<'a> Engine<'a> {
             nudged.set_points(&moved);
             let there = self.residual(&nudged);
             let column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
-            // Rows that stopped at a bound are taken one by one, the others whitened.
+            // Rows that stopped at a bound are not whitened.
             let mut white = noise.whitened(&column);
             for (row, kind) in self.observed.kinds.iter().enumerate() {
                 if *kind != Kind::Exact {
@@ -270,44 +306,4 @@ impl<'a> Engine<'a> {
         let columns = columns.collect();
         Jacobian { places, columns }
     }
-}
-
-/// `J' W J` and `J' W r`.
-pub fn normal_equations(jacobian: &Jacobian, terms: &[Term]) -> (DMatrix<f64>, DVector<f64>) {
-    let size = jacobian.columns.len();
-    let mut normal = DMatrix::zeros(size, size);
-    let mut gradient = DVector::zeros(size);
-    let mut weighted = vec![0.0; terms.len()];
-    let residual: Vec<f64> = terms.iter().map(|term| term.residual).collect();
-    for (i, column) in jacobian.columns.iter().enumerate() {
-        for ((weighted, value), term) in weighted.iter_mut().zip(column).zip(terms) {
-            *weighted = value * term.weight;
-        }
-        gradient[i] = dot(&weighted, &residual);
-        for (j, other) in jacobian.columns.iter().enumerate().skip(i) {
-            let product = dot(&weighted, other);
-            normal[(i, j)] = product;
-            normal[(j, i)] = product;
-        }
-    }
-    (normal, gradient)
-}
-
-/// What the parabola of the normal equations gains between two points, in nats.
-fn promised(normal: &DMatrix<f64>, gradient: &DVector<f64>, places: &[usize], from: &[f64], to: &[f64]) -> f64 {
-    let step = DVector::from_iterator(places.len(), places.iter().map(|&place| to[place] - from[place]));
-    gradient.dot(&step) - 0.5 * (normal * &step).dot(&step)
-}
-
-/// The solution of the damped normal equations, scaled to unit diagonal.
-pub fn damped_step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    let size = normal.nrows();
-    let scale = DVector::from_fn(size, |i, _| 1.0 / normal[(i, i)].max(1e-30).sqrt());
-    let mut scaled = DMatrix::from_fn(size, size, |i, j| normal[(i, j)] * scale[i] * scale[j]);
-    for i in 0..size {
-        scaled[(i, i)] = scaled[(i, i)].max(1e-12) + damping;
-    }
-    let right = gradient.component_mul(&scale);
-    let step = scaled.cholesky()?.solve(&right).component_mul(&scale);
-    step.iter().all(|value| value.is_finite()).then_some(step)
 }

@@ -1,46 +1,49 @@
-//! How well a model foretells stretches that its fit never saw.
+//! Cross-validation: how well a model predicts segments that its fit did not use.
 //!
-//! For each fold, the points are refitted without the fold's rows and judged on those rows alone. The refit is one
-//! Newton step from the fit to all rows: the likelihood without a few stretches is nearly the same parabola, moved by
-//! what those stretches had pulled. The prediction at the refitted points is a real run of the model. A block of which
-//! the other stretches tell nothing is not there: nobody who has not seen the stretch could know of it. The choice of
-//! blocks has seen all rows: the clean split, learnt from the first 60 % and judged on the rest, is `cargo campaign rivals`.
+//! For each fold, the points are fitted without the fold's rows, and the prediction is compared with those rows. That
+//! fit is one Newton step from the fit to all rows: without a few segments the log-likelihood is nearly the same
+//! parabola, shifted by the gradient of those segments. The prediction is a simulation at the new points. A block about
+//! which the other segments hold no information is removed, because it could not be known without the fold. The choice
+//! of blocks has used all rows; `cargo campaign rivals` learns it from the first 60 % of the record and evaluates it on
+//! the rest.
 //!
-//! What only a search can place, a run of shifted readings, may lie within one stretch, which no other stretch foretells.
-//! So there are two judgements. [`Engine::judged_unseen`] chooses between structures: it leaves such a run where all rows
-//! have put it, and the price of the block pays for the places that were looked at. [`Engine::foretold`] is what is
-//! reported as error on unseen stretches: it searches the run anew in the rows that are seen.
+//! A run of shifted readings, which only a search finds, may lie within one segment, and no other segment predicts it.
+//! So there are two measures. [`Engine::held_out_log_likelihood`] compares structures: it leaves such a run where all
+//! rows place it, and the cost of the block accounts for the number of candidates. [`Engine::held_out_residual`] is
+//! reported as the held-out error: it searches the run in the rows outside the fold.
 
 use crate::effects::model::Model;
-use crate::fit::engine::{Engine, Fit, Jacobian, damped_step, normal_equations};
+use crate::fit::engine::{Engine, Fit};
+use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations};
 use crate::noise::Term;
 
-/// A coordinate of which the seen rows hold less than this part of all information is not known.
-const KNOWN: f64 = 0.01;
+/// A coordinate is unknown if the rows outside the fold hold less than this fraction of its information.
+const LEAST_INFORMATION: f64 = 0.01;
 
 impl Engine<'_> {
-    /// Log-likelihood of all rows, each unseen by its fit, places apart.
-    pub fn judged_unseen(&mut self, fit: &Fit) -> f64 {
-        let whole = Whole::new(self, fit);
+    /// Returns the log-likelihood of all rows, each predicted by a fit without its fold, minus the cost of the fit, in
+    /// nats; searched coordinates stay.
+    pub fn held_out_log_likelihood(&mut self, fit: &Fit) -> f64 {
+        let whole = FullFit::new(self, fit);
         let mut log_likelihood = 0.0;
         for fold in 0..self.data.folds {
             let model = whole.refitted(self, fold);
             let there = if model == fit.model { fit.residual.clone() } else { self.residual(&model) };
-            let logs = fit.noise.logs(&there, self.observed).zip(&self.data.fold);
+            let logs = fit.noise.row_log_likelihoods(&there, self.observed).zip(&self.data.fold);
             log_likelihood += logs.filter(|(_, of)| usize::from(**of) == fold).map(|(log, _)| log).sum::<f64>();
         }
         log_likelihood - fit.cost()
     }
 
-    /// Readings less prediction for each row, in V, by a fit that has not seen the row.
-    pub fn foretold(&mut self, fit: &Fit) -> Vec<f64> {
-        let whole = Whole::new(self, fit);
+    /// Returns reading minus prediction of each row, in V, by a fit without the row's fold.
+    pub fn held_out_residual(&mut self, fit: &Fit) -> Vec<f64> {
+        let whole = FullFit::new(self, fit);
         let data = self.data;
         let mut unseen = fit.residual.clone();
         for fold in 0..data.folds {
             let of_fold = |row: usize| usize::from(data.fold[row]) == fold;
             let model = whole.refitted(self, fold);
-            let model = self.polished(model, |row| !of_fold(row));
+            let model = self.refine_searched(model, |row| !of_fold(row));
             let there = self.residual(&model);
             (0..unseen.len()).filter(|&row| of_fold(row)).for_each(|row| unseen[row] = there[row]);
         }
@@ -48,24 +51,23 @@ impl Engine<'_> {
     }
 }
 
-/// A fit to all rows, ready to be refitted to some.
-struct Whole<'f> {
+/// A fit to all rows, prepared for fits without one fold.
+struct FullFit<'f> {
     fit: &'f Fit,
     jacobian: Jacobian,
     terms: Vec<Term>,
-    /// What all rows know of each column.
+    /// Information of all rows on each column: the diagonal of `J' W J`.
     known: Vec<f64>,
 }
 
-impl<'f> Whole<'f> {
+impl<'f> FullFit<'f> {
     fn new(engine: &mut Engine, fit: &'f Fit) -> Self {
-        let jacobian = engine.jacobian(&fit.model, &fit.noise, &fit.residual);
-        let terms = engine.terms(&fit.noise, &fit.residual);
+        let (jacobian, terms) = engine.linearised(fit);
         let (normal, _) = normal_equations(&jacobian, &terms);
         Self { fit, jacobian, terms, known: normal.diagonal().iter().copied().collect() }
     }
 
-    /// The model as the rows outside of a fold want it.
+    /// Returns the model fitted to the rows outside a fold.
     fn refitted(&self, engine: &Engine, fold: usize) -> Model {
         let data = engine.data;
         let unseen = |of: u8| usize::from(of) == fold;
@@ -76,7 +78,7 @@ impl<'f> Whole<'f> {
             .map(|(term, &of)| Term { weight: if unseen(of) { 0.0 } else { term.weight }, ..*term })
             .collect();
         let (normal, gradient) = normal_equations(&self.jacobian, &seen);
-        let knows = |column: &usize| normal[(*column, *column)] > KNOWN * self.known[*column];
+        let knows = |column: &usize| normal[(*column, *column)] > LEAST_INFORMATION * self.known[*column];
         let columns: Vec<usize> = (0..self.known.len()).filter(knows).collect();
         let (normal, gradient) =
             (normal.select_columns(&columns).select_rows(&columns), gradient.select_rows(&columns));
@@ -94,7 +96,7 @@ impl<'f> Whole<'f> {
         model.blocks.retain(|(block, point)| {
             let own = first..first + point.len();
             first = own.end;
-            block.searched(data) || places.iter().any(|place| own.contains(place))
+            block.searched() || places.iter().any(|place| own.contains(place))
         });
         model
     }
@@ -116,7 +118,8 @@ mod tests {
     const GAIN: f64 = 1.1;
     const FOLD: usize = 2;
 
-    /// A stair up and down, read from a spring of another gain with this error, in V, of a row and its noise of 1 V.
+    /// Returns a record of a stair up and down, read from a spring with a gain of [`GAIN`], with the given error of
+    /// each row, in V, as a function of row and unit noise.
     fn data(error: impl Fn(usize, f64) -> f64) -> Data {
         let volts = |row: usize| 100.0 * (5 - (row / 80).abs_diff(5)) as f64;
         let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: volts(row), measured: Some(0.0) };
@@ -137,20 +140,21 @@ mod tests {
         usize::from(data.fold[row]) == FOLD
     }
 
-    /// The gain that all rows want, the gain that the rows outside of the fold want, and what is foretold of the fold.
+    /// Returns the gain fitted to all rows, the gain fitted to the rows outside the fold, and the prediction of the
+    /// fold, in V.
     fn gains(data: &Data) -> (f64, f64, Vec<f64>) {
         let (base, observed) = (Base::paper(), Observed::new(data));
-        let mut engine = Engine::new(data, &observed, Simulator::new(data, &base));
+        let mut engine = Engine::new(data, &observed, &base);
         let fit = engine.fit_twice(of("gain-error", vec![1.0]));
-        let refitted = Whole::new(&mut engine, &fit).refitted(&engine, FOLD);
-        let left = engine.foretold(&fit);
+        let refitted = FullFit::new(&mut engine, &fit).refitted(&engine, FOLD);
+        let left = engine.held_out_residual(&fit);
         let rows = (0..ROWS).filter(|&row| unseen(data, row));
         (fit.model.points()[0], refitted.points()[0], rows.map(|row| data.reading[row] - left[row]).collect())
     }
 
-    /// As much noise in the fold, all of it on the one side and on the other.
+    /// The noise of the fold has the same size, but is positive in one record and negative in the other.
     #[test]
-    fn a_stretch_is_foretold_without_its_own_readings() {
+    fn held_out_prediction_is_independent_of_the_fold() {
         let shape = data(|_, noise| noise);
         let to_side = |side: f64| data(|row, noise| if unseen(&shape, row) { side * noise.abs() } else { noise });
         let (seen_before, before, foretold_before) = gains(&to_side(1.0));
@@ -162,19 +166,19 @@ mod tests {
     }
 
     #[test]
-    fn a_run_is_searched_in_rows_that_are_seen() {
+    fn run_is_searched_in_rows_outside_the_fold() {
         let shifted = |row: usize, noise: f64| noise + if (500..640).contains(&row) { 9.0 } else { 0.0 };
-        let plain = data(shifted);
-        let wild = data(|row, noise| if unseen(&plain, row) { 1e3 } else { shifted(row, noise) });
-        let places = [&plain, &wild].map(|data| {
+        let white_noise_log_likelihood = data(shifted);
+        let wild = data(|row, noise| if unseen(&white_noise_log_likelihood, row) { 1e3 } else { shifted(row, noise) });
+        let places = [&white_noise_log_likelihood, &wild].map(|data| {
             let (base, observed) = (Base::paper(), Observed::new(data));
-            let mut engine = Engine::new(data, &observed, Simulator::new(data, &base));
+            let mut engine = Engine::new(data, &observed, &base);
             let run = Block { effect: index_of("reading-offset").unwrap(), form: 0 };
             let model = of("gain-error", vec![GAIN]).with(run, vec![0.0; 3]);
-            engine.polished(model, |row| !unseen(data, row)).points()
+            engine.refine_searched(model, |row| !unseen(data, row)).points()
         });
         assert_eq!(places[0], places[1]);
-        // The run ends where a stretch that is not seen begins.
+        // The run ends where an excluded segment begins.
         assert!((480.0..=520.0).contains(&places[0][1]) && (620.0..=660.0).contains(&places[0][2]), "{places:?}");
     }
 }

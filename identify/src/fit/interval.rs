@@ -1,36 +1,38 @@
-//! The user's parameters of a fit with their 95 % intervals.
+//! The reported parameters of a fit, with 95 % intervals.
 //!
 //! ```text
-//! covariance = (J' W J + B)^-1        interval = value +- 1.96 sqrt(g' covariance g),    g: slope over the coordinates
+//! covariance = (J' W J + B)^-1        interval = value +- 1.96 sqrt(g' covariance g),    g: gradient over the
+//! coordinates
 //! ```
 //!
-//! `B` is what the bounds tell of each coordinate: it is no farther than from one to the other. Where two effects do the
-//! same within them (a delay of a part of a row, the share of a step that comes at once), it is all that is known.
+//! `B` is the information of the bounds: `(1.96 / (highest - lowest))^2` for each coordinate. It is the only
+//! information where two effects are equivalent (a delay below one row, and the feedthrough).
 //!
-//! What only a search has found has the range that the search leaves it.
+//! A parameter that only a search finds has the range that the search returns.
 
 use nalgebra::DMatrix;
 
 use crate::answer::Parameter;
-use crate::effects::effect::{Quantity, Scene};
+use crate::effects::effect::{FitContext, Quantity};
 use crate::effects::model::Block;
-use crate::fit::engine::{Engine, Fit, normal_equations};
+use crate::fit::engine::{Engine, Fit};
+use crate::fit::normal_equations::normal_equations;
 use crate::record::data::Data;
 use crate::stats::scale::Z;
 
-/// What the readings tell of the fitted coordinates.
+/// Returns the information matrix of the fitted coordinates.
 pub(crate) fn information(engine: &mut Engine, fit: &Fit) -> DMatrix<f64> {
-    let jacobian = engine.jacobian(&fit.model, &fit.noise, &fit.residual);
-    let terms = engine.terms(&fit.noise, &fit.residual);
+    let (jacobian, terms) = engine.linearised(fit);
     let (normal, _) = normal_equations(&jacobian, &terms);
-    // Reweighting overstates what a heavy tail tells; the scores' own variance does not.
+    // Reweighting overstates the information under a heavy tail; the variance of the scores corrects it.
     let squares: f64 = terms.iter().map(|term| (term.weight * term.residual).powi(2)).sum();
     let weights: f64 = terms.iter().map(|term| term.weight).sum();
-    let heavy = fit.noise.cell == 0.0 && (fit.noise.nu.is_finite() || fit.noise.wide.is_some());
+    let heavy = fit.noise.half_step == 0.0 && (fit.noise.nu.is_finite() || fit.noise.outliers.is_some());
     if heavy { normal * (squares / weights).min(1.0) } else { normal }
 }
 
-/// Inverse of the information on the fitted coordinates, with what their bounds tell.
+/// Returns the covariance of the fitted coordinates, with the information of their bounds; `None` if the matrix cannot
+/// be inverted.
 pub(crate) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>> {
     let mut known = information(engine, fit);
     let bounds = fit.model.coordinates(engine.data);
@@ -41,8 +43,8 @@ pub(crate) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>>
     known.try_inverse().filter(|matrix| matrix.iter().all(|value| value.is_finite()))
 }
 
-/// The user's parameters of an effect with their intervals, by the delta method.
-pub(crate) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String, Parameter)> {
+/// Returns the reported parameters of an effect with their intervals, by the delta method.
+pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String, Parameter)> {
     let data = engine.data;
     let covariance = covariance(engine, fit);
     let bounds = fit.model.coordinates(data);
@@ -74,8 +76,8 @@ pub(crate) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(
                 found.push((name, interval(value, error, unit, reach)));
             }
             let residual = engine.residual(&fit.model.without(effect));
-            let scene = Scene { data, residual: &residual, sigma: fit.noise.sigma };
-            for (name, low, high) in block.effect().searched_range(block.form, point, &scene) {
+            let context = FitContext { data, residual: &residual, sigma: fit.noise.sigma };
+            for (name, low, high) in block.effect().searched_range(block.form, point, &context) {
                 if let Some((_, parameter)) = found.iter_mut().find(|(other, _)| *other == name) {
                     (parameter.low, parameter.high) = (low.min(parameter.value), high.max(parameter.value));
                 }
@@ -86,8 +88,8 @@ pub(crate) fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(
     found
 }
 
-/// Lowest and highest that a quantity can be: one coordinate after the other at its bounds. An amplitude of two parts is
-/// smallest between them.
+/// Returns the smallest and the largest value of a quantity with one coordinate at a time at its bounds and at the
+/// fitted point.
 fn reach(block: &Block, point: &[f64], data: &Data, index: usize) -> (f64, f64) {
     let mut reach = (f64::INFINITY, f64::NEG_INFINITY);
     for (place, bounds) in block.coordinates(data).iter().enumerate() {
@@ -103,7 +105,8 @@ fn reach(block: &Block, point: &[f64], data: &Data, index: usize) -> (f64, f64) 
     reach
 }
 
-/// Symmetric, but for what is only a size: that never crosses zero. Within the quantity's reach, where the value is.
+/// Returns a symmetric interval; if the quantity cannot be negative, a logarithmic one instead of one that would cross
+/// zero. Limited to `reach` where that contains the value.
 fn interval(value: f64, error: f64, unit: &'static str, reach: (f64, f64)) -> Parameter {
     let error = if error.is_finite() { error } else { 10.0 * value.abs() };
     let (mut low, mut high) = (value - Z * error, value + Z * error);

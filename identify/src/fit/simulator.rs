@@ -1,143 +1,142 @@
-//! What a model predicts for a record. Runs that differ in later things alone share the earlier ones.
+//! Simulation of models on a record; simulations that differ only in later blocks reuse the earlier results.
 
-use crate::effects::effect::Acts;
+use crate::effects::effect::Affects;
 use crate::effects::model::Model;
 use crate::plant::base::Base;
-use crate::plant::start::Start;
+use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::Signal;
 
-/// Runs models on a record.
+/// Simulates models under the command of one record.
 #[derive(Clone, Debug)]
 pub struct Simulator<'a> {
     /// The record.
-    pub data: &'a Data,
-    /// The simulation without any effect.
-    pub base: &'a Base,
+    data: &'a Data,
+    /// The plant without any effect.
+    pub(super) base: &'a Base,
     signal: Signal,
     levels_v: Vec<f64>,
-    /// What the last amplifier made of the command, the last memory and law of that, and the last relaxation of that.
-    amplified: Kept<Signal>,
-    settled: Kept<Signal>,
-    chained: Kept<Signal>,
-    /// Readings before any effect on them, of the last response.
-    response: Kept<Vec<f64>>,
-    /// What each state adds to them.
-    kernels: Kept<Vec<Vec<f64>>>,
-    /// Runs so far.
-    pub runs: usize,
+    /// Results of the last simulation: the voltage on the electrodes, the settled stiffness, and the stiffness behind
+    /// the relaxation.
+    amplified: Cached<Signal>,
+    static_response: Cached<Signal>,
+    chained: Cached<Signal>,
+    /// Stiffness at each row, before any effect on the readings.
+    response: Cached<Vec<f64>>,
+    /// Response of the stiffness to each initial state.
+    kernels: Cached<Vec<Vec<f64>>>,
 }
 
-/// What a part of a run made, and of what.
+/// A result, and the blocks that it was computed from.
 #[derive(Clone, Debug, Default)]
-struct Kept<T> {
-    of: Option<Model>,
-    made: T,
+struct Cached<T> {
+    key: Option<Model>,
+    value: T,
 }
 
-impl<T> Kept<T> {
-    /// True if it was made by the same blocks as far as `last`; else it is said to be from now on.
-    fn is_of(&mut self, model: &Model, last: Acts) -> bool {
-        let blocks = || model.blocks.iter().filter(|(block, _)| block.effect().acts() <= last);
-        if self.of.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks())) {
+impl<T> Cached<T> {
+    /// Returns true if the result was computed from the same blocks up to `last`; otherwise sets the key to the blocks
+    /// of the model.
+    fn update_key(&mut self, model: &Model, last: Affects) -> bool {
+        let blocks = || model.blocks.iter().filter(|(block, _)| block.effect().affects() <= last);
+        if self.key.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks())) {
             return true;
         }
-        self.of = Some(Model { blocks: blocks().cloned().collect() });
+        self.key = Some(Model { blocks: blocks().cloned().collect() });
         false
     }
 }
 
 impl<'a> Simulator<'a> {
-    /// For one record.
+    /// Prepares simulations of one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
         Self {
             data,
             base,
             signal: Signal::default(),
             levels_v: Vec::new(),
-            amplified: Kept::default(),
-            settled: Kept::default(),
-            chained: Kept::default(),
-            response: Kept::default(),
-            kernels: Kept::default(),
-            runs: 0,
+            amplified: Cached::default(),
+            static_response: Cached::default(),
+            chained: Cached::default(),
+            response: Cached::default(),
+            kernels: Cached::default(),
         }
     }
 
-    /// What a model predicts for each row, in V.
+    /// Computes the prediction of a model for each row, in V.
     pub fn run(&mut self, model: &Model, readings: &mut Vec<f64>) {
-        self.runs += 1;
-        if !self.response.is_of(model, Acts::OnResponse) {
-            let mut made = std::mem::take(&mut self.response.made);
-            made.clear();
-            made.extend(self.responded(model).at_rows());
-            self.response.made = made;
+        if !self.response.update_key(model, Affects::Response) {
+            let mut value = std::mem::take(&mut self.response.value);
+            value.clear();
+            value.extend(self.responded(model).at_rows());
+            self.response.value = value;
         }
-        readings.clone_from(&self.response.made);
-        self.read(model, readings);
+        readings.clone_from(&self.response.value);
+        self.modify_readings(model, readings);
     }
 
-    fn read(&self, model: &Model, readings: &mut [f64]) {
+    fn modify_readings(&self, model: &Model, readings: &mut [f64]) {
         for (block, point) in &model.blocks {
-            block.effect().read(block.form, point, self.data, readings);
+            block.effect().modify_readings(block.form, point, self.data, readings);
         }
     }
 
-    /// The same, and what each state that is 1 V off its rest at the first row adds to it.
-    pub fn run_begun(&mut self, model: &Model, readings: &mut Vec<f64>, kernels: &mut Vec<Vec<f64>>) {
+    /// Computes the same, and the change of the prediction for each initial state that is 1 V away from rest at the
+    /// first row.
+    pub fn run_with_initial_states(&mut self, model: &Model, readings: &mut Vec<f64>, kernels: &mut Vec<Vec<f64>>) {
         self.run(model, readings);
-        if !self.kernels.is_of(model, Acts::OnResponse) {
+        if !self.kernels.update_key(model, Affects::Response) {
             let chain = model.chain(self.base, self.data);
-            self.kernels.made.clear();
+            self.kernels.value.clear();
             let (mut state, mut states) = (0, 1);
             while state < states {
-                let mut start = Start::off(state);
-                self.signal.clone_from(&self.amplified.made);
-                chain.begin(&mut self.signal, &mut start, &self.levels_v);
+                let mut start = InitialState::off(state);
+                self.signal.clone_from(&self.amplified.value);
+                chain.initial_state_response(&mut self.signal, &mut start, &self.levels_v);
                 for (block, point) in &model.blocks {
-                    block.effect().respond(block.form, point, &mut self.signal, &mut start);
+                    block.effect().modify_response(block.form, point, &mut self.signal, &mut start);
                 }
                 (state, states) = (state + 1, start.states());
-                // What no row sees is no unknown.
+                // A state that changes no row is not estimated.
                 if self.signal.at_rows().any(|value| value != 0.0) {
-                    self.kernels.made.push(self.signal.at_rows().collect());
+                    self.kernels.value.push(self.signal.at_rows().collect());
                 }
             }
         }
-        kernels.clone_from(&self.kernels.made);
-        if model.blocks.iter().any(|(block, _)| block.effect().acts() == Acts::OnReadings) {
+        kernels.clone_from(&self.kernels.value);
+        if model.blocks.iter().any(|(block, _)| block.effect().affects() == Affects::Readings) {
             for kernel in kernels {
-                kernel.iter_mut().zip(&self.response.made).for_each(|(moved, stiffness)| *moved += stiffness);
-                self.read(model, kernel);
+                kernel.iter_mut().zip(&self.response.value).for_each(|(moved, stiffness)| *moved += stiffness);
+                self.modify_readings(model, kernel);
                 kernel.iter_mut().zip(&*readings).for_each(|(moved, reading)| *moved -= reading);
             }
         }
     }
 
-    /// The stiffness that a model's chain and response make of the command.
+    /// Returns the stiffness for the command, with the effects on the chain and on the stiffness.
     fn responded(&mut self, model: &Model) -> &Signal {
         let data = self.data;
-        let known = self.chained.is_of(model, Acts::OnChain);
-        let signal = &mut self.chained.made;
+        let known = self.chained.update_key(model, Affects::Relaxation);
+        let signal = &mut self.chained.value;
         if !known {
             let chain = model.chain(self.base, data);
-            if !self.settled.is_of(model, Acts::OnSettled) {
-                if !self.amplified.is_of(model, Acts::OnAmplifier) {
-                    self.amplified.made.clone_from(&data.command);
-                    chain.amplify(&mut self.amplified.made);
+            if !self.static_response.update_key(model, Affects::StaticResponse) {
+                if !self.amplified.update_key(model, Affects::Amplifier) {
+                    self.amplified.value.clone_from(&data.command);
+                    chain.amplify(&mut self.amplified.value);
                 }
-                self.settled.made.clone_from(&self.amplified.made);
-                chain.settle(&mut self.settled.made);
+                self.static_response.value.clone_from(&self.amplified.value);
+                chain.static_response(&mut self.static_response.value);
             }
-            signal.clone_from(&self.settled.made);
-            chain.relax(signal, &self.amplified.made, &mut self.levels_v);
+            signal.clone_from(&self.static_response.value);
+            chain.relax(signal, &self.amplified.value, &mut self.levels_v);
         }
-        if model.blocks.iter().all(|(block, _)| block.effect().acts() != Acts::OnResponse) {
+        if model.blocks.iter().all(|(block, _)| block.effect().affects() != Affects::Response) {
             return signal;
         }
         self.signal.clone_from(signal);
         for (block, point) in &model.blocks {
-            block.effect().respond(block.form, point, &mut self.signal, &mut Start::at_rest());
+            block.effect().modify_response(block.form, point, &mut self.signal, &mut InitialState::at_rest());
         }
         &self.signal
     }
@@ -151,9 +150,9 @@ mod tests {
     use crate::record::data::Input;
     use simulation::record::Record;
 
-    /// Whatever ran before: a run is what it is for a new simulator.
+    /// A simulation gives the same result as in a new simulator, whatever was simulated before.
     #[test]
-    fn what_is_kept_changes_no_run() {
+    fn cached_results_do_not_change_a_simulation() {
         let rows = (0..60).map(|row| format!("{row},{},0\n", 100 * (row / 20 % 2)));
         let text = format!("time_s,voltage_v,stiffness\n{}", rows.collect::<String>());
         let (data, base) = (Data::new(&Record::parse("r", &text, "stiffness").unwrap(), Input::Hold), Base::paper());
@@ -185,8 +184,8 @@ mod tests {
         for first in &models {
             for model in &models {
                 kept.run(first, &mut got.0);
-                kept.run_begun(model, &mut got.0, &mut got.1);
-                Simulator::new(&data, &base).run_begun(model, &mut expected.0, &mut expected.1);
+                kept.run_with_initial_states(model, &mut got.0, &mut got.1);
+                Simulator::new(&data, &base).run_with_initial_states(model, &mut expected.0, &mut expected.1);
                 assert_eq!(got, expected, "{model:?} after {first:?}");
             }
         }

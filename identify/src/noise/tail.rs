@@ -1,32 +1,34 @@
-//! The tail of the innovations: a normal's, Student's t, or a mixture of two normals, by likelihood.
+//! The tail of the innovations: normal, Student's t, or a mixture of two normals, chosen by likelihood.
 
-use crate::noise::Noise;
-use crate::stats::scale::{FINEST_V, scale, scale_of_squares};
+use crate::noise::law::Noise;
+use crate::stats::scale::{FINEST_V, robust_scale, root_mean_square};
 use crate::stats::sums::total;
 
+/// Degrees of freedom that are tried.
 const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];
-/// What a mixture must be better by than one heavy tail, in nats, to be outliers.
-const OUTLIERS: f64 = 7.0;
-/// Where more readings than this part are off, they are no outliers.
+/// Gain in nats by which a mixture must exceed one heavy tail to count as outliers.
+const COST_OF_OUTLIERS: f64 = 7.0;
+/// A mixture with a larger fraction of the wider normal is not taken for outliers.
 const MOST_OUTLIERS: f64 = 0.25;
-/// So few errors are taken one by one; of more, sizes are alike in cells, so many for each scale.
-const FEW: usize = 1_000;
-const CELLS: f64 = 100.0;
-/// Scale of outliers in the noise's scales, at least.
-const WIDE: f64 = 4.0;
+/// Up to this many errors are used one by one; more are grouped into cells by size.
+const MOST_SINGLE_ERRORS: usize = 1_000;
+/// Number of cells in one scale of the errors.
+const CELLS_PER_SCALE: f64 = 100.0;
+/// Smallest scale of outliers relative to that of the noise.
+const LEAST_OUTLIER_SCALE: f64 = 4.0;
 
 impl Noise {
     fn is_normal(&self) -> bool {
-        self.nu.is_infinite() && self.wide.is_none()
+        self.nu.is_infinite() && self.outliers.is_none()
     }
 
-    /// Where a search for the scale of some innovations starts; where it ends if they are normal.
+    /// Returns the scale of innovations, in V: the start of an iteration, and the result under a normal tail.
     pub(super) fn first_scale(&self, innovations: &[f64]) -> f64 {
-        if self.is_normal() { scale_of_squares(innovations) } else { scale(innovations) }
+        if self.is_normal() { root_mean_square(innovations) } else { robust_scale(innovations) }
     }
 
-    /// The likeliest scale for some innovations, by reweighting; the tail's shape stays. Of each item `of` says its size, and
-    /// how many have it.
+    /// Sets the most likely scale by iterative reweighting from `start`, in V, with the shape of the tail unchanged.
+    /// `of` returns the size of an item, in V, and its multiplicity.
     pub(super) fn fit_scale<T>(&mut self, start: f64, items: &[T], of: impl Fn(&T) -> (f64, f64), rounds: usize) {
         *self = self.scaled_to(start);
         if self.is_normal() {
@@ -42,16 +44,16 @@ impl Noise {
         }
     }
 
-    /// The same shape, of another scale.
+    /// Returns the same shape of the tail with another scale, in V.
     fn scaled_to(&self, sigma: f64) -> Self {
         let scaled = self.with_tail(self.nu, sigma);
-        let wide = self.wide.map(|(fraction, wide)| (fraction, wide * scaled.sigma / self.sigma));
-        Self { wide, ..scaled }
+        let outliers = self.outliers.map(|(fraction, wide)| (fraction, wide * scaled.sigma / self.sigma));
+        Self { outliers, ..scaled }
     }
 
-    /// The likeliest tail of some innovations, and its scale.
+    /// Sets the most likely tail of some innovations and its scale.
     pub(super) fn fit_tail(&mut self, innovations: &[f64]) {
-        let start = scale(innovations);
+        let start = robust_scale(innovations);
         let sizes = &*sizes(innovations, start);
         let mut best = f64::NEG_INFINITY;
         let mut consider = |noise: &mut Self, tried: Self, cost: f64| {
@@ -61,27 +63,27 @@ impl Noise {
                 *noise = tried;
             }
         };
-        let normal = self.with_tail(f64::INFINITY, scale_of_squares(innovations));
+        let normal = self.with_tail(f64::INFINITY, root_mean_square(innovations));
         consider(self, normal.clone(), 0.0);
         for nu in TAILS {
             let mut heavy = normal.with_tail(nu, start);
             heavy.fit_scale(start, sizes, |&size| size, 8);
             consider(self, heavy, 2.0);
         }
-        if innovations.len() >= 30 && innovations.iter().any(|e| e.abs() > WIDE * start) {
+        if innovations.len() >= 30 && innovations.iter().any(|e| e.abs() > LEAST_OUTLIER_SCALE * start) {
             let mixture = Self::mixture(sizes, start, &normal);
-            if mixture.wide.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS) {
-                consider(self, mixture, OUTLIERS);
+            if mixture.outliers.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS) {
+                consider(self, mixture, COST_OF_OUTLIERS);
             }
         }
     }
 
-    /// Expectation-maximisation of two normals around zero.
+    /// Returns the mixture of two zero-mean normals found by expectation-maximisation.
     fn mixture(sizes: &[(f64, f64)], start: f64, normal: &Self) -> Self {
         let sums = |sum: (f64, f64), &(e, times): &(f64, f64)| (sum.0 + times, sum.1 + times * (e * e));
         let (count, _) = sizes.iter().fold((0.0, 0.0), sums);
-        let (far, squares) = sizes.iter().filter(|(e, _)| e.abs() > WIDE * start).fold((0.0, 0.0), sums);
-        let (mut sigma, mut wide) = (start, (squares / f64::max(far, 1.0)).sqrt().max(WIDE * start));
+        let (far, squares) = sizes.iter().filter(|(e, _)| e.abs() > LEAST_OUTLIER_SCALE * start).fold((0.0, 0.0), sums);
+        let (mut sigma, mut wide) = (start, (squares / f64::max(far, 1.0)).sqrt().max(LEAST_OUTLIER_SCALE * start));
         let mut fraction = far / count;
         for _ in 0..25 {
             let (mut weight, mut narrow_sum, mut wide_sum) = (0.0, 0.0, 0.0);
@@ -95,21 +97,21 @@ impl Noise {
             }
             fraction = (weight / count).clamp(1e-6, 0.5);
             sigma = (narrow_sum / (count - weight)).sqrt().max(FINEST_V);
-            wide = (wide_sum / weight.max(1e-9)).sqrt().max(WIDE * sigma);
+            wide = (wide_sum / weight.max(1e-9)).sqrt().max(LEAST_OUTLIER_SCALE * sigma);
         }
-        Self { wide: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }
+        Self { outliers: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }
     }
 }
 
-/// Errors, each so many times: where only their sizes matter, many of nearly the same size count as one.
+/// Returns sizes of errors with their multiplicities; many errors are grouped into cells of nearly equal size.
 pub(super) fn sizes(errors: &[f64], scale: f64) -> Vec<(f64, f64)> {
-    if errors.len() <= FEW {
+    if errors.len() <= MOST_SINGLE_ERRORS {
         return errors.iter().map(|&e| (e, 1.0)).collect();
     }
-    let mut cells = vec![(0.0, 0.0); (2.0 * WIDE * CELLS) as usize];
+    let mut cells = vec![(0.0, 0.0); (2.0 * LEAST_OUTLIER_SCALE * CELLS_PER_SCALE) as usize];
     let mut sizes = Vec::new();
     for &e in errors {
-        match cells.get_mut((e.abs() / scale * CELLS) as usize) {
+        match cells.get_mut((e.abs() / scale * CELLS_PER_SCALE) as usize) {
             Some((squares, times)) => (*squares, *times) = (*squares + e * e, *times + 1.0),
             None => sizes.push((e, 1.0)),
         }
@@ -118,9 +120,4 @@ pub(super) fn sizes(errors: &[f64], scale: f64) -> Vec<(f64, f64)> {
         cells.into_iter().filter(|cell| cell.1 > 0.0).map(|(squares, times)| ((squares / times).sqrt(), times)),
     );
     sizes
-}
-
-/// Logarithm of the t distribution's constant.
-pub(super) fn tail_constant(nu: f64) -> f64 {
-    libm::lgamma(0.5 * (nu + 1.0)) - libm::lgamma(0.5 * nu) - 0.5 * (nu * std::f64::consts::PI).ln()
 }

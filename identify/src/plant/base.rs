@@ -1,44 +1,45 @@
-//! The simulation that is judged, as a plant file has it: the blocks that are there before any cause is looked for.
+//! The plant under examination, as read from a plant file: the model without any effect.
 
 use anyhow::Result;
 use model::Plant;
 
-use crate::plant::bank::Bank;
 use crate::plant::chain::Chain;
+use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
 use simulation::bad_input;
 use simulation::plant_file::PlantFile;
 
-/// A plant file's chain.
+/// The chain of a plant file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Base {
     file: PlantFile,
-    /// Its relaxation, which causes may change.
+    /// Relaxation of the plant file, which effects may change.
     pub relaxation: Relaxation,
 }
 
 impl Base {
-    /// The paper's plant.
+    /// Returns the plant of the source report.
     pub fn paper() -> Self {
         let Plant { share, time_constant_s } = Plant::PAPER;
         Self { file: Plant::PAPER.into(), relaxation: Relaxation::plain(share, time_constant_s) }
     }
 
-    /// The chain of a plant file.
+    /// Returns the chain of a plant file.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] for one with a memory that no other can stand behind.
+    /// [`simulation::bad_input::BadInput`] if the loading curve of the file's hysteresis decreases anywhere, for which
+    /// no second bank of play operators can be composed with it.
     pub fn new(file: PlantFile) -> Result<Self> {
-        if !Bank::of(file.memory.as_ref()).rises() {
+        if !PlayBank::of(file.memory.as_ref()).is_monotonic() {
             bad_input!(
-                "--plant: memory that falls as the voltage rises; expected direct >= 0, also with the weights added to it"
+                "--plant: [memory] with a decreasing loading curve; expected direct >= 0, also after adding the weights in order"
             );
         }
         let relaxation = Relaxation::of(&file.relaxation);
         Ok(Self { file, relaxation })
     }
 
-    /// The same without each of the parts that a file need not have, of those that it has.
+    /// Returns, for each optional part that the file has, the part's name and the same plant without it.
     pub fn without_each(&self) -> impl Iterator<Item = (&'static str, Self)> {
         type Take = fn(&mut PlantFile) -> bool;
         let parts: [(&str, Take); 6] = [
@@ -59,12 +60,12 @@ impl Base {
         })
     }
 
-    /// The file, to be extended.
+    /// Returns the plant file.
     pub fn file(&self) -> &PlantFile {
         &self.file
     }
 
-    /// What runs.
+    /// Returns the chain from command to stiffness.
     pub fn chain(&self) -> Chain<'_> {
         Chain::of(&self.file, self.relaxation)
     }

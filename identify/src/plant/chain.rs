@@ -1,58 +1,62 @@
-//! The chain from the command to the stiffness, in the order of [`model::extended`]:
+//! The chain from command to stiffness, in the order of [`model::extended`]:
 //!
 //! ```text
-//! command -> limit -> slew -> output's lag -> delay -> memory -> law -> leakage -> relaxation -> law behind -> stiffness
+//! command -> limit -> slew -> output lag -> delay -> hysteresis -> law -> leakage -> relaxation -> output law ->
+//! stiffness
 //! ```
 //!
-//! No plant file holds a law behind the relaxation: it is written as one before it, which settles at the same stiffness.
+//! A plant file cannot hold a law behind the relaxation; it is written in front of it, where it settles at the same
+//! stiffness.
 //!
-//! A plant file says what it is at first, effects change it; it runs, and writes itself into a plant file. So what is
-//! fitted is what is written: a second limit is the lower one, a second slew the slower, delays add up, memories and laws
-//! stand one behind the other, the relaxation's numbers are replaced.
+//! The chain starts as a plant file describes it, effects modify it, and the result is simulated and written to a plant
+//! file again: the model that is fitted is the model that is written. A second limit takes the lower value, a second
+//! slew rate the slower; delays add up, hysteresis and laws are composed, and the parameters of the relaxation are
+//! replaced.
 
-use crate::plant::bank::Bank;
+use crate::plant::initial_state::InitialState;
 use crate::plant::law::Law;
-use crate::plant::leakage::{Loss, Lost};
+use crate::plant::leakage::{InstantaneousLoss, Loss};
+use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
-use crate::plant::start::Start;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 
-/// Everything between the command and the stiffness that a plant file can hold.
+/// All blocks between the command and the stiffness that effects can modify.
 pub struct Chain<'a> {
-    /// Largest voltage of the amplifier, either way, in V.
+    /// Largest magnitude of the amplifier's voltage, in V.
     pub limit_v: f64,
-    /// Its fastest rise, in V/s.
+    /// Largest rate at which the amplifier's voltage rises, in V/s.
     pub rising_v_per_s: f64,
-    /// And fall, in V/s.
+    /// Largest rate at which it falls, in V/s, positive.
     pub falling_v_per_s: f64,
-    /// Where it begins, in V, if not at the command.
-    pub from_v: Option<f64>,
-    /// Time constant of its output's resistance with the spring's capacitance, in s.
+    /// Amplifier voltage before the first row, in V; `None` if it equals the command.
+    pub initial_v: Option<f64>,
+    /// Time constant of the amplifier's output resistance with the spring's capacitance, in s; 0 for none.
     pub output_tau_s: f64,
-    /// How late it answers, in s.
+    /// Delay of the amplifier, in s.
     pub delay_s: f64,
-    /// Hysteresis.
-    pub memory: Bank,
-    /// The static law.
+    /// Hysteresis: a bank of play operators.
+    pub memory: PlayBank,
+    /// Static law from voltage to settled stiffness.
     pub law: Law<'a>,
-    /// Another one, behind the relaxation.
+    /// A second static law, behind the relaxation.
     pub law_behind: Law<'a>,
-    /// Losses of charge; a plant file holds the first.
+    /// Charge losses; a plant file can hold the first one only.
     pub losses: Vec<Loss>,
-    /// What comes at once, and what later.
+    /// Feedthrough and lags from settled stiffness to stiffness.
     pub relaxation: Relaxation,
 }
 
-/// A jump that falls on a row's moment counts as before it, however sums of times are rounded: parts of the delay.
-const ROUNDING: f64 = 1e-5;
-/// What had been sent before may have stepped at the ends of so many parts of the delay.
-const SENT: usize = 6;
-/// Higher than any voltage of a record.
+/// Fraction by which a delay is shortened, so that a jump that falls on the time of a row is before that row however
+/// sums of times are rounded.
+const DELAY_ROUNDING: f64 = 1e-5;
+/// Number of intervals of the delay in which the voltage sent before the first row may have had different values.
+const DELAY_INTERVALS: usize = 6;
+/// A voltage above that of any record, in V.
 const HIGHEST_V: f64 = 1e6;
 
 impl<'a> Chain<'a> {
-    /// Of a plant file, whose relaxation is given.
+    /// Returns the chain of a plant file, with the given relaxation.
     pub fn of(file: &'a PlantFile, relaxation: Relaxation) -> Self {
         let amplifier = file.amplifier.as_ref();
         let number = |of: fn(&Amplifier) -> Option<f64>, else_value| amplifier.and_then(of).unwrap_or(else_value);
@@ -61,10 +65,10 @@ impl<'a> Chain<'a> {
             limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
-            from_v: None,
+            initial_v: None,
             output_tau_s: 0.0,
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
-            memory: Bank::of(file.memory.as_ref()),
+            memory: PlayBank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
@@ -72,28 +76,28 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Writes itself into a plant file, for a record up to `full_scale_v`.
+    /// Writes the chain to a plant file, with laws tabulated up to `full_scale_v`, in V.
     pub fn write(&self, file: &mut PlantFile, full_scale_v: f64) {
         let amplifier = Amplifier {
             limit_v: Some(self.limit_v).filter(|limit| limit.is_finite()),
-            // Of two rates a file holds the faster: it is a bound for both.
+            // A file holds one rate; the faster one bounds both directions.
             slew_v_per_s: Some(self.rising_v_per_s.max(self.falling_v_per_s)).filter(|slew| slew.is_finite()),
             delay_s: Some(self.delay_s).filter(|delay| *delay > 0.0),
         };
         file.amplifier = (amplifier != Amplifier::default()).then_some(amplifier);
-        if self.memory.fits() {
+        if self.memory.fits_plant_file() {
             file.memory = self.memory.table();
         }
-        let (gain, relaxation, leakage) = self.passed();
+        let (gain, relaxation, leakage) = self.as_plant_file_tables();
         file.law = self.law.table(gain, &self.law_behind, full_scale_v);
         file.leakage = leakage;
         relaxation.extend(file);
     }
 
-    /// Gain, relaxation and loss as a plant file has them.
-    fn passed(&self) -> (f64, Relaxation, Option<Leakage>) {
+    /// Returns the gain, the relaxation and the leakage that represent the chain in a plant file.
+    fn as_plant_file_tables(&self) -> (f64, Relaxation, Option<Leakage>) {
         match self.losses.first() {
-            Some(loss) if loss.at_once > 0.0 => match loss.passed(&self.relaxation) {
+            Some(loss) if loss.instantaneous > 0.0 => match loss.equivalent_leakage(&self.relaxation) {
                 Some((gain, share, leakage)) => (gain, Relaxation { share, ..self.relaxation }, Some(leakage)),
                 None => (1.0, self.relaxation, None),
             },
@@ -101,13 +105,13 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// From the command to the spring's electrodes.
+    /// Maps the commanded voltage to the voltage on the spring's electrodes.
     pub fn amplify(&self, signal: &mut Signal) {
         if self.limit_v.is_finite() {
             signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
         }
         if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {
-            signal.before = self.from_v.unwrap_or(signal.before);
+            signal.before = self.initial_v.unwrap_or(signal.before);
             *signal = signal.slewed(self.rising_v_per_s, self.falling_v_per_s);
         }
         if self.output_tau_s > 0.0 {
@@ -115,49 +119,54 @@ impl<'a> Chain<'a> {
             signal.pass(|piece| output.pass(piece));
         }
         if self.delay_s > 0.0 {
-            *signal = signal.delayed(self.delay_s * (1.0 - ROUNDING));
+            *signal = signal.delayed(self.delay_s * (1.0 - DELAY_ROUNDING));
         }
     }
 
-    /// From the electrodes to where the stiffness would settle.
-    pub fn settle(&self, signal: &mut Signal) {
+    /// Maps the voltage on the electrodes to the settled stiffness, by hysteresis and static law.
+    pub fn static_response(&self, signal: &mut Signal) {
         let mut memory = self.memory.clone();
         if memory.table().is_some() {
             signal.map(|voltage| memory.at(voltage));
         }
-        if !self.law.is_none() {
+        if !self.law.is_identity() {
             signal.map(|voltage| self.law.at(voltage));
         }
     }
 
-    /// From there to the stiffness; `applied` is what is on the electrodes, `levels_v` becomes what the relaxation needs to
-    /// know of it.
+    /// Maps the settled stiffness to the stiffness. `applied` is the voltage on the electrodes; `levels_v` receives its
+    /// value in the middle of each piece if the time constant depends on the voltage.
     pub fn relax(&self, signal: &mut Signal, applied: &Signal, levels_v: &mut Vec<f64>) {
         if self.relaxation.varies() && self.relaxation.by_state.is_none() {
             applied.middles(levels_v);
         }
-        self.follow(signal, &mut Start::at_rest(), levels_v);
-        if !self.law_behind.is_none() {
+        self.follow(signal, &mut InitialState::at_rest(), levels_v);
+        if !self.law_behind.is_identity() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }
     }
 
-    /// What is linear: from where memory and law would have it settle on.
-    fn follow(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
-        let mut lost = Lost::default();
-        self.losses.iter().for_each(|loss| loss.take(signal, start, &mut lost));
+    /// Applies the linear part of the chain: leakage and relaxation.
+    fn follow(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
+        let mut lost = InstantaneousLoss::default();
+        self.losses.iter().for_each(|loss| loss.apply(signal, start, &mut lost));
         self.relaxation.pass(signal, start, levels_v);
         if !lost.is_none() {
-            lost.off(signal);
+            lost.subtract_from(signal);
         }
     }
 
-    /// What a start adds to the stiffness under the voltage of `signal` at the electrodes. Behind them, what had been sent
-    /// before arrives late, and plays may have been left as the highest voltage leaves them.
-    pub fn begin(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
-        let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.ask() } else { 0.0 });
-        let late = if self.delay_s > 0.0 { [0.0; SENT].map(|_| start.ask()) } else { [0.0; SENT] };
-        let kept = if self.memory.table().is_some() { start.ask() } else { 0.0 };
+    /// Replaces `signal`, the voltage on the electrodes, by the response of the stiffness to the initial state:
+    /// voltages sent before the first row that arrive delayed, play operators as the largest voltage leaves them, and
+    /// the states of the lags.
+    pub fn initial_state_response(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
+        let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.next_offset_v() } else { 0.0 });
+        let late = if self.delay_s > 0.0 {
+            [0.0; DELAY_INTERVALS].map(|_| start.next_offset_v())
+        } else {
+            [0.0; DELAY_INTERVALS]
+        };
+        let kept = if self.memory.table().is_some() { start.next_offset_v() } else { 0.0 };
         let (mut rest, mut above) = (self.memory.clone(), self.memory.clone());
         rest.at(signal.before);
         above.at(HIGHEST_V);
@@ -167,12 +176,12 @@ impl<'a> Chain<'a> {
         };
         let mut at_s = 0.0;
         signal.before = 0.0;
-        let at_rest = output.value() == 0.0 && kept == 0.0 && late == [0.0; SENT];
+        let at_rest = output.value() == 0.0 && kept == 0.0 && late == [0.0; DELAY_INTERVALS];
         signal.pass(|piece| {
             if at_rest {
                 return (0.0, 0.0);
             }
-            let part = (at_s + piece.duration_s / 2.0) / self.delay_s * SENT as f64;
+            let part = (at_s + piece.duration_s / 2.0) / self.delay_s * DELAY_INTERVALS as f64;
             at_s += piece.duration_s;
             let sent = late.get(part as usize).copied().unwrap_or(0.0);
             let (from, to) = output.pass(Piece { from: 0.0, to: 0.0, ..piece });

@@ -1,25 +1,25 @@
-//! A curve as a few straight lines, each about as far off as the others.
+//! Approximation of a curve by a few straight lines with equal maximum errors.
 //!
-//! For a bound on how far a chord may be off its curve, each goes as far as it can; the bound is the least for which the
-//! chords are few enough. (With free knots the error is least where it is the same between all of them: de Boor, *A Practical
-//! Guide to Splines*, 1978.) Then each knot is lifted by what its chords are off on average, which halves the error of a curve
-//! that bends one way.
+//! For a given error bound every chord is made as long as possible; the bound is the smallest for which there are few
+//! enough chords. (With free knots the error is smallest where it is the same on all intervals: de Boor, *A Practical
+//! Guide to Splines*, 1978.) Then each knot is shifted by the mean error of its chords, which halves the error of a
+//! curve that is convex or concave.
 
-/// A point of a curve: place and value.
+/// A point of a curve: abscissa and ordinate.
 pub(crate) type Point = (f64, f64);
 
-/// Halvings of the logarithm's range in which the bound is looked for.
-const HALVINGS: usize = 30;
+/// Number of bisections of the logarithm of the error bound.
+const BISECTIONS: usize = 30;
 
-/// At most `most` knots, the curve's ends among them, and no more than are needed for chords that may be off by `enough`.
-/// The curve is at least two points, close together, in ascending places. Its first point stays.
+/// Returns at most `most` knots of a curve, including its ends, and no more than a maximum chord error of `enough`
+/// requires. The curve needs two points or more, in ascending order; its first point stays.
 pub(crate) fn knots(curve: &[Point], most: usize, enough: f64) -> Vec<Point> {
     if let Some(knots) = chords(curve, most, enough) {
         return lifted(curve, &knots);
     }
     let mut best = vec![0, curve.len() - 1];
     let (mut low, mut high) = (enough, curve.iter().fold(enough, |range, (_, value)| range.max(2.0 * value.abs())));
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTIONS {
         let bound = (low * high).sqrt();
         match chords(curve, most, bound) {
             Some(knots) => (best, high) = (knots, bound),
@@ -29,8 +29,8 @@ pub(crate) fn knots(curve: &[Point], most: usize, enough: f64) -> Vec<Point> {
     lifted(curve, &best)
 }
 
-/// The curve's points that chords go through which are off by no more than `bound`, each as long as can be; none if they
-/// are too many.
+/// Returns the indices of the points that chords with errors of at most `bound` join, each chord as long as possible;
+/// `None` if there are more than `most`.
 fn chords(curve: &[Point], most: usize, bound: f64) -> Option<Vec<usize>> {
     let mut knots = vec![0];
     while let Some(&from) = knots.last()
@@ -44,7 +44,7 @@ fn chords(curve: &[Point], most: usize, bound: f64) -> Option<Vec<usize>> {
     Some(knots)
 }
 
-/// The last point whose chord passes all between by no more than `bound`.
+/// Returns the last point whose chord from point `from` passes all points between within `bound`.
 fn farthest(curve: &[Point], from: usize, bound: f64) -> usize {
     let (x, y) = curve[from];
     let mut slopes = (f64::NEG_INFINITY, f64::INFINITY);
@@ -62,7 +62,7 @@ fn farthest(curve: &[Point], from: usize, bound: f64) -> usize {
     reached
 }
 
-/// Knots moved to where their chords are off as far to one side as to the other.
+/// Returns the knots, shifted so that the errors of the chords are the same on both sides.
 fn lifted(curve: &[Point], knots: &[usize]) -> Vec<Point> {
     let lift = |pair: &[usize]| {
         let ((x, y), (end, at_end)) = (curve[pair[0]], curve[pair[1]]);
@@ -86,7 +86,7 @@ mod tests {
         (0..=1000).map(|step| 0.5 * f64::from(step)).map(|x| (x, law(x))).collect()
     }
 
-    /// Largest distance of the lines through some knots from a curve.
+    /// Returns the largest distance between a curve and the lines through some knots.
     fn off(curve: &[Point], knots: &[Point]) -> f64 {
         let line = |x: f64| {
             let at = knots.partition_point(|knot| knot.0 <= x).clamp(1, knots.len() - 1);
@@ -97,17 +97,17 @@ mod tests {
     }
 
     #[test]
-    fn a_parabola_gets_even_knots() {
+    fn knots_of_a_parabola_are_equidistant() {
         let curve = curve(|x| x * x / 500.0);
         let knots = knots(&curve, 9, 1e-6);
         assert!(knots.len() == 9 && knots.iter().enumerate().all(|(k, knot)| (knot.0 - 62.5 * k as f64).abs() < 8.0));
-        // A chord of length h is off by h^2 / 8 f''; the first cannot be lifted at its start.
+        // The error of a chord of length `h` is `h^2 / 8 f''`; the start of the first chord is not shifted.
         let bow = 62.5f64.powi(2) / 8.0 * 2.0 / 500.0;
         assert!(off(&curve, &knots) < 0.85 * bow, "{} {bow}", off(&curve, &knots));
     }
 
     #[test]
-    fn knots_lie_where_the_curve_bends() {
+    fn knots_are_dense_where_curvature_is_large() {
         let curve = curve(|x| 100.0 * (1.0 - (-x / 40.0).exp()));
         let even: Vec<Point> = curve.iter().step_by(125).copied().collect();
         let knots = knots(&curve, 9, 1e-6);
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kink_is_met_and_a_line_needs_no_knots() {
+    fn kink_is_a_knot_and_a_line_has_none() {
         let kinked = curve(|x| x.min(200.0) + 0.5 * (x - 200.0).max(0.0));
         assert_eq!(knots(&kinked, 9, 1e-6), [(0.0, 0.0), (200.0, 200.0), (500.0, 350.0)]);
         assert_eq!(knots(&curve(|x| 2.0 * x), 9, 1e-6), [(0.0, 0.0), (500.0, 1000.0)]);

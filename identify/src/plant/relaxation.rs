@@ -1,61 +1,62 @@
-//! The relaxation: what comes at once, and the lags that bring the rest.
+//! The relaxation: feedthrough and first-order lags between settled stiffness and stiffness.
 //!
 //! ```text
 //! y = share q + (1 - share - sum part_i) lag(tau(q); q) + sum part_i lag(tau_i; q)
 //! ```
 //!
-//! `q` is the stiffness that would be reached in the end. The paper's plant has no further part and one `tau`. What `tau`
-//! follows is the voltage across the spring, or the spring's own state, in volts as well: `lag + part (q - lag)`, with the
-//! first lag's output for a part of 0, the whole stiffness for one of `share`.
+//! `q` is the settled stiffness. The paper's plant has a single lag with a constant `tau`. A variable `tau` depends on
+//! the voltage across the spring, or on the spring's own state, in V as well: `lag + part (q - lag)`, which is the
+//! output of the first lag for a part of 0 and the whole stiffness for a part of `share`.
 
-use crate::plant::start::Start;
+use crate::plant::initial_state::InitialState;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{self, PlantFile};
 
-/// A part that a lag of its own brings.
+/// A further lag and its weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Part {
-    /// Of everything; 0 for none.
+    /// Fraction of the settled stiffness, 0 to 1; 0 for none.
     pub part: f64,
-    /// Its time constant, in s.
+    /// Time constant, in s.
     pub tau_s: f64,
 }
 
-/// What the tick can hold beside the first lag.
+/// Number of further lags that the fixed-point tick can hold.
 pub const FURTHER: usize = 3;
 
-/// Longest step where the lag sets its own time constant, as a part of the shortest.
+/// Longest integration step where the lag's state sets its time constant, relative to the shortest time constant.
 const STEP: f64 = 0.1;
-/// And most steps of a piece: after so many the lag is at rest.
+/// Largest number of integration steps of one piece, after which the lag has settled.
 const MOST_STEPS: f64 = 200.0;
 
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation {
-    /// Part that comes at once.
+    /// Feedthrough: fraction of the settled stiffness that is reached without delay.
     pub share: f64,
     /// Time constant at 0 V, in s.
     pub tau_s: f64,
-    /// Time constant at [`Relaxation::HIGH_V`], in s; equal to `tau_s` where the voltage does not matter.
+    /// Time constant at [`Relaxation::HIGH_V`], in s; equal to `tau_s` if it is constant.
     pub tau_high_s: f64,
-    /// Between the two: geometric if true, else straight.
+    /// Interpolation of the time constant between both voltages: geometric if true, else linear.
     pub geometric: bool,
-    /// The time constant follows the spring's own state, of which so large a part comes at once; if none, the voltage.
+    /// Set if the time constant depends on the spring's state instead of the voltage: the fraction of the remaining
+    /// change that the state includes.
     pub by_state: Option<f64>,
-    /// Parts that further lags bring, one after the other.
+    /// Further lags, which act in parallel with the first.
     pub further: [Part; FURTHER],
 }
 
 impl Relaxation {
-    /// The voltage that `tau_high_s` belongs to.
+    /// Voltage at which the time constant is `tau_high_s`, in V.
     pub const HIGH_V: f64 = 500.0;
 
-    /// One share, one time constant.
+    /// Returns a relaxation with one feedthrough and one constant time constant, in s.
     pub fn plain(share: f64, tau_s: f64) -> Self {
         Self { share, tau_s, tau_high_s: tau_s, geometric: false, by_state: None, further: Default::default() }
     }
 
-    /// Time constant at a voltage, in s.
+    /// Returns the time constant at a voltage, in s.
     pub fn tau_at(&self, voltage_v: f64) -> f64 {
         let part = voltage_v.abs() / Self::HIGH_V;
         let tau = if self.geometric {
@@ -66,29 +67,29 @@ impl Relaxation {
         tau.max(0.02 * self.tau_s)
     }
 
-    /// The further parts that are there.
+    /// Returns the further lags with a weight other than 0.
     pub fn parts(&self) -> impl Iterator<Item = Part> {
         self.further.into_iter().filter(|part| part.part != 0.0)
     }
 
-    /// What the first lag brings.
-    fn main(&self) -> f64 {
+    /// Returns the weight of the first lag.
+    fn first_weight(&self) -> f64 {
         1.0 - self.share - self.parts().map(|part| part.part).sum::<f64>()
     }
 
-    /// Writes itself into a plant file.
+    /// Writes the relaxation to a plant file.
     pub fn extend(&self, file: &mut PlantFile) {
         let mut tau_s = vec![self.tau_s];
         tau_s.extend(self.parts().map(|part| part.tau_s));
         let weights = match tau_s.len() {
             1 => Vec::new(),
-            _ => std::iter::once(self.main()).chain(self.parts().map(|part| part.part)).collect(),
+            _ => std::iter::once(self.first_weight()).chain(self.parts().map(|part| part.part)).collect(),
         };
         let tau_high_s = self.varies().then_some(self.tau_high_s);
         file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s };
     }
 
-    /// The relaxation of a plant file, which has been checked.
+    /// Returns the relaxation of a plant file, which must be valid.
     pub fn of(file: &plant_file::Relaxation) -> Self {
         let tau_s = file.tau_s.first().copied().unwrap_or_default();
         let mut relaxation = Self { tau_high_s: file.tau_high_s.unwrap_or(tau_s), ..Self::plain(file.share, tau_s) };
@@ -99,17 +100,17 @@ impl Relaxation {
         relaxation
     }
 
-    /// True if the time constant depends on the voltage.
+    /// Returns true if the time constant depends on the voltage.
     pub fn varies(&self) -> bool {
         self.tau_high_s != self.tau_s
     }
 
-    /// What becomes of the static stiffness; `levels_v` is the voltage across the spring in the middle of each piece,
-    /// needed only if the time constant varies.
-    pub fn pass(&self, signal: &mut Signal, start: &mut Start, levels_v: &[f64]) {
+    /// Maps the settled stiffness to the stiffness. `levels_v` is the voltage across the spring in the middle of each
+    /// piece, in V; it is needed only if the time constant depends on it.
+    pub fn pass(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
         let before = signal.before;
-        let (share, main) = (self.share, self.main());
-        let mut at_first = |tau_s| Lag::at(tau_s, before + start.ask());
+        let (share, main) = (self.share, self.first_weight());
+        let mut at_first = |tau_s| Lag::at(tau_s, before + start.next_offset_v());
         let mut lag = at_first(self.tau_s);
         let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, at_first(it.tau_s))).collect();
         if further.is_empty() && !self.varies() {
@@ -129,7 +130,7 @@ impl Relaxation {
                 lag = lag.with_tau(self.tau_at(level));
             }
             let (start, end) = match by_state {
-                Some(at_once) => self.led(at_once, &mut lag, piece),
+                Some(instantaneous) => self.follow_state(instantaneous, &mut lag, piece),
                 None => lag.pass(piece),
             };
             let (mut from, mut to) = (share * piece.from + main * start, share * piece.to + main * end);
@@ -142,9 +143,9 @@ impl Relaxation {
         });
     }
 
-    /// Start and end of the first lag over a piece of its input, where the spring's state sets its time constant. Exact for the
-    /// time constant that it has in the middle of each step.
-    fn led(&self, at_once: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
+    /// Returns start and end of the first lag over a piece of its input, where the spring's state sets its time
+    /// constant. The solution is exact for the time constant in the middle of each integration step.
+    fn follow_state(&self, instantaneous: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
         let start = lag.value();
         let fastest_s = self.tau_s.min(self.tau_high_s);
         let steps = (piece.duration_s / (STEP * fastest_s)).ceil().clamp(1.0, MOST_STEPS);
@@ -152,10 +153,10 @@ impl Relaxation {
         let rise = (piece.to - piece.from) / steps;
         let mut from = piece.from;
         for _ in 0..steps as usize {
-            // Implicitly, so that it lies between the output and what that follows, however long the step.
+            // The implicit midpoint lies between the output and its input for any step length.
             let ahead = 0.5 * duration_s / (lag.tau_s() + 0.5 * duration_s);
             let to_come = from + 0.5 * rise - lag.value();
-            let middle = lag.value() + (ahead + at_once * (1.0 - ahead)) * to_come;
+            let middle = lag.value() + (ahead + instantaneous * (1.0 - ahead)) * to_come;
             *lag = lag.with_tau(self.tau_at(middle));
             lag.pass(Piece { duration_s, from, to: from + rise });
             from += rise;

@@ -1,7 +1,17 @@
-//! The record made ready: rows in, the command as a signal and the readings out.
+//! The prepared record: rows of a measured record come in; the commanded voltage as a signal, the readings and what is
+//! known about each reading go out.
+//!
+//! - *Reading*: measured stiffness, expressed as the equivalent static voltage, in V.
+//! - *Command*: the voltage that was sent to the amplifier, in V.
+//! - *Fold*: the rows that one fit of a cross-validation does not use; its prediction of these rows is held out.
+//! - *Segment*: neighbouring rows that belong to the same fold.
+//! - *Quantisation grid*: equally spaced values to which the readings were rounded.
+//! - *Censored reading*: one that stopped at a bound of the sensor.
 
 pub mod data;
-pub mod growth;
+mod decay;
+mod folds;
+pub mod heteroscedasticity;
 pub mod observed;
 pub mod quantisation_grid;
 pub mod signal;

@@ -1,60 +1,60 @@
-//! What a reading says: a number, a cell of a lattice, or "at least" a bound.
+//! Properties of the readings that need no model: quantisation, bounds of the sensor, and the scale of their noise.
 //!
-//! Continuous noise never gives the same number twice. So readings that all lie on one lattice were rounded to it, and
-//! readings that pile up exactly at the extreme stopped there. Both are seen in the readings themselves, before any model.
+//! Continuous noise does not give the same number twice. Readings that are all multiples of one step were therefore
+//! rounded to it, and readings that accumulate exactly at an extreme stopped there.
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::record::data::Data;
-use crate::record::growth;
-use crate::record::quantisation_grid::Lattice;
-use crate::stats::median::deviation;
-use crate::stats::scale::{FINEST_V, bends};
+use crate::record::heteroscedasticity;
+use crate::record::quantisation_grid::QuantisationGrid;
+use crate::stats::median::robust_deviation;
+use crate::stats::scale::{FINEST_V, second_differences};
 
-/// One row's reading.
+/// What one reading says about the true value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The number that was read.
+    /// The reading is the true value with noise.
     Exact,
-    /// It stopped at the upper bound.
+    /// The reading stopped at the upper bound; the true value is at least that (right-censored).
     AtLeast,
-    /// It stopped at the lower bound.
+    /// The reading stopped at the lower bound; the true value is at most that (left-censored).
     AtMost,
 }
 
-/// What the readings say of themselves.
+/// What is known about the readings before any model is fitted.
 #[derive(Clone, Debug)]
 pub struct Observed {
-    /// Of each row.
+    /// The kind of each row's reading.
     pub kinds: Vec<Kind>,
-    /// The lattice that all readings lie on, however fine.
-    pub lattice: Option<Lattice>,
-    /// The bounds at which readings stopped, in V.
+    /// The grid on which all readings lie, however fine; `None` if there is no common step.
+    pub grid: Option<QuantisationGrid>,
+    /// The upper bound at which readings stopped, in V.
     pub upper: Option<f64>,
-    /// As [`Observed::upper`], below.
+    /// The lower bound at which readings stopped, in V.
     pub lower: Option<f64>,
-    /// Scale of what they scatter from row to row, in V.
+    /// Scale of the noise from row to row, in V.
     pub scatter_v: f64,
-    /// What readings were cut by on average, in V: half a step if their converter cuts off instead of rounding.
-    pub cut_v: f64,
-    /// One over each row's scale of noise, where that grows with the reading; their geometric mean is 1.
+    /// Mean error of truncation, in V: half a step if the converter truncates, 0 if it rounds.
+    pub truncation_v: f64,
+    /// The reciprocal scale of each row's noise, with a geometric mean of 1; `None` if the scale is constant.
     pub weights: Option<Arc<[f64]>>,
 }
 
-/// Fewest readings at an extreme that are a bound, on a continuous scale.
+/// Smallest number of equal readings at an extreme that is taken for a bound, if readings are continuous.
 const FEWEST_TIES: usize = 3;
-/// A step coarser than this many of the noise's scales is a cell, a finer one is noise.
+/// Steps larger than this many scales of the noise are treated as quantisation cells, smaller ones as noise.
 pub const COARSE: f64 = 2.0;
-/// Half of a step that is this part of the noise's scale is seen in its mean.
-const SEEN: f64 = 0.5;
-/// A reading so many of the noise's scales from a bound is not on its way there.
-const FAR: f64 = 30.0;
-/// On a lattice, readings at a bound are this many times as many as on the next step.
-const PILE: usize = 6;
+/// Truncation is considered if half a step is at least this fraction of the noise's scale.
+const LEAST_TRUNCATION: f64 = 0.5;
+/// A reading further from the bound than this many scales of the noise is not close to it.
+const CLOSE_TO_BOUND: f64 = 30.0;
+/// Factor by which readings at a bound must outnumber those at the next step of a quantisation grid.
+const BOUND_TO_NEXT_STEP: usize = 6;
 
 impl Observed {
-    /// Looks at the readings.
+    /// Examines the readings of a record.
     pub fn new(data: &Data) -> Self {
         let mut sorted = data.reading.clone();
         sorted.sort_by(f64::total_cmp);
@@ -66,18 +66,19 @@ impl Observed {
             }
         }
         let inner: Vec<f64> = counts.iter().map(|&(value, _)| value).collect();
-        let lattice = match inner.len() {
+        let grid = match inner.len() {
             0..=5 => None,
-            many => Lattice::of(&inner[1..many - 1]),
+            many => QuantisationGrid::of(&inner[1..many - 1]),
         };
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
         let scatter_v = scatter(&data.reading).max(FINEST_V);
-        let far = FAR * scatter_v;
+        let far = CLOSE_TO_BOUND * scatter_v;
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
             let (value, count) = *extreme?;
-            let piled = count >= FEWEST_TIES && (continuous || count >= PILE * next.map_or(1, |next| next.1));
-            // A spring at rest reads zero again and again.
+            let piled =
+                count >= FEWEST_TIES && (continuous || count >= BOUND_TO_NEXT_STEP * next.map_or(1, |next| next.1));
+            // A spring at rest reads exactly zero many times.
             (piled && count < data.rows() && value != 0.0 && stays(&data.reading, value, far)).then_some(value)
         };
         let moves = data.reading.first() != data.reading.last() || counts.len() > 2;
@@ -96,37 +97,38 @@ impl Observed {
                 }
             })
             .collect();
-        let mut observed = Self { kinds, lattice, upper, lower, scatter_v, cut_v: 0.0, weights: None };
-        // Steps of a lattice are even, whatever the noise.
+        let mut observed = Self { kinds, grid, upper, lower, scatter_v, truncation_v: 0.0, weights: None };
+        // Rounding makes the scale constant.
         if observed.step_beyond(COARSE).is_none() {
-            observed.weights = growth::weights(data, |row| observed.kinds[row] == Kind::Exact);
+            observed.weights = heteroscedasticity::weights(data, |row| observed.kinds[row] == Kind::Exact);
         }
         observed
     }
 
-    /// The same where no bound is believed: a spring that settles at its highest voltage also reads the same for long.
+    /// Returns the same without bounds; a spring that settles at its highest voltage also repeats one reading.
     pub fn without_bounds(&self) -> Self {
         Self { kinds: vec![Kind::Exact; self.kinds.len()], upper: None, lower: None, ..self.clone() }
     }
 
-    /// Of a part of the rows, with what was concluded from all of them.
-    pub fn like(self, all: &Self) -> Self {
+    /// Returns the properties of a subset of the rows, with bounds and truncation as concluded from all rows.
+    pub fn with_conclusions_of(self, all: &Self) -> Self {
         let bounded = if all.all_exact() { self.without_bounds() } else { self };
-        Self { cut_v: all.cut_v, ..bounded }
+        Self { truncation_v: all.truncation_v, ..bounded }
     }
 
-    /// The step, in V, if it is at least so many times as large as what readings scatter.
+    /// Returns the step of the grid, in V, if it is at least `times` the scale of the noise.
     pub fn step_beyond(&self, times: f64) -> Option<f64> {
-        self.lattice.map(|lattice| lattice.step).filter(|step| *step >= times * self.scatter_v)
+        self.grid.map(|grid| grid.step).filter(|step| *step >= times * self.scatter_v)
     }
 
-    /// The same where the converter cuts off what is less than a step; `None` where that is little.
-    pub fn cut(&self) -> Option<Self> {
-        let step = self.step_beyond(SEEN)?;
-        Some(Self { cut_v: step / 2.0, ..self.clone() })
+    /// Returns the same for a converter that truncates instead of rounding; `None` if the step is too small to matter.
+    pub fn truncated(&self) -> Option<Self> {
+        let step = self.step_beyond(LEAST_TRUNCATION)?;
+        Some(Self { truncation_v: step / 2.0, ..self.clone() })
     }
 
-    /// What rows are off by at least: one that stopped at a bound is not off while the prediction is beyond it.
+    /// Returns the smallest error of each row that explains its reading, in V: 0 for a reading at a bound when the
+    /// prediction is beyond it.
     pub fn errors<'r>(&self, residual: &'r [f64]) -> Cow<'r, [f64]> {
         if self.all_exact() {
             return Cow::Borrowed(residual);
@@ -139,14 +141,22 @@ impl Observed {
         residual.iter().zip(&self.kinds).map(error).collect()
     }
 
-    /// True if no reading stopped at a bound.
+    /// Returns the values of the rows that did not stop at a bound.
+    pub fn uncensored<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
+        if self.all_exact() {
+            return Cow::Borrowed(values);
+        }
+        values.iter().zip(&self.kinds).filter(|(_, kind)| **kind == Kind::Exact).map(|(value, _)| *value).collect()
+    }
+
+    /// Returns true if no reading stopped at a bound.
     pub fn all_exact(&self) -> bool {
         self.upper.is_none() && self.lower.is_none()
     }
 }
 
-/// True if readings come to a value and stay: of those that read it, half have another beside them, or one not far from it.
-/// Codes of readings that failed stand alone.
+/// Returns true if at least half of the readings with this value have a neighbour within `far`, in V; isolated error
+/// codes have none.
 fn stays(reading: &[f64], value: f64, far: f64) -> bool {
     let near = |row: Option<&f64>| row.is_some_and(|other| (other - value).abs() <= far);
     let rows = || (0..reading.len()).filter(|&row| reading[row] == value);
@@ -154,7 +164,7 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
     2 * staying >= rows().count()
 }
 
-/// Scale of independent noise on readings; none where most are the same.
+/// Returns the scale of independent noise, in V; 0 if most readings repeat.
 fn scatter(reading: &[f64]) -> f64 {
-    deviation(bends(reading)).unwrap_or(f64::INFINITY)
+    robust_deviation(second_differences(reading)).unwrap_or(f64::INFINITY)
 }

@@ -1,47 +1,53 @@
-//! The lattice that readings lie on: the step of a converter, or of the digits that were printed.
+//! The grid on which readings lie: steps of the converter, or of the last printed digit.
 //!
-//! Readings of a converter are multiples of its step, and so are their differences; but what is printed is rounded once more,
-//! to a unit `p` of the last digit. Each difference `d`, taken for `k` steps, then bounds the step:
+//! Readings of a converter and their differences are multiples of its step, but printing rounds them once more, to a
+//! unit `p` of the last digit. A difference `d` of `k` steps then bounds the step:
 //!
 //! ```text
 //! d - p <= k step <= d + p
 //! ```
 
-/// Equal steps, in V.
+/// A step to which readings were rounded, with its bounds, in V.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lattice {
-    /// The likeliest.
+pub struct QuantisationGrid {
+    /// Most likely step, in V.
     pub step: f64,
-    /// The step may be as small as this,
+    /// Smallest step that agrees with the readings, in V.
     pub low: f64,
-    /// and as large as this.
+    /// Largest step that agrees with the readings, in V.
     pub high: f64,
 }
 
-/// Exact to so small a part of the step.
-const EXACT: f64 = 1e-6;
-/// A step finer than so many units of the last digit is the digits' own.
-const UNITS: f64 = 4.0;
-/// Most digits after the point that were printed on purpose.
-const DIGITS: i32 = 9;
-/// By chance less often than once in `exp` of this do so many differences fit.
-const SURE: f64 = 12.0;
+/// Relative uncertainty of a step that is not limited by printed digits.
+const RELATIVE_ERROR: f64 = 1e-6;
+/// A step finer than this many units of the last digit is attributed to the digits.
+const FEWEST_UNITS: f64 = 4.0;
+/// Largest number of decimals that is taken for deliberate rounding.
+const MOST_DECIMALS: i32 = 9;
+/// The differences agree with a common step by chance with a probability below `exp` of minus this.
+const CHANCE_NATS: f64 = 12.0;
 
-impl Lattice {
-    /// Of different readings in rising order: the coarsest that they lie on.
+impl QuantisationGrid {
+    /// Returns the coarsest grid that contains all values, which must be distinct and in ascending order; `None` if
+    /// there is none.
     pub fn of(values: &[f64]) -> Option<Self> {
-        printed(values)
-            .or_else(|| common(values).map(|step| Self { step, low: step * (1.0 - EXACT), high: step * (1.0 + EXACT) }))
+        printed(values).or_else(|| {
+            common(values).map(|step| Self {
+                step,
+                low: step * (1.0 - RELATIVE_ERROR),
+                high: step * (1.0 + RELATIVE_ERROR),
+            })
+        })
     }
 }
 
-/// The largest step of which all differences between values are multiples.
+/// Returns the largest step of which all differences between values are multiples, within rounding.
 fn common(values: &[f64]) -> Option<f64> {
     let span = values.last()? - values.first()?;
     let tolerance = 1e-7 * span.max(1e-9);
     let mut step = span;
     for pair in values.windows(2) {
-        // Euclid's algorithm.
+        // Euclid's algorithm, with a tolerance for rounding.
         let (mut a, mut b) = (step, pair[1] - pair[0]);
         while b > tolerance {
             (a, b) = (b, a - b * (a / b + 1e-4).floor());
@@ -55,19 +61,19 @@ fn common(values: &[f64]) -> Option<f64> {
     (step < span).then_some(step)
 }
 
-/// A step that was rounded to the last digit.
-fn printed(values: &[f64]) -> Option<Lattice> {
+/// Returns the bounds of a step whose multiples were rounded to the last printed digit.
+fn printed(values: &[f64]) -> Option<QuantisationGrid> {
     let unit = unit(values)?;
     let first = values.first()?;
     let mut differences: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
     differences.sort_by(f64::total_cmp);
     let least = *differences.first()?;
     let chance = (2.0 * unit / least).ln() * (differences.len() as f64 - 1.0);
-    if least < UNITS * unit || chance > -SURE {
+    if least < FEWEST_UNITS * unit || chance > -CHANCE_NATS {
         return None;
     }
     let (mut low, mut high) = (least - unit, least + unit);
-    // Neighbours first, then what is farther apart and says more.
+    // Differences of neighbours first; larger differences then narrow the bounds.
     for difference in differences.into_iter().chain(values[1..].iter().map(|value| value - first)) {
         let fewest = ((difference - unit) / high).ceil();
         let most = ((difference + unit) / low).floor();
@@ -78,13 +84,13 @@ fn printed(values: &[f64]) -> Option<Lattice> {
             (low, high) = (low.max((difference - unit) / most), high.min((difference + unit) / most));
         }
     }
-    (low <= high).then(|| Lattice { step: (low + high) / 2.0, low, high })
+    (low <= high).then(|| QuantisationGrid { step: (low + high) / 2.0, low, high })
 }
 
-/// Unit of the last digit that was printed, if few were.
+/// Returns the unit of the last printed digit, if there are at most [`MOST_DECIMALS`] decimals.
 fn unit(values: &[f64]) -> Option<f64> {
-    let is_whole = |value: f64| (value - value.round()).abs() < EXACT * value.abs().max(1.0).sqrt();
-    (0..DIGITS)
+    let is_whole = |value: f64| (value - value.round()).abs() < RELATIVE_ERROR * value.abs().max(1.0).sqrt();
+    (0..MOST_DECIMALS)
         .find(|&digits| values.iter().all(|value| is_whole(value * 10f64.powi(digits))))
         .map(|digits| 10f64.powi(-digits))
 }
@@ -94,30 +100,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lattice_is_found_through_its_gaps() {
+    fn grid_is_found_with_values_missing() {
         let values: Vec<f64> = [0, 2, 5, 6, 11, 12, 20].iter().map(|&k| 3.7 + 2.5 * f64::from(k)).collect();
-        assert!((Lattice::of(&values).unwrap().step - 2.5).abs() < 1e-9);
+        assert!((QuantisationGrid::of(&values).unwrap().step - 2.5).abs() < 1e-9);
         let values: Vec<f64> = (1..200).map(|k| f64::from(k).sqrt()).collect();
-        assert_eq!(Lattice::of(&values), None);
+        assert_eq!(QuantisationGrid::of(&values), None);
     }
 
     #[test]
-    fn a_step_is_found_behind_the_digits_that_were_printed() {
+    fn step_is_found_in_values_rounded_to_printed_digits() {
         let printed = |step: f64, digits: i32| {
             let unit = 10f64.powi(digits);
             let value = |k: i32| (f64::from(k) * step * unit).round() / unit;
             (0..40).filter(|k| k % 7 != 3).map(value).collect::<Vec<_>>()
         };
         for digits in 1..=6 {
-            let Lattice { step, low, high } = Lattice::of(&printed(14.554_425_3, digits)).unwrap();
+            let QuantisationGrid { step, low, high } = QuantisationGrid::of(&printed(14.554_425_3, digits)).unwrap();
             assert!((step - 14.554_425_3).abs() < 0.1 * 0.1f64.powi(digits), "{digits}: {step}");
             assert!(low <= 14.554_425_3 && 14.554_425_3 <= high, "{digits}: {low} to {high}");
         }
-        // Digits alone: a step of one of them.
+        // Without a coarser step, the step is one unit of the last digit.
         let dense: Vec<f64> = (0..300).map(|k| f64::from(k) / 10.0).collect();
-        assert!((Lattice::of(&dense).unwrap().step - 0.1).abs() < 1e-9);
-        // Levels that have no common step.
+        assert!((QuantisationGrid::of(&dense).unwrap().step - 0.1).abs() < 1e-9);
+        // These levels have no common step.
         let levels = [0.0, 12.3, 31.9, 44.4, 58.2, 77.7, 93.1, 120.9, 141.6, 160.2];
-        assert!(Lattice::of(&levels).is_none_or(|lattice| lattice.step < 0.2));
+        assert!(QuantisationGrid::of(&levels).is_none_or(|grid| grid.step < 0.2));
     }
 }

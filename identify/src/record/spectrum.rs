@@ -1,4 +1,4 @@
-//! Where in frequency a residual is strong.
+//! Spectral lines of a residual.
 
 use std::f64::consts::TAU;
 
@@ -6,50 +6,50 @@ use crate::record::data::Data;
 use crate::stats::periodogram;
 use crate::stats::sums::dot;
 
-/// A line in the spectrum: `cosine cos(2 pi f t) + sine sin(2 pi f t)`, t from the first reading.
+/// A sinusoid `cosine cos(2 pi f t) + sine sin(2 pi f t)`, with `t` counted from the first reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
-    /// In Hz.
+    /// Frequency `f`, in Hz.
     pub frequency_hz: f64,
-    /// In V.
+    /// Amplitude of the cosine, in V.
     pub cosine: f64,
-    /// In V.
+    /// Amplitude of the sine, in V.
     pub sine: f64,
 }
 
-/// What comes back less often in a record may be the schedule's, through another law of the spring.
+/// A line with fewer periods in the record may be a harmonic of the schedule that a nonlinear spring makes.
 pub const FEWEST_PERIODS: usize = 10;
-/// Rows between which an oscillation is turned.
-const TURNS: usize = 64;
+/// Number of rows after which the recursive oscillation is computed afresh.
+const ROTATIONS: usize = 64;
 
-/// Shorter records have no lines.
-const ROWS: usize = 16;
-/// Neighbours of a line to each side, in widths of a line.
+/// Records with fewer rows have no lines.
+const FEWEST_ROWS: usize = 16;
+/// Number of line widths on each side that count as neighbours of a line.
 const NEIGHBOURS: usize = 16;
 
-/// Power in bins, and how many of them a line is wide.
+/// Returns the power of each frequency bin, and the width of a line in bins.
 fn powers(residual: &[f64], data: &Data) -> (Vec<f64>, usize) {
-    let mut power = periodogram::powers(&on_a_grid(residual, data));
+    let mut power = periodogram::powers(&on_uniform_grid(residual, data));
     power.pop();
     let width = 2 * power.len() / residual.len();
     (power, width)
 }
 
-/// A line beside its neighbours.
+/// The spectral line with the largest power relative to its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// In Hz.
+    /// Frequency, in Hz.
     pub frequency_hz: f64,
-    /// How many times as strong as its neighbours it is. In noise, however coloured, that is exponential: 20 times is one
-    /// chance in 1e8.
-    pub alone: f64,
-    /// Its part of the square.
+    /// Power relative to the mean of the neighbouring bins. For noise of any smooth spectrum it is exponentially
+    /// distributed: a ratio of 20 in one bin has a probability of 2e-9.
+    pub prominence: f64,
+    /// Fraction of the residual's mean square, 0 to 1.
     pub share: f64,
 }
 
-/// The line that stands most alone, of those that come back often enough in the record.
-pub fn loneliest(residual: &[f64], data: &Data) -> Option<Line> {
-    if residual.len() < ROWS {
+/// Returns the most prominent line with at least [`FEWEST_PERIODS`] periods in the record; `None` for short records.
+pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
+    if residual.len() < FEWEST_ROWS {
         return None;
     }
     let (power, width) = powers(residual, data);
@@ -59,21 +59,22 @@ pub fn loneliest(residual: &[f64], data: &Data) -> Option<Line> {
         Some(*sum)
     }));
     let sum = |from: usize, to: usize| (before[to] - before[from], (to - from) as f64);
-    let alone = |bin: usize| {
+    let prominence = |bin: usize| {
         let reach = |widths: usize| (bin.saturating_sub(widths * width), (bin + widths * width).min(power.len()));
         let ((from, to), (own_from, own_to)) = (reach(NEIGHBOURS), reach(2));
         let (left, right) = (sum(from, own_from), sum(own_to, to));
         power[bin] * (left.1 + right.1) / (left.0 + right.0).max(f64::MIN_POSITIVE)
     };
-    let (bin, alone) =
-        (FEWEST_PERIODS * width..power.len()).map(|bin| (bin, alone(bin))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (bin, prominence) =
+        (FEWEST_PERIODS * width..power.len()).map(|bin| (bin, prominence(bin))).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let share = 2.0 * power[bin] / (residual.len() as f64 * dot(residual, residual)).max(f64::MIN_POSITIVE);
-    Some(Line { frequency_hz: bin as f64 / (2.0 * power.len() as f64 * data.sample_s), alone, share })
+    Some(Line { frequency_hz: bin as f64 / (2.0 * power.len() as f64 * data.sample_s), prominence, share })
 }
 
-/// The strongest lines, one at a time: each is taken off before the next is looked for.
+/// Returns the `count` strongest lines in descending order; bins around a line found are left out of the search for the
+/// next.
 pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
-    if residual.len() < ROWS {
+    if residual.len() < FEWEST_ROWS {
         return Vec::new();
     }
     let (mut power, width) = powers(residual, data);
@@ -89,8 +90,8 @@ pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
     found
 }
 
-/// Readings by index where rows are regular, else each at the grid's nearest moment.
-fn on_a_grid(residual: &[f64], data: &Data) -> Vec<f64> {
+/// Returns the residual on a uniform time grid, each value at the nearest grid time and 0 where there is none.
+fn on_uniform_grid(residual: &[f64], data: &Data) -> Vec<f64> {
     let start = data.time_s.first().copied().unwrap_or(0.0);
     let mut grid = vec![0.0; residual.len()];
     for (value, time) in residual.iter().zip(&data.time_s) {
@@ -102,8 +103,9 @@ fn on_a_grid(residual: &[f64], data: &Data) -> Vec<f64> {
     grid
 }
 
-/// Sine and cosine of a frequency at each row, from the first reading. Between equal steps of time they are turned, which is
-/// cheaper than computing them; now and then they are computed anew, before rounding shows.
+/// Returns sine and cosine of a frequency at each row, with time counted from the first reading. Over equal time steps
+/// they are rotated, which is faster than computing them; every 64 rows they are computed afresh to limit
+/// rounding errors.
 pub fn oscillation(frequency_hz: f64, data: &Data) -> impl Iterator<Item = (f64, f64)> {
     let start = data.time_s.first().copied().unwrap_or(0.0);
     let omega = TAU * frequency_hz;
@@ -116,7 +118,7 @@ pub fn oscillation(frequency_hz: f64, data: &Data) -> impl Iterator<Item = (f64,
             step = since;
             turn = (omega * step).sin_cos();
         }
-        now = if steady && row % TURNS != 0 {
+        now = if steady && row % ROTATIONS != 0 {
             (now.0 * turn.1 + now.1 * turn.0, now.1 * turn.1 - now.0 * turn.0)
         } else {
             (omega * (time - start)).sin_cos()
@@ -125,7 +127,7 @@ pub fn oscillation(frequency_hz: f64, data: &Data) -> impl Iterator<Item = (f64,
     })
 }
 
-/// Cosine and sine at one frequency by least squares, taken as orthogonal.
+/// Returns the sinusoid of one frequency that fits best in least squares, with sine and cosine taken as orthogonal.
 fn line(residual: &[f64], data: &Data, frequency_hz: f64) -> Peak {
     let (mut cosine, mut sine) = (0.0, 0.0);
     for (value, (s, c)) in residual.iter().zip(oscillation(frequency_hz, data)) {
@@ -143,7 +145,7 @@ mod tests {
     use simulation::record::{Record, Row};
 
     #[test]
-    fn a_turned_oscillation_is_the_computed_one() {
+    fn rotated_oscillation_equals_the_computed_one() {
         for jitter in [0.0, 0.3] {
             let time = |row: usize| 5.0 + 0.01 * (row as f64 + jitter * ((row * row % 7) as f64 / 7.0));
             let row = |row: usize| Row { line: row, time_s: time(row), voltage_v: 0.0, measured: Some(0.0) };

@@ -68,9 +68,12 @@ impl<J: Judge> Search<'_, J> {
         });
         // What a memory of the noise hides while much is still wrong shows in the plain error.
         let rest = fits.split_off(JUDGED.min(fits.len()));
-        let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.plain).collect();
-        plain.sort_by(|a, b| b.1.plain.total_cmp(&a.1.plain));
-        if self.patient && !node.noise.memory.is_none() {
+        let mut plain: Vec<(f64, Fit)> = rest
+            .into_iter()
+            .filter(|(_, fit)| fit.white_noise_log_likelihood > node.white_noise_log_likelihood)
+            .collect();
+        plain.sort_by(|a, b| b.1.white_noise_log_likelihood.total_cmp(&a.1.white_noise_log_likelihood));
+        if self.patient && !node.noise.autocorrelation.is_white() {
             fits.extend(plain.into_iter().take(JUDGED_PLAIN));
         }
         fits.into_iter().map(|(_, fit)| self.seen.judge_anew(self.judge, fit)).collect()

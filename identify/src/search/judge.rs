@@ -3,13 +3,13 @@
 use crate::adequacy::absorbed_by_noise;
 use crate::adequacy::unmodelled;
 use crate::effects::EFFECTS;
-use crate::effects::effect::Scene;
+use crate::effects::effect::FitContext;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
-use crate::noise::{Noise, memory};
+use crate::noise::{Noise, autocorrelation};
 use crate::search::caution::long_memory;
 use crate::search::promise::Metric;
-use crate::stats::scale::{negligible, scale, scale_of_squares};
+use crate::stats::scale::{negligible, robust_scale, root_mean_square};
 
 /// What a block costs, in nats, beside its places and forms: so many are tried.
 const PRICE: f64 = 4.3;
@@ -62,21 +62,21 @@ impl Judge for Engine<'_> {
     }
 
     fn at(&mut self, model: Model) -> Fit {
-        Engine::at(self, model)
+        Engine::evaluate(self, model)
     }
 
     fn fit_again(&mut self, first: Fit) -> Fit {
-        Engine::fit_again(self, first)
+        Engine::refit(self, first)
     }
 
     fn held_out(&mut self, fit: &Fit) -> f64 {
-        self.judged_unseen(fit)
+        self.held_out_log_likelihood(fit)
     }
 
     fn extended(&mut self, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
         let mut extensions = extensions(self, fit, patient, wanted);
         // Who is not patient trusts the law of the noise, and a promise.
-        let law = if patient { Noise::first_look() } else { fit.noise.clone() };
+        let law = if patient { Noise::default_robust() } else { fit.noise.clone() };
         if !patient {
             let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit, 1.0, fit.noise.floor_v()) };
             extensions.retain(|it| it.promise > PART_OF_PRICE * (Judge::price(self, &it.block) + misfit));
@@ -90,23 +90,23 @@ impl Judge for Engine<'_> {
         let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
         PRICE
             + PRICE_OF_COORDINATE * fitted as f64
-            + effect.places(block.form, self.data)
+            + effect.ln_candidates(block.form, self.data)
             + (effect.forms() as f64).ln()
     }
 
     fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {
         let explained: Vec<f64> =
-            self.simulation.iter().zip(&fit.residual).map(|(before, after)| before - after).collect();
-        let part = MISFIT.min(MISFIT_SEEN * floor_v / scale_of_squares(&explained).max(f64::MIN_POSITIVE));
-        memory::price(&explained, floor_v / (part * times.sqrt()))
+            self.baseline_residual.iter().zip(&fit.residual).map(|(before, after)| before - after).collect();
+        let part = MISFIT.min(MISFIT_SEEN * floor_v / root_mean_square(&explained).max(f64::MIN_POSITIVE));
+        autocorrelation::coding_cost(&explained, floor_v / (part * times.sqrt()))
     }
 
     fn doubts(&mut self, fit: &Fit) -> bool {
         // Before any effect is found, a memory may be the effect's own; and one that is to foretell nearly all that is left.
-        let remembers = !fit.noise.memory.is_none();
-        let unfound = remembers && (fit.model.blocks.is_empty() || fit.wanders());
+        let remembers = !fit.noise.autocorrelation.is_white();
+        let unfound = remembers && (fit.model.blocks.is_empty() || fit.strongly_autocorrelated());
         let errors = self.observed.errors(&fit.residual);
-        let swallowed = || absorbed_by_noise::test(self.data, &errors, &fit.noise.memory).is_some();
+        let swallowed = || absorbed_by_noise::test(self.data, &errors, &fit.noise.autocorrelation).is_some();
         unfound || swallowed() || unmodelled::test(self, fit).is_none_or(|left| left.doubtful)
     }
 
@@ -125,7 +125,7 @@ struct Extension {
 /// Blocks that might be added, each from its most promising starts.
 fn extensions(engine: &mut Engine, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Extension> {
     let mut metrics = Vec::new();
-    let (remembers, rounded) = (!fit.noise.memory.is_none(), fit.noise.cell > 0.0);
+    let (remembers, rounded) = (!fit.noise.autocorrelation.is_white(), fit.noise.half_step > 0.0);
     // What rounding leaves keeps time with the voltage, and would promise everything.
     if !rounded && (patient || !remembers) {
         metrics.push(Metric::new(engine, fit, Noise::robust(&fit.residual)));
@@ -133,14 +133,14 @@ fn extensions(engine: &mut Engine, fit: &Fit, patient: bool, wanted: &dyn Fn(usi
     if remembers || rounded {
         metrics.push(Metric::new(engine, fit, fit.noise.clone()));
     }
-    let sigma = scale(&fit.residual);
+    let sigma = robust_scale(&fit.residual);
     let mut found: Vec<Extension> = Vec::new();
     for (index, effect) in EFFECTS.iter().enumerate().filter(|(index, _)| wanted(*index)) {
         let mut of_effect: Vec<Extension> = Vec::new();
         for form in 0..effect.forms() {
             let block = Block { effect: index, form };
-            let scene = Scene { data: engine.data, residual: &fit.residual, sigma };
-            let starts = effect.starts(form, &scene).into_iter().map(|point| {
+            let scene = FitContext { data: engine.data, residual: &fit.residual, sigma };
+            let starts = effect.initial_points(form, &scene).into_iter().map(|point| {
                 let there = engine.residual(&fit.model.with(block, point.clone()));
                 let change: Vec<f64> = fit.residual.iter().zip(&there).map(|(a, b)| a - b).collect();
                 let promise = metrics.iter().map(|metric| metric.promise(&change)).fold(0.0, f64::max);

@@ -214,7 +214,7 @@ impl<'j, J: Judge> Search<'j, J> {
                 progress(&best);
             } else {
                 waited += 1;
-                if waited > 1 || best.fit.noise.memory.is_none() || !doubts {
+                if waited > 1 || best.fit.noise.autocorrelation.is_white() || !doubts {
                     break;
                 }
             }
@@ -230,16 +230,20 @@ impl<'j, J: Judge> Search<'j, J> {
             // Blocks that are only good together: while the noise seems to have a memory, one may make a loss.
             let patient = |child: &Scored| {
                 let gain = child.score - node.score;
-                gain > -PATIENCE || child.fit.plain > node.fit.plain + PATIENCE
+                gain > -PATIENCE
+                    || child.fit.white_noise_log_likelihood > node.fit.white_noise_log_likelihood + PATIENCE
             };
-            let alone = node.fit.noise.memory.is_none();
+            let alone = node.fit.noise.autocorrelation.is_white();
             let children = self.children(node).into_iter();
             next.extend(children.filter(|child| child.score > node.score || !alone && patient(child)));
         }
         next.sort_by(|a, b| b.score.total_cmp(&a.score));
         distinct(&mut next);
         let rest = next.split_off(BEAM.min(next.len()));
-        next.extend(rest.into_iter().max_by(|a, b| a.fit.plain.total_cmp(&b.fit.plain)));
+        next.extend(
+            rest.into_iter()
+                .max_by(|a, b| a.fit.white_noise_log_likelihood.total_cmp(&b.fit.white_noise_log_likelihood)),
+        );
         next
     }
 

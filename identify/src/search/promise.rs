@@ -1,7 +1,8 @@
 //! What an effect that is not fitted yet promises: how much of the residual its change could explain.
 
 use crate::effects::effect::Coordinate;
-use crate::fit::engine::{Engine, Fit, Jacobian};
+use crate::fit::engine::{Engine, Fit};
+use crate::fit::normal_equations::Jacobian;
 use crate::noise::Noise;
 use crate::stats::sums::dot;
 
@@ -59,7 +60,7 @@ impl Metric {
         let total = dot(&self.residual, &self.residual);
         let part = ((2.0 * along - step * size) * step / total.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
         // The noise's scale would shrink along; not that of rounded rows, most of which tell nothing.
-        let telling = if self.noise.cell > 0.0 { total } else { self.residual.len() as f64 };
+        let telling = if self.noise.half_step > 0.0 { total } else { self.residual.len() as f64 };
         -0.5 * telling * (1.0 - part).ln()
     }
 }

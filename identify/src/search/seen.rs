@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::effects::contains;
-use crate::effects::effect::Stage;
+use crate::effects::effect::Location;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::Fit;
 use crate::search::Scored;
@@ -36,7 +36,7 @@ impl Seen {
     pub(super) fn price(&self, judge: &impl Judge, fit: &Fit) -> f64 {
         let blocks = &fit.model.blocks;
         let further = blocks.len().saturating_sub(1) as f64;
-        let stages: HashSet<Stage> = blocks.iter().map(|(block, _)| block.effect().stage()).collect();
+        let stages: HashSet<Location> = blocks.iter().map(|(block, _)| block.effect().location()).collect();
         let times = further + ALIKE * (blocks.len() - stages.len()) as f64;
         let misfit = if times > 0.0 { judge.misfit(fit, times, self.floor_v) } else { 0.0 };
         misfit + self.caution * blocks.iter().map(|(block, _)| judge.price(block)).sum::<f64>()

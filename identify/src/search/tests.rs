@@ -49,9 +49,16 @@ impl Judge for Told {
         let of_part = self.worth.iter().filter(|(part, _)| part.is_subset(&has));
         let log_likelihood =
             of_part.map(|(part, worth)| worth + (has.len() - part.len()) as f64).fold(has.len() as f64, f64::max);
-        let mut noise = Noise::first_look();
+        let mut noise = Noise::default_robust();
         noise.marginal = if self.quiet.is_none_or(|effect| has.contains(&effect)) { 1.0 } else { 10.0 };
-        Fit { model, residual: Vec::new(), noise, log_likelihood, plain: log_likelihood, start_cost: 0.0 }
+        Fit {
+            model,
+            residual: Vec::new(),
+            noise,
+            log_likelihood,
+            white_noise_log_likelihood: log_likelihood,
+            initial_state_cost: 0.0,
+        }
     }
 
     fn at(&mut self, model: Model) -> Fit {

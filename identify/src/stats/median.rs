@@ -1,28 +1,30 @@
-//! The middle of some values, which far ones do not move.
+//! Medians and scales derived from them, which outliers hardly change.
 
-/// A normal's median size, in standard deviations.
-const NORMAL: f64 = 0.6745;
-/// Neighbours to each side of a row.
-const AROUND: usize = 2;
+/// Median of the absolute value of a standard normal variable.
+const NORMAL_MEDIAN_SIZE: f64 = 0.6745;
+/// Number of neighbours on each side of a row in a running median.
+const NEIGHBOURS: usize = 2;
 
-/// The upper middle of the values, which it reorders; `None` if there are none.
+/// Returns the upper median of the values, and reorders them; `None` if there are none.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// The standard deviation of a normal around zero with this median size; `None` if there are no values.
-pub(crate) fn deviation(values: impl Iterator<Item = f64>) -> Option<f64> {
+/// Returns the standard deviation of the zero-mean normal distribution whose median absolute value is that of the
+/// values, in their unit; `None` if there are none.
+pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut sizes: Vec<f64> = values.map(f64::abs).collect();
-    median(&mut sizes).map(|size| size / NORMAL)
+    median(&mut sizes).map(|size| size / NORMAL_MEDIAN_SIZE)
 }
 
-/// Of each row and two neighbours to each side; at the ends, of the first and the last five. At least five values.
-pub(crate) fn running(values: &[f64]) -> Vec<f64> {
+/// Returns the median of each row and its two neighbours on each side; the first two rows take the median of the first
+/// five values, the last two that of the last five. Needs at least five values.
+pub(crate) fn running_median(values: &[f64]) -> Vec<f64> {
     let of_row = |row: usize| {
-        let first = row.saturating_sub(AROUND).min(values.len() - 2 * AROUND - 1);
-        let mut around: [f64; 2 * AROUND + 1] = std::array::from_fn(|k| values[first + k]);
-        *around.select_nth_unstable_by(AROUND, f64::total_cmp).1
+        let first = row.saturating_sub(NEIGHBOURS).min(values.len() - 2 * NEIGHBOURS - 1);
+        let mut around: [f64; 2 * NEIGHBOURS + 1] = std::array::from_fn(|k| values[first + k]);
+        *around.select_nth_unstable_by(NEIGHBOURS, f64::total_cmp).1
     };
     (0..values.len()).map(of_row).collect()
 }
@@ -32,10 +34,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn far_values_move_no_median() {
+    fn outliers_do_not_change_medians() {
         assert_eq!(median(&mut []), None);
         assert_eq!(median(&mut [3.0, 1e9, 1.0]), Some(3.0));
-        assert_eq!(deviation([-0.6745, 1e9, 0.1].into_iter()), Some(1.0));
-        assert_eq!(running(&[1.0, 2.0, 1e9, 4.0, 5.0, 6.0]), [4.0, 4.0, 4.0, 5.0, 5.0, 5.0]);
+        assert_eq!(robust_deviation([-0.6745, 1e9, 0.1].into_iter()), Some(1.0));
+        assert_eq!(running_median(&[1.0, 2.0, 1e9, 4.0, 5.0, 6.0]), [4.0, 4.0, 4.0, 5.0, 5.0, 5.0]);
     }
 }

@@ -1,4 +1,10 @@
-//! Medians, sums, scales, a periodogram: numbers in, numbers out.
+//! Statistics without knowledge of the record: numbers come in, numbers go out.
+//!
+//! - *Robust scale*: a standard deviation estimated from the median absolute value, which outliers hardly change.
+//! - *Root mean square* (RMS): the scale that every value changes.
+//! - *Second difference*: `(x(n-1) - 2 x(n) + x(n+1)) / sqrt(6)`; it removes a slow signal and keeps the variance of
+//!   independent noise.
+//! - *Periodogram*: the squared magnitude of the discrete Fourier transform.
 
 pub mod median;
 pub mod periodogram;

@@ -1,10 +1,11 @@
-//! Power of equally distant values at each frequency.
+//! The periodogram of uniformly sampled values.
 //!
 //! ```text
 //! power(k) = |sum_n x(n) exp(-2 pi i k n / length)|^2,      k = 0 to length/2,  length at least twice the values'
 //! ```
 //!
-//! Twice as long, so that the end does not meet the start, and a line between two frequencies of the record is not missed.
+//! The values are padded with zeros to twice their number, so that the end is not correlated with the start and a
+//! spectral line between two frequencies of the record is not missed.
 
 use std::cell::RefCell;
 
@@ -12,11 +13,11 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 thread_local! {
-    // Plans are dearer than transforms, and lengths are few.
+    // Planning a transform costs more than the transform, and few lengths occur.
     static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
 }
 
-/// Powers from frequency 0 to half a turn a row, in the values' unit squared.
+/// Returns the power at frequencies from 0 to half a cycle per row, in the squared unit of the values.
 pub(crate) fn powers(values: &[f64]) -> Vec<f64> {
     let length = (2 * values.len()).next_power_of_two();
     let mut buffer: Vec<Complex<f64>> = values.iter().map(|&value| Complex::new(value, 0.0)).collect();
@@ -29,9 +30,9 @@ pub(crate) fn powers(values: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// `x = 3 cos(2 pi k n / length)` over 1024 values, whatever was transformed before.
+    /// The signal is `3 cos(2 pi 100 n / 2048)`; lengths that share a plan are mixed.
     #[test]
-    fn a_line_has_its_power() {
+    fn spectral_line_has_expected_power() {
         for rows in [1024usize, 700, 1024] {
             let turn = std::f64::consts::TAU * 100.0 / 2048.0;
             let power = powers(&(0..rows).map(|row| 3.0 * (turn * row as f64).cos()).collect::<Vec<_>>());

@@ -1,36 +1,37 @@
-//! Scales of values: of residuals, and of what changes from row to row.
+//! Scales of residuals and of their changes from row to row.
 
-use crate::stats::median::deviation;
+use crate::stats::median::robust_deviation;
 use crate::stats::sums::dot;
 
-/// 97.5 % quantile of the standard normal distribution: half the width of a 95 % interval, in standard deviations.
+/// The 97.5 % quantile of the standard normal distribution: half the width of a 95 % interval, in standard deviations.
 pub const Z: f64 = 1.96;
-/// No reading is taken to be better than this, in V: the tick itself says no more, and a record without noise, as another
-/// simulation writes it, differs from ours by the steps in which both were computed.
+/// Smallest scale of noise that is assumed, in V. It is the resolution of the fixed-point tick; a noise-free record of
+/// another simulation differs from this one by the time steps of both.
 pub const FINEST_V: f64 = 0.01;
 
-/// Robust scale around zero: the median size, as a normal's standard deviation, [`FINEST_V`] at least. Noise is never exactly
-/// zero; rows that are (a spring at rest, read without noise) say nothing of it.
-pub fn scale(residual: &[f64]) -> f64 {
-    deviation(residual.iter().copied().filter(|r| *r != 0.0)).map_or(FINEST_V, |scale| scale.max(FINEST_V))
+/// Returns the robust scale of a residual around zero, in V, at least [`FINEST_V`]. Zeros are left out: noise is never
+/// exactly zero, but the rows of a spring at rest in a noise-free record are.
+pub fn robust_scale(residual: &[f64]) -> f64 {
+    robust_deviation(residual.iter().copied().filter(|r| *r != 0.0)).map_or(FINEST_V, |scale| scale.max(FINEST_V))
 }
 
-/// True if what is left is the arithmetic's.
+/// Returns true if the root mean square of a residual, in V, is no more than the arithmetic's resolution [`FINEST_V`].
 pub fn negligible(residual: &[f64]) -> bool {
-    scale_of_squares(residual) <= FINEST_V
+    root_mean_square(residual) <= FINEST_V
 }
 
-/// Root of the mean square.
-pub fn scale_of_squares(residual: &[f64]) -> f64 {
+/// Returns the root mean square of the values, in their unit; 0 if there are none.
+pub fn root_mean_square(residual: &[f64]) -> f64 {
     (dot(residual, residual) / residual.len().max(1) as f64).sqrt()
 }
 
-/// Second differences, as large as independent noise: a slow signal has none.
-pub(crate) fn bends(reading: &[f64]) -> impl Iterator<Item = f64> {
+/// Returns the second differences, scaled so that independent noise keeps its standard deviation; a slow signal nearly
+/// vanishes.
+pub(crate) fn second_differences(reading: &[f64]) -> impl Iterator<Item = f64> {
     reading.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]) / 6f64.sqrt())
 }
 
-/// Independent numbers, nearly normal: sums of twelve of splitmix64's.
+/// Returns independent, nearly normal numbers of unit variance: sums of twelve uniform numbers from splitmix64.
 #[cfg(test)]
 pub(crate) fn normals(rows: usize) -> Vec<f64> {
     let mut state = 20_261_121u64;

@@ -1,8 +1,8 @@
-//! Sums over rows, in parts that do not wait for each other.
+//! Sums over rows in independent partial sums, which the compiler can vectorise.
 
 const PARTS: usize = 8;
 
-/// Scalar product of as many values as the shorter one has.
+/// Returns the scalar product over the length of the shorter slice.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
     let ((a, a_rest), (b, b_rest)) = (a[..length].as_chunks::<PARTS>(), b[..length].as_chunks::<PARTS>());
@@ -15,7 +15,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
-/// Sum of what each item has.
+/// Returns the sum of a function of each item.
 #[inline]
 pub(crate) fn total<T>(items: &[T], of: impl Fn(&T) -> f64) -> f64 {
     let (chunks, rest) = items.as_chunks::<PARTS>();

@@ -65,7 +65,7 @@ pub(crate) fn next_experiment(
             let rival = alternatives.iter().flatten().find(|cause| !named.contains(cause));
             let ours = named.iter().find(|cause| !alternatives.iter().all(|set| set.contains(cause)));
             let cause = rival.or(ours)?;
-            let experiment = EFFECTS[index_of(cause)?].experiment();
+            let experiment = EFFECTS[index_of(cause)?].isolating_experiment();
             Some(format!("run {experiment}"))
         }
         Verdict::Consistent if !wanders => None,

@@ -11,7 +11,7 @@ use crate::fit::engine::{Engine, Fit};
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::search::{Lead, Scored, Search, effects};
-use crate::stats::scale::{FINEST_V, scale_of_squares};
+use crate::stats::scale::{FINEST_V, root_mean_square};
 use crate::verdict::alternatives::{never_reverses, next_experiment, rivals, twin};
 use crate::verdict::export;
 use crate::verdict::finding::{explained, finding};
@@ -54,7 +54,7 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// True if readings that stopped at a bound did so because the spring goes beyond it, where a lattice lets them seem to.
     pub(crate) fn believes_its_bounds(&self) -> bool {
-        let step = self.observed.lattice.map_or(FINEST_V, |lattice| lattice.step);
+        let step = self.observed.grid.map_or(FINEST_V, |lattice| lattice.step);
         let beyond = |kind: Kind, sign: f64| {
             let rows = self.observed.kinds.iter().zip(&self.extended.residual).filter(|(of, _)| **of == kind);
             let beyond: Vec<f64> = rows.map(|(_, left)| -sign * left).collect();
@@ -73,7 +73,7 @@ pub(crate) fn diagnose(
     given: Option<Lead>,
     progress: impl FnMut(&Scored),
 ) -> Diagnosis {
-    let mut baseline = engine.at(Model::default());
+    let mut baseline = engine.evaluate(Model::default());
     if let Some(silent) = silent(engine, &baseline) {
         return unsearched(data, observed, engine, baseline, &silent);
     }
@@ -83,7 +83,7 @@ pub(crate) fn diagnose(
         Some(lead) => search.from(lead, progress),
     };
     // Likelier but farther off is no cure.
-    let [before, after] = [&baseline, &best.fit].map(|fit| scale_of_squares(&observed.errors(&fit.residual)));
+    let [before, after] = [&baseline, &best.fit].map(|fit| root_mean_square(&observed.errors(&fit.residual)));
     if after > WORSE * before {
         best = search.root();
     }
@@ -98,16 +98,16 @@ pub(crate) fn diagnose(
     }
     let contenders = ranking::contenders(&search, &best);
     let lead = search.lead();
-    let mut held_out = [&baseline, &best.fit].map(|fit| engine.foretold(fit));
+    let mut held_out = [&baseline, &best.fit].map(|fit| engine.held_out_residual(fit));
     let known = [(&baseline, &*held_out[0]), (&best.fit, &*held_out[1])];
     let standings = ranking::standings(engine, contenders, known);
     // The simulation as it was knows nothing of what is cut off.
     for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
-        *left -= observed.cut_v;
+        *left -= observed.truncation_v;
     }
     let spikes = spikes::test(engine, &best.fit);
     let alone = spikes.is_none();
-    let left = absorbed_by_noise::test(&data, &observed.errors(&best.fit.residual), &best.fit.noise.memory)
+    let left = absorbed_by_noise::test(&data, &observed.errors(&best.fit.residual), &best.fit.noise.autocorrelation)
         .or_else(|| in_step::test(engine, &best.fit))
         .or(spikes)
         .or_else(|| unmodelled::test(engine, &best.fit).filter(|left| left.significant))
@@ -132,7 +132,7 @@ pub(crate) fn diagnose(
         () if findings.is_empty() => Verdict::Consistent,
         () => Verdict::Explained,
     };
-    let next_experiment = next_experiment(verdict, &findings, &alternatives, best.fit.wanders());
+    let next_experiment = next_experiment(verdict, &findings, &alternatives, best.fit.strongly_autocorrelated());
     let leftover = left.map(|left| {
         let Leftover { place, share, rms, .. } = left;
         format!("{:.1} % of what is left ({rms:.3} V RMS) is no noise: it shows {place}", 100.0 * share)
@@ -201,7 +201,7 @@ fn unsearched(data: Data, observed: &Observed, engine: &Engine, baseline: Fit, s
         score: baseline.log_likelihood,
         extended: baseline.clone(),
         baseline,
-        plant: engine.simulator.base.file().clone(),
+        plant: engine.base().file().clone(),
         held_out: [unseen.clone(), unseen],
         standings: Vec::new(),
         observed: observed.clone(),

@@ -32,7 +32,7 @@ pub struct Cure {
 
 /// Of a fitted model.
 pub(crate) fn of(engine: &Engine, model: &Model, held: bool) -> Cure {
-    let (data, base) = (engine.data, engine.simulator.base);
+    let (data, base) = (engine.data, engine.base());
     let file = model.extend(base, data);
     let tick_refuses = file.check().err().map(|error| error.to_string());
     let runs = held && data.duration_s() < LONGEST_S && tick_refuses.is_none();
@@ -57,7 +57,7 @@ fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f6
     let mut chain = written.chain(base, data);
     chain.memory = chain.memory.at_rest();
     let mut fitted = voltage.clone();
-    chain.settle(&mut fitted);
+    chain.static_response(&mut fitted);
     chain.relax(&mut fitted, &voltage, &mut Vec::new());
     Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (fitted - fixed).abs()).fold(0.0, f64::max))
 }

@@ -5,7 +5,7 @@ use crate::effects::EFFECTS;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::parameters;
 use crate::search::{Scored, effects};
-use crate::stats::scale::scale_of_squares;
+use crate::stats::scale::root_mean_square;
 
 pub(crate) fn explained(finding: &Finding) -> f64 {
     finding.rmse_before.powi(2) - finding.rmse_after.powi(2)
@@ -23,7 +23,7 @@ pub(crate) fn finding(
     let [before, rival, after] = [left_out, without, best].map(|scored| rms(engine, &scored.fit));
     let others: Vec<&str> = effects(&without.fit.model).into_iter().map(|other| EFFECTS[other].cause()).collect();
     let against = if others.is_empty() { "the simulation as it was".to_owned() } else { others.join(" and ") };
-    let better = if best.fit.model.searched(effect, engine.data) {
+    let better = if best.fit.model.searched(effect) {
         format!("the readings are {odds:.1} nats likelier, all places that were searched charged,")
     } else {
         format!("on held-out stretches this is {odds:.1} nats better")
@@ -34,10 +34,13 @@ pub(crate) fn finding(
         parameters: parameters(engine, &best.fit, effect),
         rmse_before: before.max(after),
         rmse_after: after,
-        evidence: format!("{}: {better} than the best without it ({against}, {rival:.3} V)", EFFECTS[effect].meaning()),
+        evidence: format!(
+            "{}: {better} than the best without it ({against}, {rival:.3} V)",
+            EFFECTS[effect].description()
+        ),
     }
 }
 
 fn rms(engine: &Engine, fit: &Fit) -> f64 {
-    scale_of_squares(&engine.observed.errors(&fit.residual))
+    root_mean_square(&engine.observed.errors(&fit.residual))
 }

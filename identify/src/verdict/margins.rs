@@ -23,7 +23,7 @@ const WIDEST: Margins = Margins { gain: 0.5, time_constant: 1.0 };
 /// The smallest errors of gain and time constant that would show in a record on which nothing was found, as parts of the
 /// simulation's; `caution` multiplies the price of a cause.
 pub(crate) fn margins(engine: &mut Engine, nothing: &Fit, caution: f64) -> Margins {
-    let model = of_both(engine.simulator.base.relaxation.tau_s);
+    let model = of_both(engine.base().relaxation.tau_s);
     let known = information(engine, &Fit { model, ..nothing.clone() });
     let nats = gain_and_time_constant().map(|block| RIVAL + caution * Judge::price(engine, &block));
     let margin = |of: usize| ((2.0 * nats[of]).sqrt() + Z) / known[(of, of)].sqrt();

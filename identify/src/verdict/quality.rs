@@ -6,7 +6,7 @@ use crate::answer::{NoiseReport, Quality, ResidualReport};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
 use crate::record::data::Data;
-use crate::stats::scale::{FINEST_V, Z, scale_of_squares};
+use crate::stats::scale::{FINEST_V, Z, root_mean_square};
 use crate::stats::sums::dot;
 
 /// Lags of the residual's correlations.
@@ -15,11 +15,11 @@ const LAGS: usize = 20;
 /// `unseen` is the residual on held-out stretches; `stops` if the simulation knows of bounds at which readings stop.
 pub(crate) fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -> Quality {
     let observed = engine.observed;
-    let error = |residual: &[f64]| scale_of_squares(&if stops { observed.errors(residual) } else { residual.into() });
+    let error = |residual: &[f64]| root_mean_square(&if stops { observed.errors(residual) } else { residual.into() });
     let rmse = error(&fit.residual);
     let reading = &engine.data.reading;
     let mean = reading.iter().sum::<f64>() / reading.len() as f64;
-    let spread = scale_of_squares(&reading.iter().map(|value| value - mean).collect::<Vec<_>>());
+    let spread = root_mean_square(&reading.iter().map(|value| value - mean).collect::<Vec<_>>());
     Quality {
         rmse,
         // Of readings that never change there is none.
@@ -33,7 +33,7 @@ pub(crate) fn noise_report(noise: &Noise) -> NoiseReport {
     NoiseReport {
         sigma: noise.sigma,
         tail: noise.nu.is_finite().then_some(noise.nu),
-        memory_rows: noise.memory.ar.len(),
+        memory_rows: noise.autocorrelation.ar.len(),
     }
 }
 

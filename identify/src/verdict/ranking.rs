@@ -6,7 +6,7 @@ use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::record::data::Data;
 use crate::search::{Judge, Scored, Search, effects};
-use crate::stats::scale::scale_of_squares;
+use crate::stats::scale::root_mean_square;
 
 /// A set of causes in its best forms.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,14 +41,14 @@ pub(crate) fn contenders<J: Judge>(search: &Search<J>, best: &Scored) -> Vec<Sco
 pub(crate) fn standings(engine: &mut Engine, contenders: Vec<Scored>, known: [(&Fit, &[f64]); 2]) -> Vec<Standing> {
     let data = engine.data;
     let mut held_out_rmse = |fit: &Fit| match known.iter().find(|(other, _)| other.model == fit.model) {
-        Some((_, unseen)) => scale_of_squares(unseen),
-        None => scale_of_squares(&engine.foretold(fit)),
+        Some((_, unseen)) => root_mean_square(unseen),
+        None => root_mean_square(&engine.held_out_residual(fit)),
     };
     let standing = |scored: Scored| Standing {
         causes: effects(&scored.fit.model).into_iter().map(|effect| EFFECTS[effect].cause()).collect(),
         values: values(data, &scored.fit.model),
         score: scored.score,
-        rmse: scale_of_squares(&scored.fit.residual),
+        rmse: root_mean_square(&scored.fit.residual),
         held_out_rmse: held_out_rmse(&scored.fit),
     };
     contenders.into_iter().map(standing).collect()

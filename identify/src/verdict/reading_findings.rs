@@ -5,9 +5,9 @@ use crate::answer::{Finding, Parameter};
 use crate::fit::engine::Fit;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
-use crate::record::quantisation_grid::Lattice;
+use crate::record::quantisation_grid::QuantisationGrid;
 use crate::stats::scale::Z;
-use crate::stats::scale::{FINEST_V, scale_of_squares};
+use crate::stats::scale::{FINEST_V, root_mean_square};
 
 /// A step of the readings this many of the noise's scales wide is worth naming.
 const COARSE_STEP: f64 = 0.5;
@@ -16,14 +16,14 @@ const COARSE_STEP: f64 = 0.5;
 /// the command.
 pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alone: bool) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let raw = scale_of_squares(&fit.residual);
-    let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
+    let raw = root_mean_square(&fit.residual);
+    let stopped_raw = root_mean_square(&observed.errors(&fit.residual));
     let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
     let single = |name: &str, value: f64, low: f64, high: f64, unit| {
         vec![(name.to_owned(), Parameter { value, low, high, unit })]
     };
-    if let Some(Lattice { step, low, high }) = observed.lattice
-        && (step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V) || observed.cut_v > 0.0)
+    if let Some(QuantisationGrid { step, low, high }) = observed.grid
+        && (step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V) || observed.truncation_v > 0.0)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data
@@ -36,12 +36,14 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
             cause: "quantisation",
             probability: 1.0,
             parameters: single("step", step, low, high, "V"),
-            rmse_before: scale_of_squares(&fit.residual.iter().map(|left| left - observed.cut_v).collect::<Vec<_>>()),
-            rmse_after: scale_of_squares(&after).min(raw),
+            rmse_before: root_mean_square(
+                &fit.residual.iter().map(|left| left - observed.truncation_v).collect::<Vec<_>>(),
+            ),
+            rmse_after: root_mean_square(&after).min(raw),
             evidence: format!(
                 "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left{}",
                 step / raw,
-                if observed.cut_v == 0.0 { "" } else { "; what is less than a step was cut off" }
+                if observed.truncation_v == 0.0 { "" } else { "; what is less than a step was cut off" }
             ),
         });
     }
@@ -60,7 +62,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
             ),
         });
     }
-    if let Some((_, wide)) = fit.noise.wide.filter(|_| alone) {
+    if let Some((_, wide)) = fit.noise.outliers.filter(|_| alone) {
         let errors = observed.errors(&fit.residual);
         let far = far_off(&fit.noise, &fit.noise.innovations(&errors));
         let kept: Vec<f64> = errors.iter().zip(&far).filter(|(_, far)| !**far).map(|(error, _)| *error).collect();
@@ -72,7 +74,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
             probability: 1.0,
             parameters: single("fraction", fraction, (fraction - Z * spread).max(0.0), fraction + Z * spread, ""),
             rmse_before: stopped_raw,
-            rmse_after: scale_of_squares(&kept),
+            rmse_after: root_mean_square(&kept),
             evidence: format!(
                 "{off} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
                 wide / fit.noise.sigma

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::output::diagnosis::is_extended;
 use identify::answer::{Finding, Parameter};
-use identify::stats::scale::scale_of_squares;
+use identify::stats::scale::root_mean_square;
 use identify::verdict::diagnosis::Diagnosis;
 use identify::verdict::ranking::Standing;
 
@@ -134,7 +134,7 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
     let rows: Vec<(usize, usize, f64, f64)> = (0..data.folds)
         .map(|fold| {
             let (before, after) = (of(fold, before), of(fold, after));
-            (fold + 1, before.len(), scale_of_squares(&before), scale_of_squares(&after))
+            (fold + 1, before.len(), root_mean_square(&before), root_mean_square(&after))
         })
         .collect();
     let largest = rows.iter().map(|row| row.2.max(row.3)).fold(1e-12, f64::max);
@@ -176,7 +176,7 @@ pub(super) fn noise(diagnosis: &Diagnosis) -> Markup {
         1 => "a memory of one row".to_owned(),
         rows => format!("a memory of {rows} rows"),
     };
-    let wide = diagnosis.extended.noise.wide.map(|(fraction, wide)| {
+    let wide = diagnosis.extended.noise.outliers.map(|(fraction, wide)| {
         format!(" {} % of the readings are off by {} V.", number(100.0 * fraction), number(wide))
     });
     html! { p { "Scale " (number(noise.sigma)) " V, " (tail) ", " (memory) "." (wide.unwrap_or_default()) } }

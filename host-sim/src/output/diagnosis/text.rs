@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use identify::answer::Margins;
 use identify::answer::{Extended, Finding, Quality, Report, Verdict};
-use identify::effects::effect::Stage;
+use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
 use identify::verdict::export::SMALL_ERROR_V;
 
@@ -89,8 +89,8 @@ fn off_by(part: f64) -> String {
 /// What is wrong; what the cure is worth; what to do next.
 pub fn sentences(name: &str, report: &Report) -> Vec<String> {
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
-    let in_readings = effects.clone().all(|effect| effect.stage() == Stage::Reading);
-    let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.meaning())).collect();
+    let in_readings = effects.clone().all(|effect| effect.location() == Location::Reading);
+    let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.description())).collect();
     let margins = report.would_show.map(|Margins { gain, time_constant }| {
         format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
     });

@@ -1,4 +1,5 @@
-//! A spectrum in bands, narrow where frequencies are low: what a fractional difference would leave, without running it.
+//! A power spectrum in bands of constant relative width, from which the autocovariance after a fractional difference
+//! follows without filtering.
 //!
 //! ```text
 //! correlation(k) = sum_bands power |1 - exp(-i w)|^(2 d) cos(k w)
@@ -8,25 +9,26 @@ use std::f64::consts::{PI, TAU};
 
 use crate::stats::periodogram::powers;
 
-/// Width of a band beside its frequency.
+/// Width of a band relative to its frequency.
 const RELATIVE: f64 = 0.02;
-/// And at most, in radians a row: short beside a period of the longest lag.
+/// Largest width of a band, in radians per row: short compared with a period of the longest lag.
 const WIDEST: f64 = PI / 300.0;
 
-/// Mean frequency, in radians a row, and power of each band.
-pub(super) struct Octaves {
+/// Mean frequency, in radians per row, and power of each band.
+pub(super) struct BandSpectrum {
     bands: Vec<(f64, f64)>,
 }
 
-impl Octaves {
-    /// Of some values, and independent noise of this variance beside them; their mean counts as the lowest frequency.
+impl BandSpectrum {
+    /// Returns the spectrum of values in additional independent noise of the given variance; the mean counts as half of
+    /// the lowest frequency.
     pub(super) fn of(values: &[f64], variance: f64) -> Self {
         let powers = powers(values);
         let length = 2 * (powers.len() - 1);
         let line = TAU / length as f64;
         let mut bands: Vec<(f64, f64)> = Vec::new();
         let mut end = 0.0;
-        // Sums of power, and of power times frequency.
+        // Each band holds the sum of power times frequency, and the sum of power.
         for (index, of_values) in powers.into_iter().enumerate() {
             let sides = if index == 0 || 2 * index == length { 1.0 } else { 2.0 };
             let power = sides * (of_values / values.len() as f64 + variance) / length as f64;
@@ -42,12 +44,12 @@ impl Octaves {
         Self { bands: bands.into_iter().map(|(sum, power)| (sum / power.max(1e-300), power)).collect() }
     }
 
-    /// Correlations of up to `longest` rows after a fractional difference of order `power`.
+    /// Returns the autocovariances at lags 0 to `longest` after a fractional difference of order `power`.
     pub(super) fn correlation(&self, power: f64, longest: usize) -> Vec<f64> {
         let mut correlation = vec![0.0; longest + 1];
         for &(frequency, of_band) in &self.bands {
             let left = of_band * (2.0 * (frequency / 2.0).sin()).powf(2.0 * power);
-            // cos((k + 1) w) = 2 cos(w) cos(k w) - cos((k - 1) w)
+            // The recurrence is cos((k + 1) w) = 2 cos(w) cos(k w) - cos((k - 1) w).
             let (mut before, mut now) = (frequency.cos(), 1.0);
             let twice = 2.0 * before;
             for sum in &mut correlation {
@@ -65,22 +67,22 @@ mod tests {
     use crate::stats::scale::normals;
 
     #[test]
-    fn without_a_difference_it_is_the_correlation_itself() {
+    fn order_0_gives_the_autocovariance_of_the_values() {
         let values = normals(3000);
-        let of_bands = Octaves::of(&values, 0.0).correlation(0.0, 12);
+        let of_bands = BandSpectrum::of(&values, 0.0).correlation(0.0, 12);
         for (lag, of_bands) in of_bands.into_iter().enumerate() {
             let exact: f64 = values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / 3000.0;
             assert!((of_bands - exact).abs() < 2e-3, "{lag}: {of_bands} {exact}");
         }
     }
 
-    /// An order of 1 is the difference of neighbours.
+    /// A fractional difference of order 1 is the difference of neighbours.
     #[test]
-    fn a_whole_difference_is_that_of_neighbours() {
+    fn order_1_gives_the_variance_of_first_differences() {
         let values = normals(3000);
         let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let exact: f64 = steps.iter().map(|step| step * step).sum::<f64>() / 3000.0;
-        let of_bands = Octaves::of(&values, 0.0).correlation(1.0, 12)[0];
+        let of_bands = BandSpectrum::of(&values, 0.0).correlation(1.0, 12)[0];
         assert!((of_bands - exact).abs() < 5e-3, "{of_bands} {exact}");
     }
 }

@@ -1,27 +1,27 @@
-//! Rate-independent memory: a bank of play operators (the Prandtl-Ishlinskii model; Brokate and Sprekels, *Hysteresis and
-//! Phase Transitions*, 1996).
+//! Rate-independent hysteresis: a bank of play operators (the Prandtl-Ishlinskii model; Brokate and Sprekels,
+//! *Hysteresis and Phase Transitions*, 1996).
 //!
 //! ```text
 //! play: z' = clamp(z, u - r, u + r)        p = direct u + sum weight z
 //! ```
 //!
-//! A spring that never had a voltage starts with all `z` at 0; one that comes from a large voltage with each at its `r`, where
-//! its sensor has been set to zero.
-//! From rest upwards it follows its loading curve `phi(u) = direct u + sum weight max(u - r, 0)`. Behind a bank whose
-//! curve rises, another bank is a bank again, and the curves are put into each other (Kuhnen, *European Journal of
-//! Control* 9, 2003).
+//! For a spring that never had a voltage all `z` are 0. With an initial condition on the descending branch, after a
+//! large voltage, each `z` is its `r`, and the output there counts as 0.
+//! From rest upwards the output follows the loading curve `phi(u) = direct u + sum weight max(u - r, 0)`. If the
+//! loading curve of a bank increases everywhere, its composition with a second bank is again a bank, whose loading
+//! curve is the composition of both (Kuhnen, *European Journal of Control* 9, 2003).
 
 use model::extended::memory::MAX_PLAYS;
 
 use simulation::plant_file::Memory;
 
-/// A bank of play operators; without plays and with `direct = 1`, no memory.
+/// A bank of play operators; without plays and with `direct = 1` it is the identity.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bank {
+pub struct PlayBank {
     /// Weight of the input itself.
     pub direct: f64,
     plays: Vec<Play>,
-    /// What counts as 0 V.
+    /// Output that counts as 0 V, in V.
     zero: f64,
 }
 
@@ -32,8 +32,8 @@ struct Play {
     value: f64,
 }
 
-impl Bank {
-    /// Of plays with their thresholds, in V, and weights; those without weight are left out.
+impl PlayBank {
+    /// Returns a bank of plays with the given thresholds, in V, and weights; those of weight 0 are left out.
     pub fn new(direct: f64, plays: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let plays = plays.into_iter().filter(|(_, weight)| *weight != 0.0);
         Self {
@@ -43,7 +43,7 @@ impl Bank {
         }
     }
 
-    /// The same after a large voltage: each play starts where that leaves it at 0 V, and what it then holds counts as none.
+    /// Returns the same bank with its initial condition on the descending branch at 0 V, where its output is 0.
     pub fn cycled(mut self) -> Self {
         for play in &mut self.plays {
             play.value = play.threshold;
@@ -52,14 +52,14 @@ impl Bank {
         self
     }
 
-    /// The same before any voltage.
+    /// Returns the same bank before any voltage.
     pub fn at_rest(mut self) -> Self {
         self.zero = 0.0;
         self.plays.iter_mut().for_each(|play| play.value = 0.0);
         self
     }
 
-    /// Of a plant file.
+    /// Returns the bank of a plant file.
     pub fn of(memory: Option<&Memory>) -> Self {
         match memory {
             None => Self::new(1.0, []),
@@ -69,29 +69,30 @@ impl Bank {
         }
     }
 
-    /// For a plant file; none if there is no memory.
+    /// Returns the table for a plant file; `None` for the identity.
     pub fn table(&self) -> Option<Memory> {
         let (thresholds_v, weights) = self.plays.iter().map(|play| (play.threshold, play.weight)).unzip();
         (*self != Self::new(1.0, [])).then_some(Memory { direct: self.direct, thresholds_v, weights })
     }
 
-    /// True if a plant file holds that many plays.
-    pub fn fits(&self) -> bool {
+    /// Returns true if a plant file can hold the number of plays.
+    pub fn fits_plant_file(&self) -> bool {
         self.plays.len() <= MAX_PLAYS
     }
 
-    /// True if the loading curve falls nowhere.
-    pub fn rises(&self) -> bool {
+    /// Returns true if the loading curve does not decrease anywhere.
+    pub fn is_monotonic(&self) -> bool {
         self.lines().iter().all(|line| line.slope >= -1e-9)
     }
 
-    /// This bank behind another, whose loading curve falls nowhere.
-    pub fn behind(&self, first: &Self) -> Self {
+    /// Returns the composition of this bank with `first`, which acts before it and whose loading curve must not
+    /// decrease.
+    pub fn composed_with(&self, first: &Self) -> Self {
         if *first == Self::new(1.0, []) {
             return self.clone();
         }
         let (outer, inner) = (self.lines(), first.lines());
-        // Where the first bank reaches the thresholds of this one.
+        // Voltages at which the output of the first bank reaches the thresholds of this one.
         let reached = outer.iter().map(|line| {
             let below = inner[inner.partition_point(|inner| inner.value <= line.start).max(1) - 1];
             below.start + (line.start - below.value) / below.slope
@@ -103,7 +104,7 @@ impl Bank {
         let mut bank = Self::new(0.0, []);
         let mut before = 0.0;
         for (index, &threshold) in starts.iter().enumerate() {
-            // Within the line, so that rounding cannot choose the wrong one.
+            // Evaluated within the interval, so that rounding cannot select a neighbour.
             let within = starts.get(index + 1).map_or(threshold + 1.0, |next| (threshold + next) / 2.0);
             let Line { start, value, slope } = line_at(&inner, within);
             let slope = slope * line_at(&outer, value + slope * (within - start)).slope;
@@ -117,7 +118,7 @@ impl Bank {
         bank
     }
 
-    /// The output when the input comes to `voltage`.
+    /// Returns the output when the input moves monotonically to `voltage`, both in V.
     pub fn at(&mut self, voltage: f64) -> f64 {
         let mut sum = self.direct * voltage - self.zero;
         for play in &mut self.plays {
@@ -127,18 +128,20 @@ impl Bank {
         sum
     }
 
-    /// Largest distance along the voltage axis between the branches of a slow loop from 0 to `top` and back, in V.
+    /// Returns the largest distance along the voltage axis between the branches of a slow loop from 0 to `top` and
+    /// back, in V.
     pub fn width(mut self, top: f64) -> f64 {
         const STEPS: usize = 400;
         let voltage = |step: usize| top * step as f64 / STEPS as f64;
-        // Once around first, so that the loop closes.
+        // The first cycle closes the loop.
         for step in (0..=STEPS).chain((0..STEPS).rev()) {
             self.at(voltage(step));
         }
         let up: Vec<f64> = (0..=STEPS).map(|step| self.at(voltage(step))).collect();
         let mut down: Vec<f64> = (0..=STEPS).rev().map(|step| self.at(voltage(step))).collect();
         down.reverse();
-        // Both rise with the voltage: the voltage of the branch up at the same stiffness, by interpolation.
+        // Both branches increase with the voltage; the voltage of the ascending branch at the same output is
+        // interpolated.
         let mut at = 0;
         let mut widest = 0.0f64;
         for (step, &value) in down.iter().enumerate() {
@@ -152,7 +155,7 @@ impl Bank {
         widest
     }
 
-    /// The loading curve from 0 V up.
+    /// Returns the lines of the loading curve for rising voltage from 0 V.
     fn lines(&self) -> Vec<Line> {
         let mut plays = self.plays.clone();
         plays.sort_by(|a, b| a.threshold.total_cmp(&b.threshold));
@@ -165,7 +168,7 @@ impl Bank {
     }
 }
 
-/// A line of a loading curve.
+/// One line of a loading curve, from `start` to the next.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     start: f64,
@@ -181,17 +184,17 @@ fn line_at(lines: &[Line], at: f64) -> Line {
 mod tests {
     use super::*;
 
-    /// One play of weight 1 lags by its threshold on both branches.
+    /// A play of weight 1 lags by its threshold on both branches.
     #[test]
-    fn a_whole_play_is_twice_its_threshold_wide() {
-        let width = Bank::new(0.0, [(20.0, 1.0)]).width(500.0);
+    fn loop_of_one_play_is_twice_its_threshold_wide() {
+        let width = PlayBank::new(0.0, [(20.0, 1.0)]).width(500.0);
         assert!((width - 40.0).abs() < 0.5, "{width}");
     }
 
-    /// The second time up is the same for both: the first has then been cycled too.
+    /// After one large voltage, both initial conditions give the same changes of the output.
     #[test]
-    fn a_cycled_bank_begins_where_a_large_voltage_leaves_it() {
-        let mut fresh = Bank::new(0.6, [(20.0, 0.1), (60.0, 0.3)]);
+    fn cycled_bank_starts_on_the_descending_branch() {
+        let mut fresh = PlayBank::new(0.6, [(20.0, 0.1), (60.0, 0.3)]);
         let mut cycled = fresh.clone().cycled();
         assert_eq!(cycled.clone().at_rest(), fresh);
         assert_eq!(cycled.clone().at(0.0), 0.0);
@@ -203,13 +206,15 @@ mod tests {
     }
 
     #[test]
-    fn a_bank_behind_a_bank_is_one_bank() {
-        let first = Bank::new(0.5, [(20.0, 0.3), (45.0, 0.4)]);
-        let none = Bank::new(1.0, []);
-        assert_eq!(first.behind(&none), first);
-        let whole = Bank::new(0.0, [(15.0, 0.5), (15.0, 0.5)]);
-        for second in [whole, Bank::new(0.0, [(30.0, 1.0)]), Bank::new(-0.3, [(10.0, 0.9), (30.0, 0.2), (90.0, 0.4)])] {
-            let mut both = second.behind(&first);
+    fn composition_of_two_banks_is_one_bank() {
+        let first = PlayBank::new(0.5, [(20.0, 0.3), (45.0, 0.4)]);
+        let none = PlayBank::new(1.0, []);
+        assert_eq!(first.composed_with(&none), first);
+        let whole = PlayBank::new(0.0, [(15.0, 0.5), (15.0, 0.5)]);
+        for second in
+            [whole, PlayBank::new(0.0, [(30.0, 1.0)]), PlayBank::new(-0.3, [(10.0, 0.9), (30.0, 0.2), (90.0, 0.4)])]
+        {
+            let mut both = second.composed_with(&first);
             let (mut first, mut second) = (first.clone(), second.clone());
             for step in 0..4000 {
                 let voltage = 300.0 * (0.01 * f64::from(step)).sin() + 200.0 * (0.0371 * f64::from(step)).sin();

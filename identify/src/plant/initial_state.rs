@@ -1,103 +1,104 @@
-//! Where a record begins in mid-course: how far each state of the chain is off its rest by then.
+//! The initial state of the chain at the first row, where the spring may not have been at rest.
 //!
-//! Behind memory and law all is linear (but for two forms, a time constant by the spring's state and a law behind the
-//! relaxation, which are not tried here), so the prediction is straight in the states at the first row,
-//! `prediction(x) = prediction(0) + sum x_i kernel_i`, and the kernels die away. So `x` is no coordinate of a fit; every
-//! model gets the one that suits it best, by Huber's robust least squares with a normal prior as wide as the record's
-//! voltages (of kernels alike, only the sum is known). It counts as given, also for stretches that are held out; what the
-//! states cost, as by Schwarz's criterion, their model pays.
+//! Behind hysteresis and static law the chain is linear, except for two forms of effects that are not tried in this
+//! case (a time constant that depends on the state, and a law behind the relaxation). So the prediction is linear in
+//! the states at the first row, `prediction(x) = prediction(0) + sum x_i kernel_i`, and the kernels decay. The states
+//! are not coordinates of the fit: for every model they are estimated by Huber's robust least squares, with a normal
+//! prior whose width is the record's full scale (the prior decides between kernels of the same shape). Held-out
+//! segments use the same estimate. The likelihood is reduced by the cost of the states, by Schwarz's criterion.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::stats::scale::scale;
+use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
 
-/// Errors this many scales large count as that large.
-const FAR: f64 = 3.0;
-/// Rounds of reweighting.
+/// Errors beyond this many scales are weighted down (Huber's threshold).
+const HUBER_THRESHOLD: f64 = 3.0;
+/// Number of reweighting rounds.
 const ROUNDS: usize = 4;
-/// Rows where the start matters less, as a part of where it matters most, do not tell its scale.
-const FADED: f64 = 0.05;
+/// Rows in which all kernels are below this fraction of their maximum do not contribute to the estimate.
+const NEGLIGIBLE: f64 = 0.05;
 
-/// The states of a chain, in the order in which they ask: all at rest, or one of them 1 V off.
+/// The initial offsets of a chain's states, requested one after the other: all 0, or one of them 1 V.
 #[derive(Debug, Default)]
-pub struct Start {
+pub struct InitialState {
     asked: usize,
     off: Option<usize>,
 }
 
-impl Start {
-    /// All at rest.
+impl InitialState {
+    /// Returns the state in which every offset is 0.
     pub fn at_rest() -> Self {
         Self::default()
     }
 
-    /// All but one.
+    /// Returns the state in which the offset with this index is 1 V and all others are 0.
     pub(crate) fn off(state: usize) -> Self {
         Self { asked: 0, off: Some(state) }
     }
 
-    /// How far the next state is off its rest, in V.
-    pub fn ask(&mut self) -> f64 {
+    /// Returns the offset of the next state from its settled value, in V.
+    pub fn next_offset_v(&mut self) -> f64 {
         self.asked += 1;
         f64::from(u8::from(self.off == Some(self.asked - 1)))
     }
 
-    /// How many states have asked.
+    /// Returns the number of offsets that have been requested.
     pub(crate) fn states(&self) -> usize {
         self.asked
     }
 }
 
-/// Takes the likeliest start off a residual, by what `counts` of its rows; states are off by about `reach_v`. What that start
-/// costs, in nats: each state by Schwarz's criterion, and what the prior says against it.
-pub(crate) fn take_off(
+/// Subtracts the response to the most likely initial state from a residual, estimated from the rows for which `counts`
+/// is true, with a prior of standard deviation `reach_v`, in V. Returns the cost in nats: Schwarz's criterion for each
+/// state, and the prior.
+pub(crate) fn subtract_estimate(
     residual: &mut [f64],
     kernels: &[Vec<f64>],
     reach_v: f64,
     counts: impl Fn(usize) -> bool,
 ) -> f64 {
-    let early = kernels.iter().map(|kernel| faded(kernel)).max().unwrap_or(0);
+    let early = kernels.iter().map(|kernel| decay_end(kernel)).max().unwrap_or(0);
     let counted = |values: &[f64]| (0..early).filter(|&row| counts(row)).map(|row| values[row]).collect::<Vec<f64>>();
     let read = counted(residual);
-    let told: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
+    let used: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
     let mut start = DVector::zeros(kernels.len());
     let mut left = read.clone();
     let mut weighted = left.clone();
-    let (mut usual, mut far) = (scale(&left), f64::INFINITY);
+    let (mut usual, mut far) = (robust_scale(&left), f64::INFINITY);
     for round in 1..=ROUNDS {
         let prior = (usual / reach_v).powi(2);
         let mut normal = DMatrix::from_diagonal_element(kernels.len(), kernels.len(), prior);
-        for (i, kernel) in told.iter().enumerate() {
+        for (i, kernel) in used.iter().enumerate() {
             let weights = left.iter().map(|left| (far / left.abs()).min(1.0));
             weighted.iter_mut().zip(kernel).zip(weights).for_each(|((to, kernel), weight)| *to = weight * kernel);
             start[i] = dot(&weighted, &read);
-            // The lower triangle is all that is read.
-            told[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted, other));
+            // The Cholesky decomposition reads the lower triangle only.
+            used[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted, other));
         }
         let Some(cholesky) = normal.cholesky() else { return 0.0 };
         cholesky.solve_mut(&mut start);
         if round < ROUNDS {
             left.clone_from(&read);
-            take(&start, &told, &mut left);
-            usual = scale(&left);
-            far = FAR * usual;
+            subtract(&start, &used, &mut left);
+            usual = robust_scale(&left);
+            far = HUBER_THRESHOLD * usual;
         }
     }
-    take(&start, kernels, residual);
+    subtract(&start, kernels, residual);
     0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * start.norm_squared() / reach_v.powi(2)
 }
 
-fn take(start: &DVector<f64>, kernels: &[Vec<f64>], from: &mut [f64]) {
+fn subtract(start: &DVector<f64>, kernels: &[Vec<f64>], from: &mut [f64]) {
     for (start, kernel) in start.iter().zip(kernels) {
         from.iter_mut().zip(kernel).for_each(|(left, kernel)| *left -= start * kernel);
     }
 }
 
-/// The first row from which on a kernel hardly matters.
-fn faded(kernel: &[f64]) -> usize {
+/// Returns the first row from which on a kernel stays below [`NEGLIGIBLE`] of its maximum.
+fn decay_end(kernel: &[f64]) -> usize {
     let most = kernel.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    kernel.iter().rposition(|value| value.abs() > FADED * most).map_or(0, |last| last + 1)
+    kernel.iter().rposition(|value| value.abs() > NEGLIGIBLE * most).map_or(0, |last| last + 1)
 }
 
 #[cfg(test)]
@@ -112,7 +113,7 @@ mod tests {
     use simulation::record::{Record, Row};
 
     const ROWS: usize = 900;
-    /// Just after a step.
+    /// This row is just after a step.
     const CUT: usize = 302;
 
     fn record(rows: impl Iterator<Item = usize>, reading: impl Fn(usize) -> f64) -> Record {
@@ -121,9 +122,9 @@ mod tests {
         Record { name: String::new(), rows: rows.map(row).collect() }
     }
 
-    /// Cut out of a longer one, a record shows the same spring.
+    /// The readings of a spring from any row on are explained without residual by the model of that spring.
     #[test]
-    fn a_start_makes_up_for_all_that_was_before() {
+    fn initial_state_explains_a_record_cut_from_a_longer_one() {
         let springs: [&[(&str, usize, &[f64])]; 6] = [
             &[("time-constant", 0, &[2.0])],
             &[("charge-leakage", 1, &[0.2, 3.0, 0.4]), ("second-relaxation", 1, &[0.2, 3.6])],
@@ -142,10 +143,10 @@ mod tests {
             Simulator::new(&whole, &base).run(&model, &mut readings);
             let data = Data::new(&record(CUT..ROWS, |row| readings[row]), Input::Hold);
             let observed = Observed::new(&data);
-            let mut engine = Engine::new(&data, &observed, Simulator::new(&data, &base));
+            let mut engine = Engine::new(&data, &observed, &base);
             let residual = engine.residual(&model);
             let left = residual.iter().fold(0.0f64, |far, left| far.max(left.abs()));
-            assert!(data.begun && left < 0.01, "{blocks:?}: {left} V");
+            assert!(data.initial_state_unknown && left < 0.01, "{blocks:?}: {left} V");
         }
     }
 }

@@ -1,48 +1,48 @@
-//! Noise that grows with the reading, seen in the readings themselves.
+//! Noise whose scale grows with the reading (heteroscedastic noise), estimated from the readings alone.
 //!
 //! ```text
 //! scale(level) = a + b level,      level = median of |reading| over five rows
 //! ```
 //!
-//! A sensor whose error is a part of what it reads scatters more under high voltage. Taken for even noise, a far reading there
-//! passes for a shift, or for an outlier. The scale is that of second differences, of which a slow signal has none, in groups
-//! of rows of like level; it counts only if it grows beyond doubt.
+//! The noise of a sensor with an error proportional to its reading is larger under high voltage. Under a constant
+//! scale, a reading with a large error there would be taken for an offset or an outlier. The scale is estimated from
+//! second differences, in groups of rows with similar level, and used only if its growth is significant.
 
 use std::sync::Arc;
 
 use crate::record::data::Data;
-use crate::stats::median::running;
-use crate::stats::scale::bends;
-use crate::stats::scale::scale;
+use crate::stats::median::running_median;
+use crate::stats::scale::robust_scale;
+use crate::stats::scale::second_differences;
 
-/// Groups of like level.
+/// Number of groups of similar level.
 const GROUPS: usize = 10;
-/// Fewest rows of a group that tell a scale.
-const FEWEST: usize = 20;
-/// Relative error of a scale from one row's second difference; neighbours are not independent.
-const ERROR: f64 = 1.5;
-/// Growth is beyond doubt if so many standard deviations large,
-const CERTAIN: f64 = 6.0;
-/// and worth a word from this ratio between the highest and the lowest level on.
-const RATIO: f64 = 1.3;
+/// Smallest number of rows in a group.
+const FEWEST_ROWS: usize = 20;
+/// Relative standard error of a scale estimated from one second difference; neighbouring differences are correlated.
+const RELATIVE_ERROR: f64 = 1.5;
+/// Growth is significant if the slope is this many standard errors,
+const SIGNIFICANT_SLOPE: f64 = 6.0;
+/// and relevant if the scale at the highest level is this many times the scale at the lowest.
+const RELEVANT_RATIO: f64 = 1.3;
 
-/// One over each row's scale, their geometric mean 1; `None` if the noise does not grow. Rows for which `counts` is false do
-/// not tell.
+/// Returns the reciprocal scale of each row, normalised to a geometric mean of 1; `None` if the scale does not grow
+/// significantly. Rows for which `counts` is false are not used for the estimate.
 pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc<[f64]>> {
     let mut rows: Vec<usize> =
         (1..data.rows().saturating_sub(1)).filter(|row| (row - 1..=row + 1).all(&counts)).collect();
-    if rows.len() < GROUPS * FEWEST {
+    if rows.len() < GROUPS * FEWEST_ROWS {
         return None;
     }
     let reading = &data.reading;
-    let bends: Vec<f64> = bends(reading).collect();
-    let level = running(&reading.iter().map(|reading| reading.abs()).collect::<Vec<_>>());
+    let differences: Vec<f64> = second_differences(reading).collect();
+    let level = running_median(&reading.iter().map(|reading| reading.abs()).collect::<Vec<_>>());
     rows.sort_by(|a, b| level[*a].total_cmp(&level[*b]));
     let of_group = |rows: &[usize]| {
         let middle = rows.iter().map(|row| level[*row]).sum::<f64>() / rows.len() as f64;
-        let scale = scale(&rows.iter().map(|row| bends[row - 1]).collect::<Vec<_>>());
-        // Level, scale, and what the scale is worth.
-        (middle, scale, rows.len() as f64 / (ERROR * scale).powi(2))
+        let scale = robust_scale(&rows.iter().map(|row| differences[row - 1]).collect::<Vec<_>>());
+        // The mean level, the scale, and the weight of the group, which is one over the variance of its scale.
+        (middle, scale, rows.len() as f64 / (RELATIVE_ERROR * scale).powi(2))
     };
     let groups: Vec<(f64, f64, f64)> = rows.chunks(rows.len().div_ceil(GROUPS)).map(of_group).collect();
     let worth: f64 = groups.iter().map(|group| group.2).sum();
@@ -54,7 +54,7 @@ pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
     let least = groups.iter().map(|group| group.1).fold(f64::INFINITY, f64::min);
     let of_level = |level: f64| (mean_scale + slope * (level - mean_level)).max(least / 2.0);
     let (lowest, highest) = (of_level(groups.first()?.0), of_level(groups.last()?.0));
-    if slope * spread.sqrt() < CERTAIN || highest < RATIO * lowest {
+    if slope * spread.sqrt() < SIGNIFICANT_SLOPE || highest < RELEVANT_RATIO * lowest {
         return None;
     }
     let scales: Vec<f64> = level.into_iter().map(of_level).collect();
@@ -69,7 +69,7 @@ mod tests {
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 
-    /// A sweep up and down under noise of a scale for each level.
+    /// Returns the weights for a sweep of the voltage up and down, with noise of the given scale at each level.
     fn of(scale: impl Fn(f64) -> f64) -> Option<Arc<[f64]>> {
         let row = |(row, noise): (usize, f64)| {
             let level = 0.5 * (1000.0 - row as f64).abs();
@@ -80,11 +80,11 @@ mod tests {
     }
 
     #[test]
-    fn a_scale_that_grows_is_recovered() {
+    fn growing_noise_scale_is_recovered() {
         let weights = of(|level| 0.2 + 0.004 * level).unwrap();
-        // At 50 and at 500 V.
+        // The levels are 50 V and 500 V.
         let ratio = weights[900] / weights[0];
-        assert!((4.5..6.5).contains(&ratio), "{ratio} beside 5.5");
+        assert!((4.5..6.5).contains(&ratio), "{ratio} instead of 5.5");
         let mean = weights.iter().map(|weight| weight.ln()).sum::<f64>();
         assert!(mean.abs() < 1e-9, "{mean}");
         assert!(of(|_| 1.0).is_none());

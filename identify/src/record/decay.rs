@@ -1,0 +1,91 @@
+//! Detection of a spring that is not at rest when its record begins: its readings decay before the first voltage.
+
+use model::Plant;
+
+use crate::stats::scale::{robust_scale, second_differences};
+
+/// Smallest number of readings before the first voltage that can show a decay.
+const FEWEST_AT_REST: usize = 4;
+/// A rest shorter than this fraction of the time constant is too short to show a decay.
+const SHORT_REST: f64 = 0.3;
+/// A decay is significant if its amplitude is this many standard deviations.
+const SIGNIFICANT_DECAY: f64 = 5.0;
+/// Time constants of the decays that are tried, relative to the paper's.
+const DECAY_TIMES: [f64; 3] = [0.5, 1.0, 2.0];
+/// Largest lag-1 correlation of the noise that is assumed.
+const LARGEST_CORRELATION: f64 = 0.98;
+
+/// Returns true if the readings before the first voltage contain an exponential decay from an earlier stiffness; where
+/// the rest is too short to show a decay, if the readings differ from zero.
+pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], reading: &[f64]) -> bool {
+    let rest = voltage_v.iter().take_while(|voltage| **voltage == 0.0).count();
+    if rest == 0 {
+        return false;
+    }
+    let (time_s, at_rest) = (&time_s[..rest], &reading[..rest]);
+    let tau_s = Plant::PAPER.time_constant_s;
+    let short = rest < FEWEST_AT_REST || time_s[rest - 1] - time_s[0] < SHORT_REST * tau_s;
+    let new_v = robust_scale(&second_differences(reading).collect::<Vec<_>>());
+    let falls = |tau_s: f64| {
+        let decay: Vec<f64> = time_s.iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
+        // Least squares on the decay, and on a constant where the two can be distinguished.
+        let mean = |values: &[f64]| if short { 0.0 } else { values.iter().sum::<f64>() / rest as f64 };
+        let (mean_decay, mean_reading) = (mean(&decay), mean(at_rest));
+        let pairs = || decay.iter().zip(at_rest).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
+        let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
+        let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
+        let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
+        height.abs() * power.sqrt() > SIGNIFICANT_DECAY * new_v.max(scaled_deviation_of_sum(&left))
+    };
+    DECAY_TIMES.iter().any(|times| falls(times * tau_s))
+}
+
+/// Returns the standard deviation of the sum of autocorrelated noise over `n` rows, divided by `sqrt(n)`: `sigma
+/// sqrt((1 + rho) / (1 - rho))` for a first-order autoregression with lag-1 correlation `rho`.
+fn scaled_deviation_of_sum(noise: &[f64]) -> f64 {
+    let power: f64 = noise.iter().map(|value| value * value).sum();
+    let memory = noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / power.max(f64::MIN_POSITIVE);
+    let memory = memory.clamp(0.0, LARGEST_CORRELATION);
+    (power / noise.len() as f64 * (1.0 + memory) / (1.0 - memory)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::record::data::{Data, Input};
+    use crate::stats::scale::normals;
+    use simulation::record::{Record, Row};
+
+    /// Autocorrelated noise is not taken for a decay; a decay faster or slower than the paper's time constant is
+    /// recognised.
+    #[test]
+    fn autocorrelated_noise_is_not_taken_for_a_decay() {
+        let record = |row: &dyn Fn(f64, f64) -> f64, at_rest: usize, seed: usize| {
+            let noise = normals(3000 + seed).split_off(seed);
+            let remembered = noise.iter().scan(0.0, |last, noise| {
+                *last = 0.9 * *last + noise;
+                Some(*last)
+            });
+            let rows = remembered.zip(&noise).enumerate().map(|(index, (slow, quick))| {
+                let time_s = 0.1 * index as f64;
+                let voltage_v = if index < at_rest { 0.0 } else { 300.0 };
+                Row {
+                    line: 0,
+                    time_s,
+                    voltage_v,
+                    measured: Some(row(time_s, if seed.is_multiple_of(2) { slow } else { *quick })),
+                }
+            });
+            Data::new(&Record { name: String::new(), rows: rows.collect() }, Input::Hold).initial_state_unknown
+        };
+        // In 1.5 s the spring hardly relaxes, so slow noise may be taken for a decay in up to 20 % of the records.
+        for (at_rest, most) in [(60, 3), (16, 20)] {
+            let mistaken = (0..100).filter(|seed| record(&|_, noise| noise, at_rest, *seed)).count();
+            assert!(mistaken < most, "{at_rest} rows: {mistaken} of 100");
+            for tau_s in [2.0, 3.5, 8.0, 15.0] {
+                let decay = |time: f64, noise| 60.0 * (-time / tau_s).exp() + noise;
+                let falls = (0..100).filter(|seed| record(&decay, at_rest, *seed));
+                assert!(falls.count() > 90, "{at_rest} rows, {tau_s} s");
+            }
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! A signal of straight pieces with jumps between them, and the blocks that map one such signal to another.
+
+/// Durations up to this, in s, are rounding errors.
+const ROUNDING_S: f64 = 1e-9;
+
+/// One straight piece of a signal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Piece {
+    /// Duration, in s; 0 for the piece of the last row.
+    pub duration_s: f64,
+    /// Value at the start.
+    pub from: f64,
+    /// Limit of the value at the end.
+    pub to: f64,
+}
+
+/// A signal over time: contiguous straight pieces, which may jump at their borders.
+#[derive(Debug, Default)]
+pub struct Signal {
+    /// Constant value before the first piece.
+    pub before: f64,
+    pub(super) pieces: Vec<Piece>,
+    /// Index of the piece that starts at each row.
+    pub(super) rows: Vec<u32>,
+}
+
+impl Clone for Signal {
+    fn clone(&self) -> Self {
+        Self { before: self.before, pieces: self.pieces.clone(), rows: self.rows.clone() }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        self.before = source.before;
+        self.pieces.clone_from(&source.pieces);
+        self.rows.clone_from(&source.rows);
+    }
+}
+
+impl Signal {
+    /// Returns the value just after the time of each row.
+    pub fn at_rows(&self) -> impl Iterator<Item = f64> {
+        self.rows.iter().map(|&piece| self.pieces[piece as usize].from)
+    }
+
+    /// Replaces the contents of `middles` by the value in the middle of each piece.
+    pub fn middles(&self, middles: &mut Vec<f64>) {
+        middles.clear();
+        middles.extend(self.pieces.iter().map(|piece| (piece.from + piece.to) / 2.0));
+    }
+
+    /// Applies a law to start and end of every piece, in order of time; the law must return the same for a value that
+    /// repeats.
+    pub fn map(&mut self, mut law: impl FnMut(f64) -> f64) {
+        // Most pieces are constant and continue the previous one, and laws are expensive.
+        let (mut last, mut made) = (self.before, law(self.before));
+        let mut law = |value: f64| {
+            if value != last {
+                (last, made) = (value, law(value));
+            }
+            made
+        };
+        self.before = law(self.before);
+        for piece in &mut self.pieces {
+            piece.from = law(piece.from);
+            piece.to = law(piece.to);
+        }
+    }
+
+    /// Replaces start and end of each piece, in order of time, by what a block returns for it.
+    pub fn pass(&mut self, mut block: impl FnMut(Piece) -> (f64, f64)) {
+        for piece in &mut self.pieces {
+            (piece.from, piece.to) = block(*piece);
+        }
+    }
+
+    /// Returns the signal delayed by `delay_s`, in s; rows keep their times.
+    pub fn delayed(&self, delay_s: f64) -> Self {
+        let mut later = self.emptied();
+        let constant = Piece { duration_s: delay_s, from: self.before, to: self.before };
+        let all = std::iter::once(constant).chain(self.pieces.iter().copied()).filter(|p| p.duration_s > ROUNDING_S);
+        let mut source = all.peekable();
+        // Constant pieces are joined, so that they are not divided where their rows were.
+        let mut next = || {
+            let mut piece = source.next()?;
+            let stays = |to: &Piece| [piece.from, to.from, to.to] == [piece.to; 3];
+            while let Some(more) = source.next_if(stays) {
+                piece.duration_s += more.duration_s;
+            }
+            Some(piece)
+        };
+        let mut rest = next().unwrap_or(constant);
+        let mut rows = self.rows.iter().peekable();
+        for (index, piece) in self.pieces.iter().enumerate() {
+            if rows.next_if(|&&row| row as usize == index).is_some() {
+                later.start_row();
+            }
+            let mut left = piece.duration_s;
+            loop {
+                if rest.duration_s <= ROUNDING_S {
+                    let end = Piece { duration_s: f64::INFINITY, from: rest.to, to: rest.to };
+                    rest = next().unwrap_or(end);
+                }
+                let taken = left.min(rest.duration_s);
+                let slope = if rest.from == rest.to { 0.0 } else { (rest.to - rest.from) / rest.duration_s };
+                let until = rest.from + slope * taken;
+                later.pieces.push(Piece { duration_s: taken, from: rest.from, to: until });
+                rest = Piece { duration_s: rest.duration_s - taken, from: until, ..rest };
+                left -= taken;
+                if left <= ROUNDING_S {
+                    break;
+                }
+            }
+        }
+        later
+    }
+
+    /// Returns a signal that follows this one at rates of at most `rising` and `falling`, in V/s, both positive.
+    pub fn slewed(&self, rising: f64, falling: f64) -> Self {
+        let mut slewed = self.emptied();
+        let mut now = self.before;
+        let mut rows = self.rows.iter().peekable();
+        for (index, &Piece { duration_s, from, to }) in self.pieces.iter().enumerate() {
+            if rows.next_if(|&&row| row as usize == index).is_some() {
+                slewed.start_row();
+            }
+            let slope = if duration_s > 0.0 { (to - from) / duration_s } else { 0.0 };
+            let mut left = duration_s;
+            if from != now || slope > rising || -slope > falling {
+                let ahead = if from == now { slope } else { from - now };
+                let rate = if ahead > 0.0 { rising } else { -falling };
+                // Time until the output meets the line of the input.
+                let closing = rate - slope;
+                let meets = if closing * ahead > 0.0 { (from - now) / closing } else { f64::INFINITY };
+                let taken = meets.clamp(0.0, left);
+                slewed.pieces.push(Piece { duration_s: taken, from: now, to: now + rate * taken });
+                now += rate * taken;
+                left -= taken;
+            }
+            if left > ROUNDING_S || duration_s == 0.0 && from == now {
+                slewed.pieces.push(Piece { duration_s: left, from: now, to: now + slope * left });
+                now += slope * left;
+            }
+        }
+        slewed
+    }
+
+    fn emptied(&self) -> Self {
+        Self {
+            before: self.before,
+            pieces: Vec::with_capacity(2 * self.pieces.len()),
+            rows: Vec::with_capacity(self.rows.len()),
+        }
+    }
+
+    pub(super) fn start_row(&mut self) {
+        self.rows.push(self.pieces.len() as u32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use simulation::record::Record;
+    use simulation::schedule::{Between, Schedule};
+
+    fn step() -> Signal {
+        let text = "time_s,voltage_v\n0,0\n1,100\n2,100\n3,100\n4,0\n";
+        let record = Record::parse("r", text, "stiffness").unwrap();
+        Signal::new(&Schedule::from_record(&record, Between::Hold), &[0.0, 1.0, 2.0, 3.0, 4.0], 0.0)
+    }
+
+    fn rows(signal: &Signal) -> Vec<f64> {
+        signal.at_rows().collect()
+    }
+
+    #[test]
+    fn row_at_a_jump_has_the_voltage_after_it() {
+        assert_eq!(rows(&step()), [0.0, 100.0, 100.0, 100.0, 0.0]);
+    }
+
+    #[test]
+    fn delay_moves_jumps_between_and_onto_rows() {
+        assert_eq!(rows(&step().delayed(0.5)), [0.0, 0.0, 100.0, 100.0, 100.0]);
+        assert_eq!(rows(&step().delayed(1.5)), [0.0, 0.0, 0.0, 100.0, 100.0]);
+        assert_eq!(rows(&step().delayed(9.0)), [0.0; 5]);
+    }
+
+    #[test]
+    fn slew_limited_step_has_the_expected_ramp() {
+        let got = rows(&step().slewed(40.0, 40.0));
+        for (got, expected) in got.iter().zip([0.0, 0.0, 40.0, 80.0, 100.0]) {
+            assert!((got - expected).abs() < 1e-9, "{got} {expected}");
+        }
+        assert_eq!(rows(&step().slewed(1e6, 1e6)), [0.0, 0.0, 100.0, 100.0, 100.0]);
+    }
+
+    #[test]
+    fn rising_and_falling_slew_rates_are_independent() {
+        let mut up_and_down = step();
+        let falls = up_and_down.rows[3] as usize;
+        up_and_down.pieces[falls..].iter_mut().for_each(|piece| (piece.from, piece.to) = (0.0, 0.0));
+        for (rising, falling, expected) in
+            [(40.0, 70.0, [0.0, 0.0, 40.0, 80.0, 10.0]), (70.0, 40.0, [0.0, 0.0, 70.0, 100.0, 60.0])]
+        {
+            let got = rows(&up_and_down.slewed(rising, falling));
+            assert!(got.iter().zip(expected).all(|(got, expected)| (got - expected).abs() < 1e-9), "{got:?}");
+        }
+    }
+}
