@@ -1,20 +1,19 @@
-//! Causes that the readings themselves show: a lattice, a bound, outliers.
+//! Causes that show in the readings themselves: quantisation, saturation, outliers.
 
-use crate::adequacy::spikes::far_off;
+use crate::adequacy::far_off;
 use crate::answer::{Finding, Parameter};
 use crate::fit::engine::Fit;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
 use crate::record::quantisation_grid::Lattice;
-use crate::stats::scale::Z;
-use crate::stats::scale::{FINEST_V, scale_of_squares};
+use crate::stats::scale::{FINEST_V, Z, scale_of_squares};
 
-/// A step of the readings this many of the noise's scales wide is worth naming.
-const COARSE_STEP: f64 = 0.5;
+/// Smallest step of the readings that is reported, in root mean square errors.
+const STEP_TO_REPORT: f64 = 0.5;
 
-/// What the readings themselves show; those far off are outliers only if each is `alone`, neither in runs nor in time with
-/// the command.
-pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alone: bool) -> Vec<Finding> {
+/// Findings in the readings; far readings are outliers only if `isolated`, which says that they neither come in runs nor follow
+/// changes of the command.
+pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isolated: bool) -> Vec<Finding> {
     let mut findings = Vec::new();
     let raw = scale_of_squares(&fit.residual);
     let stopped_raw = scale_of_squares(&observed.errors(&fit.residual));
@@ -23,7 +22,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
         vec![(name.to_owned(), Parameter { value, low, high, unit })]
     };
     if let Some(Lattice { step, low, high }) = observed.lattice
-        && (step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V) || observed.cut_v > 0.0)
+        && (step > (STEP_TO_REPORT * stopped_raw).max(2.0 * FINEST_V) || observed.cut_v > 0.0)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data
@@ -60,7 +59,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
             ),
         });
     }
-    if let Some((_, wide)) = fit.noise.wide.filter(|_| alone) {
+    if let Some((_, wide)) = fit.noise.wide.filter(|_| isolated) {
         let errors = observed.errors(&fit.residual);
         let far = far_off(&fit.noise, &fit.noise.innovations(&errors));
         let kept: Vec<f64> = errors.iter().zip(&far).filter(|(_, far)| !**far).map(|(error, _)| *error).collect();

@@ -1,0 +1,88 @@
+//! The extensions of a structure: which of those with one block more are fitted, and which of these are evaluated.
+
+use std::collections::HashMap;
+
+use crate::effects::contains;
+use crate::effects::model::Model;
+use crate::fit::engine::Fit;
+use crate::search::evaluator::Evaluator;
+use crate::search::scored::{Scored, effects};
+use crate::search::structure_search::{FirstFits, Search};
+
+/// Largest loss of score of a first fit against the structure that it extends, in nats, at which it is still evaluated; no
+/// limit while the search is exhaustive.
+const NATS_TO_LOSE_AT_FIRST: f64 = 10.0;
+/// Extensions that are evaluated on held-out rows.
+const EVALUATED: usize = 5;
+/// Further extensions that are evaluated, by their likelihood under independent noise, where the noise is autocorrelated.
+const EVALUATED_AS_INDEPENDENT: usize = 3;
+/// Forms of one set of effects that are evaluated, so that no effect takes all places.
+const FORMS: usize = 2;
+
+impl<E: Evaluator> Search<'_, E> {
+    /// The evaluated extensions of a structure, the best first.
+    pub(super) fn children(&mut self, node: &Scored) -> Vec<Scored> {
+        let key = node.fit.model.structure();
+        if let Some(children) = self.extended.get(&key) {
+            return children.clone();
+        }
+        let first_fits = self.first_fits(&node.fit, None);
+        let mut children = self.evaluated_best(&node.fit, first_fits);
+        children.sort_by(|a, b| b.score.total_cmp(&a.score));
+        self.extended.insert(key, children.clone());
+        children
+    }
+
+    /// First fits of all extensions, or of those by the effect `wanted`; kept for the next pass, which differs in prices only.
+    pub(super) fn first_fits(&mut self, node: &Fit, wanted: Option<usize>) -> Vec<Fit> {
+        let model = &node.model;
+        let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();
+        if let Some(kept) = kept.find(|kept| kept.of == *model && kept.by == wanted) {
+            return kept.fits.clone();
+        }
+        let new =
+            |effect| wanted.is_none_or(|wanted| wanted == effect) && !model.has(effect) && !contained(effect, model);
+        let fits = self.evaluator.extended(node, self.exhaustive, &new);
+        if self.keeps_first_fits {
+            self.first_fits.entry(model.structure()).or_default().push(FirstFits {
+                of: model.clone(),
+                by: wanted,
+                fits: fits.clone(),
+            });
+        }
+        fits
+    }
+
+    /// Evaluates the best of the first fits.
+    pub(super) fn evaluated_best(&mut self, node: &Fit, first_fits: Vec<Fit>) -> Vec<Scored> {
+        let first_score = |fit: &Fit| {
+            fit.log_likelihood - self.evaluated.price(self.evaluator, fit) - fit.model.points().len() as f64
+        };
+        let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
+        if !self.exhaustive {
+            let lost = first_score(node) - NATS_TO_LOSE_AT_FIRST;
+            fits.retain(|(score, _)| *score > lost);
+        }
+        fits.sort_by(|a, b| b.0.total_cmp(&a.0));
+        fits.dedup_by_key(|(_, fit)| fit.model.structure());
+        let mut taken: HashMap<Vec<usize>, usize> = HashMap::new();
+        fits.retain(|(_, fit)| {
+            let count = taken.entry(effects(&fit.model)).or_default();
+            *count += 1;
+            *count <= FORMS
+        });
+        // While large errors remain, autocorrelation hides effects that independent noise shows.
+        let rest = fits.split_off(EVALUATED.min(fits.len()));
+        let mut plain: Vec<(f64, Fit)> = rest.into_iter().filter(|(_, fit)| fit.plain > node.plain).collect();
+        plain.sort_by(|a, b| b.1.plain.total_cmp(&a.1.plain));
+        if self.exhaustive && !node.noise.memory.is_none() {
+            fits.extend(plain.into_iter().take(EVALUATED_AS_INDEPENDENT));
+        }
+        fits.into_iter().map(|(_, fit)| self.evaluated.evaluate_again(self.evaluator, fit)).collect()
+    }
+}
+
+/// True if an effect is a special case of one in the model, or contains one: the two would not be identifiable together.
+fn contained(effect: usize, model: &Model) -> bool {
+    effects(model).into_iter().any(|other| contains(other, effect) || contains(effect, other))
+}
