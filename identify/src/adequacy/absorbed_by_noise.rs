@@ -6,7 +6,7 @@
 //! and its spectrum has no line:
 //!
 //! ```text
-//! slow    = mean_k(mean_k^2) / mean(e^2)                             over PARTS parts of the record
+//! slow    = mean_k(mean_k^2) / mean(e^2)                             over SWING_PARTS parts of the record
 //! changed = sum_halves rows/2 ln(var(e whitened by the other half's model) / var(e whitened by its own))      [nats]
 //! line    = max_f(power(f) / mean power of the frequencies around f)
 //! ```
@@ -23,9 +23,9 @@ use crate::record::spectrum;
 use crate::stats::scale::{scale, scale_of_squares};
 
 /// Parts of the record whose means are compared with the error's scale.
-const PARTS: usize = 8;
+const SWING_PARTS: usize = 8;
 /// Fewest rows that are tested: ten for each part.
-const FEWEST_ROWS: usize = 10 * PARTS;
+const ROWS_TO_TEST_ABSORPTION: usize = 10 * SWING_PARTS;
 /// Fraction of the mean square in the parts' means above which the error is not stationary noise.
 const SLOW_SHARE: f64 = 0.75;
 /// Change of the autocorrelation between the halves, in nats, above which the error is not stationary noise.
@@ -35,7 +35,7 @@ const CHANGE_NATS_PER_ROW: f64 = 0.02;
 /// Power of a spectral line over the mean power of its neighbours above which the line is not noise.
 const LINE_TO_NEIGHBOURS: f64 = 30.0;
 /// Errors are clipped at this many robust scales when the halves are compared.
-const CLIP_SCALES: f64 = 4.0;
+const HALVES_CLIP_SCALES: f64 = 4.0;
 
 /// The check of a fit whose noise is autocorrelated.
 pub(super) struct AbsorbedByNoise;
@@ -52,7 +52,7 @@ impl Check for AbsorbedByNoise {
 }
 
 fn absorbed(data: &Data, errors: &[f64], memory: &Memory) -> Option<UnmodelledDynamics> {
-    if errors.len() < FEWEST_ROWS || memory.is_none() {
+    if errors.len() < ROWS_TO_TEST_ABSORPTION || memory.is_none() {
         return None;
     }
     let found = |place: &str, share: f64| {
@@ -74,9 +74,9 @@ fn absorbed(data: &Data, errors: &[f64], memory: &Memory) -> Option<UnmodelledDy
 
 /// Mean square of the parts' means over the mean square of all errors, 0 to 1.
 fn slow(errors: &[f64]) -> f64 {
-    let parts = errors.chunks_exact(errors.len() / PARTS).take(PARTS);
+    let parts = errors.chunks_exact(errors.len() / SWING_PARTS).take(SWING_PARTS);
     let means = parts.map(|part| (part.iter().sum::<f64>() / part.len() as f64).powi(2));
-    means.sum::<f64>() / PARTS as f64 / scale_of_squares(errors).powi(2)
+    means.sum::<f64>() / SWING_PARTS as f64 / scale_of_squares(errors).powi(2)
 }
 
 /// Log-likelihood that the halves lose, in nats, when each is whitened by the autocorrelation of the other.
@@ -85,7 +85,7 @@ fn changed(errors: &[f64]) -> f64 {
     let [of_early, of_late] = [early, late].map(|half| Memory::fitted(half, scale(half)));
     let loss = |half: &[f64], own: &Memory, other: &Memory| {
         let own = own.whitened(half);
-        let bound = CLIP_SCALES * scale(&own);
+        let bound = HALVES_CLIP_SCALES * scale(&own);
         let size =
             |white: Vec<f64>| scale_of_squares(&white.iter().map(|e| e.clamp(-bound, bound)).collect::<Vec<_>>());
         half.len() as f64 * (size(other.whitened(half)) / size(own)).ln()

@@ -18,9 +18,9 @@ use crate::stats::scale::scale_of_squares;
 use crate::stats::sums::dot;
 
 /// Numbers of parts that the record is divided into: more parts resolve quick changes, fewer average louder noise.
-const PARTS: [usize; 2] = [100, 200];
+const STEP_PARTS: [usize; 2] = [100, 200];
 /// Fewest rows in a part.
-const FEWEST_ROWS: usize = 5;
+const ROWS_PER_PART: usize = 5;
 /// Value of z that noise exceeds in one of ten thousand records: exponential scores have a skewed sum, so that the quantile is
 /// above the normal distribution's 3.72.
 const Z_IN_STEP: f64 = 4.6;
@@ -48,12 +48,12 @@ impl Check for InStep {
 }
 
 fn in_step(errors: &[f64], stiffness: &[f64]) -> Option<UnmodelledDynamics> {
-    PARTS.into_iter().find_map(|parts| in_parts(parts, errors, stiffness))
+    STEP_PARTS.into_iter().find_map(|parts| in_parts(parts, errors, stiffness))
 }
 
 fn in_parts(parts: usize, errors: &[f64], stiffness: &[f64]) -> Option<UnmodelledDynamics> {
     let length = errors.len() / parts;
-    if length < FEWEST_ROWS {
+    if length < ROWS_PER_PART {
         return None;
     }
     let error = scale_of_squares(errors);

@@ -21,11 +21,11 @@ const Z_DOUBTFUL: f64 = 1.5;
 /// Standard normal quantile of one in a hundred: the significance of serial correlation in a record too short for regression.
 const Z_SHORT_RECORD: f64 = 2.33;
 /// Parts that time and voltage are each divided into.
-const PARTS: usize = 6;
+const FEATURE_PARTS: usize = 6;
 /// Fewest rows for each feature of the regression.
 const ROWS_PER_FEATURE: usize = 10;
 /// Whitened residuals are clipped at this many scales of the noise before the spectrum is taken.
-const CLIP_SCALES: f64 = 6.0;
+const SPECTRUM_CLIP_SCALES: f64 = 6.0;
 /// Gain in log-likelihood of a spectral line, less the logarithm of the number of lines that are searched, in nats, above which
 /// the line is structure.
 const LINE_NATS: f64 = 12.0;
@@ -117,7 +117,8 @@ fn serial_correlation(data: &Data, fit: &Fit) -> UnmodelledDynamics {
 /// Returns the strongest line in the spectrum of `target`, which is in scales of the noise, if it is structure and explains
 /// more than `found` does; else `found`.
 fn spectral_line(data: &Data, fit: &Fit, target: &[f64], found: UnmodelledDynamics) -> UnmodelledDynamics {
-    let clipped: Vec<f64> = target.iter().map(|value| value.clamp(-CLIP_SCALES, CLIP_SCALES)).collect();
+    let clipped: Vec<f64> =
+        target.iter().map(|value| value.clamp(-SPECTRUM_CLIP_SCALES, SPECTRUM_CLIP_SCALES)).collect();
     let Some(peak) = spectrum::peaks(&clipped, data, 1).into_iter().next() else { return found };
     let share = (0.5 * (peak.cosine.powi(2) + peak.sine.powi(2))).min(1.0);
     let power = 0.5 * data.rows() as f64 * share;
@@ -182,9 +183,9 @@ fn features(data: &Data) -> Vec<Group> {
         Group { place: "just after changes of the voltage".into(), columns: after.collect() },
         Group { place: "in the direction of the last change".into(), columns: vec![direction, directed] },
     ];
-    for part in 0..PARTS {
-        let (from, to) = (part as f64 / PARTS as f64, (part + 1) as f64 / PARTS as f64);
-        let inside = |x: f64| f64::from(u8::from(x >= from && (x < to || part + 1 == PARTS)));
+    for part in 0..FEATURE_PARTS {
+        let (from, to) = (part as f64 / FEATURE_PARTS as f64, (part + 1) as f64 / FEATURE_PARTS as f64);
+        let inside = |x: f64| f64::from(u8::from(x >= from && (x < to || part + 1 == FEATURE_PARTS)));
         let (early, late) = (start + from * duration, start + to * duration);
         groups.push(Group {
             place: format!("from {early:.1} s to {late:.1} s"),

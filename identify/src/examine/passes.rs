@@ -28,7 +28,7 @@ use crate::search::{Scored, Search, WarmStart};
 use crate::verdict::diagnosis::{self, Diagnosis};
 
 /// Fewest readings that are diagnosed.
-const FEWEST_ROWS: usize = 8;
+const ROWS_TO_DIAGNOSE: usize = 8;
 /// Difference of two scores, in nats, from which the less usual explanation is kept: readings that were cut off instead of
 /// rounded, a spring that lacks a part of the plant file.
 const CLEARLY_LIKELIER: f64 = 3.0;
@@ -52,9 +52,9 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
     let data = Data::new(record, options.input);
-    if data.rows() < FEWEST_ROWS {
+    if data.rows() < ROWS_TO_DIAGNOSE {
         bad_input!(
-            "{}: {} row(s) with a reading; expected at least {FEWEST_ROWS} to tell causes apart",
+            "{}: {} row(s) with a reading; expected at least {ROWS_TO_DIAGNOSE} to tell causes apart",
             record.name,
             data.rows()
         );
