@@ -52,7 +52,10 @@ impl Comparison {
 
     /// The report's sentence on readings that follow the voltage in another unit.
     pub(crate) fn other_unit(&self) -> String {
-        format!("The readings are {} times what the simulation says, beyond any spring", three_digits(self.slope))
+        format!(
+            "The readings are {} times the simulated stiffness, beyond the gain of any spring",
+            three_digits(self.slope)
+        )
     }
 }
 

@@ -106,7 +106,7 @@ fn serial_correlation(data: &Data, fit: &Fit) -> UnmodelledDynamics {
     let share = 1.0 - 0.5 * steps / squares.max(1e-300);
     let rows = errors.len() as f64;
     UnmodelledDynamics {
-        place: "that each error is like the one before it".to_owned() + &Localisation::new(data, errors).words(),
+        place: "correlation of successive errors".to_owned() + &Localisation::new(data, errors).words(),
         share,
         rms: share.max(0.0).sqrt() * (squares / rows).sqrt(),
         significant: share * rows.sqrt() > Z_SHORT_RECORD,
@@ -179,7 +179,7 @@ fn features(data: &Data) -> Vec<Group> {
     let direction = direction(data);
     let directed = direction.iter().zip(&data.voltage_v).map(|(sign, voltage)| sign * voltage).collect();
     let mut groups = vec![
-        Group { place: "in what the voltage was before".into(), columns: past.to_vec() },
+        Group { place: "in the response to earlier voltages".into(), columns: past.to_vec() },
         Group { place: "just after changes of the voltage".into(), columns: after.collect() },
         Group { place: "in the direction of the last change".into(), columns: vec![direction, directed] },
     ];

@@ -32,11 +32,11 @@ impl Unidentifiable {
     pub(crate) fn next_experiment(&self) -> &'static str {
         match self {
             Self::Excitation => {
-                "run a stair over the whole range up and down again, each step held for five time constants: from this \
-                 record the gain or the time constant could be almost anything"
+                "run a stair over the whole range up and down again, each step held for five time constants: this \
+                 record does not identify the gain or the time constant"
             }
             Self::Sensor(_) => {
-                "look at the sensor, its cable and its unit (volts of equivalent static voltage are expected), then repeat \
+                "check the sensor, its cable and its unit (volts of equivalent static voltage are expected), then repeat \
                  the record"
             }
         }

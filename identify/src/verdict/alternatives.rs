@@ -75,7 +75,8 @@ pub(crate) fn next_experiment(
         }
         Verdict::Consistent if !wanders => None,
         Verdict::Unexplained | Verdict::Consistent => Some(
-            "run the same schedule again: what comes back is the spring's, what does not is the readings'".to_owned(),
+            "run the same schedule again: errors that repeat belong to the spring, the others to the readings"
+                .to_owned(),
         ),
         Verdict::Insufficient => Some(Unidentifiable::Excitation.next_experiment().to_owned()),
         Verdict::Explained => None,

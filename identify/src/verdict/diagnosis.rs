@@ -164,7 +164,7 @@ fn verdict(
 
 /// The report's sentence on unmodelled dynamics.
 fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics) -> String {
-    format!("{:.1} % of what is left ({rms:.3} V RMS) is no noise: it shows {place}", 100.0 * share)
+    format!("{:.1} % of the residual ({rms:.3} V RMS) is structure, not noise: it shows {place}", 100.0 * share)
 }
 
 /// Reports a record that identifies no spring.

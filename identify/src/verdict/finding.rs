@@ -23,11 +23,11 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, cause: &Cause) -> Find
     let odds = best.score - without.score;
     let [before, rival, after] = [left_out, without, best].map(|scored| rms(engine, &scored.fit));
     let others: Vec<&str> = effects(&without.fit.model).into_iter().map(|other| EFFECTS[other].cause()).collect();
-    let against = if others.is_empty() { "the simulation as it was".to_owned() } else { others.join(" and ") };
+    let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others.join(" and ") };
     let better = if best.fit.model.searched(effect, engine.data) {
-        format!("the readings are {odds:.1} nats likelier, all places that were searched charged,")
+        format!("with the price of all searched places deducted, the readings are {odds:.1} nats likelier")
     } else {
-        format!("on held-out stretches this is {odds:.1} nats better")
+        format!("on held-out segments this is {odds:.1} nats better")
     };
     Finding {
         cause: EFFECTS[effect].cause(),
@@ -35,7 +35,10 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, cause: &Cause) -> Find
         parameters: parameters(engine, &best.fit, effect),
         rmse_before: before.max(after),
         rmse_after: after,
-        evidence: format!("{}: {better} than the best without it ({against}, {rival:.3} V)", EFFECTS[effect].meaning()),
+        evidence: format!(
+            "{}: {better} than the best explanation without it ({against}, {rival:.3} V)",
+            EFFECTS[effect].meaning()
+        ),
     }
 }
 

@@ -38,9 +38,9 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
             rmse_before: scale_of_squares(&fit.residual.iter().map(|left| left - observed.cut_v).collect::<Vec<_>>()),
             rmse_after: scale_of_squares(&after).min(raw),
             evidence: format!(
-                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left{}",
+                "all readings differ from the first by multiples of {step:.6} V, {:.1} times the remaining error{}",
                 step / raw,
-                if observed.cut_v == 0.0 { "" } else { "; what is less than a step was cut off" }
+                if observed.cut_v == 0.0 { "" } else { "; readings were cut off to the step below, not rounded" }
             ),
         });
     }
@@ -73,7 +73,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
             rmse_before: stopped_raw,
             rmse_after: scale_of_squares(&kept),
             evidence: format!(
-                "{off} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
+                "{off} readings are off by about {wide:.2} V, {:.0} times the noise: a mixture of two normal distributions fits far better than one heavy tail",
                 wide / fit.noise.sigma
             ),
         });
