@@ -51,6 +51,7 @@ impl Check for AbsorbedByNoise {
     }
 }
 
+/// Tests errors in V that the noise model predicts by `memory`, its autoregression.
 fn absorbed(data: &Data, errors: &[f64], memory: &Memory) -> Option<UnmodelledDynamics> {
     if errors.len() < ROWS_TO_TEST_ABSORPTION || memory.is_none() {
         return None;

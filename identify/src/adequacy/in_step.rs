@@ -47,6 +47,7 @@ impl Check for InStep {
     }
 }
 
+/// Tests errors against the simulated stiffness, both in V, with each number of parts.
 fn in_step(errors: &[f64], stiffness: &[f64]) -> Option<UnmodelledDynamics> {
     STEP_PARTS.into_iter().find_map(|parts| in_parts(parts, errors, stiffness))
 }

@@ -37,6 +37,7 @@ impl Check for Informative {
     }
 }
 
+/// Returns why gain and time constant are not identified, or `None` if they are.
 fn unidentifiable(engine: &mut Engine, baseline: &Fit) -> Option<Unidentifiable> {
     let data = engine.data;
     let changes = |values: &[f64]| values.iter().any(|value| *value != values[0]);
@@ -81,7 +82,7 @@ fn unidentifiable(engine: &mut Engine, baseline: &Fit) -> Option<Unidentifiable>
     if !informative {
         return Some(Unidentifiable::Excitation);
     }
-    // Found here at once; a search for causes in noise alone takes long.
+    // Checked before the search, which takes long on noise alone.
     let constant = comparison.correlation.abs() < CORRELATION_OF_NO_SPRING
         && constant_is_as_likely(engine, &best.model, best.log_likelihood);
     constant.then(|| Unidentifiable::Sensor(comparison.constant_readings()))

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::record::data::Data;
 use crate::stats::sums::dot;
 
-/// Fraction of the error's power above which a range of voltages is named beside the stretch of time, if it is also the denser
+/// Fraction of the error's power above which a range of voltages is named in addition to the stretch of time, if it is also the denser
 /// of the two.
 const POWER_TO_NAME_VOLTAGES: f64 = 0.5;
 

@@ -50,6 +50,7 @@ struct Group {
     columns: Vec<Vec<f64>>,
 }
 
+/// Regresses the whitened residual on features of the command and the time.
 fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
     let data = engine.data;
     let mut groups = features(data);

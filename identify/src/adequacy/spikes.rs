@@ -24,7 +24,7 @@ const CHANGE_OF_FULL_SCALE: f64 = 0.01;
 const ROWS_AFTER_CHANGE: f64 = 4.0;
 /// Fraction of the far readings above which those just after a change count.
 const SHARE_AFTER_CHANGES: f64 = 0.5;
-/// Fraction of the far readings above which those beside another of equal sign count.
+/// Fraction of the far readings above which those next to another of equal sign count.
 const SHARE_IN_RUNS: f64 = 0.2;
 
 /// The check of a fit whose noise is a mixture of two scales.

@@ -18,7 +18,7 @@ use crate::noise::Noise;
 use crate::stats::median::median;
 use crate::stats::scale::scale;
 
-/// Effects that act on readings whatever the sensor reads; they are kept beside the constant.
+/// Effects that act on readings whatever the sensor reads; they are added to the constant.
 const ON_ANY_READING: [&str; 2] = ["hum", "reading-offset"];
 /// A spring whose robust error is below this fraction of the readings' robust scatter around the constant follows the voltage,
 /// however likely autocorrelated noise makes the constant.

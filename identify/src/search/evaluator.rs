@@ -10,7 +10,7 @@ use crate::search::penalty_factor::penalty_factor;
 use crate::search::predicted_gain::GainPredictor;
 use crate::stats::scale::{negligible, scale, scale_of_squares};
 
-/// Price of a block, in nats, without its places and forms: about this many nats the best of all blocks gains by chance.
+/// Price of a block, in nats, without its places and forms: roughly the gain of the best of all blocks on noise.
 const PRICE_OF_BLOCK: f64 = 4.3;
 /// Price of each fitted coordinate of a block, in nats, beyond what held-out rows charge, so that a block with more coordinates
 /// does not replace one with fewer.

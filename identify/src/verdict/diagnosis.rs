@@ -147,6 +147,7 @@ fn findings(engine: &mut Engine, found: &Found) -> Vec<Finding> {
     findings
 }
 
+/// The verdict, by the first that applies: unexplained structure, alternatives, margins too wide, no findings.
 fn verdict(
     unexplained: bool,
     alternatives: &[Vec<&'static str>],

@@ -12,9 +12,9 @@ use crate::stats::sums::dot;
 /// Largest lag of the residual's correlations, in rows.
 const LAGS: usize = 20;
 
-/// Errors of a fit. `unseen` is its residual on held-out segments, in V; `stops` says that the simulation includes bounds at
+/// Errors of a fit. `held_out` is its residual on held-out segments, in V; `stops` says that the simulation includes bounds at
 /// which readings saturate, so that rows at a bound count only where the fit is within it.
-pub(crate) fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -> Quality {
+pub(crate) fn quality(engine: &Engine, fit: &Fit, held_out: &[f64], stops: bool) -> Quality {
     let observed = engine.observed;
     let error = |residual: &[f64]| scale_of_squares(&if stops { observed.errors(residual) } else { residual.into() });
     let rmse = error(&fit.residual);
@@ -25,7 +25,7 @@ pub(crate) fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -
         rmse,
         // Undefined for readings that never change.
         fit_percent: if spread > FINEST_V { 100.0 * (1.0 - rmse / spread) } else { f64::NAN },
-        held_out_rmse: error(unseen),
+        held_out_rmse: error(held_out),
         one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
     }
 }

@@ -41,7 +41,7 @@ pub(crate) fn contenders<E: Evaluator>(search: &Search<E>, best: &Scored) -> Vec
 pub(crate) fn ranking(engine: &mut Engine, contenders: &[Scored], known: [(&Fit, &[f64]); 2]) -> Vec<RankedCauses> {
     let data = engine.data;
     let mut held_out_rmse = |fit: &Fit| match known.iter().find(|(other, _)| other.model == fit.model) {
-        Some((_, unseen)) => scale_of_squares(unseen),
+        Some((_, held_out)) => scale_of_squares(held_out),
         None => scale_of_squares(&engine.foretold(fit)),
     };
     let ranked = |scored: &Scored| RankedCauses {
