@@ -11,7 +11,7 @@
 //! | false-alarm rate | fraction of records with an adequate model on which a check finds something |
 //! | power | fraction of records with the stated departure on which a check finds something |
 //!
-//! [`CHECKS`] is the table of all checks in the order in which they are asked; [`first_significant`] and [`doubts`] ask them.
+//! [`CHECKS`] is the table of all checks in the order in which they are asked; `first_significant` and `doubts` ask them.
 
 mod absorbed_by_noise;
 mod check;

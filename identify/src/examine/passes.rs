@@ -2,13 +2,13 @@
 //!
 //! | pass | question | runs | its result is kept |
 //! | --- | --- | --- | --- |
-//! | [`as_rounded`] | which causes, if readings were rounded to their grid? | always | unless a later pass replaces it |
-//! | [`as_cut_off`] | which, if they were cut off to their grid? | on a grid, if a quick fit prefers it | if clearly likelier |
-//! | [`as_unbounded`] | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
-//! | [`without_unsupported_terms`] | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
+//! | `as_rounded` | which causes, if readings were rounded to their grid? | always | unless a later pass replaces it |
+//! | `as_cut_off` | which, if they were cut off to their grid? | on a grid, if a quick fit prefers it | if clearly likelier |
+//! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
+//! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
 //!
-//! Every pass runs a [`search`], which on a long record first searches a part of its rows. "Clearly likelier" means a score that
-//! is higher by [`CLEARLY_LIKELIER`] nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that
+//! Every pass runs a `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that
+//! is higher by `CLEARLY_LIKELIER` nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that
 //! one's best models.
 
 use anyhow::Result;
