@@ -1,103 +1,103 @@
-//! What a diagnosis says, in the form that scripts read.
+//! The data types of a report, as they are serialised to JSON. Names of fields and variants are part of the interface.
 
 use serde::{Serialize, Serializer};
 
-/// Version of the form.
+/// Version of the JSON format.
 pub const SCHEMA: u32 = 1;
 
-/// The whole answer.
+/// The report of a diagnosis.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Version of this form.
+    /// Version of the JSON format, [`SCHEMA`].
     pub schema: u32,
-    /// Number of readings.
+    /// Number of rows with a reading.
     pub rows: usize,
-    /// What to make of the record.
+    /// The conclusion.
     pub verdict: Verdict,
-    /// The simulation as it was.
+    /// Errors of the simulation as it is given.
     pub baseline: Quality,
-    /// What it gets wrong, the largest error first.
+    /// Named causes, the one that explains the largest mean square error first.
     pub findings: Vec<Finding>,
-    /// Parts of the plant file that are not in this spring: the extended simulation is without them.
+    /// Parts of the plant file that the record does not support; the extended simulation lacks them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub take_out: Vec<&'static str>,
-    /// Errors that would have shown, where nothing is wrong.
+    /// Smallest errors that would have been found; `None` if something was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub would_show: Option<Margins>,
-    /// Other sets of causes that the data cannot reject.
+    /// Other sets of causes that the record cannot reject.
     pub alternatives: Vec<Vec<&'static str>>,
-    /// The experiment that would decide, or show more.
+    /// The experiment that would decide between the alternatives or show more, in one sentence.
     pub next_experiment: Option<String>,
-    /// The simulation with the named causes in it.
+    /// The simulation extended by the named causes.
     pub extended: Extended,
-    /// What no cause explains, where there is something.
+    /// Structure in the residual that no cause explains, in one sentence.
     pub leftover: Option<String>,
-    /// The noise that is left.
+    /// Parameters of the noise of the extended simulation.
     pub noise: NoiseReport,
-    /// Tests of what the extended simulation leaves.
+    /// Correlations of the residual of the extended simulation.
     pub residual: ResidualReport,
 }
 
-/// What to make of a record.
+/// The conclusion on a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// Nothing is wrong beyond noise.
+    /// The simulation differs from the readings by noise only.
     Consistent,
-    /// The findings explain what is wrong.
+    /// The findings explain all errors beyond noise.
     Explained,
-    /// Rival sets of causes explain it as well.
+    /// Another set of causes explains the errors equally well.
     Ambiguous,
-    /// Structure is left that no known cause explains.
+    /// The residual holds structure that no known cause explains.
     Unexplained,
-    /// The record cannot tell.
+    /// The record does not identify gain and time constant.
     Insufficient,
 }
 
-/// How well a simulation fits.
+/// Errors of a simulation.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Quality {
-    /// Root of the mean square of the free-run error, in V.
+    /// Root mean square of the free-running error, in V.
     pub rmse: f64,
-    /// `100 (1 - |error| / |reading - mean|)`
+    /// `100 (1 - |error| / |reading - mean|)` with Euclidean norms over all rows, in percent; 100 is a perfect fit.
     pub fit_percent: f64,
-    /// The same error on stretches that no fit has seen, in V.
+    /// Root mean square of the free-running error on held-out segments, in V.
     pub held_out_rmse: f64,
-    /// Error when each reading is foretold from the ones before it, in V.
+    /// Root mean square of the error of predicting each reading from the ones before it, in V.
     pub one_step_rmse: f64,
 }
 
-/// The extended simulation.
+/// The simulation extended by the named causes.
 #[derive(Clone, Debug, Serialize)]
 pub struct Extended {
-    /// How well it fits.
+    /// Its errors.
     #[serde(flatten)]
     pub quality: Quality,
-    /// `1 - extended / baseline` held-out error.
+    /// Held-out improvement, `1 - extended / baseline` of the root mean square errors; 0 without findings.
     pub gain: f64,
-    /// The plant file that was written.
+    /// Path of the plant file that was written; `None` if none was.
     pub model: Option<String>,
-    /// Largest difference between the fixed-point tick and the fit, over the record, in V.
+    /// Largest absolute difference between the fixed-point tick and the fit over the record, in V; `None` if it was not run.
     pub fixed_point_error_v: Option<f64>,
-    /// Why the tick does not run that plant file, where it does not.
+    /// Why the tick rejects the plant file; `None` if it accepts it.
     pub tick_refuses: Option<String>,
 }
 
 /// A named cause.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
-    /// Its name.
+    /// Its cause code.
     pub cause: &'static str,
-    /// How sure it is that this cause is there, beside the best explanation without it.
+    /// Probability of the cause against the best explanation without it, 0 to 1.
     pub probability: f64,
-    /// Its parameters, in the order of its page.
+    /// Its parameters with their names, in the order of the cause's page in the manual.
     #[serde(serialize_with = "by_name")]
     pub parameters: Vec<(String, Parameter)>,
-    /// Error of the best fit without it, in V.
+    /// Root mean square error of the best fit without the cause, in V.
     pub rmse_before: f64,
-    /// Error with it, in V.
+    /// Root mean square error with the cause, in V.
     pub rmse_after: f64,
-    /// Why it is believed, in one sentence.
+    /// The evidence, in one sentence.
     pub evidence: String,
 }
 
@@ -108,43 +108,43 @@ fn by_name<S: Serializer>(parameters: &[(String, Parameter)], to: S) -> Result<S
 /// A parameter with its 95 % interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parameter {
-    /// Likeliest value.
+    /// Maximum-likelihood estimate, in `unit`.
     pub value: f64,
-    /// Lower end of the interval.
+    /// Lower end of the 95 % interval, in `unit`.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the 95 % interval, in `unit`.
     pub high: f64,
-    /// SI unit, "" for a ratio.
+    /// Unit, "" for a dimensionless number.
     pub unit: &'static str,
 }
 
-/// The noise of the readings.
+/// Parameters of the noise of the readings.
 #[derive(Clone, Debug, Serialize)]
 pub struct NoiseReport {
-    /// Scale of what cannot be foretold, in V.
+    /// Scale of the innovations, in V.
     pub sigma: f64,
-    /// Degrees of freedom of its tail; null for a normal one.
+    /// Degrees of freedom of Student's t distribution; `None` for normal noise.
     pub tail: Option<f64>,
-    /// How many rows it remembers.
+    /// Order of the autoregression, in rows; 0 for independent noise.
     pub memory_rows: usize,
 }
 
-/// Tests of a residual.
+/// Correlations of a whitened residual.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResidualReport {
-    /// Autocorrelation of the whitened residual at lags 1 to 20.
+    /// Autocorrelation at lags of 1 to 20 rows.
     pub autocorrelation: Vec<f64>,
-    /// Its correlation with the voltage's changes, 0 to 20 rows before.
+    /// Correlation with changes of the voltage 0 to 20 rows earlier.
     pub input_correlation: Vec<f64>,
-    /// 95 % of chance values lie within this.
+    /// Absolute value that 95 % of the correlations of independent noise stay below.
     pub band: f64,
 }
 
-/// Errors from which on they show, as parts of what is simulated.
+/// Smallest errors that a record would have shown, as fractions of the simulation's values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Margins {
-    /// Of the gain.
+    /// Error of the static gain.
     pub gain: f64,
-    /// Of the time constant, when it is too long.
+    /// Error of the time constant, if the spring's is longer.
     pub time_constant: f64,
 }

@@ -51,7 +51,7 @@
 //! | [`adequacy`] | a fit | what is left that no effect explains, and where |
 //! | [`search`] | a record | which effects |
 //! | [`verdict`] | a search | what is reported |
-//! | [`mod@examine`] | a record, options | the diagnosis: all passes in order |
+//! | [`examine`](mod@examine) | a record, options | the diagnosis: all passes in order |
 
 pub mod adequacy;
 pub mod answer;

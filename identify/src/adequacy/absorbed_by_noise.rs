@@ -1,76 +1,92 @@
-//! Structure that passes for the noise's memory.
+//! Check for structure that the noise model absorbs as autocorrelation.
 //!
-//! An autoregression foretells a slow error, whatever its cause, as well as it foretells slow noise: whitened, nothing is
-//! left of it. Three things give it away. Noise with a memory forgets within the record, so that its means over long parts
-//! are small beside itself; its memory is the same in both halves of the record; and it has no line in its spectrum:
+//! An autoregression predicts a slow error as well as slow noise, whatever the cause, so that whitened residuals show
+//! nothing. Three properties distinguish structure from autocorrelated noise: noise decorrelates within the record, so that
+//! its means over long parts are small compared with its scale; its autocorrelation is the same in both halves of the record;
+//! and its spectrum has no line:
 //!
 //! ```text
-//! slow    = mean_k(mean_k^2) / mean(e^2)                             over PARTS parts of the record
-//! changed = sum_halves rows/2 ln(var(e whitened by the other half's memory) / var(e whitened by its own))     [nats]
-//! alone   = max_f(power(f) / mean power of the frequencies around f)
+//! slow    = mean_k(mean_k^2) / mean(e^2)                             over SWING_PARTS parts of the record
+//! changed = sum_halves rows/2 ln(var(e whitened by the other half's model) / var(e whitened by its own))      [nats]
+//! line    = max_f(power(f) / mean power of the frequencies around f)
 //! ```
 //!
 //! 1/f noise, the slowest that a sensor has, stays below 0.6 and 40 nats in 2400 rows; so does a first-order
 //! autoregression with a coefficient of 0.99.
 
-use crate::adequacy::localisation::whereabouts;
-use crate::adequacy::unmodelled::Leftover;
+use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
+use crate::adequacy::localisation::Localisation;
+use crate::fit::engine::Engine;
 use crate::noise::autocorrelation::Autocorrelation;
 use crate::record::data::Data;
 use crate::record::spectrum;
 use crate::stats::scale::{robust_scale, root_mean_square};
 
-/// Long parts of the record.
-const PARTS: usize = 8;
-/// Shorter records cannot tell.
-const FEWEST_ROWS: usize = 10 * PARTS;
-/// More than this part of the square in the means of the parts is no noise.
-const SLOW: f64 = 0.75;
-/// A memory that changes by so much, in nats and in nats a row, is none.
-const CHANGED: f64 = 60.0;
-const CHANGED_PER_ROW: f64 = 0.02;
-/// A line that is so many times as strong as its neighbours is none either.
-const ALONE: f64 = 30.0;
-/// Errors beyond so many scales do not count.
-const CLIP: f64 = 4.0;
+/// Parts of the record whose means are compared with the error's scale.
+const SWING_PARTS: usize = 8;
+/// Fewest rows that are tested: ten for each part.
+const ROWS_TO_TEST_ABSORPTION: usize = 10 * SWING_PARTS;
+/// Fraction of the mean square in the parts' means above which the error is not stationary noise.
+const SLOW_SHARE: f64 = 0.75;
+/// Change of the autocorrelation between the halves, in nats, above which the error is not stationary noise.
+const CHANGE_NATS: f64 = 60.0;
+/// The same threshold for each row of the record, in nats; the larger of the two applies.
+const CHANGE_NATS_PER_ROW: f64 = 0.02;
+/// Power of a spectral line over the mean power of its neighbours above which the line is not noise.
+const LINE_TO_NEIGHBOURS: f64 = 30.0;
+/// Errors are clipped at this many robust scales when the halves are compared.
+const HALVES_CLIP_SCALES: f64 = 4.0;
 
-/// Tests what a model leaves, where that has a memory.
-pub fn test(data: &Data, errors: &[f64], memory: &Autocorrelation) -> Option<Leftover> {
-    if errors.len() < FEWEST_ROWS || memory.is_white() {
+/// The check of a fit whose noise is autocorrelated.
+pub(super) struct AbsorbedByNoise;
+
+impl Check for AbsorbedByNoise {
+    fn name(&self) -> &'static str {
+        "absorbed_by_noise"
+    }
+
+    fn test(&self, engine: &mut Engine, Candidate { fit, .. }: &Candidate) -> Option<Inadequacy> {
+        let errors = engine.observed.errors(&fit.residual);
+        absorbed(engine.data, &errors, &fit.noise.autocorrelation).map(Inadequacy::from)
+    }
+}
+
+/// Tests errors in V that the noise model predicts by `memory`, its autoregression.
+fn absorbed(data: &Data, errors: &[f64], memory: &Autocorrelation) -> Option<UnmodelledDynamics> {
+    if errors.len() < ROWS_TO_TEST_ABSORPTION || memory.is_white() {
         return None;
     }
-    let found = |place: &str, share: f64| Leftover {
-        place: place.to_owned() + &whereabouts(data, errors),
-        share,
-        rms: share.sqrt() * root_mean_square(errors),
-        significant: true,
-        doubtful: true,
+    let found = |place: &str, share: f64| {
+        let place = place.to_owned() + &Localisation::new(data, errors).words();
+        UnmodelledDynamics::certain(place, share, share.sqrt() * root_mean_square(errors))
     };
     let slow = slow(errors);
-    if slow > SLOW {
+    if slow > SLOW_SHARE {
         return Some(found("as a slow swing over the whole record", slow));
     }
     let changed = changed(errors);
-    if changed > CHANGED.max(CHANGED_PER_ROW * errors.len() as f64) {
+    if changed > CHANGE_NATS.max(CHANGE_NATS_PER_ROW * errors.len() as f64) {
         let new = root_mean_square(&memory.whitened(errors)) / root_mean_square(errors);
         return Some(found("as a rhythm that changes along the record", (1.0 - new * new).max(0.0)));
     }
-    let line = spectrum::most_prominent_line(errors, data).filter(|line| line.prominence > ALONE)?;
+    let line = spectrum::most_prominent_line(errors, data).filter(|line| line.prominence > LINE_TO_NEIGHBOURS)?;
     Some(found(&format!("at a frequency of {:.3} Hz", line.frequency_hz), line.share))
 }
 
+/// Mean square of the parts' means over the mean square of all errors, 0 to 1.
 fn slow(errors: &[f64]) -> f64 {
-    let parts = errors.chunks_exact(errors.len() / PARTS).take(PARTS);
+    let parts = errors.chunks_exact(errors.len() / SWING_PARTS).take(SWING_PARTS);
     let means = parts.map(|part| (part.iter().sum::<f64>() / part.len() as f64).powi(2));
-    means.sum::<f64>() / PARTS as f64 / root_mean_square(errors).powi(2)
+    means.sum::<f64>() / SWING_PARTS as f64 / root_mean_square(errors).powi(2)
 }
 
+/// Log-likelihood that the halves lose, in nats, when each is whitened by the autocorrelation of the other.
 fn changed(errors: &[f64]) -> f64 {
     let (early, late) = errors.split_at(errors.len() / 2);
     let [of_early, of_late] = [early, late].map(|half| Autocorrelation::fitted(half, robust_scale(half)));
     let loss = |half: &[f64], own: &Autocorrelation, other: &Autocorrelation| {
         let own = own.whitened(half);
-        let bound = CLIP * robust_scale(&own);
+        let bound = HALVES_CLIP_SCALES * robust_scale(&own);
         let size =
             |white: Vec<f64>| root_mean_square(&white.iter().map(|e| e.clamp(-bound, bound)).collect::<Vec<_>>());
         half.len() as f64 * (size(other.whitened(half)) / size(own)).ln()
@@ -94,32 +110,32 @@ mod tests {
         (0..rows).map(|_| (0..12).map(|_| uniform()).sum()).collect()
     }
 
-    fn verdict(of_row: impl Fn(f64) -> f64) -> Option<String> {
+    fn place_of(of_row: impl Fn(f64) -> f64) -> Option<String> {
         let errors: Vec<f64> =
             errors(2401).iter().enumerate().map(|(row, e)| e + of_row(row as f64 / 2401.0)).collect();
         tested(&errors).map(|found| found.place)
     }
 
-    fn tested(errors: &[f64]) -> Option<Leftover> {
+    fn tested(errors: &[f64]) -> Option<UnmodelledDynamics> {
         let row = |row: usize| Row { line: row, time_s: 0.1 * row as f64, voltage_v: 0.0, measured: Some(0.0) };
         let record = Record { name: String::new(), rows: (0..errors.len()).map(row).collect() };
-        test(&Data::new(&record, Input::Hold), errors, &Autocorrelation::fitted(errors, robust_scale(errors)))
+        absorbed(&Data::new(&record, Input::Hold), errors, &Autocorrelation::fitted(errors, robust_scale(errors)))
     }
 
     #[test]
-    fn slow_errors_and_changing_rhythms_are_no_noise() {
+    fn swings_chirps_and_lines_are_not_absorbed() {
         use std::f64::consts::{PI, TAU};
-        for slow in [verdict(|t| 20.0 * (PI * t).sin()), verdict(|t| 30.0 * (-6.0 * t).exp()), verdict(|_| 20.0)] {
+        for slow in [place_of(|t| 20.0 * (PI * t).sin()), place_of(|t| 30.0 * (-6.0 * t).exp()), place_of(|_| 20.0)] {
             assert!(slow.as_ref().is_some_and(|place| place.contains("slow swing")), "{slow:?}");
         }
-        let chirp = verdict(|t| 10.0 * (TAU * (2.4 * t + 30.0 * t * t)).sin());
-        let line = verdict(|t| 4.0 * (TAU * 300.3 * t).sin());
+        let chirp = place_of(|t| 10.0 * (TAU * (2.4 * t + 30.0 * t * t)).sin());
+        let line = place_of(|t| 4.0 * (TAU * 300.3 * t).sin());
         assert!(line.as_ref().is_some_and(|place| place.contains("1.251 Hz")), "{line:?}");
         assert!(chirp.as_ref().is_some_and(|place| place.contains("rhythm")), "{chirp:?}");
     }
 
     #[test]
-    fn noise_with_a_memory_is_noise() {
+    fn autocorrelated_noise_passes() {
         for coefficient in [0.0, 0.5, 0.8, 0.95] {
             let mut last = 0.0;
             let coloured: Vec<f64> = errors(2401)

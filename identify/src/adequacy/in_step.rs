@@ -1,60 +1,69 @@
-//! Errors that keep step with the spring.
+//! Check for errors whose changes coincide with those of the simulated stiffness.
 //!
-//! An autoregression foretells a slow error, whatever its cause; what a wrong law leaves passes for noise with a memory, and
-//! whitened nothing is left of it to test. But noise does not know when the spring moves. Over parts of the record, by how much
-//! does the mean error change from one to the next, and by how much the simulated stiffness?
+//! An autoregression predicts a slow error whatever its cause, so that the error of a wrong law passes for autocorrelated
+//! noise and the whitened residual shows nothing. Noise, however, is independent of the spring's motion. The check divides the
+//! record into parts and correlates the change of the mean error from part to part with that of the simulated stiffness:
 //!
 //! ```text
 //! s(x) = -ln(1 - (rank(x) - 1/2)/n)      z = sqrt(n - 1) corr(s(|change of the error|), s(|change of the stiffness|))
 //! ```
 //!
-//! The scores are Savage's (*Annals of Mathematical Statistics* 27, 1956): large changes tell most, and none too much.
-//! Changes from part to part forget quickly, however long the noise's memory. It matters where the error is far above what
-//! it scatters within the parts.
+//! The scores are Savage's (*Annals of Mathematical Statistics* 27, 1956): large changes weigh most, and no single one
+//! dominates. Changes of the means decorrelate quickly, however long the noise's autocorrelation is. The finding counts only
+//! where the error is well above its scatter within the parts.
 
-use crate::adequacy::unmodelled::Leftover;
-use crate::fit::engine::{Engine, Fit};
+use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
+use crate::fit::engine::Engine;
 use crate::stats::scale::root_mean_square;
 use crate::stats::sums::dot;
 
-/// Parts of the record: many show quick changes, few those in loud noise.
-const PARTS: [usize; 2] = [100, 200];
-/// Shorter parts have no mean to speak of, in rows.
-const SHORTEST: usize = 5;
-/// By chance once in ten thousand records: scores that are exponential have a skew sum.
-const RARE: f64 = 4.6;
-/// An error so many times as large as its scatter within the parts is far above it.
-const FAR: f64 = 2.0;
+/// Numbers of parts that the record is divided into: more parts resolve quick changes, fewer average louder noise.
+const STEP_PARTS: [usize; 2] = [100, 200];
+/// Fewest rows in a part.
+const ROWS_PER_PART: usize = 5;
+/// Value of z that noise exceeds in one of ten thousand records: exponential scores have a skewed sum, so that the quantile is
+/// above the normal distribution's 3.72.
+const Z_IN_STEP: f64 = 4.6;
+/// Smallest ratio of the error's root mean square to its scatter within the parts.
+const ERROR_PER_SCATTER: f64 = 2.0;
 
-/// Tests the free-running error of a fit.
-pub(crate) fn test(engine: &Engine, fit: &Fit) -> Option<Leftover> {
-    // The error of rounding goes with the spring, and is no more than that.
-    if fit.noise.half_step > 0.0 {
-        return None;
+/// The check of a fit's free-running error.
+pub(super) struct InStep;
+
+impl Check for InStep {
+    fn name(&self) -> &'static str {
+        "in_step"
     }
-    let stiffness: Vec<f64> = engine.data.reading.iter().zip(&fit.residual).map(|(read, left)| read - left).collect();
-    found(&fit.noise.weighted(&engine.observed.errors(&fit.residual)), &stiffness)
+
+    fn test(&self, engine: &mut Engine, Candidate { fit, .. }: &Candidate) -> Option<Inadequacy> {
+        // The rounding error follows the stiffness by itself.
+        if fit.noise.half_step > 0.0 {
+            return None;
+        }
+        let stiffness: Vec<f64> =
+            engine.data.reading.iter().zip(&fit.residual).map(|(read, left)| read - left).collect();
+        let errors = engine.observed.errors(&fit.residual);
+        in_step(&fit.noise.weighted(&errors), &stiffness).map(Inadequacy::from)
+    }
 }
 
-fn found(errors: &[f64], stiffness: &[f64]) -> Option<Leftover> {
-    PARTS.into_iter().find_map(|parts| in_parts(parts, errors, stiffness))
+/// Tests errors against the simulated stiffness, both in V, with each number of parts.
+fn in_step(errors: &[f64], stiffness: &[f64]) -> Option<UnmodelledDynamics> {
+    STEP_PARTS.into_iter().find_map(|parts| in_parts(parts, errors, stiffness))
 }
 
-fn in_parts(parts: usize, errors: &[f64], stiffness: &[f64]) -> Option<Leftover> {
+fn in_parts(parts: usize, errors: &[f64], stiffness: &[f64]) -> Option<UnmodelledDynamics> {
     let length = errors.len() / parts;
-    if length < SHORTEST {
+    if length < ROWS_PER_PART {
         return None;
     }
     let error = root_mean_square(errors);
     let share = 1.0 - (scatter(errors, length) / error.max(f64::MIN_POSITIVE)).powi(2);
     let [of_error, of_stiffness] = [errors, stiffness].map(|values| scores(&changes(values, length)));
-    let surprise = correlation(&of_error, &of_stiffness) * (of_error.len() as f64 - 1.0).sqrt();
-    (surprise > RARE && share > 1.0 - FAR.powi(-2)).then(|| Leftover {
-        place: "in step with the spring, as an error that changes when the stiffness does".into(),
-        share,
-        rms: share.sqrt() * error,
-        significant: true,
-        doubtful: true,
+    let z = correlation(&of_error, &of_stiffness) * (of_error.len() as f64 - 1.0).sqrt();
+    (z > Z_IN_STEP && share > 1.0 - ERROR_PER_SCATTER.powi(-2)).then(|| {
+        let place = "in step with the spring, as an error that changes when the stiffness does";
+        UnmodelledDynamics::certain(place.into(), share, share.sqrt() * error)
     })
 }
 
@@ -62,7 +71,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Root of the mean square around the parts' means.
+/// Root mean square around the means of parts of `length` rows, in the unit of the values.
 fn scatter(values: &[f64], length: usize) -> f64 {
     let around = |part: &[f64]| {
         let mean = mean(part);
@@ -71,12 +80,13 @@ fn scatter(values: &[f64], length: usize) -> f64 {
     (values.chunks_exact(length).map(around).sum::<f64>() / ((length - 1) * (values.len() / length)) as f64).sqrt()
 }
 
-/// How far each part's mean is from the one before.
+/// Absolute change of the mean from each part of `length` rows to the next.
 fn changes(values: &[f64], length: usize) -> Vec<f64> {
     let means: Vec<f64> = values.chunks_exact(length).map(mean).collect();
     means.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect()
 }
 
+/// Savage's scores of the values: expected order statistics of the exponential distribution, approximately.
 fn scores(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -87,6 +97,7 @@ fn scores(values: &[f64]) -> Vec<f64> {
     scores
 }
 
+/// Pearson correlation, -1 to 1.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let centred = |values: &[f64]| -> Vec<f64> {
         let mean = mean(values);
@@ -104,7 +115,7 @@ mod tests {
     const ROWS: usize = 2400;
     const STAIR: usize = 150;
 
-    /// A stair up and down, followed with a time constant of so many rows.
+    /// A stair up and down through a first-order lag with a time constant in rows.
     fn stiffness(tau: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut lag = 0.0;
         let follow = |row: usize| {
@@ -115,7 +126,7 @@ mod tests {
         (0..ROWS).map(follow).collect()
     }
 
-    /// Noise of 1 V whose memory fades by this part a row.
+    /// First-order autoregressive noise of 1 V whose coefficient is `1 - fades`.
     fn noise(seed: usize, fades: f64) -> Vec<f64> {
         let mut last = 0.0;
         let follow = |noise: f64| {
@@ -126,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_that_keeps_step_is_no_noise() {
+    fn a_wrong_time_constant_is_in_step() {
         let (read, simulated) = (stiffness(|row| 50.0 + 0.01 * row as f64), stiffness(|_| 60.0));
         for (seed, fades) in [1.0, 0.5, 0.1].into_iter().enumerate() {
             let noise = noise(seed, fades);
@@ -134,19 +145,19 @@ mod tests {
                 let off = read.iter().zip(&simulated).map(|(read, simulated)| times * (read - simulated));
                 off.zip(&noise).map(|(off, noise)| off + noise).collect()
             };
-            let left = found(&errors(4.0), &simulated).expect("a wrong time constant");
+            let left = in_step(&errors(4.0), &simulated).expect("a wrong time constant");
             assert!(left.share > 0.75 && left.rms > 2.0, "{left:?}");
-            // What is as large as the noise is no great matter.
-            assert_eq!(found(&errors(0.1), &simulated), None);
+            // An error smaller than the noise does not count.
+            assert_eq!(in_step(&errors(0.1), &simulated), None);
         }
     }
 
     #[test]
-    fn noise_keeps_step_with_nothing() {
+    fn autocorrelated_noise_is_not_in_step() {
         let simulated = stiffness(|_| 60.0);
         for seed in 0..40 {
             let errors = noise(seed, [1.0, 0.1, 0.03, 0.01][seed % 4]);
-            assert_eq!(found(&errors, &simulated), None, "{seed}");
+            assert_eq!(in_step(&errors, &simulated), None, "{seed}");
         }
     }
 }

@@ -1,82 +1,63 @@
-//! Whether a record can tell anything of the spring, and what to do if not.
+//! Check of whether a record identifies the gain and the time constant; without these two no cause can be isolated.
 
 use model::Plant;
 
-use crate::adequacy::standstill;
-use crate::answer::Verdict;
-use crate::effects::index_of;
-use crate::effects::model::{Block, Model};
+use crate::adequacy::check::{Candidate, Check, Inadequacy};
+use crate::adequacy::comparison::Comparison;
+use crate::adequacy::gain_and_time_constant::{gain_and_time_constant, model_of_both};
+use crate::adequacy::standstill::constant_is_as_likely;
+use crate::adequacy::unidentifiable::Unidentifiable;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::covariance;
 use crate::noise::Noise;
-use crate::record::data::Data;
-use crate::stats::sums::dot;
 
-/// A stair moves the simulation at least so far, in V: readings that stay where they are then are no spring's.
-const FAR_V: f64 = 5.0;
-/// Correlation with the simulation from which on readings are the same on another scale.
-const ALIKE: f64 = 0.98;
-/// Correlation below which readings may have nothing to do with the voltage.
-const STRANGE: f64 = 0.2;
-/// Gain and time constant that are likelier than the simulation's by so many nats are no chance.
-const CLEAR: f64 = 20.0;
+/// Range of the simulation, in V, beyond which constant readings are a fault of the sensor and not a lack of excitation.
+const RANGE_OF_A_DEAD_SENSOR_V: f64 = 5.0;
+/// Absolute correlation with the simulation above which readings beyond any gain are readings in another unit.
+const CORRELATION_OF_OTHER_UNIT: f64 = 0.98;
+/// Absolute correlation with the simulation below which the readings may not depend on the voltage.
+const CORRELATION_OF_NO_SPRING: f64 = 0.2;
+/// Gain in log-likelihood by gain and time constant, in nats, above which their covariance at the fit may be used.
+const NATS_TO_TRUST_FIT: f64 = 20.0;
+/// Largest useful standard deviation of the gain: half of the nominal gain.
+const GAIN_DEVIATION: f64 = 0.5;
+/// Largest useful standard deviation of the time constant's natural logarithm: a factor of e.
+const LOG_TIME_CONSTANT_DEVIATION: f64 = 1.0;
 
-/// Why no cause is looked for.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Silent {
-    /// Too little happens, or noise hides it.
-    Excitation,
-    /// The readings are those of no spring: what they do.
-    Sensor(String),
-}
+/// The check of a record, with the fit of the simulation as it is given.
+pub(super) struct Informative;
 
-impl Silent {
-    pub(crate) fn verdict(&self) -> Verdict {
-        match self {
-            Self::Excitation => Verdict::Insufficient,
-            Self::Sensor(_) => Verdict::Unexplained,
-        }
+impl Check for Informative {
+    fn name(&self) -> &'static str {
+        "informative"
     }
 
-    /// What the simulation leaves, in words.
-    pub(crate) fn leftover(&self) -> Option<String> {
-        match self {
-            Self::Excitation => None,
-            Self::Sensor(what) => Some(what.clone()),
-        }
-    }
-
-    pub(crate) fn next_experiment(&self) -> &'static str {
-        match self {
-            Self::Excitation => {
-                "run a stair over the whole range up and down again, each step held for five time constants: from this \
-                 record the gain or the time constant could be almost anything"
-            }
-            Self::Sensor(_) => {
-                "look at the sensor, its cable and its unit (volts of equivalent static voltage are expected), then repeat \
-                 the record"
-            }
-        }
+    fn test(&self, engine: &mut Engine, candidate: &Candidate) -> Option<Inadequacy> {
+        unidentifiable(engine, candidate.fit).map(Inadequacy::from)
     }
 }
 
-/// `None` if gain and time constant would show in this record.
-pub(crate) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
+/// Returns why gain and time constant are not identified, or `None` if they are.
+fn unidentifiable(engine: &mut Engine, baseline: &Fit) -> Option<Unidentifiable> {
     let data = engine.data;
-    let moves = |values: &[f64]| values.iter().any(|value| *value != values[0]);
-    // Under one voltage all the time, what the spring does may be its start as well as its answer.
-    if !moves(&data.voltage_v) {
-        return Some(Silent::Excitation);
+    let changes = |values: &[f64]| values.iter().any(|value| *value != values[0]);
+    // Under a constant voltage a response to the voltage cannot be distinguished from the decay of the initial state.
+    if !changes(&data.voltage_v) {
+        return Some(Unidentifiable::Excitation);
     }
-    let beside = Beside::of(data, baseline);
-    if !moves(&data.reading) {
-        let far = beside.simulated[1] - beside.simulated[0] > FAR_V;
-        return Some(if far { Silent::Sensor(beside.still()) } else { Silent::Excitation });
+    let comparison = Comparison::new(engine);
+    if !changes(&data.reading) {
+        let excited = comparison.simulated_range_v() > RANGE_OF_A_DEAD_SENSOR_V;
+        return Some(if excited {
+            Unidentifiable::Sensor(comparison.constant_readings())
+        } else {
+            Unidentifiable::Excitation
+        });
     }
-    let start = of_both(engine.base().relaxation.tau_s);
+    let start = model_of_both(engine.base().relaxation.tau_s);
     let mut best = engine.fit(start.clone(), &Noise::default_robust());
-    // A simulation may be so far off that no way leads from there.
-    let paper = of_both(Plant::PAPER.time_constant_s);
+    // From a time constant that is wrong by decades the fit does not converge, so the paper's is a second start.
+    let paper = model_of_both(Plant::PAPER.time_constant_s);
     if paper != start {
         let other = engine.fit(paper, &Noise::default_robust());
         best = if other.log_likelihood > best.log_likelihood { other } else { best };
@@ -84,90 +65,25 @@ pub(crate) fn silent(engine: &mut Engine, baseline: &Fit) -> Option<Silent> {
     let [gain, _] = gain_and_time_constant();
     let bounds = &gain.coordinates(data)[0];
     let found = best.model.point(gain.effect).map_or(1.0, |point| point[0]);
-    if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found) && beside.correlation.abs() > ALIKE {
-        return Some(Silent::Sensor(beside.scaled()));
+    if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found)
+        && comparison.correlation.abs() > CORRELATION_OF_OTHER_UNIT
+    {
+        return Some(Unidentifiable::Sensor(comparison.other_unit()));
     }
-    // Half of the gain, or a factor of e in the time constant, is no knowledge.
-    let known = |fit: &Fit, engine: &mut Engine| {
-        covariance(engine, fit).is_some_and(|of| of[(0, 0)].sqrt() < 0.5 && of[(1, 1)].sqrt() < 1.0)
+    let identified = |fit: &Fit, engine: &mut Engine| {
+        covariance(engine, fit)
+            .is_some_and(|of| of[(0, 0)].sqrt() < GAIN_DEVIATION && of[(1, 1)].sqrt() < LOG_TIME_CONSTANT_DEVIATION)
     };
-    // The noise as it is at best, the information as it is where the search starts; of a start far off there is none.
+    // Noise of the best fit with the sensitivities at the start of the search; where the start is far off, these vanish.
     let residual = engine.residual(&start);
     let start = Fit { model: start, residual, noise: best.noise.clone(), ..best.clone() };
-    let is_clear = best.log_likelihood > baseline.log_likelihood + CLEAR;
-    let tells = known(&start, engine) || is_clear && known(&best, engine);
-    if !tells {
-        return Some(Silent::Excitation);
+    let is_clear = best.log_likelihood > baseline.log_likelihood + NATS_TO_TRUST_FIT;
+    let informative = identified(&start, engine) || is_clear && identified(&best, engine);
+    if !informative {
+        return Some(Unidentifiable::Excitation);
     }
-    // Quick to tell, and a search for causes in noise alone is long.
-    let still = beside.correlation.abs() < STRANGE && standstill::as_likely(engine, &best.model, best.log_likelihood);
-    still.then(|| Silent::Sensor(beside.still()))
-}
-
-/// The two numbers that every record of use tells.
-pub(crate) fn gain_and_time_constant() -> [Block; 2] {
-    ["gain-error", "time-constant"].map(|cause| Block { effect: index_of(cause).expect("an effect"), form: 0 })
-}
-
-/// A model of both: the gain as it is simulated, and a time constant.
-pub(crate) fn of_both(tau_s: f64) -> Model {
-    let [gain, time_constant] = gain_and_time_constant();
-    Model::default().with(gain, vec![1.0]).with(time_constant, vec![tau_s.ln()])
-}
-
-/// Of a spring that was found, if one that stands still is as likely.
-pub(crate) fn no_spring(engine: &mut Engine, baseline: &Fit, found: &Fit, score: f64) -> Option<Silent> {
-    let still = !found.model.blocks.is_empty() && standstill::as_likely(engine, &found.model, score);
-    still.then(|| Silent::Sensor(Beside::of(engine.data, baseline).still()))
-}
-
-/// Readings beside the simulation: the range of both, and how one goes with the other.
-struct Beside {
-    read: [f64; 2],
-    simulated: [f64; 2],
-    /// 0 where one of them stays.
-    correlation: f64,
-    /// Of the readings over the simulation.
-    slope: f64,
-}
-
-impl Beside {
-    fn of(data: &Data, baseline: &Fit) -> Self {
-        let read = &data.reading;
-        let simulated: Vec<f64> = read.iter().zip(&baseline.residual).map(|(read, left)| read - left).collect();
-        let range = |values: &[f64]| {
-            values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
-        };
-        let centred = |values: &[f64]| -> Vec<f64> {
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            values.iter().map(|value| value - mean).collect()
-        };
-        let (a, b) = (centred(read), centred(&simulated));
-        Self {
-            read: range(read),
-            simulated: range(&simulated),
-            correlation: dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt().max(f64::MIN_POSITIVE),
-            slope: dot(&a, &b) / dot(&b, &b).max(f64::MIN_POSITIVE),
-        }
-    }
-
-    fn still(&self) -> String {
-        let ([low, high], [from, to]) = (self.read, self.simulated);
-        format!(
-            "The readings, {low:.3} to {high:.3} V, do not follow the voltage, under which the simulation goes from \
-             {from:.0} to {to:.0} V"
-        )
-    }
-
-    fn scaled(&self) -> String {
-        format!("The readings are {} times what the simulation says, beyond any spring", significant(self.slope))
-    }
-}
-
-/// To three digits, however large or small.
-fn significant(number: f64) -> String {
-    match number.abs() {
-        0.001..1e5 => format!("{number:.3}"),
-        _ => format!("{number:.2e}"),
-    }
+    // Checked before the search, which takes long on noise alone.
+    let constant = comparison.correlation.abs() < CORRELATION_OF_NO_SPRING
+        && constant_is_as_likely(engine, &best.model, best.log_likelihood);
+    constant.then(|| Unidentifiable::Sensor(comparison.constant_readings()))
 }

@@ -1,4 +1,4 @@
-//! Where an error is largest: the stretch of time, and the voltages, whose mean square is above the record's.
+//! Where an error is largest: the stretch of time, and the voltages, whose mean square exceeds the record's most.
 //!
 //! ```text
 //! max over stretches of sum(e^2 - mean(e^2))        (Bentley, Communications of the ACM 27, 1984: Kadane's algorithm)
@@ -9,36 +9,77 @@ use std::ops::Range;
 use crate::record::data::Data;
 use crate::stats::sums::dot;
 
-/// Voltages that hold more than this part of the power, and more densely than the stretch of time does, are named beside it.
-const MOST: f64 = 0.5;
+/// Fraction of the error's power above which a range of voltages is named in addition to the stretch of time, if it is also the denser
+/// of the two.
+const POWER_TO_NAME_VOLTAGES: f64 = 0.5;
 
-/// In words that follow what the error looks like.
-pub(crate) fn whereabouts(data: &Data, errors: &[f64]) -> String {
-    let power = dot(errors, errors).max(f64::MIN_POSITIVE);
-    let part = |rows: usize| rows as f64 / errors.len() as f64;
-    let at_once: Vec<(f64, usize)> = errors.iter().map(|error| (error * error / power, 1)).collect();
-    let (run, share, rows) = densest(&at_once);
-    let decimals = (-(1.001 * data.sample_s).log10().floor()).clamp(0.0, 9.0) as usize;
-    let [from, to] = [run.start, run.end - 1].map(|row| format!("{:.decimals$}", data.time_s[row]));
-    let [percent, of_time] = [share, part(rows)].map(|part| 100.0 * part);
-    let mut words = format!(", {percent:.0} % of it from {from} s to {to} s, in {of_time:.0} % of the readings");
-
-    let mut by_voltage: Vec<(f64, f64)> =
-        data.voltage_v.iter().zip(&at_once).map(|(voltage, (square, _))| (voltage.abs(), *square)).collect();
-    by_voltage.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let levels: Vec<&[(f64, f64)]> = by_voltage.chunk_by(|a, b| a.0 == b.0).collect();
-    let of_levels: Vec<(f64, usize)> =
-        levels.iter().map(|level| (level.iter().map(|row| row.1).sum(), level.len())).collect();
-    let (run, at_voltages, there) = densest(&of_levels);
-    if at_voltages > MOST && at_voltages / part(there) > share / part(rows) {
-        let [low, high] = [run.start, run.end - 1].map(|level| levels[level][0].0);
-        words += &format!(", and {:.0} % at voltages from {low:.0} V to {high:.0} V", 100.0 * at_voltages);
-    }
-    words
+/// A stretch of time and a range of voltages where an error is largest.
+pub(crate) struct Localisation {
+    /// First and last time, in s.
+    time_s: [f64; 2],
+    /// Decimals that distinguish the times of two rows.
+    decimals: usize,
+    /// Fractions of the error's power and of the rows within the stretch of time.
+    in_time: Density,
+    /// First and last absolute voltage, in V, with the fractions of power and rows there; `None` if time localises better.
+    at_voltages: Option<([f64; 2], Density)>,
 }
 
-/// Of neighbours, each with its part of the power and its rows, those that hold most beyond their rows' share of it; their
-/// part of the power, and their rows.
+/// Fractions of the power and of the rows, 0 to 1.
+#[derive(Clone, Copy)]
+struct Density {
+    power: f64,
+    rows: f64,
+}
+
+impl Density {
+    fn power_per_row(self) -> f64 {
+        self.power / self.rows
+    }
+}
+
+impl Localisation {
+    /// Localises errors, in V or in any other unit, one for each row of the record.
+    pub(crate) fn new(data: &Data, errors: &[f64]) -> Self {
+        let power = dot(errors, errors).max(f64::MIN_POSITIVE);
+        let density = |power, rows: usize| Density { power, rows: rows as f64 / errors.len() as f64 };
+        let each_row: Vec<(f64, usize)> = errors.iter().map(|error| (error * error / power, 1)).collect();
+        let (run, share, rows) = densest(&each_row);
+        let in_time = density(share, rows);
+        let time_s = [run.start, run.end - 1].map(|row| data.time_s[row]);
+
+        let mut by_voltage: Vec<(f64, f64)> =
+            data.voltage_v.iter().zip(&each_row).map(|(voltage, (square, _))| (voltage.abs(), *square)).collect();
+        by_voltage.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let levels: Vec<&[(f64, f64)]> = by_voltage.chunk_by(|a, b| a.0 == b.0).collect();
+        let each_level: Vec<(f64, usize)> =
+            levels.iter().map(|level| (level.iter().map(|row| row.1).sum(), level.len())).collect();
+        let (run, share, rows) = densest(&each_level);
+        let there = density(share, rows);
+        let denser = there.power > POWER_TO_NAME_VOLTAGES && there.power_per_row() > in_time.power_per_row();
+        let voltages_v = [run.start, run.end - 1].map(|level| levels[level][0].0);
+        Self {
+            time_s,
+            decimals: (-(1.001 * data.sample_s).log10().floor()).clamp(0.0, 9.0) as usize,
+            in_time,
+            at_voltages: denser.then_some((voltages_v, there)),
+        }
+    }
+
+    /// The words that follow a description of the error in a report.
+    pub(crate) fn words(&self) -> String {
+        let [from, to] = self.time_s.map(|time| format!("{time:.0$}", self.decimals));
+        let [percent, of_rows] = [self.in_time.power, self.in_time.rows].map(|part| 100.0 * part);
+        let mut words = format!(", {percent:.0} % of it from {from} s to {to} s, in {of_rows:.0} % of the readings");
+        if let Some(([low, high], there)) = self.at_voltages {
+            words += &format!(", and {:.0} % at voltages from {low:.0} V to {high:.0} V", 100.0 * there.power);
+        }
+        words
+    }
+}
+
+/// Finds the run of neighbours, each given as its fraction of the power and its rows, that maximises power less the run's
+/// fraction of the rows; returns the run, its power and its rows.
 fn densest(parts: &[(f64, usize)]) -> (Range<usize>, f64, usize) {
     let rows: usize = parts.iter().map(|part| part.1).sum();
     let (mut best, mut best_sum) = (0..1, f64::NEG_INFINITY);
@@ -63,20 +104,21 @@ mod tests {
     use simulation::record::{Record, Row};
 
     #[test]
-    fn a_burst_is_found_in_time_and_at_its_voltage() {
-        // Levels of 100 rows, 0.1 s apart; each comes twice.
+    fn a_burst_is_localised_in_time_and_by_its_voltage() {
+        // Levels of 100 rows, 0.1 s apart; each occurs twice.
         let volts = |row: usize| 100.0 * (row / 100 % 5) as f64;
         let row = |row: usize| Row { line: row, time_s: 0.1 * row as f64, voltage_v: volts(row), measured: Some(0.0) };
         let record = Record { name: String::new(), rows: (0..1000).map(row).collect() };
         let data = Data::new(&record, Input::Hold);
-        let told = |large: &dyn Fn(usize) -> bool| {
-            whereabouts(&data, &(0..1000).map(|row| if large(row) { 9.0 } else { 1.0 }).collect::<Vec<_>>())
+        let words = |large: &dyn Fn(usize) -> bool| {
+            let errors: Vec<f64> = (0..1000).map(|row| if large(row) { 9.0 } else { 1.0 }).collect();
+            Localisation::new(&data, &errors).words()
         };
         assert_eq!(
-            told(&|row| (420..450).contains(&row)),
+            words(&|row| (420..450).contains(&row)),
             ", 71 % of it from 42.0 s to 44.9 s, in 3 % of the readings"
         );
-        let at_300 = told(&|row| volts(row) == 300.0);
+        let at_300 = words(&|row| volts(row) == 300.0);
         assert!(at_300.ends_with(", and 95 % at voltages from 300 V to 300 V"), "{at_300}");
     }
 }

@@ -1,12 +1,16 @@
-//! A sensor that reads no spring: readings that stand still are at least as likely as the best spring.
+//! Check for a sensor that does not read the spring: a constant is at least as likely as the best spring.
 //!
 //! ```text
 //! reading = constant + hum + shifted run + noise
 //! ```
 //!
-//! A dead sensor has noise, and a spring can be bent until it stands still: by a law that is flat, a play that is never
-//! taken up, readings that stop. So a spring has to be worth its causes' price beside a constant, as beside the simulation.
+//! A disconnected sensor reads noise, and a spring model can be fitted until it is constant: by a flat voltage law, a play
+//! wider than the command, readings that saturate. So the spring's score, log-likelihood less the price of its blocks, has
+//! to exceed the log-likelihood of a constant, as it has to exceed that of the simulation as it is given.
 
+use crate::adequacy::check::{Candidate, Check, Inadequacy};
+use crate::adequacy::comparison::Comparison;
+use crate::adequacy::unidentifiable::Unidentifiable;
 use crate::effects::index_of;
 use crate::effects::model::Model;
 use crate::fit::engine::Engine;
@@ -14,16 +18,31 @@ use crate::noise::Noise;
 use crate::stats::median::median;
 use crate::stats::scale::robust_scale;
 
-/// What is added to readings, whatever is read.
-const ADDED: [&str; 2] = ["hum", "reading-offset"];
-/// A spring whose error is below this part of the readings' scatter around the constant moves, however much a memory of the
-/// noise explains.
-const MOVES: f64 = 0.9;
+/// Effects that act on readings whatever the sensor reads; they are added to the constant.
+const ON_ANY_READING: [&str; 2] = ["hum", "reading-offset"];
+/// A spring whose robust error is below this fraction of the readings' robust scatter around the constant follows the voltage,
+/// however likely autocorrelated noise makes the constant.
+const SPRING_ERROR_PER_SCATTER: f64 = 0.9;
 
-/// True if a constant is as likely as a model that scores so many nats.
-pub(crate) fn as_likely(engine: &mut Engine, model: &Model, score: f64) -> bool {
+/// The check of a model with at least one effect.
+pub(super) struct Standstill;
+
+impl Check for Standstill {
+    fn name(&self) -> &'static str {
+        "standstill"
+    }
+
+    fn test(&self, engine: &mut Engine, Candidate { fit, score }: &Candidate) -> Option<Inadequacy> {
+        let constant = !fit.model.blocks.is_empty() && constant_is_as_likely(engine, &fit.model, *score);
+        constant.then(|| Unidentifiable::Sensor(Comparison::new(engine).constant_readings()).into())
+    }
+}
+
+/// True if a constant is at least as likely as a model with this score, in nats.
+pub(crate) fn constant_is_as_likely(engine: &mut Engine, model: &Model, score: f64) -> bool {
     let left = engine.residual(model);
-    let spring = ADDED.iter().fold(model.clone(), |model, cause| model.without(index_of(cause).expect("an effect")));
+    let spring =
+        ON_ANY_READING.iter().fold(model.clone(), |model, cause| model.without(index_of(cause).expect("an effect")));
     let without_added = engine.residual(&spring);
     let reading: Vec<f64> = engine
         .data
@@ -36,6 +55,6 @@ pub(crate) fn as_likely(engine: &mut Engine, model: &Model, score: f64) -> bool 
     let around: Vec<f64> = reading.iter().map(|reading| reading - constant).collect();
     let noise = Noise::fitted(&around, engine.observed);
     let likelihood = noise.log_likelihood(&around, engine.observed) - noise.cost(around.len());
-    likelihood >= score
-        && robust_scale(&engine.observed.errors(&left)) > MOVES * robust_scale(&engine.observed.errors(&around))
+    let [error, scatter] = [&left, &around].map(|residual| robust_scale(&engine.observed.errors(residual)));
+    likelihood >= score && error > SPRING_ERROR_PER_SCATTER * scatter
 }

@@ -1,27 +1,29 @@
-//! The search on its own: a judge that was told what each set of causes is worth.
+//! The search alone, on an evaluator with tabulated log-likelihoods.
 
 use std::collections::BTreeSet;
 
-use crate::effects::index_of;
+use crate::effects::model::{Block, Model};
+use crate::effects::{EFFECTS, index_of};
+use crate::fit::engine::Fit;
 use crate::noise::Noise;
-use crate::search::*;
+use crate::search::{Evaluator, Search, WarmStart, effects};
 
-/// What every block costs.
+/// Price of every block, in nats.
 const PRICE: f64 = 10.0;
 
-/// Log-likelihoods of sets of causes; of other sets that of their best part, and a little for every further cause.
-struct Told {
+/// Log-likelihoods of sets of causes; another set has that of its best subset and 1 nat for every further cause.
+struct Tabulated {
     worth: Vec<(BTreeSet<usize>, f64)>,
-    caution: f64,
-    /// Beside noise of 1 V.
+    penalty_factor: f64,
+    /// Misfit of form at a noise floor of 1 V, in nats.
     misfit: f64,
-    /// Without this effect, noise of 10 V is left.
+    /// Effect without which noise of 10 V is left.
     quiet: Option<usize>,
-    /// From this log-likelihood on, nothing but noise is left.
+    /// Log-likelihood from which nothing but noise is left.
     clean: f64,
-    /// Only the patient are told of this effect.
-    secret: Option<usize>,
-    /// Fits less looks at a point, which cost none.
+    /// Effect that only an exhaustive search finds.
+    hidden: Option<usize>,
+    /// Number of fits; evaluations at a given point are not counted.
     fits: isize,
 }
 
@@ -29,20 +31,20 @@ fn effect(cause: &str) -> usize {
     index_of(cause).unwrap()
 }
 
-fn told(worth: &[(&[&str], f64)]) -> Told {
+fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
     let set = |causes: &[&str]| causes.iter().map(|cause| effect(cause)).collect();
-    Told {
+    Tabulated {
         worth: worth.iter().map(|(causes, worth)| (set(causes), *worth)).collect(),
-        caution: 1.0,
+        penalty_factor: 1.0,
         misfit: 0.0,
         quiet: None,
         clean: f64::INFINITY,
-        secret: None,
+        hidden: None,
         fits: 0,
     }
 }
 
-impl Judge for Told {
+impl Evaluator for Tabulated {
     fn fit(&mut self, model: Model) -> Fit {
         self.fits += 1;
         let has: BTreeSet<usize> = effects(&model).into_iter().collect();
@@ -66,7 +68,7 @@ impl Judge for Told {
         self.fit(model)
     }
 
-    fn fit_again(&mut self, first: Fit) -> Fit {
+    fn refit(&mut self, first: Fit) -> Fit {
         first
     }
 
@@ -74,10 +76,10 @@ impl Judge for Told {
         fit.log_likelihood
     }
 
-    fn extended(&mut self, fit: &Fit, patient: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
-        let told = |effect: &usize| wanted(*effect) && (patient || self.secret != Some(*effect));
+    fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+        let tried = |effect: &usize| wanted(*effect) && (exhaustive || self.hidden != Some(*effect));
         let blocks =
-            (0..EFFECTS.len()).filter(told).collect::<Vec<_>>().into_iter().map(|effect| Block { effect, form: 0 });
+            (0..EFFECTS.len()).filter(tried).collect::<Vec<_>>().into_iter().map(|effect| Block { effect, form: 0 });
         blocks.map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
     }
 
@@ -93,115 +95,116 @@ impl Judge for Told {
         fit.log_likelihood < self.clean
     }
 
-    fn caution(&mut self, _: &Fit) -> f64 {
-        self.caution
+    fn penalty_factor(&mut self, _: &Fit) -> f64 {
+        self.penalty_factor
     }
 }
 
-fn found(judge: &mut Told) -> Vec<&'static str> {
-    let best = Search::new(judge).run(|_| ());
+fn found(evaluator: &mut Tabulated) -> Vec<&'static str> {
+    let best = Search::new(evaluator).run(|_| ());
     best.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect()
 }
 
 #[test]
-fn it_adds_what_is_worth_its_price_and_stops() {
-    assert!(found(&mut told(&[])).is_empty());
-    assert!(found(&mut told(&[(&["hum"], 0.9 * PRICE)])).is_empty());
-    let mut judge = told(&[(&["delay"], 50.0), (&["hum"], 30.0), (&["delay", "hum"], 80.0)]);
-    assert_eq!(found(&mut judge), ["delay", "hum"]);
-    // Each structure once as a first fit for each that it follows, and once judged.
-    assert!(judge.fits < 200, "{} fits", judge.fits);
+fn a_block_is_added_if_it_gains_more_than_its_price() {
+    assert!(found(&mut tabulated(&[])).is_empty());
+    assert!(found(&mut tabulated(&[(&["hum"], 0.9 * PRICE)])).is_empty());
+    let mut evaluator = tabulated(&[(&["delay"], 50.0), (&["hum"], 30.0), (&["delay", "hum"], 80.0)]);
+    assert_eq!(found(&mut evaluator), ["delay", "hum"]);
+    // Each structure is fitted once for each that it extends, and evaluated once.
+    assert!(evaluator.fits < 200, "{} fits", evaluator.fits);
 }
 
 #[test]
-fn it_takes_out_what_stood_in_for_two() {
+fn a_block_that_stands_in_for_two_is_replaced_by_them() {
     let pair: &[&str] = &["time-constant", "drift"];
     let worth: [(&[&str], f64); 4] =
         [(&["resonance"], 90.0), (&["time-constant"], 50.0), (&["drift"], 40.0), (pair, 200.0)];
-    let mut judge = told(&worth);
-    assert_eq!(found(&mut judge), pair);
-    // It was no stand-in if it leaves nothing but noise, and then the search is shorter.
-    let mut content = Told { clean: 80.0, ..told(&worth) };
-    assert_eq!(found(&mut content), ["resonance"]);
-    assert!(2 * content.fits < judge.fits, "{} {}", content.fits, judge.fits);
+    let mut evaluator = tabulated(&worth);
+    assert_eq!(found(&mut evaluator), pair);
+    // If it leaves nothing but noise it stays, and the search is shorter.
+    let mut adequate = Tabulated { clean: 80.0, ..tabulated(&worth) };
+    assert_eq!(found(&mut adequate), ["resonance"]);
+    assert!(2 * adequate.fits < evaluator.fits, "{} {}", adequate.fits, evaluator.fits);
 }
 
 #[test]
-fn it_changes_one_block_for_another() {
-    // Neither is worth anything without the other, and the way there leads over a third.
+fn blocks_are_exchanged() {
+    // Neither gains anything without the other, and they are reached through a third.
     let pair: &[&str] = &["amplifier-slew", "charge-leakage"];
     let worth: [(&[&str], f64); 3] = [(&["delay"], 60.0), (&["delay", "charge-leakage"], 100.0), (pair, 150.0)];
-    assert_eq!(found(&mut told(&worth)), pair);
+    assert_eq!(found(&mut tabulated(&worth)), pair);
 }
 
 #[test]
-fn caution_makes_every_block_dearer() {
-    let mut judge = told(&[(&["gain-error"], 500.0), (&["gain-error", "hum"], 525.0)]);
-    assert_eq!(found(&mut judge), ["gain-error", "hum"]);
-    judge.caution = 3.0;
-    assert_eq!(found(&mut judge), ["gain-error"]);
+fn the_penalty_factor_multiplies_every_price() {
+    let mut evaluator = tabulated(&[(&["gain-error"], 500.0), (&["gain-error", "hum"], 525.0)]);
+    assert_eq!(found(&mut evaluator), ["gain-error", "hum"]);
+    evaluator.penalty_factor = 3.0;
+    assert_eq!(found(&mut evaluator), ["gain-error"]);
 }
 
-/// What it costs is charged anew, what it is worth stays.
+/// Only the prices are computed again.
 #[test]
-fn another_pass_fits_nothing_anew() {
-    let mut judge = told(&[(&["gain-error"], 500.0), (&["gain-error", "hum"], 550.0)]);
-    assert_eq!(found(&mut judge), ["gain-error", "hum"]);
-    let once = std::mem::take(&mut judge.fits);
-    judge.caution = 1.5;
-    assert_eq!(found(&mut judge), ["gain-error", "hum"]);
-    assert_eq!(judge.fits, once);
+fn another_pass_needs_no_new_fit() {
+    let mut evaluator = tabulated(&[(&["gain-error"], 500.0), (&["gain-error", "hum"], 550.0)]);
+    assert_eq!(found(&mut evaluator), ["gain-error", "hum"]);
+    let once = std::mem::take(&mut evaluator.fits);
+    evaluator.penalty_factor = 1.5;
+    assert_eq!(found(&mut evaluator), ["gain-error", "hum"]);
+    assert_eq!(evaluator.fits, once);
 }
 
 #[test]
-fn a_further_block_costs_what_the_form_of_the_others_may_leave() {
-    let mut judge = told(&[(&["hysteresis"], 500.0), (&["hysteresis", "drift"], 520.0)]);
-    assert_eq!(found(&mut judge), ["hysteresis", "drift"]);
-    judge.misfit = 15.0;
-    assert_eq!(found(&mut judge), ["hysteresis"]);
-    // One of the same stage may be no more than the other's form.
-    let mut alike = told(&[(&["hysteresis"], 500.0), (&["hysteresis", "static-nonlinearity"], 520.0)]);
-    (judge.misfit, alike.misfit) = (1.0, 1.0);
-    assert_eq!(found(&mut judge), ["hysteresis", "drift"]);
+fn the_misfit_of_form_is_charged_for_each_further_block() {
+    let mut evaluator = tabulated(&[(&["hysteresis"], 500.0), (&["hysteresis", "drift"], 520.0)]);
+    assert_eq!(found(&mut evaluator), ["hysteresis", "drift"]);
+    evaluator.misfit = 15.0;
+    assert_eq!(found(&mut evaluator), ["hysteresis"]);
+    // A block in the same stage is charged more, for it may correct the form of the other.
+    let mut alike = tabulated(&[(&["hysteresis"], 500.0), (&["hysteresis", "static-nonlinearity"], 520.0)]);
+    (evaluator.misfit, alike.misfit) = (1.0, 1.0);
+    assert_eq!(found(&mut evaluator), ["hysteresis", "drift"]);
     assert_eq!(found(&mut alike), ["hysteresis"]);
 }
 
 #[test]
-fn what_the_form_may_leave_shows_beside_the_least_noise_for_all() {
+fn the_misfit_of_form_is_compared_with_the_smallest_noise_floor_for_all() {
     let sets: [(&[&str], f64); 3] = [
         (&["amplifier-limit"], 300.0),
         (&["amplifier-limit", "charge-leakage"], 500.0),
         (&["amplifier-limit", "charge-leakage", "hum"], 700.0),
     ];
-    // Whose noise is 10 V would pay a hundredth for it, and seem the better one.
-    let mut judge = Told { misfit: 100.0, quiet: Some(effect("hum")), ..told(&sets) };
-    assert_eq!(found(&mut judge), ["amplifier-limit", "charge-leakage", "hum"]);
-    judge.misfit = 210.0;
-    assert_eq!(found(&mut judge), ["amplifier-limit"]);
+    // Compared with its own noise of 10 V, a structure would be charged a hundredth and win.
+    let mut evaluator = Tabulated { misfit: 100.0, quiet: Some(effect("hum")), ..tabulated(&sets) };
+    assert_eq!(found(&mut evaluator), ["amplifier-limit", "charge-leakage", "hum"]);
+    evaluator.misfit = 210.0;
+    assert_eq!(found(&mut evaluator), ["amplifier-limit"]);
 }
 
 #[test]
 fn a_special_case_is_not_added_to_what_contains_it() {
-    let mut judge = told(&[(&["static-nonlinearity"], 90.0), (&["static-nonlinearity", "gain-error"], 300.0)]);
-    assert_eq!(found(&mut judge), ["static-nonlinearity"]);
+    let mut evaluator = tabulated(&[(&["static-nonlinearity"], 90.0), (&["static-nonlinearity", "gain-error"], 300.0)]);
+    assert_eq!(found(&mut evaluator), ["static-nonlinearity"]);
 }
 
 #[test]
-fn a_lead_is_judged_and_extended() {
-    let mut judge = told(&[(&["delay"], 50.0), (&["delay", "hum"], 90.0), (&["drift"], 40.0)]);
-    let from = |judge: &mut Told| {
+fn a_warm_start_is_evaluated_and_extended() {
+    let mut evaluator = tabulated(&[(&["delay"], 50.0), (&["delay", "hum"], 90.0), (&["drift"], 40.0)]);
+    let search_from = |evaluator: &mut Tabulated| {
         let model = |cause: &str| Model::default().with(Block { effect: effect(cause), form: 0 }, Vec::new());
-        Search::new(judge).from(Lead { models: vec![model("drift"), model("delay")], caution: 1.0 }, |_| ())
+        Search::new(evaluator)
+            .run_from(WarmStart { models: vec![model("drift"), model("delay")], penalty_factor: 1.0 }, |_| ())
     };
-    let best = from(&mut judge);
+    let best = search_from(&mut evaluator);
     assert_eq!(effects(&best.fit.model), [effect("delay"), effect("hum")]);
     assert!((best.score - (90.0 - 2.0 * PRICE)).abs() < 1e-9);
-    // What hides in the noise's memory is looked for while something seems to be left.
-    judge.secret = Some(effect("hum"));
-    assert_eq!(effects(&from(&mut judge).fit.model), [effect("delay"), effect("hum")]);
-    judge.clean = 50.0;
-    assert_eq!(effects(&from(&mut judge).fit.model), [effect("delay")]);
-    // All rows show a memory of the noise that the part did not.
-    (judge.secret, judge.caution) = (None, 4.5);
-    assert_eq!(effects(&from(&mut judge).fit.model), [effect("delay")]);
+    // An effect that autocorrelation hides is searched for while the residual may hold structure.
+    evaluator.hidden = Some(effect("hum"));
+    assert_eq!(effects(&search_from(&mut evaluator).fit.model), [effect("delay"), effect("hum")]);
+    evaluator.clean = 50.0;
+    assert_eq!(effects(&search_from(&mut evaluator).fit.model), [effect("delay")]);
+    // All rows show autocorrelation that a part of them did not.
+    (evaluator.hidden, evaluator.penalty_factor) = (None, 4.5);
+    assert_eq!(effects(&search_from(&mut evaluator).fit.model), [effect("delay")]);
 }

@@ -1,24 +1,26 @@
-//! Other explanations that a record leaves open, and the experiment that would decide.
+//! Sets of causes that a record cannot reject, and the experiment that would decide between them.
 
-use crate::adequacy::informative::Silent;
+use crate::adequacy::Unidentifiable;
 use crate::answer::{Finding, Verdict};
 use crate::effects::{EFFECTS, contains, index_of};
 use crate::record::data::Data;
-use crate::search::{Judge, Scored, Search, effects};
+use crate::search::{Evaluator, Scored, Search, effects};
 
-/// Odds under which a rival set counts as possible, in nats.
-pub(crate) const RIVAL: f64 = 3.0;
-/// Rivals that are listed.
+/// Odds against a rival set, in nats, below which the record cannot reject it.
+pub(crate) const RIVAL_ODDS: f64 = 3.0;
+/// Change of the voltage, as a fraction of the full scale, that counts as a reversal.
+const REVERSAL_OF_FULL_SCALE: f64 = 0.02;
+/// Largest number of rivals that are listed.
 const MOST_RIVALS: usize = 3;
 
-/// Sets of causes that are nearly as good, without being the best with more: with more causes, or with one that contains
-/// the best's and so fits as well whatever the truth is.
-pub(crate) fn rivals<J: Judge>(search: &Search<J>, best: &Scored) -> Vec<Vec<&'static str>> {
+/// Sets of causes with nearly the best score. Left out are supersets of the best set, and sets in which a cause that contains
+/// one of the best's as a special case replaces it: they fit as well whatever the truth is.
+pub(crate) fn rivals<E: Evaluator>(search: &Search<E>, best: &Scored) -> Vec<Vec<&'static str>> {
     let own = effects(&best.fit.model);
     search
         .ranked()
         .into_iter()
-        .take_while(|other| other.score > best.score - RIVAL)
+        .take_while(|other| other.score > best.score - RIVAL_ODDS)
         .map(|other| effects(&other.fit.model))
         .filter(|set| !own.iter().all(|effect| set.iter().any(|other| other == effect || contains(*other, *effect))))
         .take(MOST_RIVALS)
@@ -26,7 +28,8 @@ pub(crate) fn rivals<J: Judge>(search: &Search<J>, best: &Scored) -> Vec<Vec<&'s
         .collect()
 }
 
-/// On a record that only rises (or falls), memory and a law without memory are one.
+/// The findings with hysteresis and static nonlinearity exchanged, which a monotone voltage cannot distinguish; `None` if
+/// neither was found.
 pub(crate) fn twin(findings: &[Finding]) -> Option<Vec<&'static str>> {
     let swapped = |cause| match cause {
         "static-nonlinearity" => Some("hysteresis"),
@@ -40,11 +43,11 @@ pub(crate) fn twin(findings: &[Finding]) -> Option<Vec<&'static str>> {
         .then(|| causes.iter().map(|&cause| swapped(cause).unwrap_or(cause)).collect())
 }
 
-/// True if the voltage never turns back by more than a fiftieth of its range.
+/// True if the voltage is monotone, up to changes of [`REVERSAL_OF_FULL_SCALE`].
 pub(crate) fn never_reverses(data: &Data) -> bool {
     let mut extremes = (f64::MAX, f64::MIN);
     let (mut falls, mut rises) = (false, false);
-    let slack = 0.02 * data.full_scale_v;
+    let slack = REVERSAL_OF_FULL_SCALE * data.full_scale_v;
     for &voltage in &data.voltage_v {
         falls |= voltage < extremes.1 - slack;
         rises |= voltage > extremes.0 + slack;
@@ -53,6 +56,8 @@ pub(crate) fn never_reverses(data: &Data) -> bool {
     !(falls && rises)
 }
 
+/// The report's sentence on the experiment that would decide or show more; `None` if none is needed. `wanders` says that the
+/// noise's autocorrelation predicts nearly all of the residual.
 pub(crate) fn next_experiment(
     verdict: Verdict,
     findings: &[Finding],
@@ -70,9 +75,10 @@ pub(crate) fn next_experiment(
         }
         Verdict::Consistent if !wanders => None,
         Verdict::Unexplained | Verdict::Consistent => Some(
-            "run the same schedule again: what comes back is the spring's, what does not is the readings'".to_owned(),
+            "run the same schedule again: errors that repeat belong to the spring, the others to the readings"
+                .to_owned(),
         ),
-        Verdict::Insufficient => Some(Silent::Excitation.next_experiment().to_owned()),
+        Verdict::Insufficient => Some(Unidentifiable::Excitation.next_experiment().to_owned()),
         Verdict::Explained => None,
     }
 }

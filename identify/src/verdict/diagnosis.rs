@@ -1,210 +1,203 @@
-//! From a record to an answer: search, then what each cause is worth, what rivals there are, what is left.
+//! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict.
 
-use crate::adequacy::absorbed_by_noise;
-use crate::adequacy::in_step;
-use crate::adequacy::informative::{Silent, no_spring, silent};
-use crate::adequacy::spikes;
-use crate::adequacy::unmodelled::{self, Leftover};
-use crate::answer::{Extended, Finding, Report, SCHEMA, Verdict};
+use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
+use crate::answer::{Extended, Finding, Margins, Report, SCHEMA, Verdict};
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
-use crate::search::{Lead, Scored, Search, effects};
-use crate::stats::scale::{FINEST_V, root_mean_square};
-use crate::verdict::alternatives::{never_reverses, next_experiment, rivals, twin};
-use crate::verdict::export;
+use crate::search::{Scored, WarmStart};
+use crate::stats::scale::FINEST_V;
+use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
+use crate::verdict::export::export;
 use crate::verdict::finding::{explained, finding};
+use crate::verdict::found::{self, Found};
 use crate::verdict::margins;
 use crate::verdict::quality::{noise_report, quality, residual_report};
-use crate::verdict::ranking::{self, Standing};
+use crate::verdict::ranking::{RankedCauses, ranking};
 use crate::verdict::reading_findings::reading_findings;
 use simulation::plant_file::PlantFile;
 
-/// A model whose error is so many times that of the simulation as it was is none.
-const WORSE: f64 = 1.005;
-/// What must be left of the whitened residual's variance to be called unexplained.
-const MATERIAL: f64 = 0.1;
+/// Fraction of the residual's mean square that unmodelled dynamics must exceed for the verdict `unexplained`.
+const SHARE_UNEXPLAINED: f64 = 0.1;
+/// Mean distance beyond a bound, in steps of the readings, from which readings at the bound have saturated.
+const STEPS_BEYOND_BOUND: f64 = 0.5;
 
 /// A finished diagnosis: the report and what is needed to draw it.
 #[derive(Clone, Debug)]
 pub struct Diagnosis {
-    /// The answer.
+    /// The report.
     pub report: Report,
     /// The record.
     pub data: Data,
-    /// The simulation as it was.
+    /// The simulation as it is given.
     pub baseline: Fit,
-    /// The simulation with the causes.
+    /// The simulation extended by the named causes.
     pub extended: Fit,
-    /// The extended spring.
+    /// The extended simulation as a plant file.
     pub plant: PlantFile,
-    /// Readings less what each of the two foretells on stretches that no fit has seen, in V.
+    /// Readings less predictions of `baseline` and of `extended` on held-out segments, in V.
     pub held_out: [Vec<f64>; 2],
-    /// The best sets of causes beside each other, the best first.
-    pub standings: Vec<Standing>,
-    /// What its readings say of themselves.
+    /// The best sets of causes with their scores and errors, the best first.
+    pub ranking: Vec<RankedCauses>,
+    /// How each reading was taken: exact or at a bound, on a quantisation grid, cut off.
     pub(crate) observed: Observed,
-    /// What the causes are worth: held-out log-likelihood less their price, in nats.
+    /// Held-out log-likelihood of the extended simulation less the price of its causes, in nats.
     pub(crate) score: f64,
-    /// For a search under another reading of the same rows.
-    pub(crate) lead: Option<Lead>,
+    /// From which a search under another reading of the same rows starts; `None` if no search was run.
+    pub(crate) warm_start: Option<WarmStart>,
 }
 
 impl Diagnosis {
-    /// True if readings that stopped at a bound did so because the spring goes beyond it, where a lattice lets them seem to.
-    pub(crate) fn believes_its_bounds(&self) -> bool {
+    /// True if the extended simulation goes beyond the bounds at which readings stopped; on a quantisation grid, a plateau may
+    /// only look like a bound.
+    pub(crate) fn confirms_bounds(&self) -> bool {
         let step = self.observed.grid.map_or(FINEST_V, |lattice| lattice.step);
         let beyond = |kind: Kind, sign: f64| {
             let rows = self.observed.kinds.iter().zip(&self.extended.residual).filter(|(of, _)| **of == kind);
             let beyond: Vec<f64> = rows.map(|(_, left)| -sign * left).collect();
-            beyond.is_empty() || beyond.iter().sum::<f64>() > 0.5 * step * beyond.len() as f64
+            beyond.is_empty() || beyond.iter().sum::<f64>() > STEPS_BEYOND_BOUND * step * beyond.len() as f64
         };
         beyond(Kind::AtLeast, 1.0) && beyond(Kind::AtMost, -1.0)
     }
 }
 
-/// Runs the search and says what it found.
+/// Searches the engine's record for causes, from a warm start if there is one, and reports them. `held` says that the voltage
+/// is held between rows; `progress` receives each structure that becomes the best.
 pub(crate) fn diagnose(
-    data: Data,
-    observed: &Observed,
     engine: &mut Engine,
     held: bool,
-    given: Option<Lead>,
+    warm_start: Option<WarmStart>,
     progress: impl FnMut(&Scored),
 ) -> Diagnosis {
-    let mut baseline = engine.evaluate(Model::default());
-    if let Some(silent) = silent(engine, &baseline) {
-        return unsearched(data, observed, engine, baseline, &silent);
+    let baseline = engine.evaluate(Model::default());
+    match found::search(engine, &baseline, warm_start, progress) {
+        Ok(found) => identified(engine, held, baseline, found),
+        Err(reason) => unidentified(engine, baseline, &reason),
     }
-    let mut search = Search::new(engine);
-    let mut best = match given {
-        None => search.run(progress),
-        Some(lead) => search.from(lead, progress),
-    };
-    // Likelier but farther off is no cure.
-    let [before, after] = [&baseline, &best.fit].map(|fit| root_mean_square(&observed.errors(&fit.residual)));
-    if after > WORSE * before {
-        best = search.root();
-    }
-    if let Some(silent) = no_spring(search.judge(), &baseline, &best.fit, best.score) {
-        return unsearched(data, observed, engine, baseline, &silent);
-    }
-    let mut alternatives = rivals(&search, &best);
-    let mut weights = Vec::new();
-    for effect in effects(&best.fit.model) {
-        let left_out = search.left_out(&best, effect);
-        weights.push((effect, search.best_without(effect), left_out));
-    }
-    let contenders = ranking::contenders(&search, &best);
-    let lead = search.lead();
-    let mut held_out = [&baseline, &best.fit].map(|fit| engine.held_out_residual(fit));
-    let known = [(&baseline, &*held_out[0]), (&best.fit, &*held_out[1])];
-    let standings = ranking::standings(engine, contenders, known);
-    // The simulation as it was knows nothing of what is cut off.
+}
+
+/// Reports a finished search.
+fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) -> Diagnosis {
+    let (data, observed) = (engine.data, engine.observed);
+    let extended = &found.best.fit;
+    let mut held_out = [&baseline, extended].map(|fit| engine.held_out_residual(fit));
+    let known = [(&baseline, &*held_out[0]), (extended, &*held_out[1])];
+    let ranking = ranking(engine, &found.contenders, known);
+    // The simulation as it is given does not include what the readings cut off.
     for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
         *left -= observed.truncation_v;
     }
-    let spikes = spikes::test(engine, &best.fit);
-    let alone = spikes.is_none();
-    let left = absorbed_by_noise::test(&data, &observed.errors(&best.fit.residual), &best.fit.noise.autocorrelation)
-        .or_else(|| in_step::test(engine, &best.fit))
-        .or(spikes)
-        .or_else(|| unmodelled::test(engine, &best.fit).filter(|left| left.significant))
-        .filter(|left| left.rms > FINEST_V);
-    let quality_before = quality(engine, &baseline, &held_out[0], false);
-    let quality_after = quality(engine, &best.fit, &held_out[1], true);
-    let mut findings: Vec<Finding> =
-        weights.iter().map(|(effect, without, left_out)| finding(engine, &best, *effect, without, left_out)).collect();
-    findings.extend(reading_findings(&data, observed, &best.fit, alone));
-    findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
+    let unmodelled = adequacy::first_significant(engine, extended).filter(|found| found.rms > FINEST_V);
+    let before = quality(engine, &baseline, &held_out[0], false);
+    let after = quality(engine, extended, &held_out[1], true);
 
-    if never_reverses(&data) {
-        alternatives.extend(twin(&findings));
-    }
-    let cure = export::of(engine, &best.fit.model, held);
-    let material = left.as_ref().is_some_and(|left| left.share > MATERIAL);
-    let would_show = (findings.is_empty() && !material).then(|| margins::margins(engine, &best.fit, lead.caution));
-    let verdict = match () {
-        () if material => Verdict::Unexplained,
-        () if !alternatives.is_empty() => Verdict::Ambiguous,
-        () if would_show.as_ref().is_some_and(|margins| !margins::informative(margins)) => Verdict::Insufficient,
-        () if findings.is_empty() => Verdict::Consistent,
-        () => Verdict::Explained,
-    };
-    let next_experiment = next_experiment(verdict, &findings, &alternatives, best.fit.strongly_autocorrelated());
-    let leftover = left.map(|left| {
-        let Leftover { place, share, rms, .. } = left;
-        format!("{:.1} % of what is left ({rms:.3} V RMS) is no noise: it shows {place}", 100.0 * share)
-    });
+    let findings = findings(engine, &found);
+    let twin = never_reverses(data).then(|| twin(&findings)).flatten();
+    let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).collect();
+    let unexplained = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED);
+    let would_show = (findings.is_empty() && !unexplained)
+        .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
+    let verdict = verdict(unexplained, &alternatives, would_show.as_ref(), &findings);
+    let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
+    let export = export(engine, found.model(), held);
+
     let report = Report {
         schema: SCHEMA,
         rows: data.rows(),
         verdict,
-        baseline: quality_before,
+        baseline: before,
         extended: Extended {
-            gain: if findings.is_empty() {
-                0.0
-            } else {
-                1.0 - quality_after.held_out_rmse / quality_before.held_out_rmse.max(1e-12)
-            },
-            quality: quality_after,
+            gain,
+            quality: after,
             model: None,
-            fixed_point_error_v: cure.fixed_point_error_v,
-            tick_refuses: cure.tick_refuses,
+            fixed_point_error_v: export.fixed_point_error_v,
+            tick_refuses: export.tick_refuses,
         },
+        next_experiment: next_experiment(verdict, &findings, &alternatives, extended.strongly_autocorrelated()),
         findings,
         take_out: Vec::new(),
         would_show,
         alternatives,
-        next_experiment,
-        leftover,
-        noise: noise_report(&best.fit.noise),
-        residual: residual_report(&data, &best.fit),
+        leftover: unmodelled.as_ref().map(sentence),
+        noise: noise_report(&extended.noise),
+        residual: residual_report(data, extended),
     };
     Diagnosis {
         report,
-        data,
+        data: data.clone(),
         baseline,
-        extended: best.fit,
-        plant: cure.file,
+        plant: export.file,
         held_out,
-        standings,
+        ranking,
         observed: observed.clone(),
-        score: best.score,
-        lead: Some(lead),
+        score: found.best.score,
+        warm_start: Some(found.warm_start),
+        extended: found.best.fit,
     }
 }
 
-/// Of a record that can tell nothing of the spring.
-fn unsearched(data: Data, observed: &Observed, engine: &Engine, baseline: Fit, silent: &Silent) -> Diagnosis {
-    let unseen = baseline.residual.clone();
-    let quality = quality(engine, &baseline, &unseen, false);
+/// All findings, the one that explains the largest mean square error first.
+fn findings(engine: &mut Engine, found: &Found) -> Vec<Finding> {
+    let (data, observed, fit) = (engine.data, engine.observed, &found.best.fit);
+    let mut findings: Vec<Finding> = found.causes.iter().map(|cause| finding(engine, &found.best, cause)).collect();
+    let isolated = adequacy::spikes(engine, fit).is_none();
+    findings.extend(reading_findings(data, observed, fit, isolated));
+    findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
+    findings
+}
+
+/// The verdict, by the first that applies: unexplained structure, alternatives, margins too wide, no findings.
+fn verdict(
+    unexplained: bool,
+    alternatives: &[Vec<&'static str>],
+    would_show: Option<&Margins>,
+    findings: &[Finding],
+) -> Verdict {
+    match () {
+        () if unexplained => Verdict::Unexplained,
+        () if !alternatives.is_empty() => Verdict::Ambiguous,
+        () if would_show.is_some_and(|margins| !margins::informative(margins)) => Verdict::Insufficient,
+        () if findings.is_empty() => Verdict::Consistent,
+        () => Verdict::Explained,
+    }
+}
+
+/// The report's sentence on unmodelled dynamics.
+fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics) -> String {
+    format!("{:.1} % of the residual ({rms:.3} V RMS) is structure, not noise: it shows {place}", 100.0 * share)
+}
+
+/// Reports a record that identifies no spring.
+fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diagnosis {
+    let data = engine.data;
+    let held_out = baseline.residual.clone();
+    let quality = quality(engine, &baseline, &held_out, false);
     let report = Report {
         schema: SCHEMA,
         rows: data.rows(),
-        verdict: silent.verdict(),
+        verdict: reason.verdict(),
         baseline: quality,
         findings: Vec::new(),
         take_out: Vec::new(),
         would_show: None,
         alternatives: Vec::new(),
-        next_experiment: Some(silent.next_experiment().into()),
+        next_experiment: Some(reason.next_experiment().into()),
         extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
-        leftover: silent.leftover(),
+        leftover: reason.leftover(),
         noise: noise_report(&baseline.noise),
-        residual: residual_report(&data, &baseline),
+        residual: residual_report(data, &baseline),
     };
     Diagnosis {
         report,
-        data,
+        data: data.clone(),
         score: baseline.log_likelihood,
         extended: baseline.clone(),
         baseline,
         plant: engine.base().file().clone(),
-        held_out: [unseen.clone(), unseen],
-        standings: Vec::new(),
-        observed: observed.clone(),
-        lead: None,
+        held_out: [held_out.clone(), held_out],
+        ranking: Vec::new(),
+        observed: engine.observed.clone(),
+        warm_start: None,
     }
 }

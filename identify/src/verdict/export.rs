@@ -1,4 +1,4 @@
-//! The cure: the extended simulation as a plant file, and how well the fixed-point tick runs it.
+//! The extended simulation as a plant file, and the error of the fixed-point tick that runs it.
 
 use crate::effects::model::Model;
 use crate::fit::engine::Engine;
@@ -10,37 +10,38 @@ use simulation::plant_file::PlantFile;
 use simulation::record::{Record, Row};
 use simulation::schedule::{Between, Schedule};
 
-/// The rate at which the tick is tried, in Hz.
+/// Rate of the tick, in Hz.
 const RATE_HZ: f64 = 1000.0;
-/// Longer records are not run tick by tick, in s.
-const LONGEST_S: f64 = 5000.0;
-/// What goes beyond, in V, is said to be no small thing.
+/// Duration of a record, in s, from which it is not run tick by tick.
+const LONGEST_TICKED_S: f64 = 5000.0;
+/// Error of the tick, in V, above which reports point it out.
 pub const SMALL_ERROR_V: f64 = 1.0;
 
-/// The extended spring.
+/// The extended simulation, exported.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cure {
-    /// As a file for `vsj stair --plant`.
+pub struct Export {
+    /// The plant file, for `vsj stair --plant`.
     pub file: PlantFile,
-    /// Largest difference between the fixed-point tick on that file and the fitted spring, in V: both from rest, under
-    /// the voltages that the fitted amplifier puts out at the record's rows, each held until the next. What the file
-    /// only mentions is in neither. `None` if the tick refuses the spring, or the record's voltage is not held.
+    /// Largest absolute difference between the fixed-point tick with this file and the fitted spring, in V. Both start at
+    /// rest and receive the voltages of the fitted amplifier at the record's rows, each held until the next; effects that the
+    /// file lists as not modelled are in neither. `None` if the tick rejects the file, or the record's voltage is not held.
     pub fixed_point_error_v: Option<f64>,
-    /// Why the tick refuses the spring, if it does.
+    /// Why the tick rejects the file; `None` if it accepts it.
     pub tick_refuses: Option<String>,
 }
 
-/// Of a fitted model.
-pub(crate) fn of(engine: &Engine, model: &Model, held: bool) -> Cure {
+/// Exports a fitted model; `held` says that the record's voltage is held between rows.
+pub(crate) fn export(engine: &Engine, model: &Model, held: bool) -> Export {
     let (data, base) = (engine.data, engine.base());
     let file = model.extend(base, data);
     let tick_refuses = file.check().err().map(|error| error.to_string());
-    let runs = held && data.duration_s() < LONGEST_S && tick_refuses.is_none();
-    let fixed_point_error_v = runs.then(|| error(model, base, data, &file)).flatten();
-    Cure { file, fixed_point_error_v, tick_refuses }
+    let runs = held && data.duration_s() < LONGEST_TICKED_S && tick_refuses.is_none();
+    let fixed_point_error_v = runs.then(|| tick_error(model, base, data, &file)).flatten();
+    Export { file, fixed_point_error_v, tick_refuses }
 }
 
-fn error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f64> {
+/// Largest absolute difference between the tick and the fitted spring, in V; `None` if the tick fails.
+fn tick_error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f64> {
     let mut applied = data.command.clone();
     model.chain(base, data).amplify(&mut applied);
     let row = |(&time_s, voltage_v)| Row { line: 0, time_s, voltage_v, measured: None };

@@ -1,36 +1,36 @@
-//! What a record would have shown, where nothing is wrong.
+//! Smallest errors of gain and time constant that a record without findings would have shown.
 //!
 //! ```text
-//! margin = (sqrt(2 N) + 1.64) / sqrt(J' W J)
+//! margin = (sqrt(2 N) + 1.64) / sqrt(J' W J)        J, W: sensitivities and weights of the rows
 //! ```
 //!
-//! An error of the gain that large, or of the time constant's logarithm, is likelier than no error by the `N` nats that its
-//! cause and a rival's odds ask for. It shows in about nine of ten records like this one, in noise with a long memory, which
-//! may hide it, in two of three. "Nothing is wrong" is worth no more than that.
+//! An error of the gain, or of the time constant's logarithm, of this size gains the `N` nats that the price of its cause and
+//! the odds against a rival require. It is found in about nine of ten records like this one, and in two of three where
+//! strongly autocorrelated noise may hide it. The verdict that nothing is wrong holds up to these margins.
 
-use crate::adequacy::informative::{gain_and_time_constant, of_both};
+use crate::adequacy::{gain_and_time_constant, model_of_both};
 use crate::answer::Margins;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::information;
-use crate::search::Judge;
-use crate::verdict::alternatives::RIVAL;
+use crate::search::Evaluator;
+use crate::verdict::alternatives::RIVAL_ODDS;
 
-/// 95 % of the standard normal.
-const Z: f64 = 1.64;
-/// An error of half the gain, or of a factor of 2 in the time constant, that need not show: the record can tell nothing.
+/// 95 % quantile of the standard normal distribution.
+const Z_POWER: f64 = 1.64;
+/// Margins from which the record is insufficient: half of the gain, or a factor of 2 in the time constant.
 const WIDEST: Margins = Margins { gain: 0.5, time_constant: 1.0 };
 
-/// The smallest errors of gain and time constant that would show in a record on which nothing was found, as parts of the
-/// simulation's; `caution` multiplies the price of a cause.
-pub(crate) fn margins(engine: &mut Engine, nothing: &Fit, caution: f64) -> Margins {
-    let model = of_both(engine.base().relaxation.tau_s);
+/// Smallest errors of gain and time constant that would have been found in a record without findings, as fractions of the
+/// simulation's values; prices are multiplied by `penalty_factor`.
+pub(crate) fn margins(engine: &mut Engine, nothing: &Fit, penalty_factor: f64) -> Margins {
+    let model = model_of_both(engine.base().relaxation.tau_s);
     let known = information(engine, &Fit { model, ..nothing.clone() });
-    let nats = gain_and_time_constant().map(|block| RIVAL + caution * Judge::price(engine, &block));
-    let margin = |of: usize| ((2.0 * nats[of]).sqrt() + Z) / known[(of, of)].sqrt();
+    let nats = gain_and_time_constant().map(|block| RIVAL_ODDS + penalty_factor * Evaluator::price(engine, &block));
+    let margin = |of: usize| ((2.0 * nats[of]).sqrt() + Z_POWER) / known[(of, of)].sqrt();
     Margins { gain: margin(0), time_constant: margin(1).exp_m1() }
 }
 
-/// True if the margins are narrow enough for "nothing is wrong" to be a statement about the spring.
+/// True if both margins are narrow enough for the verdict that nothing is wrong.
 pub(crate) fn informative(margins: &Margins) -> bool {
     margins.gain < WIDEST.gain && margins.time_constant < WIDEST.time_constant
 }

@@ -1,9 +1,21 @@
-//! A search in, what is reported out.
+//! What is reported of a record: a search in, the report and what is needed to draw it out.
+//!
+//! | term | meaning |
+//! | --- | --- |
+//! | finding | a named cause with its parameters, its probability and the evidence for it |
+//! | rival, alternative | another set of causes that the record cannot reject |
+//! | odds | difference of two scores, in nats |
+//! | margins | smallest errors of gain and time constant that a record without findings would have shown |
+//! | export | the extended simulation as a plant file |
+//! | ranking | the best sets of causes compared by score and held-out error |
+//!
+//! [`diagnosis`] puts the parts together.
 
 pub mod alternatives;
 pub mod diagnosis;
 pub mod export;
 pub mod finding;
+pub(crate) mod found;
 pub mod margins;
 pub mod quality;
 pub mod ranking;

@@ -1,4 +1,4 @@
-//! How good a simulation is: its errors, the noise that they show, and tests of what they should not show.
+//! Errors of a simulation, the parameters of its noise, and correlations of its residual.
 
 use std::ops::RangeInclusive;
 
@@ -9,11 +9,12 @@ use crate::record::data::Data;
 use crate::stats::scale::{FINEST_V, Z, root_mean_square};
 use crate::stats::sums::dot;
 
-/// Lags of the residual's correlations.
+/// Largest lag of the residual's correlations, in rows.
 const LAGS: usize = 20;
 
-/// `unseen` is the residual on held-out stretches; `stops` if the simulation knows of bounds at which readings stop.
-pub(crate) fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -> Quality {
+/// Errors of a fit. `held_out` is its residual on held-out segments, in V; `stops` says that the simulation includes bounds at
+/// which readings saturate, so that rows at a bound count only where the fit is within it.
+pub(crate) fn quality(engine: &Engine, fit: &Fit, held_out: &[f64], stops: bool) -> Quality {
     let observed = engine.observed;
     let error = |residual: &[f64]| root_mean_square(&if stops { observed.errors(residual) } else { residual.into() });
     let rmse = error(&fit.residual);
@@ -22,13 +23,14 @@ pub(crate) fn quality(engine: &Engine, fit: &Fit, unseen: &[f64], stops: bool) -
     let spread = root_mean_square(&reading.iter().map(|value| value - mean).collect::<Vec<_>>());
     Quality {
         rmse,
-        // Of readings that never change there is none.
+        // Undefined for readings that never change.
         fit_percent: if spread > FINEST_V { 100.0 * (1.0 - rmse / spread) } else { f64::NAN },
-        held_out_rmse: error(unseen),
+        held_out_rmse: error(held_out),
         one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
     }
 }
 
+/// Parameters of the noise for the report.
 pub(crate) fn noise_report(noise: &Noise) -> NoiseReport {
     NoiseReport {
         sigma: noise.sigma,
@@ -37,12 +39,13 @@ pub(crate) fn noise_report(noise: &Noise) -> NoiseReport {
     }
 }
 
+/// Correlations of the whitened residual with itself and with changes of the voltage.
 pub(crate) fn residual_report(data: &Data, fit: &Fit) -> ResidualReport {
     let white = fit.noise.innovations(&fit.residual);
     let changes: Vec<f64> = (0..data.rows())
         .map(|row| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] })
         .collect();
-    // Of the errors with what was `lag` rows before.
+    // Correlation of the errors with values `lag` rows earlier.
     let correlation = |earlier: &[f64], lags: RangeInclusive<usize>| {
         let size = (dot(&white, &white) * dot(earlier, earlier)).sqrt().max(1e-300);
         lags.map(|lag| dot(&white[lag.min(white.len())..], earlier) / size).collect()

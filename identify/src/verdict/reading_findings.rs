@@ -1,20 +1,19 @@
-//! Causes that the readings themselves show: a lattice, a bound, outliers.
+//! Causes that show in the readings themselves: quantisation, saturation, outliers.
 
-use crate::adequacy::spikes::far_off;
+use crate::adequacy::far_off;
 use crate::answer::{Finding, Parameter};
 use crate::fit::engine::Fit;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
 use crate::record::quantisation_grid::QuantisationGrid;
-use crate::stats::scale::Z;
-use crate::stats::scale::{FINEST_V, root_mean_square};
+use crate::stats::scale::{FINEST_V, Z, root_mean_square};
 
-/// A step of the readings this many of the noise's scales wide is worth naming.
-const COARSE_STEP: f64 = 0.5;
+/// Smallest step of the readings that is reported, in root mean square errors.
+const STEP_TO_REPORT: f64 = 0.5;
 
-/// What the readings themselves show; those far off are outliers only if each is `alone`, neither in runs nor in time with
-/// the command.
-pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alone: bool) -> Vec<Finding> {
+/// Findings in the readings; far readings are outliers only if `isolated`, which says that they neither come in runs nor follow
+/// changes of the command.
+pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isolated: bool) -> Vec<Finding> {
     let mut findings = Vec::new();
     let raw = root_mean_square(&fit.residual);
     let stopped_raw = root_mean_square(&observed.errors(&fit.residual));
@@ -23,7 +22,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
         vec![(name.to_owned(), Parameter { value, low, high, unit })]
     };
     if let Some(QuantisationGrid { step, low, high }) = observed.grid
-        && (step > (COARSE_STEP * stopped_raw).max(2.0 * FINEST_V) || observed.truncation_v > 0.0)
+        && (step > (STEP_TO_REPORT * stopped_raw).max(2.0 * FINEST_V) || observed.truncation_v > 0.0)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data
@@ -41,9 +40,13 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
             ),
             rmse_after: root_mean_square(&after).min(raw),
             evidence: format!(
-                "every reading is a multiple of {step:.6} V from the first, {:.1} times the error that is left{}",
+                "all readings differ from the first by multiples of {step:.6} V, {:.1} times the remaining error{}",
                 step / raw,
-                if observed.truncation_v == 0.0 { "" } else { "; what is less than a step was cut off" }
+                if observed.truncation_v == 0.0 {
+                    ""
+                } else {
+                    "; readings were cut off to the step below, not rounded"
+                }
             ),
         });
     }
@@ -62,7 +65,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
             ),
         });
     }
-    if let Some((_, wide)) = fit.noise.outliers.filter(|_| alone) {
+    if let Some((_, wide)) = fit.noise.outliers.filter(|_| isolated) {
         let errors = observed.errors(&fit.residual);
         let far = far_off(&fit.noise, &fit.noise.innovations(&errors));
         let kept: Vec<f64> = errors.iter().zip(&far).filter(|(_, far)| !**far).map(|(error, _)| *error).collect();
@@ -76,7 +79,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, alon
             rmse_before: stopped_raw,
             rmse_after: root_mean_square(&kept),
             evidence: format!(
-                "{off} readings are off by {wide:.2} V, {:.0} times the noise: two scales fit far better than one heavy tail",
+                "{off} readings are off by about {wide:.2} V, {:.0} times the noise: a mixture of two normal distributions fits far better than one heavy tail",
                 wide / fit.noise.sigma
             ),
         });

@@ -6,7 +6,7 @@ use crate::output::diagnosis::is_extended;
 use identify::answer::{Finding, Parameter};
 use identify::stats::scale::root_mean_square;
 use identify::verdict::diagnosis::Diagnosis;
-use identify::verdict::ranking::Standing;
+use identify::verdict::ranking::RankedCauses as Standing;
 
 /// Each cause with its parameters.
 pub(super) fn findings(findings: &[Finding]) -> Markup {
@@ -39,7 +39,7 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
 
 /// The best sets of causes, how far each is behind, and which cause it does without.
 pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
-    let standings = &diagnosis.standings;
+    let standings = &diagnosis.ranking;
     let Some(best) = standings.first() else {
         return html! { p { "Nothing was compared: the record cannot tell." } };
     };

@@ -1,4 +1,5 @@
-//! What an effect that is not fitted yet promises: how much of the residual its change could explain.
+//! The predicted gain of an effect that is not fitted yet: how much of the residual its change of the prediction explains,
+//! linearised, while the model's own parameters follow.
 
 use crate::effects::effect::Coordinate;
 use crate::fit::engine::{Engine, Fit};
@@ -6,20 +7,24 @@ use crate::fit::normal_equations::Jacobian;
 use crate::noise::Noise;
 use crate::stats::sums::dot;
 
-/// How many times its start an effect may be, in the hope of a promise.
-const FARTHEST: f64 = 6.0;
+/// Largest multiple of an effect's start to which its change of the prediction is extrapolated.
+const LONGEST_STEP: f64 = 6.0;
+/// Norm of a column after orthogonalisation over its norm before, below which the column is linearly dependent.
+const DEPENDENT: f64 = 1e-6;
 
-/// How much a change of the prediction could explain, when the model's own points follow.
-pub(super) struct Metric {
+/// Predicts gains for one fit, under one noise model.
+pub(super) struct GainPredictor {
     noise: Noise,
+    /// Whitened residual in scales of the noise, dimensionless.
     residual: Vec<f64>,
-    /// Square roots of the rows' weights.
+    /// Square roots of the rows' weights, in 1/V.
     roots: Vec<f64>,
-    /// What the model's own points can make, orthonormal.
+    /// Orthonormal basis of the changes that the model's own parameters can make.
     own: Vec<Vec<f64>>,
 }
 
-impl Metric {
+impl GainPredictor {
+    /// Linearises a fit under `noise`, which need not be the fit's own.
     pub(super) fn new(engine: &mut Engine, fit: &Fit, noise: Noise) -> Self {
         let terms = engine.terms(&noise, &fit.residual);
         let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
@@ -29,16 +34,16 @@ impl Metric {
         let mut own: Vec<Vec<f64>> = Vec::new();
         for (column, place) in columns.iter().zip(places) {
             let mut column: Vec<f64> = column.iter().zip(&roots).map(|(value, root)| value * root).collect();
-            // A point at its bound cannot follow where it wants out: what it wants there, another effect may be.
-            let wanted = dot(&column, &residual);
+            // A parameter at its bound cannot move outwards, so that another effect may explain what it cannot.
+            let slope = dot(&column, &residual);
             let Coordinate { lowest, highest, .. } = bounds[place];
-            if points[place] <= lowest && wanted < 0.0 || points[place] >= highest && wanted > 0.0 {
+            if points[place] <= lowest && slope < 0.0 || points[place] >= highest && slope > 0.0 {
                 continue;
             }
             let size = norm(&column);
             remove(&mut column, &own);
             let left = norm(&column);
-            if left > 1e-6 * size {
+            if left > DEPENDENT * size {
                 column.iter_mut().for_each(|value| *value /= left);
                 own.push(column);
             }
@@ -46,8 +51,9 @@ impl Metric {
         Self { noise, residual, roots, own }
     }
 
-    /// Gain in nats of the best step along `change`, as far as a straight line may be believed.
-    pub(super) fn promise(&self, change: &[f64]) -> f64 {
+    /// Gain in log-likelihood, in nats, of the best multiple of `change` (a change of the residual, in V), 0 to
+    /// [`LONGEST_STEP`].
+    pub(super) fn predicted_gain(&self, change: &[f64]) -> f64 {
         let mut change: Vec<f64> =
             self.noise.whitened(change).iter().zip(&self.roots).map(|(value, root)| value * root).collect();
         remove(&mut change, &self.own);
@@ -56,20 +62,21 @@ impl Metric {
             return 0.0;
         }
         let along = dot(&self.residual, &change);
-        let step = (along / size).clamp(0.0, FARTHEST);
+        let step = (along / size).clamp(0.0, LONGEST_STEP);
         let total = dot(&self.residual, &self.residual);
         let part = ((2.0 * along - step * size) * step / total.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
-        // The noise's scale would shrink along; not that of rounded rows, most of which tell nothing.
-        let telling = if self.noise.half_step > 0.0 { total } else { self.residual.len() as f64 };
-        -0.5 * telling * (1.0 - part).ln()
+        // The scale of the noise would shrink with the residual, but not that of rounded rows, few of which are informative.
+        let informative = if self.noise.half_step > 0.0 { total } else { self.residual.len() as f64 };
+        -0.5 * informative * (1.0 - part).ln()
     }
 }
 
+/// Euclidean norm, in the unit of the values.
 fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Takes off what lies along an orthonormal basis.
+/// Subtracts the projection onto an orthonormal basis.
 fn remove(vector: &mut [f64], basis: &[Vec<f64>]) {
     for direction in basis {
         let along = dot(vector, direction);

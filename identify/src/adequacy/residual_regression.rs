@@ -1,12 +1,15 @@
-//! What is left in a residual that no block explains.
+//! Check of whether the whitened residual depends on the command or on the time.
 //!
-//! Noise does not know what was commanded. So the residual, whitened by its own memory, is regressed on features of the
-//! command and of the clock; what they explain beyond chance is structure, and the group of features that explains most
-//! says where. Testing against the command is what tells structure from coloured noise, which may look just as smooth.
+//! Noise is independent of the command. So the residual, whitened by its own autocorrelation, is regressed on features of the
+//! command and of the time; what they explain beyond chance is structure, and the group of features that explains most
+//! localises it. The command distinguishes structure from autocorrelated noise, which may be equally smooth. A spectral line
+//! that explains more than the features is reported instead of them. A record too short for the regression is tested for
+//! serial correlation (von Neumann's ratio).
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::adequacy::localisation::whereabouts;
+use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics, Z_RARE};
+use crate::adequacy::localisation::Localisation;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::Jacobian;
 use crate::record::data::Data;
@@ -14,45 +17,47 @@ use crate::record::signal::{Lag, Piece};
 use crate::record::spectrum;
 use crate::stats::sums::dot;
 
-/// Structure that no block has taken.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Leftover {
-    /// Where it is, in words.
-    pub place: String,
-    /// Part of the whitened residual's variance that features explain.
-    pub share: f64,
-    /// Root of the mean square of what they explain of the residual itself, in V.
-    pub rms: f64,
-    /// True if chance does as much too often to be sure that it is noise: in one of fifteen records, in all short ones.
-    pub doubtful: bool,
-    /// True if chance would do as much once in ten thousand records, once in a hundred short ones.
-    pub significant: bool,
+/// Standard normal quantile above which the search goes on: one of fifteen records of noise exceeds it.
+const Z_DOUBTFUL: f64 = 1.5;
+/// Standard normal quantile of one in a hundred: the significance of serial correlation in a record too short for regression.
+const Z_SHORT_RECORD: f64 = 2.33;
+/// Parts that time and voltage are each divided into.
+const FEATURE_PARTS: usize = 6;
+/// Fewest rows for each feature of the regression.
+const ROWS_PER_FEATURE: usize = 10;
+/// Whitened residuals are clipped at this many scales of the noise before the spectrum is taken.
+const SPECTRUM_CLIP_SCALES: f64 = 6.0;
+/// Gain in log-likelihood of a spectral line, less the logarithm of the number of lines that are searched, in nats, above which
+/// the line is structure.
+const LINE_NATS: f64 = 12.0;
+
+/// The check of any fit.
+pub(super) struct ResidualRegression;
+
+impl Check for ResidualRegression {
+    fn name(&self) -> &'static str {
+        "residual_regression"
+    }
+
+    fn test(&self, engine: &mut Engine, candidate: &Candidate) -> Option<Inadequacy> {
+        dependence(engine, candidate.fit).map(Inadequacy::from)
+    }
 }
 
-/// Standard normal quantile of one in ten thousand.
-pub(crate) const RARE: f64 = 3.72;
-/// Explained beyond this, it may be structure.
-const DOUBTFUL: f64 = 1.5;
-/// Standard normal quantile of one in a hundred, for records too short for more.
-const UNLIKELY: f64 = 2.33;
-/// Parts that time and voltage are divided into.
-const PARTS: usize = 6;
-/// Records with fewer rows per feature are not tested.
-const ROWS_PER_FEATURE: usize = 10;
-
-/// A named group of columns.
+/// A named group of features.
 struct Group {
     place: String,
+    /// One column of values for each feature.
     columns: Vec<Vec<f64>>,
 }
 
-/// Tests a fit.
-pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
+/// Regresses the whitened residual on features of the command and the time.
+fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
     let data = engine.data;
     let mut groups = features(data);
     let count: usize = groups.iter().map(|group| group.columns.len()).sum();
     if data.rows() < ROWS_PER_FEATURE * count {
-        return alike(data, fit);
+        return Some(serial_correlation(data, fit));
     }
     let terms = engine.terms(&fit.noise, &fit.residual);
     let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
@@ -71,7 +76,7 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     let total: f64 = target.iter().map(|value| value * value).sum();
     let mut variance = (total - before - gain) / (data.rows() - everything.len()) as f64;
     if fit.noise.half_step > 0.0 {
-        // Few rounded rows lie near an edge and tell anything; the others only lower the mean.
+        // Only rounded rows near an edge of their cell are informative; the others lower the mean.
         variance = variance.max(1.0);
     }
     let most = groups.iter().max_by(|a, b| {
@@ -83,55 +88,57 @@ pub fn test(engine: &mut Engine, fit: &Fit) -> Option<Leftover> {
     })?;
     let share = (gain / total.max(1e-300)).clamp(0.0, 1.0);
     let rms = share.sqrt() * fit.noise.marginal;
-    let surprise = quantile(gain / variance, count as f64);
-    let leftover = Leftover {
+    let z = normal_quantile(gain / variance, count as f64);
+    let found = UnmodelledDynamics {
         place: most.place.clone(),
-        // What rounding hides is no matter.
+        // Structure below the rounding error does not count.
         share: if fit.noise.half_step > 0.0 { share.min((rms / fit.noise.half_step).powi(2) * 3.0) } else { share },
         rms,
-        significant: surprise > RARE,
-        doubtful: surprise > DOUBTFUL,
+        significant: z > Z_RARE,
+        doubtful: z > Z_DOUBTFUL,
     };
-    Some(line(data, fit, &target, leftover))
+    Some(spectral_line(data, fit, &target, found))
 }
 
-/// A short record is asked only whether errors are like the ones before them (von Neumann's ratio).
-fn alike(data: &Data, fit: &Fit) -> Option<Leftover> {
+/// Correlation of each error with the one before it, by von Neumann's ratio.
+fn serial_correlation(data: &Data, fit: &Fit) -> UnmodelledDynamics {
     let errors = &fit.noise.innovations(&fit.residual);
     let squares: f64 = errors.iter().map(|error| error * error).sum();
     let steps: f64 = errors.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     let share = 1.0 - 0.5 * steps / squares.max(1e-300);
     let rows = errors.len() as f64;
-    Some(Leftover {
-        place: "that each error is like the one before it".to_owned() + &whereabouts(data, errors),
+    UnmodelledDynamics {
+        place: "correlation of successive errors".to_owned() + &Localisation::new(data, errors).words(),
         share,
         rms: share.max(0.0).sqrt() * (squares / rows).sqrt(),
-        significant: share * rows.sqrt() > UNLIKELY,
+        significant: share * rows.sqrt() > Z_SHORT_RECORD,
         doubtful: true,
-    })
+    }
 }
 
-/// A strong line in the spectrum is structure too, whatever was commanded. `target` is in the noise's scales.
-fn line(data: &Data, fit: &Fit, target: &[f64], found: Leftover) -> Leftover {
-    let clipped: Vec<f64> = target.iter().map(|value| value.clamp(-6.0, 6.0)).collect();
+/// Returns the strongest line in the spectrum of `target`, which is in scales of the noise, if it is structure and explains
+/// more than `found` does; else `found`.
+fn spectral_line(data: &Data, fit: &Fit, target: &[f64], found: UnmodelledDynamics) -> UnmodelledDynamics {
+    let clipped: Vec<f64> =
+        target.iter().map(|value| value.clamp(-SPECTRUM_CLIP_SCALES, SPECTRUM_CLIP_SCALES)).collect();
     let Some(peak) = spectrum::peaks(&clipped, data, 1).into_iter().next() else { return found };
     let share = (0.5 * (peak.cosine.powi(2) + peak.sine.powi(2))).min(1.0);
     let power = 0.5 * data.rows() as f64 * share;
-    // As many lines as half the rows were looked at.
-    if power - (data.rows() as f64 / 2.0).ln() > 12.0 && share > found.share {
+    // Half as many lines as rows are searched.
+    if power - (data.rows() as f64 / 2.0).ln() > LINE_NATS && share > found.share {
         let place = format!("at a frequency of {:.3} Hz", peak.frequency_hz);
-        return Leftover { place, share, rms: share.sqrt() * fit.noise.sigma, significant: true, doubtful: true };
+        return UnmodelledDynamics::certain(place, share, share.sqrt() * fit.noise.sigma);
     }
     found
 }
 
-/// Standard normal quantile of a chi-square value (Wilson and Hilferty).
-fn quantile(value: f64, freedom: f64) -> f64 {
+/// Standard normal quantile of a chi-square value with `freedom` degrees of freedom (Wilson and Hilferty, 1931).
+fn normal_quantile(value: f64, freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     ((value / freedom).max(0.0).cbrt() - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Part of the target's square sum that columns explain, by least squares.
+/// Part of the target's sum of squares that columns explain by least squares, in the target's unit squared.
 fn explained(columns: &[&Vec<f64>], target: &[f64]) -> f64 {
     if columns.is_empty() {
         return 0.0;
@@ -151,14 +158,14 @@ fn explained(columns: &[&Vec<f64>], target: &[f64]) -> f64 {
     normal.cholesky().map_or(0.0, |factor| factor.solve(&right).dot(&right))
 }
 
-/// What noise cannot know: the voltage, its past, its changes; and the clock.
+/// Features that noise is independent of: past, changes and direction of the voltage, and parts of time and voltage.
 fn features(data: &Data) -> Vec<Group> {
     let rows = data.rows();
     let duration = data.duration_s().max(1e-9);
     let start = data.time_s.first().copied().unwrap_or(0.0);
     let per_row = |value: &mut dyn FnMut(usize) -> f64| (0..rows).map(value).collect::<Vec<f64>>();
     let change = |row: usize| if row == 0 { 0.0 } else { data.voltage_v[row] - data.voltage_v[row - 1] };
-    let followed = |tau_s: f64, input: &dyn Fn(usize) -> f64| {
+    let lagged = |tau_s: f64, input: &dyn Fn(usize) -> f64| {
         let mut lag = Lag::at(tau_s, 0.0);
         per_row(&mut |row| {
             let duration_s = if row + 1 < rows { data.time_s[row + 1] - data.time_s[row] } else { 0.0 };
@@ -167,20 +174,20 @@ fn features(data: &Data) -> Vec<Group> {
         })
     };
     let sample = data.sample_s;
-    let past = [4.0, 20.0, 100.0, 500.0].map(|samples| followed(samples * sample, &|row| data.voltage_v[row]));
-    let after = [2.0, 10.0, 50.0].into_iter().flat_map(|samples| {
-        [followed(samples * sample, &change), followed(samples * sample, &|row| change(row).abs())]
-    });
+    let past = [4.0, 20.0, 100.0, 500.0].map(|samples| lagged(samples * sample, &|row| data.voltage_v[row]));
+    let after = [2.0, 10.0, 50.0]
+        .into_iter()
+        .flat_map(|samples| [lagged(samples * sample, &change), lagged(samples * sample, &|row| change(row).abs())]);
     let direction = direction(data);
     let directed = direction.iter().zip(&data.voltage_v).map(|(sign, voltage)| sign * voltage).collect();
     let mut groups = vec![
-        Group { place: "in what the voltage was before".into(), columns: past.to_vec() },
+        Group { place: "in the response to earlier voltages".into(), columns: past.to_vec() },
         Group { place: "just after changes of the voltage".into(), columns: after.collect() },
         Group { place: "in the direction of the last change".into(), columns: vec![direction, directed] },
     ];
-    for part in 0..PARTS {
-        let (from, to) = (part as f64 / PARTS as f64, (part + 1) as f64 / PARTS as f64);
-        let inside = |x: f64| f64::from(u8::from(x >= from && (x < to || part + 1 == PARTS)));
+    for part in 0..FEATURE_PARTS {
+        let (from, to) = (part as f64 / FEATURE_PARTS as f64, (part + 1) as f64 / FEATURE_PARTS as f64);
+        let inside = |x: f64| f64::from(u8::from(x >= from && (x < to || part + 1 == FEATURE_PARTS)));
         let (early, late) = (start + from * duration, start + to * duration);
         groups.push(Group {
             place: format!("from {early:.1} s to {late:.1} s"),
@@ -195,7 +202,7 @@ fn features(data: &Data) -> Vec<Group> {
     groups
 }
 
-/// The sign of the last change of the voltage.
+/// For each row, the sign of the last change of the voltage; 0 before the first.
 fn direction(data: &Data) -> Vec<f64> {
     let mut sign = 0.0;
     let changes = data.voltage_v.iter().scan(0.0, |last, &voltage| {

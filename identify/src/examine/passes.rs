@@ -1,0 +1,203 @@
+//! The passes of a diagnosis, in the order in which they run.
+//!
+//! | pass | question | runs | its result is kept |
+//! | --- | --- | --- | --- |
+//! | `as_rounded` | which causes, if readings were rounded to their grid? | always | unless a later pass replaces it |
+//! | `as_cut_off` | which, if they were cut off to their grid? | on a grid, if a quick fit prefers it | if clearly likelier |
+//! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
+//! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
+//!
+//! Every pass runs a `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that
+//! is higher by `CLEARLY_LIKELIER` nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that
+//! one's best models.
+
+use anyhow::Result;
+
+use simulation::bad_input;
+use simulation::record::Record;
+
+use crate::answer::{Report, Verdict};
+use crate::effects::index_of;
+use crate::examine::options::Options;
+use crate::fit::engine::Engine;
+use crate::plant::base::Base;
+use crate::record::data::{Data, Input};
+use crate::record::observed::Observed;
+use crate::search::{Scored, Search, WarmStart};
+use crate::verdict::diagnosis::{self, Diagnosis};
+
+/// Fewest readings that are diagnosed.
+const ROWS_TO_DIAGNOSE: usize = 8;
+/// Difference of two scores, in nats, from which the less usual explanation is kept: readings that were cut off instead of
+/// rounded, a spring that lacks a part of the plant file.
+const CLEARLY_LIKELIER: f64 = 3.0;
+/// Number of rows above which a part of them is searched first.
+const LONG_RECORD_ROWS: usize = 5_000;
+/// Number of rows, about, in that part.
+const ROWS_TO_SEARCH: usize = 2_500;
+
+/// Finds out what the simulation gets wrong on a record.
+///
+/// # Errors
+/// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
+pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
+    examine(record, options, |_| ()).map(|diagnosis| diagnosis.report)
+}
+
+/// Finds out what the simulation gets wrong on a record, and returns the report with all that is needed to draw it; `progress`
+/// receives the names of the best causes so far, separated by commas.
+///
+/// # Errors
+/// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
+pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
+    let data = Data::new(record, options.input);
+    if data.rows() < ROWS_TO_DIAGNOSE {
+        bad_input!(
+            "{}: {} row(s) with a reading; expected at least {ROWS_TO_DIAGNOSE} to tell causes apart",
+            record.name,
+            data.rows()
+        );
+    }
+    let progress = &mut |scored: &Scored| {
+        let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
+        progress(&causes.join(", "));
+    };
+    let record = ExaminedRecord { record, input: options.input, data: &data };
+    let found = of_readings(&record, &options.base, progress);
+    Ok(without_unsupported_terms(&record, &options.base, found, progress))
+}
+
+/// A record as all passes take it.
+struct ExaminedRecord<'r> {
+    record: &'r Record,
+    input: Input,
+    data: &'r Data,
+}
+
+/// Receives each structure that becomes the best.
+type Progress<'p> = &'p mut dyn FnMut(&Scored);
+
+/// The passes over the readings, with one simulation.
+fn of_readings(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagnosis {
+    let found = as_rounded(record, base, progress);
+    let found = as_cut_off(record, base, found, progress);
+    as_unbounded(record, base, found, progress)
+}
+
+/// First pass: searches with readings rounded to their grid, if they lie on one, and with plateaus at the highest and lowest
+/// reading taken as bounds of the sensor.
+fn as_rounded(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagnosis {
+    search(record, base, &Observed::new(record.data), None, progress)
+}
+
+/// Second pass: searches with readings cut off to their grid, which the readings alone cannot distinguish from rounding.
+fn as_cut_off(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
+    let Some(cut) = found.observed.truncated().filter(|cut| prefers(record, base, cut, &found)) else { return found };
+    let cut = search(record, base, &cut, found.warm_start.clone(), progress);
+    if cut.score > found.score + CLEARLY_LIKELIER { cut } else { found }
+}
+
+/// True if the causes that were found fit readings that were cut off better; without a shift of the readings, which may stand
+/// in for what was cut off.
+fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnosis) -> bool {
+    let shift = index_of("reading-offset").expect("an effect");
+    let model = found.extended.model.without(shift);
+    let likelihood = |observed| {
+        let mut engine = Engine::new(record.data, observed, base);
+        engine.fit_twice(model.clone()).log_likelihood
+    };
+    likelihood(cut) > likelihood(&found.observed)
+}
+
+/// Third pass: searches without bounds of the sensor, where the model does not go beyond the plateau that looked like one.
+fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
+    if found.confirms_bounds() {
+        return found;
+    }
+    search(record, base, &found.observed.without_bounds(), found.warm_start, progress)
+}
+
+/// Fourth pass: removes parts of the plant file that the record does not support, then repeats the passes over the readings.
+///
+/// Causes are added to a simulation. A part that the spring lacks would need the opposite of a cause, which does not exist for
+/// hysteresis; combinations of other causes stand in for it. So each optional part is removed in turn, and stays removed if
+///
+/// ```text
+/// score(best causes without the part) > score(best causes) + CLEARLY_LIKELIER
+/// ```
+fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
+    let Some(mut warm_start) = found.warm_start.clone() else { return found };
+    let (mut score, mut base) = (found.score, base.clone());
+    let mut unsupported_terms = Vec::new();
+    loop {
+        let tried = base.without_each().map(|(part, base)| {
+            let (score, warm_start) = best_score(record.data, &base, &found.observed, warm_start.clone(), progress);
+            (part, base, score, warm_start)
+        });
+        let best = tried.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|best| best.2 > score + CLEARLY_LIKELIER);
+        let Some((part, without, better, found)) = best else { break };
+        unsupported_terms.push(part);
+        (base, score, warm_start) = (without, better, found);
+    }
+    if unsupported_terms.is_empty() {
+        return found;
+    }
+    let without = of_readings(record, &base, progress);
+    compared_with(found, without, unsupported_terms)
+}
+
+/// The best score of a search from a warm start, in nats, with the warm start for the next one.
+fn best_score(
+    data: &Data,
+    base: &Base,
+    observed: &Observed,
+    warm_start: WarmStart,
+    progress: Progress,
+) -> (f64, WarmStart) {
+    let mut engine = Engine::new(data, observed, base);
+    let mut search = Search::new(&mut engine);
+    let best = search.run_from(warm_start, progress);
+    (best.score, search.warm_start())
+}
+
+/// The diagnosis `without` some parts of the plant file, with the simulation that has them as its baseline.
+fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec<&'static str>) -> Diagnosis {
+    let report = &mut without.report;
+    report.baseline = with.report.baseline;
+    report.extended.gain = 1.0 - report.extended.quality.held_out_rmse / report.baseline.held_out_rmse.max(1e-12);
+    if report.verdict == Verdict::Consistent {
+        report.verdict = Verdict::Explained;
+    }
+    report.take_out = unsupported_terms;
+    without.baseline = with.baseline;
+    let [before, _] = with.held_out;
+    without.held_out[0] = before;
+    without
+}
+
+/// Searches and reports what was found, from a warm start or, on a long record, from a search on a part of its rows.
+fn search(
+    record: &ExaminedRecord,
+    base: &Base,
+    observed: &Observed,
+    warm_start: Option<WarmStart>,
+    progress: Progress,
+) -> Diagnosis {
+    let warm_start = warm_start.or_else(|| on_part_of_rows(record, base, observed, progress));
+    let mut engine = Engine::new(record.data, observed, base);
+    diagnosis::diagnose(&mut engine, record.input == Input::Hold, warm_start, progress)
+}
+
+/// Searches a part of the rows of a long record, evenly spaced; `None` if the record is not long.
+fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, progress: Progress) -> Option<WarmStart> {
+    let rows = record.data.rows();
+    if rows <= LONG_RECORD_ROWS {
+        return None;
+    }
+    let part = Data::thinned(record.record, record.input, rows.div_ceil(ROWS_TO_SEARCH));
+    let observed = Observed::new(&part).with_conclusions_of(observed);
+    let mut engine = Engine::new(&part, &observed, base);
+    let mut search = Search::new(&mut engine);
+    search.run(progress);
+    Some(search.warm_start())
+}

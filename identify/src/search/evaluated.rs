@@ -1,0 +1,118 @@
+//! All structures that were evaluated so far, and the prices of their blocks.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::effects::contains;
+use crate::effects::effect::Location;
+use crate::effects::model::{Block, Model};
+use crate::fit::engine::Fit;
+use crate::search::evaluator::Evaluator;
+use crate::search::scored::{Scored, effects};
+
+/// Factor on the misfit of form that is charged for a second block in the same stage of the chain, in addition to that of any
+/// further block: it may correct the form of the first rather than be another cause.
+const SAME_STAGE: f64 = 15.0;
+/// Gain in log-likelihood of a new first fit over an evaluated one, in nats, from which the structure is evaluated again.
+const NATS_TO_EVALUATE_AGAIN: f64 = 1.0;
+
+/// Structures with their scores, under one penalty factor.
+#[derive(Debug)]
+pub(super) struct Evaluated {
+    scored: HashMap<Vec<Block>, Scored>,
+    /// Factor by which prices are multiplied, 1 or more.
+    pub(super) penalty_factor: f64,
+    /// Smallest noise floor of all evaluated fits, in V, with which the misfit of form is compared in every structure.
+    floor_v: f64,
+}
+
+impl Default for Evaluated {
+    fn default() -> Self {
+        Self { scored: HashMap::new(), penalty_factor: 1.0, floor_v: f64::INFINITY }
+    }
+}
+
+impl Evaluated {
+    /// Price of a fit's blocks, in nats.
+    pub(super) fn price(&self, evaluator: &impl Evaluator, fit: &Fit) -> f64 {
+        let blocks = &fit.model.blocks;
+        let further = blocks.len().saturating_sub(1) as f64;
+        let stages: HashSet<Location> = blocks.iter().map(|(block, _)| block.effect().location()).collect();
+        let times = further + SAME_STAGE * (blocks.len() - stages.len()) as f64;
+        let misfit = if times > 0.0 { evaluator.misfit(fit, times, self.floor_v) } else { 0.0 };
+        misfit + self.penalty_factor * blocks.iter().map(|(block, _)| evaluator.price(block)).sum::<f64>()
+    }
+
+    /// Recomputes all scores with a penalty factor and with the present noise floor, which the first evaluations lacked.
+    pub(super) fn reprice(&mut self, evaluator: &impl Evaluator, penalty_factor: f64) {
+        self.penalty_factor = penalty_factor;
+        let mut scored = std::mem::take(&mut self.scored);
+        scored.values_mut().for_each(|it| it.score = it.held_out - self.price(evaluator, &it.fit));
+        self.scored = scored;
+    }
+
+    /// Returns a structure with its score; fits it unless it was evaluated before.
+    pub(super) fn evaluate(&mut self, evaluator: &mut impl Evaluator, model: Model) -> Scored {
+        if let Some(known) = self.scored.get(&model.structure()) {
+            return known.clone();
+        }
+        let fit = evaluator.fit(model);
+        self.scored(evaluator, fit)
+    }
+
+    /// Returns a structure with its score; fits it again if the model's own point is likelier than the evaluated fit, as it may
+    /// be after the other blocks were fitted.
+    pub(super) fn evaluate_from(&mut self, evaluator: &mut impl Evaluator, model: Model) -> Scored {
+        if !self.scored.contains_key(&model.structure()) {
+            return self.evaluate(evaluator, model);
+        }
+        let here = evaluator.at(model);
+        self.evaluate_again(evaluator, here)
+    }
+
+    /// Returns a structure with its score; fits it again from `first` if that is likelier than the evaluated fit.
+    pub(super) fn evaluate_again(&mut self, evaluator: &mut impl Evaluator, first: Fit) -> Scored {
+        match self.scored.get(&first.model.structure()).cloned() {
+            Some(known) if known.fit.log_likelihood + NATS_TO_EVALUATE_AGAIN < first.log_likelihood => {
+                let fit = evaluator.refit(first);
+                let again = self.scored(evaluator, fit);
+                if known.score > again.score {
+                    self.scored.insert(known.fit.model.structure(), known.clone());
+                    return known;
+                }
+                again
+            }
+            Some(known) => known,
+            None => {
+                let fit = evaluator.refit(first);
+                self.scored(evaluator, fit)
+            }
+        }
+    }
+
+    /// Scores a fit and stores it under its structure.
+    fn scored(&mut self, evaluator: &mut impl Evaluator, fit: Fit) -> Scored {
+        let held_out = evaluator.held_out(&fit);
+        self.floor_v = self.floor_v.min(fit.noise.floor_v());
+        let score = held_out - self.price(evaluator, &fit);
+        let scored = Scored { fit, held_out, score };
+        self.scored.insert(scored.fit.model.structure(), scored.clone());
+        scored
+    }
+
+    /// The best structure of each set of effects, the best set first.
+    pub(super) fn ranked(&self) -> Vec<&Scored> {
+        let mut ranked: Vec<&Scored> = self.scored.values().collect();
+        let key = |scored: &Scored| scored.fit.model.structure();
+        ranked.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| key(a).cmp(&key(b))));
+        let mut sets = HashSet::new();
+        ranked.retain(|scored| sets.insert(effects(&scored.fit.model)));
+        ranked
+    }
+
+    /// The best of all structures without an effect and without every effect that contains it as a special case.
+    pub(super) fn best_without(&self, effect: usize) -> Option<Scored> {
+        let has = |model: &Model| effects(model).into_iter().any(|other| other == effect || contains(other, effect));
+        let without = self.scored.values().filter(|scored| !has(&scored.fit.model));
+        without.max_by(|a, b| a.score.total_cmp(&b.score)).cloned()
+    }
+}

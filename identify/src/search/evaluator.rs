@@ -1,0 +1,160 @@
+//! What a search asks about structures. An [`Engine`] answers from a record, a test from a table.
+
+use crate::adequacy;
+use crate::effects::EFFECTS;
+use crate::effects::effect::FitContext;
+use crate::effects::model::{Block, Model};
+use crate::fit::engine::{Engine, Fit};
+use crate::noise::{Noise, autocorrelation};
+use crate::search::penalty_factor::penalty_factor;
+use crate::search::predicted_gain::GainPredictor;
+use crate::stats::scale::{negligible, robust_scale, root_mean_square};
+
+/// Price of a block, in nats, without its places and forms: roughly the gain of the best of all blocks on noise.
+const PRICE_OF_BLOCK: f64 = 4.3;
+/// Price of each fitted coordinate of a block, in nats, beyond what held-out rows charge, so that a block with more coordinates
+/// does not replace one with fewer.
+const PRICE_OF_COORDINATE: f64 = 1.8;
+/// Assumed difference in form between the spring and a block, as a fraction of what the block changes.
+const MISFIT_OF_FORM: f64 = 0.005;
+/// Largest misfit of form, as a fraction of the noise floor: a larger one would show as autocorrelation.
+const MISFIT_PER_FLOOR: f64 = 0.3;
+/// Predicted gain, in nats, that one form of an effect must exceed for the effect to be fitted.
+const NATS_TO_FIT: f64 = 2.5;
+/// Fraction of its price that the predicted gain of a block must exceed when the search is not exhaustive.
+const GAIN_PER_PRICE: f64 = 0.5;
+
+/// Fits structures and evaluates them.
+pub trait Evaluator {
+    /// Returns the likeliest fit near the model's own point.
+    fn fit(&mut self, model: Model) -> Fit;
+
+    /// Returns the model at its own point, with the noise of its residual.
+    fn at(&mut self, model: Model) -> Fit;
+
+    /// Returns the likeliest fit near that of a first fit.
+    fn refit(&mut self, first: Fit) -> Fit;
+
+    /// Log-likelihood of all rows, in nats, each predicted by a fit to the other folds.
+    fn held_out(&mut self, fit: &Fit) -> f64;
+
+    /// First fits of the structures with one block more, whose effect is `wanted`, in every form that is worth fitting; if
+    /// `exhaustive` also of blocks whose gain the noise's autocorrelation may hide.
+    fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit>;
+
+    /// Price of a block, in nats.
+    fn price(&self, block: &Block) -> f64;
+
+    /// Log-likelihood, in nats, that a further block gains by correcting the form of the others, `times` as strong in power as
+    /// assumed, above a noise floor of `floor_v` volts.
+    fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64;
+
+    /// True if the residual of a fit may hold structure.
+    fn doubts(&mut self, fit: &Fit) -> bool;
+
+    /// Factor by which prices are multiplied for the residual of a fit, 1 or more.
+    fn penalty_factor(&mut self, fit: &Fit) -> f64;
+}
+
+impl Evaluator for Engine<'_> {
+    fn fit(&mut self, model: Model) -> Fit {
+        self.fit_twice(model)
+    }
+
+    fn at(&mut self, model: Model) -> Fit {
+        Engine::evaluate(self, model)
+    }
+
+    fn refit(&mut self, first: Fit) -> Fit {
+        Engine::refit(self, first)
+    }
+
+    fn held_out(&mut self, fit: &Fit) -> f64 {
+        self.held_out_log_likelihood(fit)
+    }
+
+    fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+        let mut extensions = extensions(self, fit, exhaustive, wanted);
+        // A search that is not exhaustive relies on the noise of the present fit, and on predicted gains.
+        let law = if exhaustive { Noise::default_robust() } else { fit.noise.clone() };
+        if !exhaustive {
+            let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit, 1.0, fit.noise.floor_v()) };
+            extensions.retain(|it| it.predicted_gain > GAIN_PER_PRICE * (Evaluator::price(self, &it.block) + misfit));
+        }
+        let extensions = extensions.into_iter();
+        extensions.map(|Extension { block, point, .. }| self.fit(fit.model.with(block, point), &law)).collect()
+    }
+
+    fn price(&self, block: &Block) -> f64 {
+        let effect = block.effect();
+        let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
+        PRICE_OF_BLOCK
+            + PRICE_OF_COORDINATE * fitted as f64
+            + effect.ln_candidates(block.form, self.data)
+            + (effect.forms() as f64).ln()
+    }
+
+    fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {
+        let explained: Vec<f64> =
+            self.baseline_residual.iter().zip(&fit.residual).map(|(before, after)| before - after).collect();
+        let part = MISFIT_OF_FORM.min(MISFIT_PER_FLOOR * floor_v / root_mean_square(&explained).max(f64::MIN_POSITIVE));
+        autocorrelation::coding_cost(&explained, floor_v / (part * times.sqrt()))
+    }
+
+    fn doubts(&mut self, fit: &Fit) -> bool {
+        // Before any effect is found, autocorrelation may be the effect's own; so it may where it predicts nearly all errors.
+        let autocorrelated = !fit.noise.autocorrelation.is_white();
+        autocorrelated && (fit.model.blocks.is_empty() || fit.strongly_autocorrelated()) || adequacy::doubts(self, fit)
+    }
+
+    fn penalty_factor(&mut self, fit: &Fit) -> f64 {
+        if negligible(&fit.residual) { 1.0 } else { penalty_factor(&self.terms(&fit.noise, &fit.residual)) }
+    }
+}
+
+/// A block that could be added, at one start.
+struct Extension {
+    block: Block,
+    point: Vec<f64>,
+    /// Predicted gain in log-likelihood, in nats.
+    predicted_gain: f64,
+}
+
+/// Blocks that could be added, each at the starts with the largest predicted gain.
+fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Extension> {
+    let mut predictors = Vec::new();
+    let (autocorrelated, rounded) = (!fit.noise.autocorrelation.is_white(), fit.noise.half_step > 0.0);
+    // The rounding error depends on the voltage, so that every effect would seem to explain it.
+    if !rounded && (exhaustive || !autocorrelated) {
+        predictors.push(GainPredictor::new(engine, fit, Noise::robust(&fit.residual)));
+    }
+    if autocorrelated || rounded {
+        predictors.push(GainPredictor::new(engine, fit, fit.noise.clone()));
+    }
+    let sigma = robust_scale(&fit.residual);
+    let mut found: Vec<Extension> = Vec::new();
+    for (index, effect) in EFFECTS.iter().enumerate().filter(|(index, _)| wanted(*index)) {
+        let mut of_effect: Vec<Extension> = Vec::new();
+        for form in 0..effect.forms() {
+            let block = Block { effect: index, form };
+            let scene = FitContext { data: engine.data, residual: &fit.residual, sigma };
+            let starts = effect.initial_points(form, &scene).into_iter().map(|point| {
+                let there = engine.residual(&fit.model.with(block, point.clone()));
+                let change: Vec<f64> = fit.residual.iter().zip(&there).map(|(a, b)| a - b).collect();
+                let predicted_gain =
+                    predictors.iter().map(|predictor| predictor.predicted_gain(&change)).fold(0.0, f64::max);
+                Extension { block, point, predicted_gain }
+            });
+            let mut starts: Vec<Extension> = starts.collect();
+            starts.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
+            // Two starts where the first may be a local maximum.
+            starts.truncate(1 + usize::from(starts.len() > 4 && effect.forms() == 1));
+            of_effect.extend(starts);
+        }
+        // Predicted gains rank the forms of an effect poorly: if one form is worth fitting, all are fitted.
+        if of_effect.iter().any(|extension| extension.predicted_gain > NATS_TO_FIT) {
+            found.extend(of_effect);
+        }
+    }
+    found
+}

@@ -1,0 +1,295 @@
+//! The search for the structure with the largest score.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::effects::EFFECTS;
+use crate::effects::model::{Block, Model};
+use crate::fit::engine::Fit;
+use crate::search::evaluated::Evaluated;
+use crate::search::evaluator::Evaluator;
+use crate::search::scored::{Scored, effects};
+use crate::search::warm_start::WarmStart;
+
+/// Models in a warm start.
+const MODELS_IN_WARM_START: usize = 3;
+/// Structures in the beam.
+const BEAM: usize = 3;
+/// Largest number of blocks in a model.
+const MOST_BLOCKS: usize = 6;
+/// Rounds in which each block is exchanged for every other.
+const EXCHANGES: usize = 3;
+/// Loss of score, in nats, at which a structure may stay in the beam while the noise is autocorrelated.
+const NATS_TO_LOSE_IN_BEAM: f64 = 30.0;
+
+/// A search, with all that it has evaluated.
+pub struct Search<'e, E> {
+    pub(super) evaluator: &'e mut E,
+    pub(super) evaluated: Evaluated,
+    /// Evaluated extensions of each structure, the best first.
+    pub(super) extended: HashMap<Vec<Block>, Vec<Scored>>,
+    /// First fits of the extensions of a structure, whatever their price.
+    pub(super) first_fits: HashMap<Vec<Block>, Vec<FirstFits>>,
+    /// True if first fits are kept for another pass.
+    pub(super) keeps_first_fits: bool,
+    /// True if effects that the noise's autocorrelation may hide are also tried.
+    pub(super) exhaustive: bool,
+}
+
+/// First fits of a model's extensions.
+pub(super) struct FirstFits {
+    /// The model that is extended, with its parameters.
+    pub(super) of: Model,
+    /// The effect that is added, or `None` for all.
+    pub(super) by: Option<usize>,
+    /// The fits.
+    pub(super) fits: Vec<Fit>,
+}
+
+impl<'e, E: Evaluator> Search<'e, E> {
+    /// An exhaustive search that asks `evaluator`.
+    pub fn new(evaluator: &'e mut E) -> Self {
+        let (extended, first_fits) = (HashMap::new(), HashMap::new());
+        Self {
+            evaluator,
+            evaluated: Evaluated::default(),
+            extended,
+            first_fits,
+            keeps_first_fits: true,
+            exhaustive: true,
+        }
+    }
+
+    /// The evaluator that the search asks.
+    pub fn evaluator(&mut self) -> &mut E {
+        self.evaluator
+    }
+
+    /// Searches from the simulation as it is given and returns the best structure; `progress` receives each structure that
+    /// becomes the best.
+    pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
+        loop {
+            let best = self.pass(&mut progress);
+            let penalty_factor = self.evaluator.penalty_factor(&best.fit);
+            if penalty_factor <= self.evaluated.penalty_factor || best.fit.model.blocks.is_empty() {
+                return self.repriced(best, &mut progress);
+            }
+            self.extended.clear();
+            self.evaluated.reprice(self.evaluator, penalty_factor);
+        }
+    }
+
+    /// Searches from the models of a warm start, which are evaluated and then extended, and returns the best structure.
+    pub fn run_from(
+        &mut self,
+        WarmStart { models, penalty_factor }: WarmStart,
+        mut progress: impl FnMut(&Scored),
+    ) -> Scored {
+        self.exhaustive = false;
+        // On all rows of a long record they would take much memory.
+        self.keeps_first_fits = false;
+        self.evaluated.penalty_factor = penalty_factor;
+        self.root();
+        for model in models {
+            self.evaluated.evaluate(self.evaluator, model);
+        }
+        // All rows may show autocorrelation that a part of them, far apart, could not.
+        let penalty_factor = penalty_factor.max(self.evaluator.penalty_factor(&self.best().fit));
+        self.evaluated.reprice(self.evaluator, penalty_factor);
+        let best = self.best();
+        progress(&best);
+        let best = self.extended_greedily(best, &mut progress);
+        if !self.evaluator.doubts(&best.fit) {
+            return best;
+        }
+        // An effect too quick for a part of the rows may be hidden by the noise's autocorrelation.
+        self.exhaustive = true;
+        self.extended.clear();
+        self.extended_greedily(best, &mut progress)
+    }
+
+    /// The best structure after all were priced with the same noise floor; extended further unless it is the one found before.
+    fn repriced(&mut self, found: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
+        self.evaluated.reprice(self.evaluator, self.evaluated.penalty_factor);
+        let best = self.best();
+        if best.fit.model.structure() == found.fit.model.structure() {
+            return best;
+        }
+        progress(&best);
+        self.extended.clear();
+        self.extended_greedily(best, progress)
+    }
+
+    /// Adds the best block while that raises the score, then removes blocks while that does.
+    fn extended_greedily(&mut self, mut best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
+        for _ in 0..MOST_BLOCKS {
+            let better = self.children(&best).into_iter().next().filter(|child| child.score > best.score);
+            let Some(better) = better else { break };
+            best = better;
+            progress(&best);
+        }
+        self.pruned(best)
+    }
+
+    /// The best models, for another search.
+    pub fn warm_start(&self) -> WarmStart {
+        let models =
+            self.ranked().into_iter().take(MODELS_IN_WARM_START).map(|scored| scored.fit.model.clone()).collect();
+        WarmStart { models, penalty_factor: self.evaluated.penalty_factor }
+    }
+
+    /// The simulation as it is given, without any block.
+    pub fn root(&mut self) -> Scored {
+        self.evaluated.evaluate(self.evaluator, Model::default())
+    }
+
+    /// The structure without one of its effects, the other blocks fitted again.
+    pub fn left_out(&mut self, scored: &Scored, effect: usize) -> Scored {
+        self.evaluated.evaluate_from(self.evaluator, scored.fit.model.without(effect))
+    }
+
+    /// The best structure that was evaluated.
+    fn best(&self) -> Scored {
+        let ranked = self.ranked();
+        (*ranked.first().expect("the search starts from no effect at all")).clone()
+    }
+
+    /// The best structure of each set of effects, the best set first.
+    pub fn ranked(&self) -> Vec<&Scored> {
+        self.evaluated.ranked()
+    }
+
+    /// The best of all evaluated structures without an effect and without every effect that contains it as a special case.
+    pub fn best_without(&self, effect: usize) -> Scored {
+        self.evaluated.best_without(effect).expect("the search starts from no effect at all")
+    }
+
+    /// One beam search at the present penalty factor.
+    fn pass(&mut self, progress: &mut impl FnMut(&Scored)) -> Scored {
+        let root = self.root();
+        let mut best = root.clone();
+        let mut beam = vec![root];
+        let mut waited = 0;
+        for _ in 0..MOST_BLOCKS {
+            // A structure that leaves nothing but noise is the only one that is extended: no other can be much likelier.
+            let doubts = self.evaluator.doubts(&best.fit);
+            if !doubts {
+                beam = vec![best.clone()];
+            }
+            let mut next = self.next(&beam);
+            // Structures that may lose score for a while are left as they are: pruning would only undo them.
+            next = next.into_iter().map(|it| if it.score > best.score { self.pruned(it) } else { it }).collect();
+            if let Some(first) = next.first().cloned()
+                && first.score > best.score
+            {
+                next[0] = self.reformed(first);
+            }
+            distinct(&mut next);
+            let Some(first) = next.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else { break };
+            if first.score > best.score {
+                best = first.clone();
+                waited = 0;
+                progress(&best);
+            } else {
+                waited += 1;
+                if waited > 1 || best.fit.noise.autocorrelation.is_white() || !doubts {
+                    break;
+                }
+            }
+            beam = next;
+        }
+        self.settled(best)
+    }
+
+    /// The next beam: the best structures with one block more, and the likeliest of the others under independent noise.
+    fn next(&mut self, beam: &[Scored]) -> Vec<Scored> {
+        let mut next: Vec<Scored> = Vec::new();
+        for node in beam {
+            // Two blocks may gain only together, so that the first may lose score while the noise is autocorrelated.
+            let may_lose = |child: &Scored| {
+                let gain = child.score - node.score;
+                gain > -NATS_TO_LOSE_IN_BEAM
+                    || child.fit.white_noise_log_likelihood > node.fit.white_noise_log_likelihood + NATS_TO_LOSE_IN_BEAM
+            };
+            let independent = node.fit.noise.autocorrelation.is_white();
+            let children = self.children(node).into_iter();
+            next.extend(children.filter(|child| child.score > node.score || !independent && may_lose(child)));
+        }
+        next.sort_by(|a, b| b.score.total_cmp(&a.score));
+        distinct(&mut next);
+        let rest = next.split_off(BEAM.min(next.len()));
+        next.extend(
+            rest.into_iter()
+                .max_by(|a, b| a.fit.white_noise_log_likelihood.total_cmp(&b.fit.white_noise_log_likelihood)),
+        );
+        next
+    }
+
+    /// Exchanges each block for every other while that raises the score.
+    fn settled(&mut self, mut best: Scored) -> Scored {
+        for _ in 0..EXCHANGES {
+            let before = best.score;
+            for effect in effects(&best.fit.model) {
+                let without = self.left_out(&best, effect);
+                let children = self.children(&without).into_iter().next();
+                let other = self.exchanged(&best, effect).into_iter().chain(children);
+                let other = other.max_by(|a, b| a.score.total_cmp(&b.score));
+                if let Some(other) = other.filter(|other| other.score > best.score) {
+                    best = self.pruned(other);
+                }
+            }
+            if best.score <= before {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The best structure with another effect in place of `effect`, the other blocks kept at their parameters: fitted without
+    /// either, they may suit neither.
+    fn exchanged(&mut self, scored: &Scored, effect: usize) -> Option<Scored> {
+        let rest = scored.fit.model.without(effect);
+        if rest.blocks.is_empty() {
+            return None;
+        }
+        let node = self.evaluator.at(rest);
+        let first_fits = self.first_fits(&node, None);
+        self.evaluated_best(&node, first_fits).into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    /// Fits each block again in every form and from every start, the others kept at their parameters: the form and the start
+    /// that were found first may have stood in for a block that was found later.
+    fn reformed(&mut self, mut scored: Scored) -> Scored {
+        let alone = scored.fit.model.blocks.len() == 1;
+        for effect in effects(&scored.fit.model) {
+            if alone && EFFECTS[effect].forms() < 2 {
+                continue;
+            }
+            let rest = self.evaluator.at(scored.fit.model.without(effect));
+            let first_fits = self.first_fits(&rest, Some(effect));
+            for other in self.evaluated_best(&rest, first_fits) {
+                if other.score > scored.score {
+                    scored = other;
+                }
+            }
+        }
+        scored
+    }
+
+    /// Removes blocks while that raises the score.
+    fn pruned(&mut self, mut scored: Scored) -> Scored {
+        loop {
+            let effects = effects(&scored.fit.model).into_iter();
+            let shorter = effects.map(|effect| self.left_out(&scored, effect));
+            match shorter.max_by(|a, b| a.score.total_cmp(&b.score)) {
+                Some(shorter) if shorter.score > scored.score => scored = shorter,
+                _ => return scored,
+            }
+        }
+    }
+}
+
+/// Keeps the first structure of each set of effects.
+fn distinct(scored: &mut Vec<Scored>) {
+    let mut known = HashSet::new();
+    scored.retain(|scored| known.insert(effects(&scored.fit.model)));
+}
