@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::misprint::Pair;
 use crate::table3;
-use simulation::experiment::{Experiment, Judged, Run, Sample, StartsFrom, max_fixed_point_error};
+use simulation::experiment::{Experiment, HasReference, Run, Sample, StartsFrom, max_fixed_point_error};
 use simulation::record::Record;
 use simulation::response::{Response, responses};
 
@@ -90,7 +90,7 @@ impl Report {
     ///
     /// # Errors
     /// If the table that was built in is damaged.
-    pub fn new<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>, controlled: bool) -> Result<Self> {
+    pub fn new<P: HasReference>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>, controlled: bool) -> Result<Self> {
         let compared = matches!(source, Rows::Table3 { same: true });
         let mut rows = rows(experiment, run, source)?;
         let (printed_compared, printed_agree) = if compared { explain(&mut rows) } else { (0, 0) };
@@ -109,7 +109,7 @@ impl Report {
 }
 
 /// Rows at the moments of a table or file: the reference at the very moment, fixed point at the last tick before.
-fn rows<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>) -> Result<Vec<Row>> {
+fn rows<P: HasReference>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>) -> Result<Vec<Row>> {
     let blank = |time_s, voltage_v, measured| {
         let tick = run.tick_at(time_s);
         Row {

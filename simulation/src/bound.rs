@@ -52,7 +52,7 @@ pub fn shortest_time(system: &Loop, from_v: f64, to_v: f64, part: f64) -> Option
 
 /// The same for each change of a run from the state that its `samples` brought the spring to; `None` if the stiffness is
 /// not there before the next change.
-pub fn from_where_it_is(
+pub fn shortest_times_from_state(
     system: &SampledLoop,
     run: &Run,
     samples: &[Sample],
@@ -163,7 +163,7 @@ mod tests {
                 range_v: (0.0, 700.0),
                 slew_v_per_s,
             };
-            let got = from_where_it_is(&system, &run, &samples, &[change], 0.97)[0].unwrap();
+            let got = shortest_times_from_state(&system, &run, &samples, &[change], 0.97)[0].unwrap();
             let exact = shortest_time(&paper(700.0, slew_v_per_s), 400.0, 500.0, 0.97).unwrap();
             // A tick makes its part of a slew at once.
             assert!((got - exact).abs() < 1e-3, "{slew_v_per_s}: {got} {exact}");

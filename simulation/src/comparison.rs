@@ -4,7 +4,7 @@ use anyhow::Result;
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Settings};
 use serde::Serialize;
 
-use crate::experiment::{Experiment, Judged, StartsFrom, with_plant};
+use crate::experiment::{Experiment, HasReference, StartsFrom, with_plant};
 use crate::plant_file::PlantFile;
 use crate::response::Response;
 use crate::response::responses;
@@ -71,7 +71,7 @@ pub fn compare(file: &PlantFile, rate_hz: f64, amplifiers: &[Amplifier]) -> Resu
     Ok(Comparison { bound_from, limits: limits.collect::<Result<_>>()? })
 }
 
-fn steps<P: Judged>(settings: Settings<P>) -> Result<Vec<Step>> {
+fn steps<P: HasReference>(settings: Settings<P>) -> Result<Vec<Step>> {
     let of = |compensation| {
         let settings = Settings { compensation, ..settings };
         let experiment =

@@ -9,7 +9,7 @@ use model::{Compensation, Config, Input, Output, Plant, Settings, Spring, State,
 
 use crate::bad_input;
 use crate::bad_input::{BadInput, number};
-pub use crate::judged::{Judged, StartsFrom, continuous, reference_at, with_plant};
+pub use crate::has_reference::{HasReference, StartsFrom, continuous, reference_at, with_plant};
 pub use crate::run::{Run, Sample};
 use crate::schedule::Schedule;
 
@@ -27,7 +27,7 @@ pub struct Experiment<P = Plant> {
     pub settings: Settings<P>,
 }
 
-impl<P: Judged> Experiment<P> {
+impl<P: HasReference> Experiment<P> {
     /// Runs it; `progress` hears of the ticks done, every few thousand, and of their total.
     ///
     /// # Errors

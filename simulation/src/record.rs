@@ -7,7 +7,6 @@ use anyhow::Result;
 use crate::bad_input;
 use crate::bad_input::number;
 use crate::csv_table::{Table, read};
-use crate::schedule::Schedule;
 
 /// One row of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,9 +33,6 @@ pub struct Record {
 /// Larger magnitudes, in V, are a fault of the file: no spring and no amplifier has them.
 const MOST_V: f64 = 1e6;
 
-/// Voltages that differ by less are the same, in V.
-const ROUNDING_V: f64 = 1.0;
-
 /// The voltage at the spring, where a file has that and not the commanded one.
 pub const APPLIED: &str = "applied_v";
 
@@ -56,24 +52,6 @@ impl Record {
                 self.name
             ),
         }
-    }
-
-    /// Checks that the voltages are those of a schedule, between its lowest and highest within `near_s` of each row.
-    ///
-    /// # Errors
-    /// [`crate::bad_input::BadInput`] with file, line and column of the first that is not.
-    pub fn check_commanded(&self, schedule: &Schedule, name: &str, near_s: f64) -> Result<()> {
-        for &Row { line, time_s, voltage_v, .. } in &self.rows {
-            let [before, after] = [-near_s, near_s].map(|near| schedule.reader().at(time_s + near));
-            if !(before.min(after) - ROUNDING_V..=before.max(after) + ROUNDING_V).contains(&voltage_v) {
-                bad_input!(
-                    "{}, line {line}, column voltage_v: {voltage_v} V at {} s; expected {after} V as in {name}",
-                    self.name,
-                    number(time_s)
-                );
-            }
-        }
-        Ok(())
     }
 
     /// Reads a file; `measured` names the column of the measured stiffness, [`MEASURED`] unless the user says another.
@@ -182,18 +160,6 @@ mod tests {
         assert!(Record::parse("r", text, MEASURED).is_err(), "a schedule says what is commanded");
         let both = "time_s,applied_v,voltage_v,stiffness\n0,1,2,3\n1,1,2,3\n";
         assert_eq!(Record::parse_measured("r", both, MEASURED).unwrap().rows[1].voltage_v, 2.0);
-    }
-
-    #[test]
-    fn a_record_of_another_schedule_is_refused_with_its_first_row() {
-        let check = |text: &str| {
-            let record = Record::parse("r", text, MEASURED).unwrap();
-            record.check_commanded(&Schedule::stair(), "the stair", 0.1).map_err(|error| error.to_string())
-        };
-        // On the ramp, and at its ends, either voltage will do.
-        assert_eq!(check("time_s,voltage_v\n0,0\n20,0\n20.05,100\n20.1,100\n90,500\n"), Ok(()));
-        let expected = "r, line 3, column voltage_v: 0 V at 25 s; expected 100 V as in the stair";
-        assert_eq!(check("time_s,voltage_v\n0,0\n25,0\n"), Err(expected.to_owned()));
     }
 
     #[test]

@@ -13,11 +13,12 @@
 //! is the exact step (first-order hold). At a limit, `u` is itself a straight line and `w`, `z` follow it in closed
 //! form; the moments at which limits begin and end to act are found by bisection.
 
+mod kernel;
 mod mode;
 
 use nalgebra::Matrix4;
 
-use crate::leap::{Leap, Pair};
+use kernel::{Kernel, Pair};
 
 /// The loop to be solved, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +47,7 @@ pub struct Solution {
     /// What one whole sample with `u = c` makes of `w`, `z`, the target and its slope: rows for `w` and `z`.
     whole: [[f64; 4]; 2],
     /// The same for many samples.
-    leap: Leap,
+    kernel: Kernel,
     w: f64,
     z: f64,
     u: f64,
@@ -76,7 +77,7 @@ impl Loop {
             reset_per_s,
             sample_s,
             whole: [[0.0; 4]; 2],
-            leap: Leap::new([[0.0; 2]; 2], [0.0; 2], [0.0; 2]),
+            kernel: Kernel::new([[0.0; 2]; 2], [0.0; 2], [0.0; 2]),
             w: 0.0,
             z: 0.0,
             u: 0.0,
@@ -87,7 +88,7 @@ impl Loop {
         let columns = |a: usize, b: usize| solution.whole.map(|row| [row[a], row[b]]);
         let later = solution.whole.map(|row| row[3] / sample_s);
         let now = [0, 1].map(|state| solution.whole[state][2] - later[state]);
-        solution.leap = Leap::new(columns(0, 1), now, later);
+        solution.kernel = Kernel::new(columns(0, 1), now, later);
         solution
     }
 }
@@ -126,11 +127,11 @@ impl Solution {
     fn run_free(&mut self, targets: &[f64], moments: &mut [Moment]) -> usize {
         let ([first, second, ..], true) = (targets, self.free) else { return 0 };
         let (lowest, highest) = (Pair::splat(self.system.range_v.0), Pair::splat(self.system.range_v.1));
-        let (leap, share, [by_w, by_z, by_target]) = (self.leap, self.system.share, self.law);
-        let voltage = leap.output([by_w, by_z], by_target);
-        let stiffness = leap.output([1.0 - share + share * by_w, share * by_z], share * by_target);
+        let (kernel, share, [by_w, by_z, by_target]) = (self.kernel, self.system.share, self.law);
+        let voltage = kernel.output([by_w, by_z], by_target);
+        let stiffness = kernel.output([1.0 - share + share * by_w, share * by_z], share * by_target);
 
-        let mut pair = leap.start([self.w, self.z], [*first, *second]);
+        let mut pair = kernel.start([self.w, self.z], [*first, *second]);
         let mut samples = 0;
         for (targets, moments) in targets[1..].windows(3).step_by(2).zip(moments.chunks_exact_mut(2)) {
             let (now, next) = (Pair::new([targets[0], targets[1]]), Pair::new([targets[1], targets[2]]));
@@ -142,7 +143,7 @@ impl Solution {
             moments[0] = Moment { stiffness, voltage };
             moments[1] = Moment { stiffness: later_stiffness, voltage: later_voltage };
             samples += 2;
-            pair = leap.next(pair, now, next);
+            pair = kernel.next(pair, now, next);
         }
         if samples > 0 {
             self.rejoin(moments[samples - 1], targets[samples]);

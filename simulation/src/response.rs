@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::experiment::{Experiment, Judged};
+use crate::experiment::{Experiment, HasReference};
 use crate::run::{Run, Sample};
 use crate::schedule::Change;
 
@@ -63,7 +63,7 @@ pub fn measure(run: &Run, samples: &[Sample], change: &Change, bound_t97_s: Opti
 }
 
 /// The answer of one loop of a run to each change of its target.
-pub fn responses<P: Judged>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> Vec<Response> {
+pub fn responses<P: HasReference>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> Vec<Response> {
     let changes = experiment.schedule.changes();
     let bounds = P::bounds(&experiment.settings, run, samples, &changes);
     let each = |(change, bound): (&Change, _)| measure(run, samples, change, bound);

@@ -10,7 +10,7 @@
 
 pub mod spring;
 
-pub use spring::Spring;
+pub use spring::{Spring, simulate};
 
 /// Settings in SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,19 +143,4 @@ impl SampledLoop {
         self.spring.hold(&mut state.spring, self.sample_s);
         stiffness
     }
-}
-
-/// The spring alone: its stiffness in V at increasing times in s, just after each of the voltages in V was put across it,
-/// each held until the next time.
-pub fn simulate(spring: &Spring, time_s: &[f64], voltage_v: &[f64]) -> Vec<f64> {
-    let mut state = spring.at_rest();
-    let lasts = time_s.windows(2).map(|pair| pair[1] - pair[0]).chain([0.0]);
-    let points = voltage_v.iter().zip(lasts);
-    let at = |(&voltage, lasts): (&f64, f64)| {
-        spring.apply(&mut state, voltage);
-        let stiffness = spring.stiffness(&state);
-        spring.hold(&mut state, lasts);
-        stiffness
-    };
-    points.map(at).collect()
 }

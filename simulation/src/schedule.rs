@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::bad_input;
 use crate::bad_input::number;
-use crate::record::Record;
+use crate::record::{Record, Row};
 
 /// One straight piece, from `start_s` up to but not including `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +52,9 @@ pub enum Between {
 
 /// A plateau shorter than this belongs to the change that it interrupts.
 const SHORTEST_PLATEAU_S: f64 = 1.0;
+
+/// Voltages that differ by less than this, in V, count as equal when a record is compared with a schedule.
+const ROUNDING_V: f64 = 1.0;
 
 /// The stair: up by 100 V every 10 s, from 20 s on.
 const STAIR_STARTS_S: [f64; 5] = [20.0, 30.0, 40.0, 50.0, 60.0];
@@ -150,6 +153,25 @@ impl Schedule {
                 bad_input!(
                     "{name} asks for {volts} V at {} s; expected {lowest_v} to {highest_v} V, the amplifier's range",
                     number(time)
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the record's voltages are those of this schedule: each row must lie between the lowest and the highest
+    /// scheduled voltage within `near_s` seconds of it, give or take 1 V. `name` is what messages call the schedule.
+    ///
+    /// # Errors
+    /// [`crate::bad_input::BadInput`] with file, line and column of the first row that differs.
+    pub fn check_commanded(&self, name: &str, record: &Record, near_s: f64) -> Result<()> {
+        for &Row { line, time_s, voltage_v, .. } in &record.rows {
+            let [before, after] = [-near_s, near_s].map(|near| self.reader().at(time_s + near));
+            if !(before.min(after) - ROUNDING_V..=before.max(after) + ROUNDING_V).contains(&voltage_v) {
+                bad_input!(
+                    "{}, line {line}, column voltage_v: {voltage_v} V at {} s; expected {after} V as in {name}",
+                    record.name,
+                    number(time_s)
                 );
             }
         }
@@ -291,6 +313,18 @@ mod tests {
         assert_eq!([1.0, 3.0, 5.0].map(|time| straight.reader().at(time)), [50.0, 100.0, 75.0]);
         let change = Change { start_s: 4.0, end_s: 9.0, from_v: 100.0, to_v: 50.0 };
         assert_eq!(straight.changes(), [change], "the first ramp starts on no plateau");
+    }
+
+    #[test]
+    fn a_record_of_another_schedule_is_rejected_at_its_first_different_row() {
+        let check = |text: &str| {
+            let record = Record::parse("r", text, MEASURED).unwrap();
+            Schedule::stair().check_commanded("the stair", &record, 0.1).map_err(|error| error.to_string())
+        };
+        // On the ramp, and at its ends, either voltage will do.
+        assert_eq!(check("time_s,voltage_v\n0,0\n20,0\n20.05,100\n20.1,100\n90,500\n"), Ok(()));
+        let expected = "r, line 3, column voltage_v: 0 V at 25 s; expected 100 V as in the stair";
+        assert_eq!(check("time_s,voltage_v\n0,0\n25,0\n"), Err(expected.to_owned()));
     }
 
     #[test]

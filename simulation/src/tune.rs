@@ -9,6 +9,7 @@
 
 pub mod margins;
 pub mod trade;
+mod worst;
 
 use anyhow::Result;
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Settings};
@@ -22,6 +23,7 @@ use crate::schedule::Schedule;
 
 pub use margins::Margins;
 pub use trade::Trade;
+pub use worst::Worst;
 
 /// How much longer than dead-beat a smoother approach may take.
 pub const WITHIN: f64 = 1.05;
@@ -74,15 +76,6 @@ pub struct TunedApproach {
     /// On the stair.
     #[serde(flatten)]
     pub worst: Worst,
-}
-
-/// The worst of the steps of the stair.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Worst {
-    /// In s; `None` if a step does not get there.
-    pub t97_s: Option<f64>,
-    /// In percent of the step.
-    pub overshoot_percent: f64,
 }
 
 impl Question<'_> {
@@ -194,16 +187,6 @@ fn responses(run: &Run) -> Vec<crate::response::Response> {
 /// The worst step of a run over the stair.
 fn worst(run: &Run) -> Worst {
     Worst::of(responses(run).iter().map(|step| (step.t97_s, step.overshoot_percent)))
-}
-
-impl Worst {
-    fn of(steps: impl Iterator<Item = (Option<f64>, f64)>) -> Self {
-        let start = Self { t97_s: Some(0.0), overshoot_percent: 0.0 };
-        steps.fold(start, |worst, (t97_s, overshoot)| Self {
-            t97_s: worst.t97_s.zip(t97_s).map(|(one, other)| f64::max(one, other)),
-            overshoot_percent: worst.overshoot_percent.max(overshoot),
-        })
-    }
 }
 
 fn three_digits(value: f64) -> f64 {

@@ -89,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let base = Base::new(plant_file::load(&arguments.plant)?)?;
     let record = Record::open_measured(&arguments.data, &arguments.column)?;
     if arguments.input == Input::Stair {
-        record.check_commanded(&Schedule::stair(), "the report's stair (--input stair)", RAMP_S)?;
+        Schedule::stair().check_commanded("the report's stair (--input stair)", &record, RAMP_S)?;
     }
     let options = Options { input: arguments.input.into(), base };
     // A folder that cannot be made is known before the search begins.

@@ -14,7 +14,7 @@ use paper::stair::{Report, Rows};
 use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::bad_input::number;
-use simulation::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
+use simulation::experiment::{Experiment, HasReference, Run, paper_spring, with_plant};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::Schedule;
@@ -169,7 +169,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Runs the command for one kind of spring; `is_the_reports` says whether Table 3's simulated columns should come out.
-fn run_plant<P: Judged>(
+fn run_plant<P: HasReference>(
     arguments: &Arguments,
     settings: Settings<P>,
     is_the_reports: impl Fn(&Settings<P>) -> bool,

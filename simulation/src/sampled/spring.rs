@@ -172,6 +172,21 @@ impl Spring {
     }
 }
 
+/// Simulates the spring without a controller, from rest at 0 V: returns its stiffness in V at the increasing times `time_s`
+/// (s), each just after `voltage_v` (V) of the same index was applied; every voltage is held until the next time.
+pub fn simulate(spring: &Spring, time_s: &[f64], voltage_v: &[f64]) -> Vec<f64> {
+    let mut state = spring.at_rest();
+    let lasts = time_s.windows(2).map(|pair| pair[1] - pair[0]).chain([0.0]);
+    let points = voltage_v.iter().zip(lasts);
+    let at = |(&voltage, lasts): (&f64, f64)| {
+        spring.apply(&mut state, voltage);
+        let stiffness = spring.stiffness(&state);
+        spring.hold(&mut state, lasts);
+        stiffness
+    };
+    points.map(at).collect()
+}
+
 /// A time constant that goes straight from `low_s` at 0 V through `high_s` at 500 V, never below half of the shorter.
 fn varied(low_s: f64, high_s: f64, volts: f64) -> f64 {
     let straight = low_s * (1.0 - volts.max(0.0) / 500.0) + high_s * volts.max(0.0) / 500.0;
@@ -193,7 +208,6 @@ fn decaying_input(seconds: f64, tau: f64, fading: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::plant_file::parse;
-    use crate::sampled::simulate;
 
     /// The example, its leakage and its second lag just as fast.
     fn example() -> Spring {

@@ -12,7 +12,7 @@ use crate::plant_file::PlantFile;
 use crate::response::measure;
 use crate::sampled::{self, Spring};
 use crate::schedule::{Change, Schedule};
-use crate::tune::Worst;
+use crate::tune::worst::Worst;
 
 /// What is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

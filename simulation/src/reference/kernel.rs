@@ -12,7 +12,7 @@ pub(crate) type Pair = f64x2;
 
 /// The double transition of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Leap {
+pub(crate) struct Kernel {
     once: [[f64; 2]; 2],
     twice: [[f64; 2]; 2],
     now: [f64; 2],
@@ -24,7 +24,7 @@ pub(crate) struct Leap {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Output([f64; 3]);
 
-impl Leap {
+impl Kernel {
     /// Of `x[i]' = by_state[i] . x + now[i] r + later[i] r'`.
     pub(crate) fn new(by_state: [[f64; 2]; 2], now: [f64; 2], later: [f64; 2]) -> Self {
         let times = |x: [f64; 2]| by_state.map(|[a, b]| a * x[0] + b * x[1]);

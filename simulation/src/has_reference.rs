@@ -8,7 +8,7 @@ use model::{Compensation, ExtendedPlant, Plant, Settings};
 
 use serde::Serialize;
 
-use crate::bound::{from_where_it_is, shortest_time};
+use crate::bound::{shortest_times_from_state, shortest_time};
 use crate::reference::{Loop, Moment};
 use crate::run::{Run, Sample};
 use crate::sampled::{Controller, SampledLoop, Spring};
@@ -25,7 +25,7 @@ pub enum StartsFrom {
 }
 
 /// A spring whose fixed-point run is laid beside a reference.
-pub trait Judged: Model {
+pub trait HasReference: Model {
     /// The highest voltage that may be asked for: what the reference treats as the tick does.
     fn highest_target(settings: &Settings<Self>) -> f64;
 
@@ -48,7 +48,7 @@ pub trait Judged: Model {
     fn bounds_from(settings: &Settings<Self>) -> StartsFrom;
 }
 
-impl Judged for Plant {
+impl HasReference for Plant {
     fn highest_target(settings: &Settings) -> f64 {
         settings.amplifier.max_v
     }
@@ -84,7 +84,7 @@ impl Judged for Plant {
 }
 
 /// In steps of the tick: between ticks the last one counts.
-impl Judged for ExtendedPlant<'_> {
+impl HasReference for ExtendedPlant<'_> {
     /// Where the amplifier ends below its full scale, both take a higher target at that end.
     fn highest_target(settings: &Settings<Self>) -> f64 {
         settings.amplifier.full_scale_v
@@ -101,7 +101,7 @@ impl Judged for ExtendedPlant<'_> {
     fn bounds(settings: &Settings<Self>, run: &Run, samples: &[Sample], changes: &[Change]) -> Vec<Option<f64>> {
         match settings.plant.plain() {
             Some(plant) => Plant::bounds(&with_plant(settings, plant), run, samples, changes),
-            None => from_where_it_is(&SampledLoop::from(settings), run, samples, changes, 0.97),
+            None => shortest_times_from_state(&SampledLoop::from(settings), run, samples, changes, 0.97),
         }
     }
 
