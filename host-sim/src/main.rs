@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
+use host_sim::output::terminal::remark;
 use simulation::bad_input::BadInput;
 
 /// Simulates the variable-stiffness spring and its controller, with the code that runs in the amplifier's MCU.
@@ -57,8 +58,7 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // What a file says may break lines; an error is one.
-            eprintln!("vsj: {}", format!("{error:#}").replace(['\n', '\r'], " "));
+            remark(&format!("{error:#}"));
             ExitCode::from(if error.is::<BadInput>() { 2 } else { 1 })
         }
     }
@@ -71,7 +71,7 @@ fn usage(error: &clap::Error) -> ExitCode {
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
-    eprintln!("{}: {}", Cli::command().get_name(), what_is_wrong(error));
+    remark(&what_is_wrong(error));
     ExitCode::from(2)
 }
 

@@ -90,7 +90,12 @@ impl Report {
     ///
     /// # Errors
     /// If the table that was built in is damaged.
-    pub fn new<P: HasReference>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>, controlled: bool) -> Result<Self> {
+    pub fn new<P: HasReference>(
+        experiment: &Experiment<P>,
+        run: &Run,
+        source: &Rows<'_>,
+        controlled: bool,
+    ) -> Result<Self> {
         let compared = matches!(source, Rows::Table3 { same: true });
         let mut rows = rows(experiment, run, source)?;
         let (printed_compared, printed_agree) = if compared { explain(&mut rows) } else { (0, 0) };

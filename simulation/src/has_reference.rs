@@ -8,7 +8,7 @@ use model::{Compensation, ExtendedPlant, Plant, Settings};
 
 use serde::Serialize;
 
-use crate::bound::{shortest_times_from_state, shortest_time};
+use crate::bound::{shortest_time, shortest_times_from_state};
 use crate::reference::{Loop, Moment};
 use crate::run::{Run, Sample};
 use crate::sampled::{Controller, SampledLoop, Spring};

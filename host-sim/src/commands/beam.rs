@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::output::figure;
 use host_sim::output::files::Files;
+use host_sim::output::terminal::{json, print, wrote};
+use host_sim::output::{beam, figure};
 use paper::beam::cantilever::{Beam, Load};
 use paper::beam::layered::ELEMENTS;
 use paper::beam::readings;
@@ -14,7 +15,7 @@ use paper::beam::slip::tips;
 use paper::beam::stack::{self, ORDER, Stack, TABLE2};
 use simulation::csv_table::read;
 
-use super::{named, print, wrote};
+use super::option_names::named;
 
 /// The leaf spring's statics: beam experiment, deflection small and large, layers that slip
 #[derive(Args, Debug)]
@@ -83,7 +84,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let question = question(arguments)?;
     let report = Report::new(&question).map_err(|error| in_file(named(error, OPTIONS), arguments))?;
-    let text = report.text();
+    let text = beam::text(&report);
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
@@ -93,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         }
         written = wrote(&files.finish()?);
     }
-    if arguments.json { print(&format!("{}\n", serde_json::to_string(&report)?)) } else { print(&(text + &written)) }
+    print(&if arguments.json { json(&report)? } else { text + &written })
 }
 
 /// Says which file an experiment that says too little came from.

@@ -2,12 +2,13 @@
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::output::comparison;
+use host_sim::output::compare::text;
+use host_sim::output::terminal::{json, print};
 use model::Amplifier;
 use simulation::comparison::compare;
 use simulation::plant_file;
 
-use super::{SETTINGS, named, print};
+use super::option_names::{SETTINGS, named};
 
 /// Compare all controllers on the stair of ideal steps, and with the fastest that any could be
 #[derive(Args, Debug)]
@@ -40,8 +41,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
     let comparison = compare(&file, arguments.rate_hz, &amplifiers).map_err(|error| named(error, SETTINGS))?;
-    if arguments.json {
-        return print(&format!("{}\n", serde_json::to_string(&comparison)?));
-    }
-    print(&comparison::text(&comparison))
+    print(&if arguments.json { json(&comparison)? } else { text(&comparison) })
 }

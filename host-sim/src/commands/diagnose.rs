@@ -8,15 +8,15 @@ use clap::Args;
 use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
+use host_sim::output::terminal::{json, print, wrote};
 use identify::plant::base::Base;
-use identify::{Options, examine};
+use identify::{Input, Options, examine};
 use indicatif::ProgressBar;
 use simulation::plant_file;
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::Schedule;
 
-use super::voltage::Input;
-use super::{print, wrote};
+use super::choice::{INPUT, one_of};
 
 /// Within this time, in s, a row of the stair may have the voltage before a step or that after it.
 const RAMP_S: f64 = 0.1;
@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// What the voltage did between the rows
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = "hold", value_parser = one_of(INPUT))]
     input: Input,
     /// Column with the measured stiffness
     #[arg(long, default_value = MEASURED, value_name = "NAME")]
@@ -68,7 +68,7 @@ impl Arguments {
         Origin {
             record: record.name.clone(),
             column: self.column.clone(),
-            input: self.input.into(),
+            input: self.input,
             command: command.join(" "),
         }
     }
@@ -91,7 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if arguments.input == Input::Stair {
         Schedule::stair().check_commanded("the report's stair (--input stair)", &record, RAMP_S)?;
     }
-    let options = Options { input: arguments.input.into(), base };
+    let options = Options { input: arguments.input, base };
     // A folder that cannot be made is known before the search begins.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();
@@ -105,9 +105,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Some(files) => output::write(files, &diagnosis, &arguments.origin(&record))?,
         None => Vec::new(),
     };
-    if arguments.json {
-        print(&format!("{}\n", serde_json::to_string(&diagnosis.report)?))
+    print(&if arguments.json {
+        json(&diagnosis.report)?
     } else {
-        print(&(text::text(&record.name, &diagnosis.report) + &wrote(&paths)))
-    }
+        text::text(&record.name, &diagnosis.report) + &wrote(&paths)
+    })
 }

@@ -5,13 +5,16 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
+use host_sim::output::joint;
+use host_sim::output::terminal::{json, print, wrote};
 use paper::beam::cantilever::Beam;
 use paper::joint::report::{Report, Requirement};
 use paper::joint::{Joint, MOST_SPRINGS, OuterEnd};
 use simulation::plant_file;
 use simulation::reference::Loop;
 
-use super::{named, print, wrote};
+use super::choice::{OUTER_END, one_of};
+use super::option_names::named;
 
 /// Joint stiffness of springs set radially between two rings, against what the report requires
 #[derive(Args, Debug)]
@@ -29,7 +32,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 20.0, value_name = "MM", allow_negative_numbers = true)]
     inner_radius_mm: f64,
     /// How the outer end of a spring is held
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = "supported", value_parser = one_of(OUTER_END))]
     outer_end: OuterEnd,
     /// Free length of a spring, in mm
     #[arg(long, default_value_t = 59.8, value_name = "MM", allow_negative_numbers = true)]
@@ -71,14 +74,14 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let joint = Joint {
+    let geometry = Joint {
         inner_radius_m: 1e-3 * arguments.inner_radius_mm,
         spring_length_m: 1e-3 * arguments.length_mm,
         springs: arguments.springs,
         outer_end: arguments.outer_end,
     };
     let beam = Beam {
-        length_m: joint.spring_length_m,
+        length_m: geometry.spring_length_m,
         width_m: 1e-3 * arguments.width_mm,
         thickness_m: 1e-6 * arguments.thickness_um,
         // Young's modulus is what the experiment says.
@@ -99,9 +102,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         range_v: (0.0, arguments.limit_v),
         slew_v_per_s: arguments.slew_v_per_s.unwrap_or(f64::INFINITY),
     };
-    let report =
-        Report::new(joint, requirement, &beam, &system, arguments.stiffness).map_err(|error| named(error, OPTIONS))?;
-    let (json, text) = (format!("{}\n", serde_json::to_string(&report)?), report.text());
+    let report = Report::new(geometry, requirement, &beam, &system, arguments.stiffness)
+        .map_err(|error| named(error, OPTIONS))?;
+    let (json, text) = (json(&report)?, joint::text(&report));
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;

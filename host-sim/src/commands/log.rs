@@ -1,16 +1,13 @@
 //! `vsj log`: the firmware's log as text.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, IsTerminal, Read, StdoutLock, Write};
+use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::log::{
-    CSV_HEADER, Decoder, Encoding, Formats, Item, Line, Summary, TABLE_HEADER, csv_row, more_damage_csv_row,
-    more_damage_table_row, summary_text, table_row,
-};
-use serde::Serialize;
+use host_sim::log::{Decoder, Formats, Summary};
+use host_sim::output::log::{Format, Printer};
 use simulation::bad_input;
 
 /// Decode the firmware's log into a table and a summary, from a file or as it comes
@@ -38,23 +35,6 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    encoding: Encoding,
-    lines: Vec<Line>,
-    damaged: Vec<Damage>,
-    summary: Summary,
-}
-
-/// A stretch of the log that is no frame.
-#[derive(Serialize)]
-struct Damage {
-    offset: u64,
-    /// Not known where a raw log stops to make sense; the summary has them.
-    bytes: Option<u64>,
-}
-
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let elf = match std::fs::read(&arguments.elf) {
@@ -66,9 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Err(error) => bad_input!("{}: {error:#}", arguments.elf.display()),
     };
     let source = open(&arguments.file)?;
-    let mut printer =
-        Printer { arguments, out: io::stdout().lock(), lines: Vec::new(), damaged: Vec::new(), run: None };
-    match decode(source, formats, &mut printer) {
+    match decode(source, formats, arguments) {
         // Who closes the pipe has seen enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
         done => done,
@@ -100,13 +78,17 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
     }
 }
 
-fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>) -> Result<()> {
+fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) -> Result<()> {
     let encoding = formats.encoding();
     let mut decoder = Decoder::new(formats);
     let mut summary = Summary::default();
     let mut buffer = [0; 1 << 13];
     let mut broken = None;
-    printer.start()?;
+    let mut printer = Printer::start(match (arguments.json, arguments.csv) {
+        (true, _) => Format::Json,
+        (_, true) => Format::Csv,
+        _ => Format::Table,
+    })?;
     loop {
         let read = match source.read(&mut buffer) {
             Ok(0) => break,
@@ -121,15 +103,15 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>
             summary.add(&item);
             printer.item(item)?;
         }
-        printer.out.flush()?;
+        printer.flush()?;
     }
     if let Some(item) = decoder.finish() {
         summary.add(&item);
         printer.item(item)?;
     }
-    let verdict = verdict(printer.arguments, &summary);
+    let verdict = verdict(arguments, &summary);
     printer.end(encoding, summary)?;
-    let name = name(&printer.arguments.file);
+    let name = name(&arguments.file);
     match broken {
         Some(error) => Err(anyhow::Error::msg(error.to_string())).with_context(|| format!("{name}: cannot be read on")),
         None => verdict,
@@ -163,71 +145,4 @@ fn verdict(arguments: &Arguments, summary: &Summary) -> Result<()> {
 
 fn name(path: &Path) -> String {
     if path == Path::new("-") { "stdin".to_owned() } else { path.display().to_string() }
-}
-
-/// Prints what the options ask for.
-struct Printer<'a> {
-    arguments: &'a Arguments,
-    out: StdoutLock<'static>,
-    /// For `--json`, which is one object.
-    lines: Vec<Line>,
-    damaged: Vec<Damage>,
-    /// In a run of damaged frames: how many after its first, and their bytes. Another build's log is nothing else.
-    run: Option<(u64, u64)>,
-}
-
-impl Printer<'_> {
-    fn start(&mut self) -> io::Result<()> {
-        match (self.arguments.json, self.arguments.csv) {
-            (true, _) => return Ok(()),
-            (_, true) => writeln!(self.out, "{CSV_HEADER}")?,
-            _ => writeln!(self.out, "{TABLE_HEADER}")?,
-        }
-        self.out.flush()
-    }
-
-    fn item(&mut self, item: Item) -> io::Result<()> {
-        if self.arguments.json {
-            match item {
-                Item::Line(line) => self.lines.push(line),
-                Item::Damaged { offset, bytes } => self.damaged.push(Damage { offset, bytes: Some(bytes) }),
-                Item::Lost { offset } => self.damaged.push(Damage { offset, bytes: None }),
-                Item::Unread { .. } | Item::CutOff { .. } => {}
-            }
-            return Ok(());
-        }
-        match (&item, &mut self.run) {
-            (Item::Damaged { bytes: more, .. }, Some((frames, bytes))) => {
-                *frames += 1;
-                *bytes += more;
-                return Ok(());
-            }
-            (Item::Damaged { .. }, None) => self.run = Some((0, 0)),
-            _ => self.end_run()?,
-        }
-        let row = if self.arguments.csv { csv_row(&item) } else { table_row(&item) };
-        writeln!(self.out, "{row}")
-    }
-
-    fn end_run(&mut self) -> io::Result<()> {
-        let Some((frames @ 1.., bytes)) = self.run.take() else { return Ok(()) };
-        let row = if self.arguments.csv { more_damage_csv_row } else { more_damage_table_row };
-        writeln!(self.out, "{}", row(frames, bytes))
-    }
-
-    fn end(&mut self, encoding: Encoding, summary: Summary) -> Result<()> {
-        self.end_run()?;
-        if self.arguments.json {
-            let (lines, damaged) = (std::mem::take(&mut self.lines), std::mem::take(&mut self.damaged));
-            let report = Report { encoding, lines, damaged, summary };
-            writeln!(self.out, "{}", serde_json::to_string(&report)?)?;
-        } else if self.arguments.csv {
-            for line in summary_text(&summary).lines() {
-                writeln!(self.out, "# {line}")?;
-            }
-        } else {
-            write!(self.out, "\n{}", summary_text(&summary))?;
-        }
-        Ok(self.out.flush()?)
-    }
 }

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
+use host_sim::output::reproduce::{page, text};
+use host_sim::output::terminal::{json, print, wrote};
 use paper::reproduce::reproduce;
-
-use super::{print, wrote};
 
 /// Compute every printed number of the source report again, and say which do not come out and why
 #[derive(Args, Debug)]
@@ -33,12 +33,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
-        files.add("README.md", |out| out.write_all(report.page().as_bytes()))?;
+        files.add("README.md", |out| out.write_all(page(&report).as_bytes()))?;
         written = wrote(&files.finish()?);
     }
-    if arguments.json {
-        print(&format!("{}\n", serde_json::to_string(&report)?))
-    } else {
-        print(&(report.text() + &written))
-    }
+    print(&if arguments.json { json(&report)? } else { text(&report) + &written })
 }

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::voltage::Between;
-use super::{SETTINGS, named, print, wrote};
+use super::choice::{BETWEEN, one_of};
+use super::option_names::{SETTINGS, named};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::output::files::{Files, write_csv};
-use host_sim::output::{plots, terminal};
+use host_sim::output::terminal::{json, print, remark, wrote};
+use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Plant, Settings};
 use paper::stair::{Report, Rows};
@@ -17,7 +18,7 @@ use simulation::bad_input::number;
 use simulation::experiment::{Experiment, HasReference, Run, paper_spring, with_plant};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
-use simulation::schedule::Schedule;
+use simulation::schedule::{Between, Schedule};
 
 /// Run the stair experiment in closed loop on the fixed-point controller, beside the report's Table 3
 #[derive(Args, Debug)]
@@ -44,7 +45,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
     input: String,
     /// What the voltage does between two rows of an input file; without it, hold
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(BETWEEN))]
     between: Option<Between>,
     /// Column of an input file with the measured stiffness; without it, stiffness, if there is one
     #[arg(long, value_name = "NAME")]
@@ -158,7 +159,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let left_out = file.left_out();
     if !left_out.is_empty() {
-        eprintln!("vsj: {}: not simulated: {}", arguments.plant, left_out.join(", "));
+        remark(&format!("{}: not simulated: {}", arguments.plant, left_out.join(", ")));
     }
     let settings = arguments.settings(&file);
     // Where the range ends below what may be asked for, only the sampled reference takes the target at its end.
@@ -182,7 +183,7 @@ fn run_plant<P: HasReference>(
         file => {
             let read = record.insert(Record::open(Path::new(file), arguments.column.as_deref().unwrap_or(MEASURED))?);
             read.check_range(arguments.min_v, arguments.limit_v)?;
-            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default().into()))
+            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default()))
         }
     };
     let experiment = Experiment { name, schedule, settings };
@@ -207,11 +208,7 @@ fn run_plant<P: HasReference>(
         Some(folder) => write(folder, &experiment, &run, &report, controlled, stride)?,
         None => Vec::new(),
     };
-    if arguments.json {
-        print(&format!("{}\n", serde_json::to_string(&report)?))
-    } else {
-        print(&(terminal::text(&report) + &wrote(&paths)))
-    }
+    print(&if arguments.json { json(&report)? } else { stair::text(&report) + &wrote(&paths) })
 }
 
 /// The options that no other command has for fields of the settings.

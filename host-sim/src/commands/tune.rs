@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
-use host_sim::output::tuning;
+use host_sim::output::terminal::{json, print, wrote};
+use host_sim::output::tune as output;
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::plant_file;
 use simulation::tune::{Question, tune};
 
-use super::{SETTINGS, named, print, wrote};
+use super::option_names::{SETTINGS, named};
 
 /// Choose gains and settings for a spring and an amplifier, with margins, and what an error of the model costs
 #[derive(Args, Debug)]
@@ -56,14 +57,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
     let question = Question { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent };
     let answer = tune(&question).map_err(|error| named(error, SETTINGS))?;
-    let json = format!("{}\n", serde_json::to_string(&answer)?);
-    let text = tuning::text(&answer, &arguments.plant);
+    let json = json(&answer)?;
+    let text = output::text(&answer, &arguments.plant);
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("tune.json", |out| out.write_all(json.as_bytes()))?;
         files.add("tune.txt", |out| out.write_all(text.as_bytes()))?;
-        tuning::write(&mut files, &answer)?;
+        output::write(&mut files, &answer)?;
         written = wrote(&files.finish()?);
     }
     print(&if arguments.json { json } else { text + &written })

@@ -4,15 +4,12 @@
 //! | --- | --- |
 //! | [`Port`] | a serial device, a unix socket or a TCP socket, as bytes |
 //! | [`Client`] | asks, waits, asks again; collects telemetry |
-//! | [`Recording`] | telemetry as CSV, complete to the last row whenever it stops |
 //! | [`StatusReport`], [`Row`] | what the MCU says, as text and JSON |
 
 mod client;
 mod port;
-mod recording;
 mod report;
 
 pub use client::{Client, Failure, Patience};
 pub use port::Port;
-pub use recording::Recording;
 pub use report::{Row, StatusReport};

@@ -1,6 +1,6 @@
 //! The answer to one step as columns of a table: times, overshoot, peak, and the bound on t97.
 
-use crate::output::terminal::optional;
+use crate::output::cells::optional;
 use simulation::experiment::StartsFrom;
 use simulation::response::Response;
 

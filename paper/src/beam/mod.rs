@@ -26,4 +26,3 @@ pub mod regression;
 pub mod report;
 pub mod slip;
 pub mod stack;
-mod text;

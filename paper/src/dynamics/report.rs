@@ -1,7 +1,5 @@
 //! What `vsj dynamics` says: the response, and what the model is in terms of the others.
 
-use std::fmt::Write;
-
 use anyhow::Result;
 use model::Plant;
 use serde::Serialize;
@@ -16,7 +14,7 @@ use crate::dynamics::zener::{Changes, Sample, Start, Zener};
 use crate::figure::Figure;
 
 /// The models by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Model {
     /// Spring in series with spring and damper
@@ -27,6 +25,18 @@ pub enum Model {
     Analogue,
     /// The report's proportional-integral plant, driven by the level as a voltage
     PiPlant,
+}
+
+impl Model {
+    /// Name of the model in titles and legends.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Zener => "Zener model",
+            Self::SpringDamper => "spring and damper",
+            Self::Analogue => "electrical analogue",
+            Self::PiPlant => "proportional-integral plant",
+        }
+    }
 }
 
 /// What is asked.
@@ -100,7 +110,7 @@ impl Report {
         let rows = run(question, question.model, question.every_s)?;
         // Close enough for the eye, however long the input.
         let curve_every_s = question.every_s.min(f64::max(0.5, 1e-5 * question.input.duration_s()));
-        let curve = |model: Model| Ok::<_, anyhow::Error>((name(model), run(question, model, curve_every_s)?));
+        let curve = |model: Model| Ok::<_, anyhow::Error>((model.name(), run(question, model, curve_every_s)?));
         let mut curves = vec![curve(question.model)?];
         match question.model {
             Model::Zener => curves.push(curve(Model::Analogue)?),
@@ -123,73 +133,6 @@ impl Report {
             analogue_difference,
             curves,
         })
-    }
-
-    /// For the terminal.
-    pub fn text(&self) -> String {
-        let mut text = String::new();
-        // Writing to a string cannot fail.
-        let _ = self.write(&mut text);
-        text
-    }
-
-    fn write(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(out, "{} driven by {}", name(self.model), self.input)?;
-        let unit = if self.model == Model::PiPlant { "  output [V]" } else { "stiffness [N/m]" };
-        writeln!(out, "  time [s] |  level | elongation [m] | {unit}")?;
-        for row in &self.rows {
-            let elongation = row.elongation_m.map_or_else(|| "-".to_owned(), |m| format!("{m:.5}"));
-            let stiffness = if row.stiffness.is_finite() { format!("{:.5}", row.stiffness) } else { "-".to_owned() };
-            writeln!(out, "  {:8.2} | {:6.3} | {elongation:>14} | {stiffness:>12}", row.time_s, row.level)?;
-        }
-        let Self { plant, share, tau_s, zener_of_plant, stand_in, .. } = self;
-        if matches!(self.model, Model::Zener | Model::Analogue) {
-            writeln!(
-                out,
-                "Under a changing force this Zener model, at level 1, is exactly the plant with Kp = {:.4}, Ki = {:.4} 1/s: \
-                 {:.2} % at once, the rest with {tau_s:.3} s.",
-                plant.proportional,
-                plant.integral_per_s,
-                1e2 * share
-            )?;
-        }
-        if self.model == Model::SpringDamper {
-            writeln!(out, "Without the series spring nothing comes at once: no plant with Kp > 0 is this model.")?;
-        }
-        if let Some(difference) = self.analogue_difference {
-            writeln!(
-                out,
-                "Zener model and circuit differ by at most {difference:.1e} of the largest elongation at any moment shown."
-            )?;
-        }
-        let Zener { k1_n_per_m, k2_n_per_m, damper_n_s_per_m, .. } = zener_of_plant;
-        writeln!(
-            out,
-            "The plant asked for is the Zener model with K1 = {k1_n_per_m:.4} N/m, K2 = {k2_n_per_m:.4} N/m, D = \
-             {damper_n_s_per_m:.4} N s/m (K1 = K2 / Kp, D = tau K2)."
-        )?;
-        writeln!(
-            out,
-            "It stands in for that model, when both springs change under a constant force, within 1 % of the change up to a \
-             ratio of {:.3}, within 5 % up to {:.3}. This material's {:.3} is off by {:.1} % upwards and {:.1} % downwards: \
-             the model is faster where it is stiffer, the plant is not.",
-            stand_in.ratio_at_1_percent,
-            stand_in.ratio_at_5_percent,
-            stand_in.material_ratio,
-            stand_in.material_up_percent,
-            stand_in.material_down_percent
-        )
-    }
-
-    /// The response as CSV.
-    pub fn csv(&self) -> String {
-        let mut csv = format!("# {} driven by {}\ntime_s,level,elongation_m,stiffness\n", name(self.model), self.input);
-        for row in &self.rows {
-            let elongation = row.elongation_m.map(|m| format!("{m:.9}")).unwrap_or_default();
-            let stiffness = if row.stiffness.is_finite() { format!("{:.9}", row.stiffness) } else { String::new() };
-            let _ = writeln!(csv, "{:.6},{:.6},{elongation},{stiffness}", row.time_s, row.level);
-        }
-        csv
     }
 
     /// The response over time, with the level.
@@ -233,13 +176,4 @@ fn stand_in(zener: &Zener) -> Result<StandIn> {
         material_up_percent: 1e2 * stand_in_error(&zener, material_ratio)?,
         material_down_percent: 1e2 * stand_in_error(&zener, material_ratio.recip())?,
     })
-}
-
-fn name(model: Model) -> &'static str {
-    match model {
-        Model::Zener => "Zener model",
-        Model::SpringDamper => "spring and damper",
-        Model::Analogue => "electrical analogue",
-        Model::PiPlant => "proportional-integral plant",
-    }
 }

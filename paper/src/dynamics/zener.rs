@@ -31,7 +31,7 @@ pub struct Zener {
 }
 
 /// The springs that a voltage changes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Changes {
     /// The series spring: the whole change comes at once

@@ -18,7 +18,7 @@ use serde::Serialize;
 use simulation::bad_input::check;
 
 /// How the outer end is held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OuterEnd {
     /// It slides and turns in a slot

@@ -6,14 +6,14 @@
 use anyhow::Result;
 use toml::Value;
 
-use crate::reproduce::compute::number as as_number;
-use crate::reproduce::inputs::{input_needed, other_reading, terms_left_out};
+use crate::reproduce::comparison::Comparison;
+use crate::reproduce::inputs::number as as_number;
+use crate::reproduce::other_inputs::{input_needed, other_reading, terms_left_out};
 use crate::reproduce::printed::Relation;
 use crate::reproduce::slips::{digit_of_a_reading, simple_factor, simulated, slip_of_the_pen};
-use crate::reproduce::{Judged, short};
 
 /// The likeliest explanation of a disagreement, with its evidence.
-pub(crate) fn explain(number: &Judged, all: &[Judged]) -> Result<String> {
+pub(crate) fn explain(number: &Comparison, all: &[Comparison]) -> Result<String> {
     let mut said: Vec<String> =
         [&number.entry.because, &number.outcome.evidence].into_iter().flatten().cloned().collect();
     said.extend(in_standard_errors(number));
@@ -32,7 +32,7 @@ fn capital(sentence: &str) -> String {
 }
 
 /// How far a fitted number is off, in what its readings leave open.
-fn in_standard_errors(number: &Judged) -> Option<String> {
+fn in_standard_errors(number: &Comparison) -> Option<String> {
     let off = (number.printed.value - number.outcome.value) / number.outcome.standard_error?;
     let says = if off.abs() > 3.0 {
         "more than their scatter leaves open"
@@ -43,12 +43,12 @@ fn in_standard_errors(number: &Judged) -> Option<String> {
 }
 
 /// A number that agrees and was computed with this one as it is printed: then this is no slip of the pen.
-fn used_again<'a>(number: &Judged, all: &'a [Judged]) -> Option<&'a str> {
+fn used_again<'a>(number: &Comparison, all: &'a [Comparison]) -> Option<&'a str> {
     if number.printed.significant_digits() < 4 {
         return None;
     }
     let equal = |value: &Value| as_number(value) == Some(number.printed.value);
-    let uses = |other: &&Judged| {
+    let uses = |other: &&Comparison| {
         other.agrees
             && !other.entry.of_table
             && other.entry.of != "same"
@@ -61,9 +61,9 @@ fn used_again<'a>(number: &Judged, all: &'a [Judged]) -> Option<&'a str> {
 }
 
 /// The first explanation that fits.
-fn first_explanation(number: &Judged, all: &[Judged]) -> Result<Option<String>> {
+fn first_explanation(number: &Comparison, all: &[Comparison]) -> Result<Option<String>> {
     if number.entry.relation != Relation::Equal && number.entry.relation != Relation::About {
-        return Ok(Some(other_reading(number, all)?.unwrap_or_else(|| off(number))));
+        return Ok(Some(other_reading(number, all)?.unwrap_or_else(|| number.difference())));
     }
     if number.outcome.expected.is_some() {
         // What others share is no slip of one digit.
@@ -79,31 +79,16 @@ fn first_explanation(number: &Judged, all: &[Judged]) -> Result<Option<String>> 
     if let Some(left_out) = terms_left_out(number)? {
         return Ok(Some(left_out));
     }
-    let what = simple_factor(number).unwrap_or_else(|| off(number));
+    let what = simple_factor(number).unwrap_or_else(|| number.difference());
     Ok(Some(match input_needed(number)? {
         Some(needed) => format!("{what}; {needed}"),
         None => what,
     }))
 }
 
-/// By how much printed and computed differ.
-pub(super) fn off(number: &Judged) -> String {
-    let (printed, computed) = (number.printed.value, number.outcome.value);
-    let ratio = printed / computed;
-    if ratio < 0.0 {
-        return "printed has the opposite sign of what is computed".to_owned();
-    }
-    if !(0.1..10.0).contains(&ratio) {
-        return format!("printed is {} times what is computed", short(ratio));
-    }
-    let percent = 1e2 * (ratio - 1.0);
-    let decimals = if percent.abs() < 1.0 { 3 } else { 1 };
-    format!("printed is {percent:+.decimals$} % off what is computed")
-}
-
 /// Other measured numbers of the table with the same voltage under another force.
-fn likes<'a>(number: &Judged, all: &'a [Judged]) -> Vec<&'a Judged> {
-    let same = |other: &&Judged| {
+fn likes<'a>(number: &Comparison, all: &'a [Comparison]) -> Vec<&'a Comparison> {
+    let same = |other: &&Comparison| {
         number.outcome.expected.is_some()
             && other.entry.group == number.entry.group
             && other.entry.place != number.entry.place
@@ -114,17 +99,17 @@ fn likes<'a>(number: &Judged, all: &'a [Judged]) -> Vec<&'a Judged> {
 }
 
 /// How far a number is off what it should be.
-fn deviation(number: &Judged) -> f64 {
+fn deviation(number: &Comparison) -> f64 {
     number.printed.value / number.outcome.value - 1.0
 }
 
 /// True if there are others and they are off by as much, to 5 %.
-fn alike(number: &Judged, likes: &[&Judged]) -> bool {
+fn alike(number: &Comparison, likes: &[&Comparison]) -> bool {
     !likes.is_empty() && likes.iter().all(|like| (deviation(like) - deviation(number)).abs() < 0.05)
 }
 
 /// How far others of the same voltage are off.
-fn with_its_likes(number: &Judged, all: &[Judged]) -> Option<String> {
+fn with_its_likes(number: &Comparison, all: &[Comparison]) -> Option<String> {
     let likes = likes(number, all);
     if likes.is_empty() {
         return None;
@@ -143,13 +128,14 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::reproduce::compute::Outcome;
-    use crate::reproduce::compute::{Inputs, compute};
+    use crate::reproduce::compute::compute;
+    use crate::reproduce::inputs::Inputs;
+    use crate::reproduce::outcome::Outcome;
     use crate::reproduce::printed::Printed;
     use crate::reproduce::printed::Rule;
     use crate::reproduce::source::{BearsOn, Entry};
 
-    fn judged(printed: &str, of: &str, inputs: &str, also: &str) -> Judged {
+    fn comparison(printed: &str, of: &str, inputs: &str, also: &str) -> Comparison {
         let inputs: BTreeMap<String, Value> = toml::from_str(inputs).unwrap();
         let entry = Entry {
             place: "here".to_owned(),
@@ -165,7 +151,7 @@ mod tests {
             of_table: false,
         };
         let outcome: Outcome = compute(of, &Inputs(&entry.inputs)).unwrap();
-        Judged { printed: Printed::new(printed).unwrap(), outcome, rule: Rule::Rounded, agrees: false, entry }
+        Comparison { printed: Printed::new(printed).unwrap(), outcome, rule: Rule::Rounded, agrees: false, entry }
     }
 
     /// Each kind of slip, made on purpose, is told from the others.
@@ -190,7 +176,7 @@ mod tests {
             ("8.111", "quotient", "dividend = 31.416\ndivisor = 3.0", "", "it would take dividend = 24.333"),
             ("77.7", "product", product, "", "Printed is +528.1 % off"),
         ] {
-            let number = judged(printed, of, inputs, also);
+            let number = comparison(printed, of, inputs, also);
             let said = explain(&number, &[]).unwrap();
             assert!(said.contains(expected), "{printed}: {said}");
         }
@@ -198,7 +184,7 @@ mod tests {
 
     #[test]
     fn a_reading_that_one_digit_puts_in_line() {
-        let mut number = judged("331", "sum", "terms = [349]", "");
+        let mut number = comparison("331", "sum", "terms = [349]", "");
         number.outcome.expected = Some((343.0, 355.0));
         let said = digit_of_a_reading(&number).unwrap();
         assert!(said.starts_with("one digit misread would explain it: 351 (by chance one fits in "), "{said}");

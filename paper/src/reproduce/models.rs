@@ -8,7 +8,7 @@ use crate::beam::limits::bonded_n_per_m;
 use crate::beam::regression::Fit;
 use crate::beam::stack::{Layer, Stack};
 use crate::dynamics::plant::PlantGains;
-use crate::reproduce::compute::Inputs;
+use crate::reproduce::inputs::Inputs;
 use crate::table3;
 use simulation::experiment::reference_at;
 use simulation::reference::Loop;

@@ -1,22 +1,23 @@
 //! Slips of the pen: what the printed digits themselves say.
 
 use crate::misprint::{Pair, single_digit, swapped_digits};
+use crate::reproduce::comparison::Comparison;
+use crate::reproduce::digits::short;
 use crate::reproduce::printed::{Relation, Rule};
-use crate::reproduce::{Judged, short};
 
 /// A number of a simulation that was cut off at two decimals: its own, finer, explanations.
-pub(super) fn simulated(number: &Judged, all: &[Judged]) -> Option<String> {
+pub(super) fn simulated(number: &Comparison, all: &[Comparison]) -> Option<String> {
     if number.rule != Rule::Truncated || number.printed.decimals != 2 || number.printed.exponent != 0 {
         return None;
     }
-    let pair = |one: &Judged| Pair { printed: one.printed.value, computed: one.outcome.value };
+    let pair = |one: &Comparison| Pair { printed: one.printed.value, computed: one.outcome.value };
     let group: Vec<Pair> = all.iter().filter(|other| other.entry.group == number.entry.group).map(pair).collect();
     Some(pair(number).explain(&group))
 }
 
 /// Swapped or wrong digits, a shifted point, the reciprocal.
-pub(super) fn slip_of_the_pen(number: &Judged, used_again: bool) -> Option<String> {
-    let Judged { printed, outcome, rule, .. } = number;
+pub(super) fn slip_of_the_pen(number: &Comparison, used_again: bool) -> Option<String> {
+    let Comparison { printed, outcome, rule, .. } = number;
     let (found, expected) = (printed.digits(), printed.alike(outcome.value, *rule));
     let all_digits = printed.significant_digits();
     if number.entry.relation == Relation::About {
@@ -57,7 +58,7 @@ pub(super) fn slip_of_the_pen(number: &Judged, used_again: bool) -> Option<Strin
 }
 
 /// A reading that one digit would put in line, and how much that says.
-pub(super) fn digit_of_a_reading(number: &Judged) -> Option<String> {
+pub(super) fn digit_of_a_reading(number: &Comparison) -> Option<String> {
     let (low, high) = number.outcome.expected?;
     // Well within: half of what is tolerated.
     let half = 0.25 * (high - low);
@@ -80,7 +81,7 @@ pub(super) fn digit_of_a_reading(number: &Judged) -> Option<String> {
 }
 
 /// All numbers that differ from a printed one in one digit: their digits and value.
-fn misread(number: &Judged) -> Option<Vec<(String, f64)>> {
+fn misread(number: &Comparison) -> Option<Vec<(String, f64)>> {
     let digits: Vec<char> = number.printed.digits().chars().collect();
     let mut others = Vec::new();
     for (place, old) in digits.iter().enumerate().filter(|(_, old)| old.is_ascii_digit()) {
@@ -96,8 +97,8 @@ fn misread(number: &Judged) -> Option<Vec<(String, f64)>> {
 }
 
 /// A small whole number times what is computed, to all of at least three digits.
-pub(super) fn simple_factor(number: &Judged) -> Option<String> {
-    let Judged { printed, outcome, rule, .. } = number;
+pub(super) fn simple_factor(number: &Comparison) -> Option<String> {
+    let Comparison { printed, outcome, rule, .. } = number;
     if printed.significant_digits() < 3 {
         return None;
     }

@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 
+use crate::output::cells::{line, optional};
 use crate::output::figure;
 use crate::output::files::Files;
-use crate::output::terminal::{line, optional};
 use paper::figure::Figure;
 use simulation::tune::trade::Parameter;
 use simulation::tune::{Margins, Trade, Tuning, Worst};

@@ -2,18 +2,15 @@
 
 mod model;
 mod record;
+mod session;
 mod watch;
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
-
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
-use host_sim::link::{Client, Failure, Patience, Port, StatusReport};
-use link::{Desired, Fault, Reason, Request, State, Status, WireVolts};
-use serde::Serialize;
+use host_sim::link::{Client, Patience, Port};
+use link::{Desired, Fault, Request};
+use session::{Session, seconds};
 use simulation::bad_input;
-use simulation::bad_input::number;
 
 /// Talk to the MCU over its serial link: status, set, arm, disarm, watch, record, model
 #[derive(Args, Debug)]
@@ -29,7 +26,7 @@ Examples:
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run what was found
 
 The MCU leads the voltage down when it has not heard the host for longer than its limit (see `status`): a target lives as \
-long as a command that keeps talking, --keep, watch or record. Each request is sent every 0.1 s until it is answered, for \
+long as a command that keeps sessioning, --keep, watch or record. Each request is sent every 0.1 s until it is answered, for \
 --timeout seconds; the MCU applies it once.
 
 Exit codes: 0 done, 1 refused, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a stiffness \
@@ -103,20 +100,6 @@ enum Unit {
     NPerM,
 }
 
-/// What `set`, `arm`, `disarm` and `acknowledge` print with `--json`.
-#[derive(Serialize)]
-struct Done {
-    state: &'static str,
-    target_v: f64,
-}
-
-/// An open connection, and what all commands need of it.
-struct Talk {
-    client: Client,
-    status: Status,
-    json: bool,
-}
-
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let json = arguments.json;
@@ -150,9 +133,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
 
     let port = Port::open(&arguments.port, arguments.baud)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
-    let mut talk = Talk { client, status, json };
+    let mut session = Session { client, status, json };
     match &arguments.command {
-        Command::Status => talk.show_status(),
+        Command::Status => session.show_status(),
         Command::Set(set) => {
             let desired = match set.unit {
                 Unit::V => Desired::ScaledVolts(set.value),
@@ -160,123 +143,29 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
                 Unit::NPerM => Desired::NewtonPerMetre(set.value),
             };
             if set.arm {
-                talk.order(Request::Arm)?;
+                session.order(Request::Arm)?;
             }
-            let done = talk.order(Request::Set(desired))?;
-            talk.show(done)?;
-            talk.keep(keep)
+            let done = session.order(Request::Set(desired))?;
+            session.show(done)?;
+            session.keep(keep)
         }
         Command::Arm { .. } => {
-            let done = talk.order(Request::Arm)?;
-            talk.show(done)?;
-            talk.keep(keep)
+            let done = session.order(Request::Arm)?;
+            session.show(done)?;
+            session.keep(keep)
         }
         Command::Disarm => {
-            let done = talk.order(Request::Disarm)?;
-            talk.show(done)
+            let done = session.order(Request::Disarm)?;
+            session.show(done)
         }
         Command::Acknowledge { .. } => {
-            let done = talk.order(Request::Acknowledge(fault))?;
-            talk.show(done)
+            let done = session.order(Request::Acknowledge(fault))?;
+            session.show(done)
         }
-        Command::Watch(arguments) => watch::run(&mut talk, arguments),
-        Command::Record(arguments) => record::run(&mut talk, arguments),
-        Command::Model(arguments) => model::run(&mut talk, arguments, model.as_ref()),
+        Command::Watch(arguments) => watch::run(&mut session, arguments),
+        Command::Record(arguments) => record::run(&mut session, arguments),
+        Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
     }
-}
-
-impl Talk {
-    /// A stiffness out of reach is the caller's to mend; everything else failed.
-    fn order(&mut self, request: Request) -> Result<(State, WireVolts)> {
-        match self.client.order(request) {
-            Ok(done) => Ok(done),
-            Err(Failure::Refused(reason @ Reason::OutOfRange { .. })) => {
-                let unit = match request {
-                    Request::Set(Desired::Pascal(_)) => "Pa",
-                    Request::Set(Desired::NewtonPerMetre(_)) => "N/m",
-                    _ => "V",
-                };
-                bad_input!("{}: {reason} {unit}", self.client.name())
-            }
-            Err(failure) => Err(failure).with_context(|| self.client.name().to_owned()),
-        }
-    }
-
-    fn refresh(&mut self) -> Result<Status> {
-        self.status = self.client.status().with_context(|| self.client.name().to_owned())?;
-        Ok(self.status)
-    }
-
-    fn show_status(&self) -> Result<()> {
-        let report = StatusReport::new(&self.status);
-        if self.json {
-            println!("{}", serde_json::to_string(&report)?);
-        } else {
-            print!("{}", report.text());
-        }
-        Ok(())
-    }
-
-    fn show(&self, (state, target): (State, WireVolts)) -> Result<()> {
-        let done = Done { state: state.name(), target_v: target.to_f64() };
-        if self.json {
-            println!("{}", serde_json::to_string(&done)?);
-        } else {
-            println!("{}, target {:.3} V", done.state, done.target_v);
-        }
-        Ok(())
-    }
-
-    /// How often the MCU has to hear us: five times within its limit.
-    fn heartbeat(&self) -> Duration {
-        let limit_s = f64::from(self.status.silence_limit_ticks) / f64::from(self.status.rate_hz.max(1));
-        Duration::from_secs_f64((limit_s / 5.0).clamp(0.01, 1.0))
-    }
-
-    /// An error unless armed. Ramping is: the frame that told us so has just ended it.
-    fn still_armed(&mut self, state: State) -> Result<()> {
-        if !matches!(state, State::Armed | State::Ramping) {
-            self.refresh()?;
-            bail!("{}: no longer armed: {state}, fault {}", self.client.name(), self.status.fault);
-        }
-        Ok(())
-    }
-
-    /// Stays connected, and says when the MCU no longer does what it was told.
-    fn keep(&mut self, time: Option<Duration>) -> Result<()> {
-        let Some(time) = time else { return Ok(()) };
-        stop_on_interrupt()?;
-        let (start, pause) = (Instant::now(), self.heartbeat());
-        while start.elapsed() < time && !stopped() {
-            let (state, _) = self.order(Request::Heartbeat)?;
-            self.still_armed(state)?;
-            std::thread::sleep(pause.min(time.saturating_sub(start.elapsed())));
-        }
-        Ok(())
-    }
-}
-
-static STOP: AtomicBool = AtomicBool::new(false);
-
-/// From now on Ctrl-C only ends the loop that asks [`stopped`]; a second one ends the program.
-fn stop_on_interrupt() -> Result<()> {
-    Ok(ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })?)
-}
-
-fn stopped() -> bool {
-    STOP.load(Ordering::Relaxed)
-}
-
-/// A positive time, `most` seconds at the most; an infinite one is as long as a `Duration` goes.
-fn seconds(option: &str, value: f64, most: f64) -> Result<Duration> {
-    if !(value > 0.0 && value <= most) {
-        bad_input!("{option} {}: expected a positive number of seconds", number(value));
-    }
-    Ok(Duration::try_from_secs_f64(value).unwrap_or(Duration::MAX))
 }
 
 fn parse_fault(text: &str) -> Result<Fault> {

@@ -1,7 +1,7 @@
 //! A comparison of controllers as text.
 
+use crate::output::cells::{line, tidy};
 use crate::output::step_response;
-use crate::output::terminal::{line, tidy};
 use simulation::comparison::{AtLimit, Comparison};
 
 /// One table an amplifier.
