@@ -1,4 +1,5 @@
-//! The fixed-point loop of the `model` crate run over a schedule on a host, compared with references in double precision.
+//! Runs the fixed-point loop of the `model` crate over a schedule on a host and compares it with references in double
+//! precision.
 //!
 //! | module | what it is |
 //! | --- | --- |

@@ -1,10 +1,12 @@
-//! The extended spring's fixed-point tick against a double-precision loop of the same rate, over random springs such as
-//! identification finds: each block alone and all together, up a stair and down again, at 100 Hz, 1 kHz and 10 kHz.
+//! Compares the fixed-point tick of the extended spring with a double-precision loop of the same rate, over random
+//! springs in the range of identified ones: each block alone and all together, up a stair and down again, at 100 Hz, 1
+//! kHz and 10 kHz.
 //!
-//! Twice: told which code of 12 bits was put out, which leaves the arithmetic and the interpolated time constant; and on
-//! its own, without a DAC beside one of 16 bits. With 12 bits the spring left alone would show up to half a code, 0.085 V.
+//! Each spring is run twice: with the double-precision loop following the DAC codes of 12 bits, which leaves the errors
+//! of the arithmetic and of the interpolated time constant; and on its own, with 16 bits. With 12 bits the loop without
+//! controller would differ by up to half a code, 0.085 V.
 //!
-//! `cargo test -p host-sim --test extended -- --nocapture` prints the worst cases.
+//! `cargo test -p simulation --test extended -- --nocapture` prints the worst cases.
 
 mod springs;
 
@@ -17,19 +19,19 @@ use simulation::sampled::SampledLoop;
 
 use springs::{ALL, SETS, plant};
 
-/// What is promised of the tick, and of `vsj stair`, in V.
+/// Largest difference allowed for the tick and for `vsj stair`, in V.
 const ALLOWED_V: f64 = 0.05;
-/// Levels in V, 6 s each, with the report's ramps of 0.1 s.
+/// Levels in V, 6 s each, connected by the report's ramps of 0.1 s.
 const STAIR: [f64; 9] = [100.0, 200.0, 300.0, 400.0, 500.0, 250.0, 50.0, 350.0, 0.0];
 
 /// Largest differences of the stiffness, in V.
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
-    /// Told the codes.
+    /// With the double-precision loop following the DAC codes.
     told: f64,
-    /// On its own.
+    /// With the double-precision loop on its own.
     alone: f64,
-    /// On its own, without pre-compensator.
+    /// With the double-precision loop on its own, without pre-compensator.
     uncontrolled: f64,
 }
 
@@ -43,7 +45,7 @@ impl Worst {
     }
 }
 
-/// Over the stair.
+/// Largest differences over the stair.
 fn disagreement(file: &PlantFile, rate_hz: f64) -> Worst {
     let of = |compensation, dac_bits, told| {
         let amplifier = Amplifier { dac_bits, ..Amplifier::PAPER };
@@ -57,7 +59,7 @@ fn disagreement(file: &PlantFile, rate_hz: f64) -> Worst {
     }
 }
 
-/// Of one loop, whose double is `told` the codes or left to itself.
+/// Largest difference of one loop; `told` makes the double-precision loop follow the DAC codes.
 fn of_loop(settings: &Settings<ExtendedPlant<'_>>, told: bool) -> f64 {
     let config = settings.check().expect("a spring such as identification finds");
     let double = SampledLoop::from(settings);
@@ -76,7 +78,7 @@ fn of_loop(settings: &Settings<ExtendedPlant<'_>>, told: bool) -> f64 {
     off
 }
 
-/// Always the same springs.
+/// The random springs are the same in every run.
 #[test]
 fn each_block_alone_and_all_together_at_three_rates() {
     println!("worst difference to double precision [V]   told codes   with controller   without");
@@ -91,7 +93,7 @@ fn each_block_alone_and_all_together_at_three_rates() {
             let Worst { told, alone, uncontrolled } = worst;
             println!("{name:12} {rate_hz:5} Hz, {springs:3} springs {told:22.6} {alone:17.6} {uncontrolled:9.6}");
             assert!(told < ALLOWED_V && alone < ALLOWED_V && uncontrolled < ALLOWED_V, "{name} {rate_hz}");
-            // Exact agreement would mean that both are the same code.
+            // Exact agreement would mean that both run the same code.
             assert!(told > 0.0);
         }
     }

@@ -10,7 +10,7 @@ use host_sim::output::{beam, figure};
 use paper::beam::cantilever::{Beam, Load};
 use paper::beam::layered::ELEMENTS;
 use paper::beam::readings;
-use paper::beam::report::{Question, Report};
+use paper::beam::report::{Report, Setup};
 use paper::beam::slip::tips;
 use paper::beam::stack::{self, ORDER, Stack, TABLE2};
 use simulation::csv_table::read;
@@ -82,14 +82,14 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let question = question(arguments)?;
-    let report = Report::new(&question).map_err(|error| in_file(named(error, OPTIONS), arguments))?;
+    let setup = setup(arguments)?;
+    let report = Report::new(&setup).map_err(|error| in_file(named(error, OPTIONS), arguments))?;
     let text = beam::text(&report);
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("beam.txt", |out| out.write_all(text.as_bytes()))?;
-        for (name, figure) in report.figures(&question.readings) {
+        for (name, figure) in report.figures(&setup.readings) {
             files.add(name, |out| out.write_all(figure::svg(&figure).as_bytes()))?;
         }
         written = wrote(&files.finish()?);
@@ -105,7 +105,7 @@ fn in_file(error: anyhow::Error, arguments: &Arguments) -> anyhow::Error {
     }
 }
 
-fn question(arguments: &Arguments) -> Result<Question> {
+fn setup(arguments: &Arguments) -> Result<Setup> {
     let beam = Beam {
         length_m: 1e-3 * arguments.length_mm,
         width_m: 1e-3 * arguments.width_mm,
@@ -129,7 +129,7 @@ fn question(arguments: &Arguments) -> Result<Question> {
     } else {
         arguments.at_mm.iter().map(|mm| 1e-3 * mm).collect()
     };
-    Ok(Question {
+    Ok(Setup {
         readings,
         tips: if reports_own { tips()? } else { Vec::new() },
         stack: Stack::in_order(&kinds, &arguments.stack)?,

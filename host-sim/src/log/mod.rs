@@ -4,7 +4,7 @@
 //! A [`Summary`] adds them up. Neither knows where the bytes come from.
 //!
 //! ```no_run
-//! use crate::log::{Decoder, Formats, Item, Summary};
+//! use host_sim::log::{Decoder, Formats, Item, Summary};
 //!
 //! let mut decoder = Decoder::new(Formats::parse(&std::fs::read("firmware.elf")?)?);
 //! let mut summary = Summary::default();

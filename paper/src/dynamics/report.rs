@@ -1,4 +1,4 @@
-//! What `vsj dynamics` says: the response, and what the model is in terms of the others.
+//! The answer of `vsj dynamics`: the response, and the equivalent parameters of the other models.
 
 use anyhow::Result;
 use model::Plant;
@@ -13,17 +13,17 @@ use crate::dynamics::spring_damper::SpringDamper;
 use crate::dynamics::zener::{Changes, Sample, Start, Zener};
 use crate::figure::Figure;
 
-/// The models by name.
+/// The dynamic models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Model {
-    /// Spring in series with spring and damper
+    /// Spring in series with a parallel spring and damper.
     Zener,
-    /// The same without the series spring
+    /// Parallel spring and damper alone.
     SpringDamper,
-    /// The electrical analogue of the Zener model, solved as a circuit
+    /// The electrical analogue of the Zener model, solved as a circuit.
     Analogue,
-    /// The report's proportional-integral plant, driven by the level as a voltage
+    /// The report's proportional-integral plant, its input the level as a voltage.
     PiPlant,
 }
 
@@ -39,80 +39,81 @@ impl Model {
     }
 }
 
-/// What is asked.
-pub struct Question {
-    /// The model.
+/// Inputs of `vsj dynamics`.
+pub struct Setup {
+    /// The model to run.
     pub model: Model,
-    /// Its springs, damper and force.
+    /// Springs, damper and force of the mechanical models.
     pub zener: Zener,
-    /// Relaxed length of the simplified model, in m.
+    /// Relaxed length of the spring-damper model, in m.
     pub length_m: f64,
-    /// Gains of the plant.
+    /// Gains of the proportional-integral plant.
     pub gains: PlantGains,
-    /// What drives it.
+    /// The level over time.
     pub input: Input,
-    /// Where it starts.
+    /// Initial state.
     pub start: Start,
     /// Time between two rows, in s.
     pub every_s: f64,
 }
 
-/// The whole answer of `vsj dynamics --json`.
+/// The answer of `vsj dynamics --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The model that ran.
     pub model: Model,
-    /// What drove it.
+    /// Name of the input.
     pub input: String,
     /// The response.
     pub rows: Vec<Sample>,
-    /// The plant that the Zener model is, under a changing force.
+    /// The plant equivalent to the Zener model under a changing force.
     pub plant: PlantGains,
-    /// Its instantaneous share.
+    /// Instantaneous share of that plant, 0 to 1.
     pub share: f64,
-    /// Its time constant, in s.
+    /// Time constant of that plant, in s.
     pub tau_s: f64,
-    /// The Zener model that is the plant asked for, springs at level 1.
+    /// The Zener model equivalent to the given plant, its springs at level 1.
     pub zener_of_plant: Zener,
-    /// Where the plant stands in for a Zener model whose springs change.
+    /// Accuracy of the plant as an approximation of a Zener model whose springs change.
     pub stand_in: StandIn,
-    /// Largest difference between Zener model and circuit over this input, by the largest elongation, if one of them was asked for.
+    /// Largest difference between the Zener model and its circuit over this input, as a part of the largest elongation;
+    /// `None` if neither of the two ran.
     pub analogue_difference: Option<f64>,
     #[serde(skip)]
     curves: Vec<(&'static str, Vec<Sample>)>,
 }
 
-/// How well the plant stands in when both springs change by one ratio under a constant force.
+/// Accuracy of the plant as an approximation when both springs change by the same ratio under a constant force.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct StandIn {
-    /// Largest ratio, up to 100, for which the plant is off by at most 1 % of the change.
+    /// Largest ratio, up to 100, at which the plant's error is at most 1 % of the change.
     pub ratio_at_1_percent: f64,
-    /// The same for 5 %.
+    /// Largest ratio, up to 100, at which the plant's error is at most 5 % of the change.
     pub ratio_at_5_percent: f64,
-    /// What this material does from no voltage to the highest one measured.
+    /// Stiffness ratio of this material between the highest measured voltage and 0 V.
     pub material_ratio: f64,
-    /// The plant's error there, upwards, in percent of the change.
+    /// The plant's error at `material_ratio` upwards, in percent of the change.
     pub material_up_percent: f64,
-    /// And downwards.
+    /// The plant's error at `material_ratio` downwards, in percent of the change.
     pub material_down_percent: f64,
 }
 
 impl Report {
-    /// Answers.
+    /// Runs the model and computes the equivalent parameters.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] names what cannot be.
-    pub fn new(question: &Question) -> Result<Self> {
-        let zener = question.zener.checked()?;
+    /// [`simulation::bad_input::BadInput`] names the input that is out of range.
+    pub fn new(setup: &Setup) -> Result<Self> {
+        let zener = setup.zener.checked()?;
         let plant = plant_of(&zener);
         let Plant { share, time_constant_s: tau_s } = plant.plant();
-        let zener_of_plant = question.gains.zener(zener.k2_n_per_m, zener.force_n)?;
-        let rows = run(question, question.model, question.every_s)?;
-        // Close enough for the eye, however long the input.
-        let curve_every_s = question.every_s.min(f64::max(0.5, 1e-5 * question.input.duration_s()));
-        let curve = |model: Model| Ok::<_, anyhow::Error>((model.name(), run(question, model, curve_every_s)?));
-        let mut curves = vec![curve(question.model)?];
-        match question.model {
+        let zener_of_plant = setup.gains.zener(zener.k2_n_per_m, zener.force_n)?;
+        let rows = run(setup, setup.model, setup.every_s)?;
+        // Dense enough for a smooth curve, however long the input.
+        let curve_every_s = setup.every_s.min(f64::max(0.5, 1e-5 * setup.input.duration_s()));
+        let curve = |model: Model| Ok::<_, anyhow::Error>((model.name(), run(setup, model, curve_every_s)?));
+        let mut curves = vec![curve(setup.model)?];
+        match setup.model {
             Model::Zener => curves.push(curve(Model::Analogue)?),
             Model::Analogue => curves.push(curve(Model::Zener)?),
             Model::SpringDamper | Model::PiPlant => {}
@@ -122,8 +123,8 @@ impl Report {
             _ => None,
         };
         Ok(Self {
-            model: question.model,
-            input: question.input.name.clone(),
+            model: setup.model,
+            input: setup.input.name.clone(),
             rows,
             plant,
             share,
@@ -135,7 +136,7 @@ impl Report {
         })
     }
 
-    /// The response over time, with the level.
+    /// The response and the level over time.
     pub fn figure(&self) -> Figure {
         let (title, label) = match self.model {
             Model::PiPlant => ("Proportional-integral plant", "output [V]"),
@@ -151,9 +152,9 @@ impl Report {
     }
 }
 
-/// Samples of one model.
-fn run(question: &Question, model: Model, every_s: f64) -> Result<Vec<Sample>> {
-    let Question { zener, length_m, gains, input, start, .. } = question;
+/// Runs one model; samples are `every_s` seconds apart.
+fn run(setup: &Setup, model: Model, every_s: f64) -> Result<Vec<Sample>> {
+    let Setup { zener, length_m, gains, input, start, .. } = setup;
     match model {
         Model::Zener => zener.response(input, *start, every_s),
         Model::Analogue => analogue::response(zener, input, *start, every_s),

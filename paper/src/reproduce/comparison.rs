@@ -5,7 +5,7 @@ use crate::reproduce::outcome::Outcome;
 use crate::reproduce::printed::{Printed, Rule};
 use crate::reproduce::source::Entry;
 
-/// A number with what was computed for it.
+/// A printed number with the computed one; `agrees` holds to the printed precision under `rule`.
 pub(crate) struct Comparison {
     pub(crate) entry: Entry,
     pub(crate) printed: Printed,
@@ -15,7 +15,7 @@ pub(crate) struct Comparison {
 }
 
 impl Comparison {
-    /// By how much printed and computed differ.
+    /// The difference between printed and computed number in words, as a factor or in percent of the computed number.
     pub(crate) fn difference(&self) -> String {
         let (printed, computed) = (self.printed.value, self.outcome.value);
         let ratio = printed / computed;

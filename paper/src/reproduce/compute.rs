@@ -1,4 +1,4 @@
-//! The computations, by the names that `data/printed.toml` calls them.
+//! The computations, by the names used in `data/printed.toml`.
 
 use anyhow::{Result, bail};
 
@@ -8,10 +8,10 @@ use crate::reproduce::inputs::Inputs;
 use crate::reproduce::outcome::Outcome;
 use crate::reproduce::{models, readings};
 
-/// Does one computation.
+/// Runs the computation named `of`.
 ///
 /// # Errors
-/// If there is none of that name, or an input is missing.
+/// If no computation has that name, or an input is missing.
 pub fn compute(of: &str, inputs: &Inputs<'_>) -> Result<Outcome> {
     let sum = |terms: Vec<f64>| terms.iter().sum::<f64>();
     Ok(match of {

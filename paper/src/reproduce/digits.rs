@@ -1,6 +1,6 @@
 //! Numbers with six significant digits, for messages and tables.
 
-/// A number with six digits.
+/// Formats a number with six significant digits and without trailing zeros.
 pub fn short(value: f64) -> String {
     if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
         let decimals = (5 - value.abs().max(1e-3).log10().floor() as i32).clamp(0, 8) as usize;
@@ -10,7 +10,7 @@ pub fn short(value: f64) -> String {
     let text = format!("{value:.5e}");
     match text.split_once('e') {
         Some((digits, exponent)) => format!("{}e{exponent}", digits.trim_end_matches('0').trim_end_matches('.')),
-        // Not finite.
+        // Infinite and NaN have no exponent.
         None => text,
     }
 }

@@ -1,7 +1,7 @@
-//! Why a printed number is not what comes out: general explanations, tried in order of how much they claim.
+//! Explanations of a disagreement between printed and computed number, tried from the most to the least specific.
 //!
-//! A slip of the pen must give the printed digits exactly. Another input must be printed in the report for the same
-//! quantity. Where nothing fits, it is said what one input would have to be, and nothing is claimed.
+//! A misprint must give the printed digits exactly. Another input must be printed in the report for the same quantity.
+//! If nothing fits, the value that one input would need is stated, without claiming it.
 
 use anyhow::Result;
 use toml::Value;
@@ -12,7 +12,7 @@ use crate::reproduce::other_inputs::{input_needed, other_reading, terms_left_out
 use crate::reproduce::printed::Relation;
 use crate::reproduce::slips::{digit_of_a_reading, simple_factor, simulated, slip_of_the_pen};
 
-/// The likeliest explanation of a disagreement, with its evidence.
+/// The most likely explanation of a disagreement, with its evidence.
 pub(crate) fn explain(number: &Comparison, all: &[Comparison]) -> Result<String> {
     let mut said: Vec<String> =
         [&number.entry.because, &number.outcome.evidence].into_iter().flatten().cloned().collect();
@@ -31,7 +31,7 @@ fn capital(sentence: &str) -> String {
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
-/// How far a fitted number is off, in what its readings leave open.
+/// Distance of a fitted number from the printed one, in standard errors of the fit.
 fn in_standard_errors(number: &Comparison) -> Option<String> {
     let off = (number.printed.value - number.outcome.value) / number.outcome.standard_error?;
     let says = if off.abs() > 3.0 {
@@ -42,7 +42,7 @@ fn in_standard_errors(number: &Comparison) -> Option<String> {
     Some(format!("printed is {off:+.1} standard errors off: {says}"))
 }
 
-/// A number that agrees and was computed with this one as it is printed: then this is no slip of the pen.
+/// Place of a number that agrees and was computed with this one as printed, which rules out a misprint.
 fn used_again<'a>(number: &Comparison, all: &'a [Comparison]) -> Option<&'a str> {
     if number.printed.significant_digits() < 4 {
         return None;
@@ -66,7 +66,7 @@ fn first_explanation(number: &Comparison, all: &[Comparison]) -> Result<Option<S
         return Ok(Some(other_reading(number, all)?.unwrap_or_else(|| number.difference())));
     }
     if number.outcome.expected.is_some() {
-        // What others share is no slip of one digit.
+        // A deviation shared with other readings is no misprint of one digit.
         let alone = !number.outcome.lasts && !alike(number, &likes(number, all));
         return Ok(alone.then(|| digit_of_a_reading(number)).flatten());
     }
@@ -86,7 +86,7 @@ fn first_explanation(number: &Comparison, all: &[Comparison]) -> Result<Option<S
     }))
 }
 
-/// Other measured numbers of the table with the same voltage under another force.
+/// Other measured numbers of the same table, at the same voltage under another force.
 fn likes<'a>(number: &Comparison, all: &'a [Comparison]) -> Vec<&'a Comparison> {
     let same = |other: &&Comparison| {
         number.outcome.expected.is_some()
@@ -98,17 +98,17 @@ fn likes<'a>(number: &Comparison, all: &'a [Comparison]) -> Vec<&'a Comparison> 
     all.iter().filter(same).collect()
 }
 
-/// How far a number is off what it should be.
+/// Relative deviation of the printed from the computed number.
 fn deviation(number: &Comparison) -> f64 {
     number.printed.value / number.outcome.value - 1.0
 }
 
-/// True if there are others and they are off by as much, to 5 %.
+/// True if there are other numbers and their deviations agree with this one within 5 percentage points.
 fn alike(number: &Comparison, likes: &[&Comparison]) -> bool {
     !likes.is_empty() && likes.iter().all(|like| (deviation(like) - deviation(number)).abs() < 0.05)
 }
 
-/// How far others of the same voltage are off.
+/// The deviations of other numbers at the same voltage, in words.
 fn with_its_likes(number: &Comparison, all: &[Comparison]) -> Option<String> {
     let likes = likes(number, all);
     if likes.is_empty() {
@@ -154,9 +154,9 @@ mod tests {
         Comparison { printed: Printed::new(printed).unwrap(), outcome, rule: Rule::Rounded, agrees: false, entry }
     }
 
-    /// Each kind of slip, made on purpose, is told from the others.
+    /// Each kind of misprint, made deliberately, gets its own explanation.
     #[test]
-    fn each_slip_is_told() {
+    fn each_kind_of_misprint_is_identified() {
         let product = "factors = [3.0, 4.1234]";
         for (printed, of, inputs, also, expected) in [
             ("12.73", "product", product, "", "digits 3 and 7 swapped"),
@@ -183,12 +183,12 @@ mod tests {
     }
 
     #[test]
-    fn a_reading_that_one_digit_puts_in_line() {
+    fn a_reading_explained_by_one_misread_digit_names_that_digit() {
         let mut number = comparison("331", "sum", "terms = [349]", "");
         number.outcome.expected = Some((343.0, 355.0));
         let said = digit_of_a_reading(&number).unwrap();
         assert!(said.starts_with("one digit misread would explain it: 351 (by chance one fits in "), "{said}");
-        // Every window of 6 beside numbers that are 10 apart, in six tenths of places; near 331 there are more.
+        // Windows of width 6 around numbers that are 10 apart cover six tenths of all places; near 331 they cover more.
         let percent: f64 = said.split(' ').rev().nth(1).unwrap().parse().unwrap();
         assert!((60.0..75.0).contains(&percent), "{said}");
         number.outcome.expected = Some((445.0, 455.0));

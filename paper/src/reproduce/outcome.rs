@@ -1,22 +1,22 @@
 //! The result of a computation, with what the explanation of a disagreement needs.
 
-/// What comes out.
+/// The result of a computation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// The number.
+    /// The computed number, in the unit of the printed one.
     pub value: f64,
-    /// For a measured number: where other measured numbers say that it lies.
+    /// Range that other measured numbers predict, for a printed number that was measured.
     pub expected: Option<(f64, f64)>,
-    /// True if the readings after it go on from it: then no digit of it is misread.
+    /// True if the following readings continue from this one, so that none of its digits can be misread.
     pub lasts: bool,
-    /// For a fitted number: its standard error.
+    /// Standard error of the number, if it was fitted.
     pub standard_error: Option<f64>,
-    /// What else the computation knows, for the explanation.
+    /// Further facts for the explanation of a disagreement.
     pub evidence: Option<String>,
 }
 
 impl Outcome {
-    /// A number that follows from others.
+    /// A number computed without uncertainty.
     pub fn exact(value: f64) -> Self {
         Self { value, expected: None, lasts: false, standard_error: None, evidence: None }
     }

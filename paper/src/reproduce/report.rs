@@ -10,47 +10,47 @@ use crate::reproduce::inputs::Inputs;
 use crate::reproduce::printed::{Printed, Rule};
 use crate::reproduce::source::{self, BearsOn};
 
-/// One printed number.
+/// One printed number compared with the computed one.
 #[derive(Clone, Debug, Serialize)]
 pub struct Item {
-    /// Where it is printed.
+    /// Place in the report.
     #[serde(rename = "where")]
     pub place: String,
-    /// As a number.
+    /// The printed value.
     pub printed: f64,
-    /// What comes out.
+    /// The computed value, or the predicted one of a measured number.
     pub computed: f64,
-    /// True if it is what was printed, to the printed precision.
+    /// True if printed and computed agree to the printed precision.
     pub agrees: bool,
-    /// The likeliest explanation of a disagreement, with its evidence.
+    /// The most likely explanation of a disagreement, with its evidence.
     pub note: Option<String>,
-    /// As it is printed.
+    /// The number as printed.
     pub text: String,
-    /// Unit of both.
+    /// Unit of both values.
     pub unit: String,
-    /// What rests on it.
+    /// What depends on the number.
     pub bears_on: BearsOn,
-    /// True if it was measured: then it is compared with what other measured numbers lead to expect.
+    /// True if the number was measured; it is then compared with the prediction of other measured numbers.
     pub measured: bool,
 }
 
-/// The whole answer of `vsj reproduce --json`.
+/// The answer of `vsj reproduce --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Every number, those of tables first.
+    /// All numbers, those of tables first.
     pub items: Vec<Item>,
-    /// How many agree.
+    /// Number of agreements.
     pub agree: usize,
-    /// How many do not.
+    /// Number of disagreements.
     pub disagree: usize,
-    /// Groups whose numbers are cut off, not rounded; found by counting.
+    /// Groups of numbers that were truncated instead of rounded, as more of their digits then agree.
     pub truncated_groups: Vec<String>,
 }
 
-/// Computes, judges and explains everything.
+/// Computes, compares and explains all printed numbers.
 ///
 /// # Errors
-/// If a data file that was built in is damaged or asks for a computation that does not exist.
+/// If a built-in data file is damaged or names an unknown computation.
 pub fn reproduce() -> Result<Report> {
     let mut comparisons = Vec::new();
     for entry in source::entries()? {
@@ -87,7 +87,7 @@ pub fn reproduce() -> Result<Report> {
     Ok(Report { agree, disagree: items.len() - agree, items, truncated_groups })
 }
 
-/// Finds out, group by group, whether numbers were rounded or cut off; returns the groups that were cut off.
+/// Decides for each group whether its numbers were rounded or truncated; returns the truncated groups.
 fn find_rules(comparisons: &mut [Comparison]) -> Vec<String> {
     let mut groups: Vec<String> = comparisons.iter().map(|number| number.entry.group.clone()).collect();
     groups.dedup();
@@ -98,7 +98,7 @@ fn find_rules(comparisons: &mut [Comparison]) -> Vec<String> {
             let of_group = comparisons.iter().filter(|number| number.entry.group == *group);
             of_group.filter(|n| n.printed.agrees(n.outcome.value, n.entry.relation, rule)).count()
         };
-        // One number is no habit.
+        // A single number is not enough evidence.
         count(Rule::Truncated) > count(Rule::Rounded) + 1
     });
     for number in comparisons {
