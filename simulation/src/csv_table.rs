@@ -68,7 +68,7 @@ pub struct Row<'t> {
 impl<'a> Table<'a> {
     /// Reads the header; `name` is what messages call the table.
     pub fn new(name: &'a str, text: &'a str) -> Result<Self> {
-        // Rows of another length are reported by [`Table::next`], which knows their line.
+        // Rows of another length are reported by [`Table::next_row`], which knows their line.
         let mut builder = csv::ReaderBuilder::new();
         builder.comment(Some(b'#')).trim(csv::Trim::All).flexible(true);
         let mut reader = builder.from_reader(text.as_bytes());
@@ -121,7 +121,7 @@ impl<'a> Table<'a> {
     }
 
     /// Reads the next row; `None` after the last.
-    pub fn next(&mut self) -> Result<Option<Row<'_>>> {
+    pub fn next_row(&mut self) -> Result<Option<Row<'_>>> {
         match self.reader.read_record(&mut self.record) {
             Ok(false) => Ok(None),
             Ok(true) => {

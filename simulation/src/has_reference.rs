@@ -205,7 +205,7 @@ fn exact_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f6
     stiffness
 }
 
-/// The stiffness of the exact solution at increasing moments of a schedule, in V.
+/// Stiffness of the exact solution at increasing times (s) of a schedule, in V.
 pub fn reference_at(system: Loop, schedule: &Schedule, times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut solution = system.at_rest(1e-3);
     let mut now = schedule.start_s();

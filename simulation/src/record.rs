@@ -99,7 +99,7 @@ impl Record {
 
         let name = table.name();
         let mut rows: Vec<Row> = Vec::new();
-        while let Some(row) = table.next()? {
+        while let Some(row) = table.next_row()? {
             let row = Row {
                 line: row.line,
                 time_s: row.number(time)?,

@@ -58,10 +58,10 @@ impl SampledLoop {
         let target = target.clamp(lowest, highest);
         let wanted = match self.controller {
             Controller::None => target,
-            Controller::TimeOptimal(approach_s) => self.leading_to(&state.spring, target, approach_s),
+            Controller::TimeOptimal(approach_s) => self.voltage_to_reach(&state.spring, target, approach_s),
             Controller::ProportionalIntegral(proportional, _) => {
                 // u = Kp (target - y) + z with y = y0 + s (u - u0)
-                let (before, steepest) = (state.spring.voltage(), self.spring.steepest());
+                let (before, steepest) = (state.spring.voltage(), self.spring.steepest_slope());
                 let error = target - self.spring.stiffness(&state.spring) + steepest * before;
                 (proportional * error + state.integral) / (1.0 + proportional * steepest)
             }
@@ -79,7 +79,7 @@ impl SampledLoop {
 
     /// The voltage within the range that covers the approach's part of the distance to the target in the coming tick,
     /// found by regula falsi (Illinois), since the stiffness increases with the voltage.
-    fn leading_to(&self, spring: &spring::State, target: f64, approach_s: f64) -> f64 {
+    fn voltage_to_reach(&self, spring: &spring::State, target: f64, approach_s: f64) -> f64 {
         let now = self.spring.stiffness(spring);
         let part = if approach_s > 0.0 { -(-self.sample_s / approach_s).exp_m1() } else { 1.0 };
         let ahead = |volts: f64| {
@@ -88,7 +88,7 @@ impl SampledLoop {
             self.spring.hold(&mut tried, self.sample_s);
             self.spring.stiffness(&tried)
         };
-        let aim = self.braked(now, ahead(spring.voltage()), target, now + part * (target - now));
+        let aim = self.limited_by_slew(now, ahead(spring.voltage()), target, now + part * (target - now));
         let missed = |volts: f64| ahead(volts) - aim;
         let (mut low, mut high) = self.range_v;
         let (mut at_low, mut at_high) = (missed(low), missed(high));
@@ -122,18 +122,18 @@ impl SampledLoop {
     /// Limits the `aim` for the end of the tick so that the slew limit leaves time to stop at the target; the stiffness
     /// is `now`, and `then` at the end of the tick under constant voltage. While the voltage turns back at the slew
     /// limit, every tick reduces the drift by the same amount and by the part that relaxes.
-    fn braked(&self, now: f64, then: f64, target: f64, aim: f64) -> f64 {
+    fn limited_by_slew(&self, now: f64, then: f64, target: f64, aim: f64) -> f64 {
         let step = self.slew_v_per_s * self.sample_s;
         let (sign, drift) = ((then - now).signum(), (then - now).abs());
-        let spring::Turning { within_a_tick, in_each_later, relaxed } = self.spring.turning(self.sample_s);
+        let spring::Reversal { within_a_tick, in_each_later, relaxed } = self.spring.reversal(self.sample_s);
         let beyond = drift - within_a_tick * step;
         if beyond <= 0.0 || step.is_infinite() {
             return aim;
         }
         let slower = in_each_later * step + relaxed * (drift + within_a_tick * step) / 2.0;
         let allowed = (2.0 * slower * (sign * (target - then)).max(0.0)).sqrt();
-        let braked = then + sign * within_a_tick / in_each_later * (allowed - beyond);
-        if sign > 0.0 { aim.min(braked) } else { aim.max(braked) }
+        let limited = then + sign * within_a_tick / in_each_later * (allowed - beyond);
+        if sign > 0.0 { aim.min(limited) } else { aim.max(limited) }
     }
 
     /// Second half of a tick: holds `applied` (V) across the spring; returns the stiffness just after it was applied,

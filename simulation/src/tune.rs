@@ -30,7 +30,7 @@ pub const WITHIN: f64 = 1.05;
 
 /// The spring, amplifier and limits to tune for.
 #[derive(Clone, Debug)]
-pub struct Question<'a> {
+pub struct Specification<'a> {
     /// The spring.
     pub file: &'a PlantFile,
     /// The amplifier.
@@ -73,12 +73,12 @@ pub struct TunedGains {
 pub struct TunedApproach {
     /// Time constant of the approach, in s, for `--approach-s`.
     pub approach_s: f64,
-    /// On the stair.
+    /// Worst response on the stair.
     #[serde(flatten)]
     pub worst: Worst,
 }
 
-impl Question<'_> {
+impl Specification<'_> {
     fn settings(&self, compensation: Compensation) -> Settings<ExtendedPlant<'_>> {
         Settings {
             rate_hz: self.rate_hz,
@@ -110,7 +110,8 @@ impl Question<'_> {
         let tried = |proportional, integral_per_s| {
             let gains = Gains { proportional, integral_per_s };
             let margins = Margins::of(self.file, &gains, self.rate_hz);
-            let worst = margins.enough().then(|| self.worst(Compensation::ProportionalIntegral(gains))).flatten()?;
+            let worst =
+                margins.sufficient().then(|| self.worst(Compensation::ProportionalIntegral(gains))).flatten()?;
             let t97 = worst.t97_s.filter(|_| worst.overshoot_percent <= self.overshoot_percent)?;
             Some((t97, TunedGains { proportional, integral_per_s, margins, worst }))
         };
@@ -165,19 +166,19 @@ impl Question<'_> {
 ///
 /// # Errors
 /// [`BadInput`] for a spring or amplifier that the tick rejects.
-pub fn tune(question: &Question<'_>) -> Result<Tuning> {
-    let fast = question.approach()?;
-    let proportional_integral = question.gains();
+pub fn tune(specification: &Specification<'_>) -> Result<Tuning> {
+    let fast = specification.approach()?;
+    let proportional_integral = specification.gains();
     let compensations = [
         proportional_integral.map(|TunedGains { proportional, integral_per_s, .. }| {
             Compensation::ProportionalIntegral(Gains { proportional, integral_per_s })
         }),
         Some(Compensation::TimeOptimal(Approach { time_constant_s: fast.approach_s })),
     ];
-    let runs = compensations.map(|compensation| compensation.map(|it| question.run(it)).transpose());
+    let runs = compensations.map(|compensation| compensation.map(|it| specification.run(it)).transpose());
     let [with_gains, with_approach] = runs;
-    let trade = trade::over_errors(question.file, with_gains?.as_ref(), with_approach?.as_ref());
-    Ok(Tuning { limit_v: question.amplifier.max_v, proportional_integral, fast, trade })
+    let trade = trade::over_model_errors(specification.file, with_gains?.as_ref(), with_approach?.as_ref());
+    Ok(Tuning { limit_v: specification.amplifier.max_v, proportional_integral, fast, trade })
 }
 
 fn responses(run: &Run) -> Vec<crate::response::Response> {

@@ -1,4 +1,4 @@
-//! Options whose value is one of a few names. The enums belong to libraries that do not depend on clap.
+//! Options whose value is one of a few names. Their enums belong to libraries without a dependency on clap.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use paper::dynamics::report::Model;
@@ -6,7 +6,7 @@ use paper::dynamics::zener::Changes;
 use paper::joint::OuterEnd;
 use simulation::schedule::Between;
 
-/// The values of an option: name on the command line, help, meaning.
+/// The values of an option: name on the command line, help text, value.
 pub(crate) type Choices<T> = &'static [(&'static str, &'static str, T)];
 
 /// Parses one of `choices` by its name; help and errors list the names.

@@ -10,7 +10,7 @@ use simulation::plant_file;
 
 use super::option_names::{SETTINGS, named};
 
-/// Compare all controllers on the stair of ideal steps, and with the fastest that any could be
+/// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -18,13 +18,13 @@ Examples:
   vsj compare --limit-v 850 --slew-v-per-s 500
   vsj compare --plant spring.toml --json  on another spring")]
 pub(crate) struct Arguments {
-    /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
+    /// The spring: `paper`, or a plant file; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// Highest voltages of the amplifier, in V
     #[arg(long, default_values_t = [700.0, 1000.0], value_delimiter = ',', value_name = "V,V", allow_negative_numbers = true)]
     limit_v: Vec<f64>,
-    /// Fastest change of the amplifier, in V/s; without it, no limit
+    /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// Ticks per second, 100 to 10 000

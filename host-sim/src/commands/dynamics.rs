@@ -16,7 +16,7 @@ use simulation::schedule::Between;
 use super::choice::{BETWEEN, CHANGES, MODEL, one_of};
 use super::option_names::named;
 
-/// Run one of the report's dynamic models, and say what it is in terms of the others
+/// Run one of the report's dynamic models, and give the equivalent parameters of the others
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -26,7 +26,7 @@ Examples:
   vsj dynamics pi-plant --input stair  the plant alone on the stair of Table 3
   vsj dynamics zener --k1 5 --k2 0.5 --input levels.csv --between linear")]
 pub(crate) struct Arguments {
-    /// The model
+    /// The dynamic model
     #[arg(value_parser = one_of(MODEL))]
     model: Model,
     /// Series spring at level 1, in N/m
@@ -56,10 +56,10 @@ pub(crate) struct Arguments {
     /// The report's levels, the stair, or a file with columns time_s,voltage_v
     #[arg(long, default_value = "report", value_name = "report|stair|FILE.csv")]
     input: String,
-    /// What the level does between two rows of an input file
+    /// Interpolation of the level between two rows of an input file
     #[arg(long, default_value = "hold", value_parser = one_of(BETWEEN))]
     between: Between,
-    /// Start at rest under force and first level, not just loaded
+    /// Start in equilibrium under the force and the first level, instead of just loaded
     #[arg(long)]
     settled: bool,
     /// Time between two rows, in s

@@ -1,4 +1,4 @@
-//! `vsj joint`: what springs between two rings can do.
+//! `vsj joint`: the stiffness of a joint with springs between two rings.
 
 use std::path::PathBuf;
 
@@ -16,13 +16,13 @@ use simulation::reference::Loop;
 use super::choice::{OUTER_END, one_of};
 use super::option_names::named;
 
-/// Joint stiffness of springs set radially between two rings, against what the report requires
+/// Joint stiffness of springs set radially between two rings, compared with the report's requirement
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj joint                                     12 springs of the report's size
   vsj joint --springs 24 --inner-radius-mm 40 --outer-end clamped
-  vsj joint --stiffness 0.02                    what makes 0.02 N m/rad, if any
+  vsj joint --stiffness 0.02                    the spring constant for 0.02 N m/rad
   vsj joint --limit-v 1000 --within-s 1 --json  another amplifier, more time")]
 pub(crate) struct Arguments {
     /// Number of springs
@@ -31,34 +31,34 @@ pub(crate) struct Arguments {
     /// Radius of the inner ring, in mm
     #[arg(long, default_value_t = 20.0, value_name = "MM", allow_negative_numbers = true)]
     inner_radius_mm: f64,
-    /// How the outer end of a spring is held
+    /// Support of the outer end of a spring
     #[arg(long, default_value = "supported", value_parser = one_of(OUTER_END))]
     outer_end: OuterEnd,
     /// Free length of a spring, in mm
     #[arg(long, default_value_t = 59.8, value_name = "MM", allow_negative_numbers = true)]
     length_mm: f64,
-    /// Its width, in mm
+    /// Width of a spring, in mm
     #[arg(long, default_value_t = 19.8, value_name = "MM", allow_negative_numbers = true)]
     width_mm: f64,
-    /// Its thickness, in um
+    /// Thickness of a spring, in um
     #[arg(long, default_value_t = 190.0, value_name = "UM", allow_negative_numbers = true)]
     thickness_um: f64,
-    /// A joint stiffness to be made, in N m/rad
+    /// A joint stiffness to be realised, in N m/rad
     #[arg(long, value_name = "N_M/RAD", allow_negative_numbers = true)]
     stiffness: Option<f64>,
-    /// Softest joint required, in N m/rad
+    /// Lowest required joint stiffness, in N m/rad
     #[arg(long, default_value_t = Requirement::PAPER.low_n_m_per_rad, value_name = "N_M/RAD", allow_negative_numbers = true)]
     low: f64,
-    /// Stiffest joint required, in N m/rad
+    /// Highest required joint stiffness, in N m/rad
     #[arg(long, default_value_t = Requirement::PAPER.high_n_m_per_rad, value_name = "N_M/RAD", allow_negative_numbers = true)]
     high: f64,
-    /// Time required, in s
+    /// Time allowed for a change, in s
     #[arg(long, default_value_t = Requirement::PAPER.within_s, value_name = "S", allow_negative_numbers = true)]
     within_s: f64,
     /// Highest voltage of the amplifier, in V
     #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
     limit_v: f64,
-    /// Fastest change of the amplifier, in V/s; without it, no limit
+    /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// The spring's relaxation: `paper`, or a plant file
@@ -84,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         length_m: geometry.spring_length_m,
         width_m: 1e-3 * arguments.width_mm,
         thickness_m: 1e-6 * arguments.thickness_um,
-        // Young's modulus is what the experiment says.
+        // Replaced by the Young's modulus of the experiment.
         youngs_modulus_pa: 1.0,
         density_kg_per_m3: 0.0,
     };

@@ -10,7 +10,7 @@ use host_sim::log::{Decoder, Formats, Summary};
 use host_sim::output::log::{Format, Printer};
 use simulation::bad_input;
 
-/// Decode the firmware's log into a table and a summary, from a file or as it comes
+/// Decode the firmware's log into a table and a summary, from a file or while it arrives
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -19,15 +19,15 @@ Examples:
   vsj log firmware.elf capture.bin --csv      time_s,level,event,message
   vsj log firmware.elf capture.bin --json     one object, summary included
 
-Exit codes: 0 all read, 1 damaged or cut off but what could be read is printed, 2 not the log of this ELF.")]
+Exit codes: 0 decoded completely, 1 damaged or cut off, with the readable part printed, 2 not the log of this ELF file.")]
 pub(crate) struct Arguments {
-    /// The ELF file of the very build that wrote the log
+    /// The ELF file of the build that wrote the log
     #[arg(value_name = "ELF")]
     elf: PathBuf,
-    /// The log as it left the MCU; `-` is stdin
+    /// The log as sent by the MCU; `-` is stdin
     #[arg(value_name = "FILE", default_value = "-")]
     file: PathBuf,
-    /// Columns time_s,level,event,message; the summary as comments
+    /// Print CSV with the columns time_s,level,event,message, and the summary as comments
     #[arg(long, conflicts_with = "json")]
     csv: bool,
     /// One JSON object on stdout, at the end
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     };
     let source = open(&arguments.file)?;
     match decode(source, formats, arguments) {
-        // Who closes the pipe has seen enough.
+        // A closed pipe ends the command without an error.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
         done => done,
     }
@@ -58,7 +58,7 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
         if io::stdin().is_terminal() {
             bad_input!("stdin is a terminal; expected a FILE, or a log from a pipe");
         }
-        // Ctrl-C goes to the whole pipe. Who writes to it ends, and then so do we, with the summary; the second ends us.
+        // Ctrl-C reaches the whole pipeline: the writer ends first, then this program prints its summary. A second one ends it.
         let mut before = false;
         ctrlc::set_handler(move || {
             if std::mem::replace(&mut before, true) {
@@ -67,7 +67,7 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
         })?;
         return Ok(Box::new(io::stdin()));
     }
-    // A folder opens like a file, and fails only when it is read.
+    // A folder can be opened like a file and fails only when it is read.
     let file = match std::fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => Err(ErrorKind::IsADirectory.into()),
         _ => File::open(path),
@@ -113,12 +113,14 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) ->
     printer.end(encoding, summary)?;
     let name = name(&arguments.file);
     match broken {
-        Some(error) => Err(anyhow::Error::msg(error.to_string())).with_context(|| format!("{name}: cannot be read on")),
+        Some(error) => {
+            Err(anyhow::Error::msg(error.to_string())).with_context(|| format!("{name}: cannot be read further"))
+        }
         None => verdict,
     }
 }
 
-/// What is wrong with the log.
+/// The error of a log that is empty, damaged, cut off, or of another build.
 fn verdict(arguments: &Arguments, summary: &Summary) -> Result<()> {
     let (name, elf) = (name(&arguments.file), arguments.elf.display());
     let Summary { lines, damaged_frames, damaged_bytes, cut_off_bytes, .. } = summary;
@@ -126,17 +128,17 @@ fn verdict(arguments: &Arguments, summary: &Summary) -> Result<()> {
         bad_input!("{name}: empty; expected the log of the firmware");
     }
     if *lines == 0 && *damaged_frames > 0 {
-        bad_input!("{name}: none of its frames fits {elf}; expected the log of this very build");
+        bad_input!("{name}: none of its frames fits {elf}; expected the log of this build");
     }
     let mut wrong = Vec::new();
     if let Some(first) = summary.first_damage {
         wrong.push(format!("{damaged_frames} damaged frames ({damaged_bytes} bytes), the first at byte {first}"));
     }
     if *cut_off_bytes > 0 {
-        wrong.push(format!("cut off, the last {cut_off_bytes} bytes are no whole frame"));
+        wrong.push(format!("cut off, the last {cut_off_bytes} bytes are an incomplete frame"));
     }
     if !wrong.is_empty() {
-        // Frames have no checksum: a few of another build's may pass.
+        // Frames have no checksum: a few frames of another build may be decoded.
         let foreign = if damaged_frames > lines { "; is it the log of another build?" } else { "" };
         bail!("{name}: {}; {lines} lines were read{foreign}", wrong.join("; "));
     }

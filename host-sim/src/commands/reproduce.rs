@@ -9,15 +9,15 @@ use host_sim::output::reproduce::{page, text};
 use host_sim::output::terminal::{json, print, wrote};
 use paper::reproduce::reproduce;
 
-/// Compute every printed number of the source report again, and say which do not come out and why
+/// Recompute every printed number of the source report; list and explain those that disagree
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj reproduce                       what does not come out, and why
+  vsj reproduce                       disagreements, with explanations
   vsj reproduce --json                every number
   vsj reproduce --out docs/reproduce  as a page
 
-The printed numbers are in data/printed.toml and the tables beside it.")]
+The printed numbers are in data/printed.toml and the tables that it names.")]
 pub(crate) struct Arguments {
     /// Write README.md, a page with every number, to this folder
     #[arg(long, value_name = "DIR")]

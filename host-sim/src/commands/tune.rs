@@ -10,32 +10,32 @@ use host_sim::output::tune as output;
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::plant_file;
-use simulation::tune::{Question, tune};
+use simulation::tune::{Specification, tune};
 
 use super::option_names::{SETTINGS, named};
 
-/// Choose gains and settings for a spring and an amplifier, with margins, and what an error of the model costs
+/// Choose gains and settings for a spring and an amplifier, with stability margins and the effect of model errors
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj tune                                     the report's spring at 700 V
   vsj tune --limit-v 1000 --overshoot-percent 1
-  vsj tune --plant spring.toml --out out/tune  with plots of the cost of errors
+  vsj tune --plant spring.toml --out out/tune  with plots over model errors
   vsj tune --json | jq .fast")]
 pub(crate) struct Arguments {
-    /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
+    /// The spring: `paper`, or a plant file; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// Highest voltage of the amplifier, in V
     #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
     limit_v: f64,
-    /// Fastest change of the amplifier, in V/s; without it, no limit
+    /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// Ticks per second, 100 to 10 000
     #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// The most overshoot that a step may have, in percent
+    /// Largest overshoot allowed for a step, in percent
     #[arg(long, default_value_t = 5.0, value_name = "PERCENT", allow_negative_numbers = true)]
     overshoot_percent: f64,
     /// Write tune.json, tune.txt, trade.csv, t97.svg and overshoot.svg to this folder
@@ -55,8 +55,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let amplifier =
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
-    let question = Question { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent };
-    let answer = tune(&question).map_err(|error| named(error, SETTINGS))?;
+    let specification = Specification { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent };
+    let answer = tune(&specification).map_err(|error| named(error, SETTINGS))?;
     let json = json(&answer)?;
     let text = output::text(&answer, &arguments.plant);
     let mut written = String::new();

@@ -1,4 +1,4 @@
-//! What `vsj beam` says, for the terminal.
+//! The answer of `vsj beam` as text.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use paper::beam::regression::Interval;
 use paper::beam::report::{Layers, Report, Statics};
 use paper::beam::slip::Identified;
 
-/// For the terminal.
+/// Tables of the experiment, the beam of one material, and the stack.
 pub fn text(report: &Report) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -18,7 +18,7 @@ pub fn text(report: &Report) -> String {
 fn write(out: &mut String, report: &Report) -> std::fmt::Result {
     let Report { experiment, deflection, layers } = report;
     writeln!(out, "Beam experiment (95 % intervals)")?;
-    writeln!(out, "  voltage | spring constant, all readings | without readings out of line | Young's modulus")?;
+    writeln!(out, "  voltage | spring constant, all readings |         without the outliers | Young's modulus")?;
     writeln!(out, "      [V] |                     [uN/mm] |                      [uN/mm] |           [GPa]")?;
     for line in &experiment.lines {
         writeln!(
@@ -34,8 +34,8 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
         let Reading { voltage_v, displacement_mm, force_un } = out_of_line.reading;
         writeln!(
             out,
-            "Out of line: {force_un} uN at {displacement_mm:.2} mm, {voltage_v} V; the others say {:.0} to {:.0} uN \
-             (chance of such a reading {:.0e}).",
+            "Outlier: {force_un} uN at {displacement_mm:.2} mm, {voltage_v} V; the others predict {:.0} to {:.0} uN (p-value \
+             {:.0e}).",
             out_of_line.expected_un.low, out_of_line.expected_un.high, out_of_line.chance
         )?;
     }
@@ -46,12 +46,12 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
         plus_minus(&experiment.per_volt_pa.scaled(1e-6), 4)
     )?;
     if let Some(chance) = experiment.straight_chance.filter(|&chance| chance < 0.01) {
-        writeln!(out, "E(V) is not quite straight: it flattens (chance of that by scatter alone {chance:.0e}).")?;
+        writeln!(out, "E(V) is not quite linear: its slope decreases (p-value of a linear E(V) {chance:.0e}).")?;
     }
     let [low, high] = &experiment.reach_n_per_m;
     writeln!(
         out,
-        "Within reach: {} to {} N/m, a ratio of {}.",
+        "Stiffness range: {} to {} N/m, a ratio of {}.",
         plus_minus(low, 4),
         plus_minus(high, 4),
         plus_minus(&experiment.reach_ratio, 3)
@@ -70,13 +70,17 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
     let Statics { linear_error, tolerance, .. } = deflection;
     writeln!(
         out,
-        "{}: the linear result is off by {:.1} % of the largest displacement, {:.1} % are tolerated.",
-        if deflection.droops { "Droops, the large-deflection solution is the valid one" } else { "Linear is valid" },
+        "{}: the linear result differs by {:.1} % of the largest displacement, the tolerance is {:.1} %.",
+        if deflection.droops {
+            "The beam droops, the large-deflection solution is valid"
+        } else {
+            "The linear solution is valid"
+        },
         1e2 * linear_error,
         1e2 * tolerance
     )?;
     if let Some(factor) = deflection.limit_factor {
-        writeln!(out, "Linear holds up to {factor:.3} times this load (force and weight together).")?;
+        writeln!(out, "The linear solution is valid up to {factor:.3} times this load (force and weight together).")?;
     }
 
     writeln!(out, "\nStack of layers, by finite elements with slip")?;
@@ -108,14 +112,16 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
     match active_alone_pa {
         Some(pascal) => writeln!(
             out,
-            "To do it alone the active layer would need {:.1} GPa at {highest_v} V: in this model the voltage acts on the \
-             coupling.",
+            "The active layer alone would need {:.1} GPa at {highest_v} V: in this model the voltage acts on the coupling.",
             1e-9 * pascal
         )?,
-        None => writeln!(out, "No stiffness of the active layer alone gives what {highest_v} V do.")?,
+        None => writeln!(
+            out,
+            "No stiffness of the active layer alone gives the measured spring constant at {highest_v} V."
+        )?,
     }
     if !layers.identified.tips.is_empty() {
-        writeln!(out, "\n  force | voltage | measured |   slip | off by | report's FEM | off by | bonded")?;
+        writeln!(out, "\n  force | voltage | measured |   slip |  error | report's FEM |  error | bonded")?;
         writeln!(out, "   [uN] |     [V] |     [mm] |   [mm] |    [%] |         [mm] |    [%] |   [mm]")?;
         for tip in &layers.identified.tips {
             let off = |value: f64| 1e2 * (value / tip.printed.measured_mm - 1.0);
@@ -136,7 +142,7 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
     let Layers { voltage_v, interlayer_pa_per_m, tip_mm, bonded_mm, sliding_mm, .. } = layers;
     writeln!(
         out,
-        "Under the force above, {voltage_v} V, {interlayer_pa_per_m:.3e} Pa/m: {tip_mm:.3} mm ({bonded_mm:.3} bonded, \
+        "Under the given force at {voltage_v} V, {interlayer_pa_per_m:.3e} Pa/m: {tip_mm:.3} mm ({bonded_mm:.3} bonded, \
          {sliding_mm:.3} sliding), small deflections."
     )
 }

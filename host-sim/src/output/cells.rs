@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-/// At most six decimals, none that are zero.
+/// Rounds to six decimals, so that trailing zeros are not printed.
 pub(super) fn tidy(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

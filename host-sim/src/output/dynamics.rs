@@ -5,7 +5,7 @@ use std::fmt::Write;
 use paper::dynamics::report::{Model, Report};
 use paper::dynamics::zener::Zener;
 
-/// For the terminal.
+/// Table of the response, followed by the equivalent parameters.
 pub fn text(report: &Report) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -27,14 +27,17 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
         writeln!(
             out,
             "Under a changing force this Zener model, at level 1, is exactly the plant with Kp = {:.4}, Ki = {:.4} 1/s: \
-             {:.2} % at once, the rest with {tau_s:.3} s.",
+             {:.2} % instantaneous, the rest with a time constant of {tau_s:.3} s.",
             plant.proportional,
             plant.integral_per_s,
             1e2 * share
         )?;
     }
     if report.model == Model::SpringDamper {
-        writeln!(out, "Without the series spring nothing comes at once: no plant with Kp > 0 is this model.")?;
+        writeln!(
+            out,
+            "Without the series spring there is no instantaneous part: no plant with Kp > 0 is equivalent to this model."
+        )?;
     }
     if let Some(difference) = report.analogue_difference {
         writeln!(
@@ -45,14 +48,14 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
     let Zener { k1_n_per_m, k2_n_per_m, damper_n_s_per_m, .. } = zener_of_plant;
     writeln!(
         out,
-        "The plant asked for is the Zener model with K1 = {k1_n_per_m:.4} N/m, K2 = {k2_n_per_m:.4} N/m, D = \
+        "The given plant is equivalent to the Zener model with K1 = {k1_n_per_m:.4} N/m, K2 = {k2_n_per_m:.4} N/m, D = \
          {damper_n_s_per_m:.4} N s/m (K1 = K2 / Kp, D = tau K2)."
     )?;
     writeln!(
         out,
-        "It stands in for that model, when both springs change under a constant force, within 1 % of the change up to a \
-         ratio of {:.3}, within 5 % up to {:.3}. This material's {:.3} is off by {:.1} % upwards and {:.1} % downwards: \
-         the model is faster where it is stiffer, the plant is not.",
+        "If instead both springs change under a constant force, it approximates that model within 1 % of the change up to a \
+         ratio of {:.3}, within 5 % up to {:.3}. At this material's ratio of {:.3} the error is {:.1} % upwards and {:.1} % \
+         downwards: the model is faster where it is stiffer, the plant is not.",
         stand_in.ratio_at_1_percent,
         stand_in.ratio_at_5_percent,
         stand_in.material_ratio,

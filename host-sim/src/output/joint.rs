@@ -2,7 +2,7 @@
 
 use paper::joint::report::{Report, Requirement, Time};
 
-/// For the terminal.
+/// The joint's stiffness, and whether the requirement can be met.
 pub fn text(report: &Report) -> String {
     let Report { joint, requirement, limit_v, springs_n_per_m: [soft, stiff], reach_n_m_per_rad, .. } = report;
     let Requirement { low_n_m_per_rad, high_n_m_per_rad, within_s, part } = requirement;
@@ -18,14 +18,14 @@ pub fn text(report: &Report) -> String {
         reach_n_m_per_rad[1],
     );
     if let Some([asked, constant]) = report.asked {
-        let reach = if (*soft..=*stiff).contains(&constant) { "within" } else { "out of" };
-        text += &format!("{asked} N m/rad needs a spring constant of {constant:.5} N/m: {reach} reach.\n");
+        let place = if (*soft..=*stiff).contains(&constant) { "within" } else { "out of" };
+        text += &format!("{asked} N m/rad needs a spring constant of {constant:.5} N/m: {place} range.\n");
     }
     text += &format!(
         "\nThe requirement, {low_n_m_per_rad} to {high_n_m_per_rad} N m/rad in {within_s} s, {}.\n\
-         Range: a ratio of {:.0} is asked for; the material gives {:.3} at {limit_v} V ({:.3} +- {:.3} over the voltages \
-         measured), in any geometry.\n\
-         Size: the soft end alone would take {:.0} springs here, the stiff end {:.0}.\n\
+         Range: a ratio of {:.0} is required; the material gives {:.3} at {limit_v} V ({:.3} +- {:.3} over the measured \
+         voltages), in any geometry.\n\
+         Size: the lowest stiffness alone would need {:.0} springs of this geometry, the highest {:.0}.\n\
          Time: {:.0} % of a change from 0 V takes at least\n",
         if report.in_time_ratio >= report.required_ratio { "can be met" } else { "cannot be met with this material" },
         report.required_ratio,
@@ -41,7 +41,7 @@ pub fn text(report: &Report) -> String {
         text += &format!("  to {to_v:6.1} V  {time:>9}\n");
     }
     text + &format!(
-        "Within {within_s} s no controller makes {:.0} % of a change to more than {:.1} V, a stiffness ratio of {:.3}.\n",
+        "Within {within_s} s no controller completes {:.0} % of a change to more than {:.1} V, a stiffness ratio of {:.3}.\n",
         1e2 * part,
         report.in_time_v,
         report.in_time_ratio

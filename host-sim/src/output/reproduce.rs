@@ -1,4 +1,4 @@
-//! The report as a page and as text.
+//! The answer of `vsj reproduce` as text and as a page in Markdown.
 
 use std::fmt::Write;
 
@@ -6,14 +6,14 @@ use paper::reproduce::digits::short;
 use paper::reproduce::source::BearsOn;
 use paper::reproduce::{Item, Report};
 
-/// How important a disagreement is: what rests on the number, then how far it is off.
+/// Disagreements, most important first: by what depends on the number, then by their size.
 fn by_importance(report: &Report) -> Vec<&Item> {
     let mut wrong: Vec<&Item> = report.items.iter().filter(|item| !item.agrees).collect();
     wrong.sort_by(|one, other| one.bears_on.cmp(&other.bears_on).then(distance(other).total_cmp(&distance(one))));
     wrong
 }
 
-/// Size of the disagreement, on the scale of factors.
+/// Size of a disagreement, as the logarithm of the ratio.
 fn distance(item: &Item) -> f64 {
     let ratio = item.printed / item.computed;
     if ratio > 0.0 { ratio.ln().abs() } else { f64::INFINITY }
@@ -21,9 +21,9 @@ fn distance(item: &Item) -> f64 {
 
 fn heading(bears_on: BearsOn) -> &'static str {
     match bears_on {
-        BearsOn::Conclusion => "Claims and what they rest on",
-        BearsOn::Model => "Inputs of models, and whether the models are sound",
-        BearsOn::Result => "Results that nothing is built on",
+        BearsOn::Conclusion => "Claims and the numbers they depend on",
+        BearsOn::Model => "Inputs and validity of models",
+        BearsOn::Result => "Results that nothing else depends on",
         BearsOn::Detail => "Side remarks",
     }
 }
@@ -33,7 +33,7 @@ fn computed(item: &Item) -> String {
     if item.computed.is_finite() { short(item.computed) } else { "never".to_owned() }
 }
 
-/// For the terminal: what does not agree, most important first.
+/// The disagreements, most important first.
 pub fn text(report: &Report) -> String {
     let mut text = String::new();
     let mut last = None;
@@ -54,15 +54,15 @@ fn summary(report: &Report) -> String {
     let measured = report.items.iter().filter(|item| item.measured).count();
     let wrong = report.items.iter().filter(|item| item.measured && !item.agrees).count();
     format!(
-        "{} of {} printed numbers agree; {} do not. {measured} of them were measured and are compared with what other \
-         measured numbers lead to expect; {wrong} of those are out of line.\n",
+        "{} of {} printed numbers agree; {} do not. {measured} of them were measured and are compared with the \
+         prediction of other measured numbers; {wrong} of those are outliers.\n",
         report.agree,
         report.items.len(),
         report.disagree
     )
 }
 
-/// As a page in Markdown.
+/// A page in Markdown with every number.
 pub fn page(report: &Report) -> String {
     let mut page = String::new();
     // Writing to a string cannot fail.
@@ -71,28 +71,32 @@ pub fn page(report: &Report) -> String {
 }
 
 fn write_page(out: &mut String, report: &Report) -> std::fmt::Result {
-    writeln!(out, "# What of the source report comes out again\n")?;
+    writeln!(out, "# The printed numbers of the source report, recomputed\n")?;
     writeln!(
         out,
         "The source report: X. Liu, *Modeling of a Piezoelectric Beam Spring*, BSc report 030RAM2016, University of \
          Twente, August 2016.\n"
     )?;
-    writeln!(out, "Made by `cargo run --release -- reproduce --out docs/reproduce`; a test compares it.\n")?;
+    writeln!(
+        out,
+        "Written by `cargo run --release -- reproduce --out docs/reproduce`; a test checks that it is up to date.\n"
+    )?;
     writeln!(out, "{}", summary(report))?;
     writeln!(
         out,
-        "A number agrees if it comes out to its last printed digit. Whether digits were rounded or cut off is counted, \
-         table by table; cut off: {}. A claim such as \"more than\" agrees if it holds. A measured number agrees if it \
-         lies where the other measurements put it (5 % false alarms a table).\n",
+        "A number agrees if the computed value equals it to the last printed digit. Whether digits were rounded or truncated is \
+         decided for each table by the number of agreements; truncated: {}. A claim such as \"more than\" agrees if it holds. A \
+         measured number agrees if it lies within the prediction interval of the other measurements (5 % false alarms per \
+         table).\n",
         if report.truncated_groups.is_empty() { "none".to_owned() } else { report.truncated_groups.join(", ") }
     )?;
-    writeln!(out, "| | numbers | do not come out |\n| --- | ---: | ---: |")?;
+    writeln!(out, "| | numbers | disagree |\n| --- | ---: | ---: |")?;
     for bears_on in [BearsOn::Conclusion, BearsOn::Model, BearsOn::Result, BearsOn::Detail] {
         let of_kind = || report.items.iter().filter(|item| item.bears_on == bears_on);
         let wrong = of_kind().filter(|item| !item.agrees).count();
         writeln!(out, "| {} | {} | {wrong} |", heading(bears_on), of_kind().count())?;
     }
-    writeln!(out, "\n## What does not come out, most important first\n")?;
+    writeln!(out, "\n## Disagreements, most important first\n")?;
     let mut last = None;
     for (index, item) in by_importance(report).into_iter().enumerate() {
         if last != Some(item.bears_on) {
@@ -113,7 +117,7 @@ fn write_page(out: &mut String, report: &Report) -> std::fmt::Result {
         )?;
     }
     writeln!(out, "\n## Every number\n")?;
-    writeln!(out, "| where | printed | comes out | unit | agrees |\n| --- | ---: | ---: | --- | --- |")?;
+    writeln!(out, "| where | printed | computed | unit | agrees |\n| --- | ---: | ---: | --- | --- |")?;
     for item in &report.items {
         let agrees = if item.agrees { "yes" } else { "**no**" };
         writeln!(out, "| {} | {} | {} | {} | {agrees} |", item.place, item.text, computed(item), item.unit)?;

@@ -1,4 +1,4 @@
-//! A report as text.
+//! The answer of `vsj stair` as text.
 
 use crate::output::cells::{line, optional, tidy};
 use crate::output::step_response;
@@ -6,7 +6,7 @@ use paper::stair::{LimitedTicks, Report, Row};
 use simulation::experiment::StartsFrom;
 use simulation::response::Response;
 
-/// The rows beside what was printed and measured, what does not agree and why, and the steps.
+/// The rows compared with printed and measured values, explanations of differences, and the steps.
 pub fn text(report: &Report) -> String {
     let mut text = String::new();
     rows(&mut text, &report.rows);
@@ -42,7 +42,7 @@ pub fn text(report: &Report) -> String {
     text
 }
 
-/// Rows on the terminal; a long file is not printed whole.
+/// Largest number of rows on the terminal.
 const MOST_ROWS: usize = 40;
 
 fn rows(text: &mut String, rows: &[Row]) {

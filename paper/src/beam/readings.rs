@@ -37,7 +37,7 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
         return Err(table.lacks("force_un_<V>v", COLUMNS).into());
     }
     let mut readings = Vec::new();
-    while let Some(row) = table.next()? {
+    while let Some(row) = table.next_row()? {
         let displacement_mm = row.number(displacement)?;
         for &(column, voltage_v) in &voltages {
             readings.push(Reading { voltage_v, displacement_mm, force_un: row.number(column)? });
@@ -67,7 +67,7 @@ mod tests {
             ("force_un_0v\n1\n", "t, line 1: no column `displacement_mm`"),
             ("# a\ndisplacement_mm\n1\n", "t, line 2: no column `force_un_<V>v`"),
             ("displacement_mm,force_un_infv\n1,2\n", "t, line 1: no column `force_un_<V>v`"),
-            ("displacement_mm,force_un_0v,force_un_0v\n1,2,3\n", "t, line 1: column `force_un_0v` stands there twice"),
+            ("displacement_mm,force_un_0v,force_un_0v\n1,2,3\n", "t, line 1: column `force_un_0v` appears twice"),
             ("displacement_mm,force_un_0v\n", "t: 0 rows of data"),
             ("# a\n", "t: no header; expected one with displacement_mm"),
             (

@@ -70,7 +70,7 @@ pub fn kinds(name: &str, text: &str) -> Result<Vec<Kind>> {
     }
     let [material, youngs_modulus, length, width, thickness, count] = at;
     let mut kinds = Vec::new();
-    while let Some(row) = table.next()? {
+    while let Some(row) = table.next_row()? {
         kinds.push(Kind {
             material: row.text(material).to_owned(),
             youngs_modulus_gpa: row.number(youngs_modulus)?,

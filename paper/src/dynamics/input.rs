@@ -104,7 +104,7 @@ impl Input {
             for (time, level) in [(piece.start_s, piece.from_v), (piece.end_s, piece.to_v)] {
                 if level.is_nan() || level <= 0.0 {
                     bad_input!(
-                        "{}: level {} at {} s is no stiffness; expected more than 0 (or the model pi-plant)",
+                        "{}: level {} at {} s is not a stiffness; expected more than 0 (or the model pi-plant)",
                         self.name,
                         number(level),
                         number(time)

@@ -8,7 +8,7 @@ use toml::Value;
 
 use crate::reproduce::comparison::Comparison;
 use crate::reproduce::inputs::number as as_number;
-use crate::reproduce::other_inputs::{input_needed, other_reading, terms_left_out};
+use crate::reproduce::other_inputs::{input_needed, other_value, terms_left_out};
 use crate::reproduce::printed::Relation;
 use crate::reproduce::slips::{digit_of_a_reading, simple_factor, simulated, slip_of_the_pen};
 
@@ -16,12 +16,12 @@ use crate::reproduce::slips::{digit_of_a_reading, simple_factor, simulated, slip
 pub(crate) fn explain(number: &Comparison, all: &[Comparison]) -> Result<String> {
     let mut said: Vec<String> =
         [&number.entry.because, &number.outcome.evidence].into_iter().flatten().cloned().collect();
-    said.extend(in_standard_errors(number));
+    said.extend(distance_in_standard_errors(number));
     said.extend(first_explanation(number, all)?);
-    said.extend(with_its_likes(number, all));
+    said.extend(deviations_of_siblings(number, all));
     if number.outcome.standard_error.is_some() {
         let carried = |place| format!("{place} was computed with it: it was so before it was printed");
-        said.extend(used_again(number, all).map(carried));
+        said.extend(used_as_printed(number, all).map(carried));
     }
     Ok(said.iter().map(|sentence| capital(sentence)).collect::<Vec<_>>().join(". "))
 }
@@ -32,7 +32,7 @@ fn capital(sentence: &str) -> String {
 }
 
 /// Distance of a fitted number from the printed one, in standard errors of the fit.
-fn in_standard_errors(number: &Comparison) -> Option<String> {
+fn distance_in_standard_errors(number: &Comparison) -> Option<String> {
     let off = (number.printed.value - number.outcome.value) / number.outcome.standard_error?;
     let says = if off.abs() > 3.0 {
         "more than their scatter leaves open"
@@ -43,7 +43,7 @@ fn in_standard_errors(number: &Comparison) -> Option<String> {
 }
 
 /// Place of a number that agrees and was computed with this one as printed, which rules out a misprint.
-fn used_again<'a>(number: &Comparison, all: &'a [Comparison]) -> Option<&'a str> {
+fn used_as_printed<'a>(number: &Comparison, all: &'a [Comparison]) -> Option<&'a str> {
     if number.printed.significant_digits() < 4 {
         return None;
     }
@@ -63,17 +63,19 @@ fn used_again<'a>(number: &Comparison, all: &'a [Comparison]) -> Option<&'a str>
 /// The first explanation that fits.
 fn first_explanation(number: &Comparison, all: &[Comparison]) -> Result<Option<String>> {
     if number.entry.relation != Relation::Equal && number.entry.relation != Relation::About {
-        return Ok(Some(other_reading(number, all)?.unwrap_or_else(|| number.difference())));
+        return Ok(Some(other_value(number, all)?.unwrap_or_else(|| number.difference())));
     }
     if number.outcome.expected.is_some() {
         // A deviation shared with other readings is no misprint of one digit.
-        let alone = !number.outcome.lasts && !alike(number, &likes(number, all));
+        let alone = !number.outcome.persists && !deviate_alike(number, &siblings(number, all));
         return Ok(alone.then(|| digit_of_a_reading(number)).flatten());
     }
-    if let Some(slip) = simulated(number, all).or_else(|| slip_of_the_pen(number, used_again(number, all).is_some())) {
+    if let Some(slip) =
+        simulated(number, all).or_else(|| slip_of_the_pen(number, used_as_printed(number, all).is_some()))
+    {
         return Ok(Some(slip));
     }
-    if let Some(other) = other_reading(number, all)? {
+    if let Some(other) = other_value(number, all)? {
         return Ok(Some(other));
     }
     if let Some(left_out) = terms_left_out(number)? {
@@ -87,7 +89,7 @@ fn first_explanation(number: &Comparison, all: &[Comparison]) -> Result<Option<S
 }
 
 /// Other measured numbers of the same table, at the same voltage under another force.
-fn likes<'a>(number: &Comparison, all: &'a [Comparison]) -> Vec<&'a Comparison> {
+fn siblings<'a>(number: &Comparison, all: &'a [Comparison]) -> Vec<&'a Comparison> {
     let same = |other: &&Comparison| {
         number.outcome.expected.is_some()
             && other.entry.group == number.entry.group
@@ -104,22 +106,26 @@ fn deviation(number: &Comparison) -> f64 {
 }
 
 /// True if there are other numbers and their deviations agree with this one within 5 percentage points.
-fn alike(number: &Comparison, likes: &[&Comparison]) -> bool {
-    !likes.is_empty() && likes.iter().all(|like| (deviation(like) - deviation(number)).abs() < 0.05)
+fn deviate_alike(number: &Comparison, siblings: &[&Comparison]) -> bool {
+    !siblings.is_empty() && siblings.iter().all(|like| (deviation(like) - deviation(number)).abs() < 0.05)
 }
 
 /// The deviations of other numbers at the same voltage, in words.
-fn with_its_likes(number: &Comparison, all: &[Comparison]) -> Option<String> {
-    let likes = likes(number, all);
-    if likes.is_empty() {
+fn deviations_of_siblings(number: &Comparison, all: &[Comparison]) -> Option<String> {
+    let siblings = siblings(number, all);
+    if siblings.is_empty() {
         return None;
     }
-    let others: Vec<String> = likes.iter().map(|like| format!("{:+.1} %", 1e2 * deviation(like))).collect();
+    let others: Vec<String> = siblings.iter().map(|like| format!("{:+.1} %", 1e2 * deviation(like))).collect();
     Some(format!(
         "it is off by {:+.1} %, at the same voltage the other by {}: {}",
         1e2 * deviation(number),
         others.join(", "),
-        if alike(number, &likes) { "a common cause, such as another sample or mounting" } else { "this one alone" }
+        if deviate_alike(number, &siblings) {
+            "a common cause, such as another sample or mounting"
+        } else {
+            "this one alone"
+        }
     ))
 }
 

@@ -11,7 +11,7 @@ use crate::reproduce::digits::short;
 use crate::reproduce::inputs::{Inputs, number as as_number};
 
 /// Explanation by another value of an input: one that the report prints under the same name or that the text may mean.
-pub(super) fn other_reading(number: &Comparison, all: &[Comparison]) -> Result<Option<String>> {
+pub(super) fn other_value(number: &Comparison, all: &[Comparison]) -> Result<Option<String>> {
     if number.entry.of_table {
         return Ok(None);
     }

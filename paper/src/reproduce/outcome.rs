@@ -8,7 +8,7 @@ pub struct Outcome {
     /// Range that other measured numbers predict, for a printed number that was measured.
     pub expected: Option<(f64, f64)>,
     /// True if the following readings continue from this one, so that none of its digits can be misread.
-    pub lasts: bool,
+    pub persists: bool,
     /// Standard error of the number, if it was fitted.
     pub standard_error: Option<f64>,
     /// Further facts for the explanation of a disagreement.
@@ -18,6 +18,6 @@ pub struct Outcome {
 impl Outcome {
     /// A number computed without uncertainty.
     pub fn exact(value: f64) -> Self {
-        Self { value, expected: None, lasts: false, standard_error: None, evidence: None }
+        Self { value, expected: None, persists: false, standard_error: None, evidence: None }
     }
 }

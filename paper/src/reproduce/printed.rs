@@ -76,7 +76,7 @@ impl Printed {
     }
 
     /// Formats `value` with the decimals and exponent of this number.
-    pub fn alike(&self, value: f64, rule: Rule) -> String {
+    pub fn format_like(&self, value: f64, rule: Rule) -> String {
         let scaled = value / 10f64.powi(self.exponent);
         let shift = 10f64.powi(self.decimals as i32);
         let cut = match rule {
@@ -166,7 +166,7 @@ mod tests {
             for rule in [Rule::Rounded, Rule::Truncated] {
                 let value = value * 10f64.powi(exponent);
                 let shape = Printed { value: 1.0, decimals, exponent };
-                let text = format!("{}e{exponent}", shape.alike(value, rule));
+                let text = format!("{}e{exponent}", shape.format_like(value, rule));
                 prop_assert!(agrees(&text, value, rule), "{text} {value} {rule:?}");
             }
         }

@@ -51,23 +51,23 @@ pub(crate) fn table1(inputs: &Inputs<'_>) -> Result<Outcome> {
     let fit = lines(&all, &voltages(&all))?;
     let expected = fit.readings[index].expected;
     // The prediction interval holds one further reading with 95 %; widened, it holds all readings of the table.
-    let half = (expected.high - expected.value) * widening(&fit, all.len())?;
+    let half = (expected.high - expected.value) * bonferroni_factor(&fit, all.len())?;
     let evidence = format!(
         "the line through the other readings, which gives {:.1} +- {half:.1}; by chance a reading falls so far off once in \
          {:.0}",
         expected.value,
         1.0 / fit.readings[index].chance
     );
-    Ok(near(expected.value, half, evidence))
+    Ok(predicted(expected.value, half, evidence))
 }
 
 /// A measured number predicted to lie within `half` of `value`.
-fn near(value: f64, half: f64, evidence: String) -> Outcome {
+fn predicted(value: f64, half: f64, evidence: String) -> Outcome {
     Outcome { expected: Some((value - half, value + half)), evidence: Some(evidence), ..Outcome::exact(value) }
 }
 
 /// Ratio of the interval that holds `numbers` numbers to that of a single one, both with 95 %.
-fn widening(fit: &Fit, numbers: usize) -> Result<f64> {
+fn bonferroni_factor(fit: &Fit, numbers: usize) -> Result<f64> {
     let student = StudentsT::new(0.0, 1.0, (fit.degrees_of_freedom - 1) as f64)?;
     Ok(student.inverse_cdf(1.0 - 0.5 * FALSE_ALARM / numbers as f64) / student.inverse_cdf(0.975))
 }
@@ -83,11 +83,11 @@ pub(crate) fn tip_by_table1_mm(inputs: &Inputs<'_>) -> Result<Outcome> {
     let slope = fit.coefficients[index];
     // The widest prediction interval of Table 1.
     let spread = fit.readings.iter().map(|r| r.expected.high - r.expected.value).fold(0.0, f64::max);
-    let half = spread * widening(&fit, tips()?.len())? / slope;
+    let half = spread * bonferroni_factor(&fit, tips()?.len())? / slope;
     let value = force / slope;
     let evidence =
         format!("{force} uN by the slope of Table 1 at {voltage} V, {slope:.2} uN/mm: {value:.3} +- {half:.3} mm");
-    Ok(near(value, half, evidence))
+    Ok(predicted(value, half, evidence))
 }
 
 /// A reading of Table 3 in V, predicted from the one before by the simulation without controller.
@@ -107,7 +107,7 @@ pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
     let value = simulated[index] + off[index - 1];
     let side = |off: f64| if off < 0.0 { "below" } else { "above" };
     let run = off[1..index].iter().rev().take_while(|earlier| side(**earlier) == side(off[index - 1])).count();
-    let lasts = off
+    let persists = off
         .get(index + 1)
         .is_some_and(|next| (next - off[index]).abs() <= half && (next - off[index - 1]).abs() > half);
     let evidence = format!(
@@ -122,9 +122,9 @@ pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
         off[index - 1].abs(),
         off[index].abs(),
         side(off[index]),
-        if lasts { ", and the next goes on from there: what was measured shifted between the two" } else { "" },
+        if persists { ", and the next goes on from there: what was measured shifted between the two" } else { "" },
     );
-    Ok(Outcome { lasts, ..near(value, half, evidence) })
+    Ok(Outcome { persists, ..predicted(value, half, evidence) })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -16,9 +16,9 @@ pub(super) fn simulated(number: &Comparison, all: &[Comparison]) -> Option<Strin
 }
 
 /// Explanation by swapped or wrong digits, a shifted decimal point, or the reciprocal.
-pub(super) fn slip_of_the_pen(number: &Comparison, used_again: bool) -> Option<String> {
+pub(super) fn slip_of_the_pen(number: &Comparison, used_as_printed: bool) -> Option<String> {
     let Comparison { printed, outcome, rule, .. } = number;
-    let (found, expected) = (printed.digits(), printed.alike(outcome.value, *rule));
+    let (found, expected) = (printed.digits(), printed.format_like(outcome.value, *rule));
     let all_digits = printed.significant_digits();
     if number.entry.relation == Relation::About {
         let near = |power: i32| printed.agrees(outcome.value * 10f64.powi(power), Relation::About, *rule);
@@ -27,7 +27,7 @@ pub(super) fn slip_of_the_pen(number: &Comparison, used_again: bool) -> Option<S
     }
     // The fewer digits agree, the weaker the evidence of a match.
     if all_digits >= 3
-        && !used_again
+        && !used_as_printed
         && let Some((left, right)) = swapped_digits(&expected, &found)
     {
         return Some(format!("the computed {expected} with its neighbouring digits {left} and {right} swapped"));
@@ -46,7 +46,7 @@ pub(super) fn slip_of_the_pen(number: &Comparison, used_again: bool) -> Option<S
     // A difference in the last digit is a matter of precision.
     let but_last = |text: &str| text.chars().take(text.len() - 1).collect::<String>();
     if all_digits >= 2
-        && !used_again
+        && !used_as_printed
         && but_last(&expected) != but_last(&found)
         && let Some((wrong, right)) = single_digit(&expected, &found)
     {

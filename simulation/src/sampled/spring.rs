@@ -39,7 +39,7 @@ pub struct State {
 
 /// Effect of a change of the voltage by 1 V, dimensionless.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turning {
+pub struct Reversal {
     /// Change of the stiffness at the end of the first tick.
     pub within_a_tick: f64,
     /// Further change in each later tick.
@@ -100,14 +100,14 @@ impl Spring {
 
     /// Stiffness as the equivalent static voltage, in V.
     pub fn stiffness(&self, state: &State) -> f64 {
-        let charge = self.answer(state) - self.leakage.0 * state.leaked;
+        let charge = self.law_output(state) - self.leakage.0 * state.leaked;
         let later: f64 = self.lags.iter().zip(&state.lags).map(|((_, weight), lag)| weight * lag).sum();
         self.share * charge + later
     }
 
     /// Holds the voltage for `seconds`.
     pub fn hold(&self, state: &mut State, seconds: f64) {
-        let answer = self.answer(state);
+        let answer = self.law_output(state);
         let (leak_share, leak_tau) = self.leakage;
         let still_to_leak = leak_share * (answer - state.leaked);
         let settled = (1.0 - leak_share) * answer;
@@ -125,7 +125,7 @@ impl Spring {
 
     /// Largest instantaneous change of the stiffness per volt: all play operators move, on the steepest segment of the
     /// law.
-    pub fn steepest(&self) -> f64 {
+    pub fn steepest_slope(&self) -> f64 {
         let plays: f64 = self.plays.iter().map(|(_, weight)| weight.max(0.0)).sum();
         let slopes = self.law.windows(2).map(|pair| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0));
         let law = if self.law.is_empty() { 1.0 } else { slopes.fold(0.0, f64::max) };
@@ -133,7 +133,7 @@ impl Spring {
     }
 
     /// Smallest effect of 1 V when the voltage turns back, for ticks of `seconds`.
-    pub fn turning(&self, seconds: f64) -> Turning {
+    pub fn reversal(&self, seconds: f64) -> Reversal {
         let slopes = self.law.windows(2).map(|pair| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0));
         let law = slopes.reduce(f64::min).unwrap_or(1.0);
         let all: f64 = self.plays.iter().map(|(_, weight)| weight).sum::<f64>() + self.direct;
@@ -149,7 +149,7 @@ impl Spring {
             self.lags.iter().enumerate().map(|(index, &(tau, weight))| (made(slowest(index, tau)), weight)).collect();
         let later: f64 = lags.iter().map(|(made, weight)| made * weight).sum();
         let in_each_later = slope * (1.0 - mean_loss) * later;
-        Turning {
+        Reversal {
             within_a_tick: slope * self.share * (1.0 - loss * made(leak_tau)) + in_each_later,
             in_each_later,
             relaxed: lags.iter().map(|lag| lag.0).fold(1.0, f64::min),
@@ -157,7 +157,7 @@ impl Spring {
     }
 
     /// Output of the static law after the play operators, in V.
-    fn answer(&self, state: &State) -> f64 {
+    fn law_output(&self, state: &State) -> f64 {
         let plays: f64 = self.plays.iter().zip(&state.plays).map(|((_, weight), place)| weight * place).sum();
         let input = self.direct * state.voltage + plays;
         // The segment around the input, or the nearest one.
@@ -230,7 +230,7 @@ mod tests {
         spring.hold(&mut short, 1.75);
         assert!((spring.stiffness(&long) - spring.stiffness(&short)).abs() < 1e-9);
 
-        let (f, steps) = (spring.answer(&state), 3_000_000);
+        let (f, steps) = (spring.law_output(&state), 3_000_000);
         let h = 3.0 / f64::from(steps);
         for _ in 0..steps {
             let q = f - 0.1 * state.leaked;
@@ -249,17 +249,17 @@ mod tests {
         let mut state = spring.at_rest();
         spring.apply(&mut state, 300.0);
         // 0.8 * 300 + 0.15 * 290 + 0.05 * 275 = 297.25, on the line from (200, 190) to (300, 300)
-        assert!((spring.answer(&state) - (190.0 + 1.1 * 97.25)).abs() < 1e-9);
+        assert!((spring.law_output(&state) - (190.0 + 1.1 * 97.25)).abs() < 1e-9);
         spring.apply(&mut state, 290.0);
         // Both play operators stay.
-        assert!((spring.answer(&state) - (190.0 + 1.1 * 89.25)).abs() < 1e-9);
+        assert!((spring.law_output(&state) - (190.0 + 1.1 * 89.25)).abs() < 1e-9);
         spring.apply(&mut state, 700.0);
         // 560 + 103.5 + 33.75 = 697.25, beyond the last point on its line
-        assert!((spring.answer(&state) - (500.0 + 0.9 * 197.25)).abs() < 1e-9);
+        assert!((spring.law_output(&state) - (500.0 + 0.9 * 197.25)).abs() < 1e-9);
         spring.apply(&mut state, -100.0);
         // -80 - 13.5 - 3.75
-        assert!((spring.answer(&state) + 0.9 * 97.25).abs() < 1e-9);
-        assert!((spring.steepest() - 0.0909 * 1.1).abs() < 1e-12);
+        assert!((spring.law_output(&state) + 0.9 * 97.25).abs() < 1e-9);
+        assert!((spring.steepest_slope() - 0.0909 * 1.1).abs() < 1e-12);
     }
 
     /// Rows at uneven times, the last after a long rest.

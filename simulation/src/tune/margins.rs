@@ -59,7 +59,7 @@ impl Margins {
     }
 
     /// True if all margins are at least as good as [`Margins::LEAST`].
-    pub fn enough(&self) -> bool {
+    pub fn sufficient(&self) -> bool {
         let at_least =
             |own: Option<f64>, least: Option<f64>| own.is_none_or(|own| least.is_none_or(|least| own >= least));
         at_least(self.gain, Self::LEAST.gain)
@@ -100,6 +100,6 @@ mod tests {
         let got = margins.phase_deg.unwrap();
         assert!((got - phase).abs() < 0.5, "{got} {phase}");
         assert_eq!(margins.gain, None, "two lags never turn it to -180 degrees: {margins:?}");
-        assert!(!Margins::of(&file, &Gains { proportional: 0.01, integral_per_s: 50.0 }, 1000.0).enough());
+        assert!(!Margins::of(&file, &Gains { proportional: 0.01, integral_per_s: 50.0 }, 1000.0).sufficient());
     }
 }

@@ -53,12 +53,12 @@ pub struct Trade {
 }
 
 /// Evaluates errors of -50 % to +50 % in steps of 5 %.
-pub(super) fn over_errors(file: &PlantFile, with_gains: Option<&Run>, fast: Option<&Run>) -> Vec<Trade> {
+pub(super) fn over_model_errors(file: &PlantFile, with_gains: Option<&Run>, fast: Option<&Run>) -> Vec<Trade> {
     let mut trade = Vec::new();
     for parameter in Parameter::ALL {
         for part in -10..=10 {
             let error = f64::from(part) / 20.0;
-            let on = |run: Option<&Run>| run.map(|run| on_another(file, parameter, error, run));
+            let on = |run: Option<&Run>| run.map(|run| with_model_error(file, parameter, error, run));
             trade.push(Trade { parameter, error, proportional_integral: on(with_gains), fast: on(fast) });
         }
     }
@@ -66,8 +66,8 @@ pub(super) fn over_errors(file: &PlantFile, with_gains: Option<&Run>, fast: Opti
 }
 
 /// Worst response when the voltages of `run` drive a spring that differs from the file's.
-fn on_another(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> Worst {
-    let (spring, gain) = another(file, parameter, 1.0 + error);
+fn with_model_error(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> Worst {
+    let (spring, gain) = differing_spring(file, parameter, 1.0 + error);
     let times: Vec<f64> = (0..run.with.len()).map(|tick| run.time_s(tick)).collect();
     let volts: Vec<f64> = run.with.iter().map(|sample| sample.applied.to_f64()).collect();
     let stiffness = sampled::simulate(&spring, &times, &volts);
@@ -87,7 +87,7 @@ fn on_another(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> 
 }
 
 /// A spring whose `parameter` is `factor` times the file's, and the gain of its response.
-fn another(file: &PlantFile, parameter: Parameter, factor: f64) -> (Spring, f64) {
+fn differing_spring(file: &PlantFile, parameter: Parameter, factor: f64) -> (Spring, f64) {
     let mut file = file.clone();
     let relaxation = &mut file.relaxation;
     match parameter {
@@ -121,7 +121,7 @@ mod tests {
             let settled = |spring: &Spring| sampled::simulate(spring, &[0.0, 1e4], &[100.0, 100.0])[1];
             let nominal = settled(&Spring::from(file.extended()));
             for parameter in Parameter::ALL {
-                let (spring, gain) = another(&file, parameter, 1.4);
+                let (spring, gain) = differing_spring(&file, parameter, 1.4);
                 let expected = if parameter == Parameter::Gain { 1.4 * nominal } else { nominal };
                 assert!((gain * settled(&spring) - expected).abs() < 1e-6, "{parameter:?}");
             }

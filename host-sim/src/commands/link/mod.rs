@@ -12,7 +12,7 @@ use link::{Desired, Fault, Request};
 use session::{Session, seconds};
 use simulation::bad_input;
 
-/// Talk to the MCU over its serial link: status, set, arm, disarm, watch, record, model
+/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, model
 #[derive(Args, Debug)]
 #[command(
     arg_required_else_help = false,
@@ -23,14 +23,14 @@ Examples:
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
   vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
-  vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run what was found
+  vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
 
-The MCU leads the voltage down when it has not heard the host for longer than its limit (see `status`): a target lives as \
-long as a command that keeps sessioning, --keep, watch or record. Each request is sent every 0.1 s until it is answered, for \
---timeout seconds; the MCU applies it once.
+The MCU ramps the voltage down when the host is silent for longer than its limit (see `status`): a target is kept only while \
+a command stays connected: --keep, watch or record. A request is repeated every 0.1 s until it is answered, for --timeout \
+seconds; the MCU applies it once.
 
-Exit codes: 0 done, 1 refused, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a stiffness \
-out of reach."
+Exit codes: 0 success, 1 request rejected, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a \
+stiffness out of reach."
 )]
 pub(crate) struct Arguments {
     /// A serial device, unix:PATH or tcp:HOST:PORT
@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     port: String,
     #[command(subcommand)]
     command: Command,
-    /// Speed of a serial device, in bit/s
+    /// Baud rate of a serial device, in bit/s
     #[arg(long, global = true, default_value_t = 115_200, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     baud: u32,
     /// How long to wait for an answer, in s
@@ -51,43 +51,43 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Everything about the MCU
+    /// Show the status of the MCU
     Status,
     /// Set the desired stiffness of an armed MCU
     Set(Set),
-    /// Let voltage out; the target starts at 0 V
+    /// Enable the output; the target starts at 0 V
     Arm {
-        /// Stay connected for so many seconds, `inf` until Ctrl-C
+        /// Stay connected for this many seconds, `inf` until Ctrl-C
         #[arg(long, value_name = "S", allow_negative_numbers = true)]
         keep: Option<f64>,
     },
-    /// Take the voltage away at once
+    /// Disable the output immediately
     Disarm,
-    /// Acknowledge a fault, by its name or number as `status` says it; the MCU is disarmed then
+    /// Acknowledge a fault by the name or number that `status` shows; the MCU is then disarmed
     Acknowledge {
         /// Name or number of the fault
         fault: String,
     },
-    /// Show the loop while it runs, and keep the MCU from thinking the host silent
+    /// Show the running loop, and keep the MCU from detecting a silent host
     Watch(watch::Arguments),
-    /// Record time, voltage and stiffness as CSV, as `vsj diagnose` reads them
+    /// Record time, voltage and stiffness as CSV for `vsj diagnose`
     Record(record::Arguments),
-    /// Which model of the spring the MCU runs; with a plant file, send it, have it checked and stored, and restart
+    /// Show the MCU's model of the spring; with a plant file, send it to be checked and stored, and restart
     Model(model::Arguments),
 }
 
 #[derive(Args, Debug)]
 struct Set {
-    /// The stiffness
+    /// The desired stiffness
     #[arg(allow_negative_numbers = true)]
     value: f64,
-    /// Its unit: volts of equivalent static voltage, Pa of Young's modulus, N/m at the tip
+    /// Unit of the value: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip
     #[arg(long, value_enum, default_value_t)]
     unit: Unit,
-    /// Arm first
+    /// Arm the MCU first
     #[arg(long)]
     arm: bool,
-    /// Stay connected for so many seconds, `inf` until Ctrl-C
+    /// Stay connected for this many seconds, `inf` until Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     keep: Option<f64>,
 }
@@ -104,7 +104,7 @@ enum Unit {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let json = arguments.json;
     let patience = Patience::of(seconds("--timeout", arguments.timeout, 3600.0)?);
-    // What can be wrong with the arguments, before anything is sent.
+    // The arguments are checked before anything is sent.
     let fault = match &arguments.command {
         Command::Acknowledge { fault } => parse_fault(fault)?,
         _ => Fault::NONE,
@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if let Command::Set(Set { value, .. }) = &arguments.command
         && !value.is_finite()
     {
-        bad_input!("{value} is no stiffness; expected a finite number");
+        bad_input!("{value} is not a stiffness; expected a finite number");
     }
     let keep = match &arguments.command {
         Command::Set(Set { keep, .. }) | Command::Arm { keep } => keep.map(|s| seconds("--keep", s, f64::INFINITY)),
@@ -177,7 +177,7 @@ fn parse_fault(text: &str) -> Result<Fault> {
         Ok(code) if code > 0 => Ok(Fault(code)),
         _ => {
             let names: Vec<_> = known.map(Fault::name).collect();
-            bad_input!("{text} is no fault; expected {} or a number of 1 to 255", names.join(", "))
+            bad_input!("{text} is not a fault; expected {} or a number of 1 to 255", names.join(", "))
         }
     }
 }

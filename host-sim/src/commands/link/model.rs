@@ -9,18 +9,18 @@ use simulation::{BadInput, bad_input, plant_file};
 
 use super::session::Session;
 
-/// A spring nearer to rest than this, in V, counts as settled.
+/// A spring whose stiffness is below this, in V, counts as settled at 0 V.
 const SETTLED_V: f64 = 1.0;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// A plant file, as `vsj diagnose --out` writes it, or `paper`
+    /// A plant file, such as `vsj diagnose --out` writes, or `paper`
     #[arg(value_name = "FILE.toml|paper")]
     plant: Option<String>,
 }
 
 impl Arguments {
-    /// What is to be sent.
+    /// Reads the model to be sent; `None` without a plant file.
     pub(super) fn read(&self) -> Result<Option<WireModel>> {
         let Some(plant) = &self.plant else { return Ok(None) };
         let file = plant_file::load(plant)?;
@@ -55,7 +55,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, model: Option<&W
     print(&if session.json { json(&models)? } else { text })
 }
 
-/// How long the slowest of a spring's relaxations takes to settle without voltage, in s, if it has not.
+/// Time in s that the slowest relaxation needs to settle at 0 V; `None` if it has settled.
 fn unsettled_s(estimate_v: f64, model: &WireModel) -> Option<f64> {
     let leak_s = model.leakage.map(|(_, time_constant_s)| time_constant_s);
     let all_s = model.time_constants_s.iter().copied().chain(model.time_constant_high_s).chain(leak_s);

@@ -1,4 +1,4 @@
-//! `vsj link PORT record`: telemetry to a file, and a schedule to the MCU meanwhile if one is asked for.
+//! `vsj link PORT record`: writes telemetry to a file, and optionally commands a schedule.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -22,22 +22,22 @@ pub(super) struct Arguments {
     /// The file to write
     #[arg(value_name = "FILE.csv")]
     file: PathBuf,
-    /// Stop after so many seconds; without it, with Ctrl-C or at the end of --input
+    /// Stop after this many seconds; default: at the end of --input, or with Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Samples per second; 115 200 bit/s carry about 250
+    /// Samples per second; 115 200 bit/s suffice for about 250
     #[arg(long, default_value_t = 100.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// Lead an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v
+    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v
     #[arg(long, value_name = "stair|step|FILE.csv")]
     input: Option<String>,
-    /// What the voltage does between two rows of an input file
+    /// Interpolation of the voltage between two rows of an input file
     #[arg(long, default_value = "hold", value_parser = one_of(BETWEEN))]
     between: Between,
-    /// Arm first
+    /// Arm the MCU first
     #[arg(long)]
     arm: bool,
-    /// Overwrite a file that exists
+    /// Overwrite an existing file
     #[arg(long)]
     force: bool,
 }
@@ -71,7 +71,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         bail!("{}: not armed ({}); expected --arm with --input", session.client.name(), session.status.sample.state);
     }
     if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {
-        // Before anything is armed or written, not in the middle of an experiment.
+        // Checked before anything is armed or written.
         schedule.check_range(name, session.status.lowest.to_f64(), session.status.highest.to_f64())?;
     }
     let length = schedule.as_ref().map(|schedule| Duration::from_secs_f64(schedule.end_s() - schedule.start_s()));
@@ -85,10 +85,10 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     }
     session.order(Request::Stream { every_ticks })?;
     let done = follow(session, schedule.as_ref(), whole, &mut recording);
-    // Out of courtesy: it also stops by itself when it no longer hears us.
+    // The MCU would also stop by itself once the host is silent.
     let stopped = session.order(Request::Stream { every_ticks: 0 });
     let (summary, file) = (recording.summary(), arguments.file.display());
-    done.with_context(|| format!("{file} keeps {} rows", summary.rows))?;
+    done.with_context(|| format!("{file} contains {} rows", summary.rows))?;
     stopped?;
     if summary.stiffness == "estimate" {
         remark("no sensor: the column stiffness is the controller's own estimate, not a measurement");

@@ -11,14 +11,14 @@ use serde::Serialize;
 use simulation::bad_input;
 use simulation::bad_input::number;
 
-/// What `set`, `arm`, `disarm` and `acknowledge` print with `--json`.
+/// The answer of `set`, `arm`, `disarm` and `acknowledge` with `--json`.
 #[derive(Serialize)]
 struct Done {
     state: &'static str,
     target_v: f64,
 }
 
-/// An open connection, and what all commands need of it.
+/// A connection to an MCU with its latest status.
 pub(super) struct Session {
     pub(super) client: Client,
     pub(super) status: Status,
@@ -26,7 +26,7 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// A stiffness out of reach is the caller's to mend; everything else failed.
+    /// Sends a request. A stiffness out of reach is bad input; any other error is a failure.
     pub(super) fn order(&mut self, request: Request) -> Result<(State, WireVolts)> {
         match self.client.order(request) {
             Ok(done) => Ok(done),
@@ -58,13 +58,13 @@ impl Session {
         print(&if self.json { json(&done)? } else { text })
     }
 
-    /// How often the MCU has to hear us: five times within its limit.
+    /// Interval of heartbeats: five within the longest silence that the MCU allows, 0.01 s to 1 s.
     pub(super) fn heartbeat(&self) -> Duration {
         let limit_s = f64::from(self.status.silence_limit_ticks) / f64::from(self.status.rate_hz.max(1));
         Duration::from_secs_f64((limit_s / 5.0).clamp(0.01, 1.0))
     }
 
-    /// An error unless armed. Ramping is: the frame that told us so has just ended it.
+    /// Returns an error unless the MCU is armed. Ramping is accepted: the frame that reported it has ended it.
     pub(super) fn still_armed(&mut self, state: State) -> Result<()> {
         if !matches!(state, State::Armed | State::Ramping) {
             self.refresh()?;
@@ -73,7 +73,7 @@ impl Session {
         Ok(())
     }
 
-    /// Stays connected, and says when the MCU no longer does what it was told.
+    /// Stays connected for `time`; returns an error if the MCU is no longer armed.
     pub(super) fn keep(&mut self, time: Option<Duration>) -> Result<()> {
         let Some(time) = time else { return Ok(()) };
         stop_on_interrupt()?;
@@ -89,7 +89,7 @@ impl Session {
 
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C only ends the loop that asks [`stopped`]; a second one ends the program.
+/// Makes Ctrl-C set the flag read by [`stopped`]; a second Ctrl-C ends the program.
 pub(super) fn stop_on_interrupt() -> Result<()> {
     Ok(ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::Relaxed) {
@@ -102,7 +102,7 @@ pub(super) fn stopped() -> bool {
     STOP.load(Ordering::Relaxed)
 }
 
-/// A positive time, `most` seconds at the most; an infinite one is as long as a `Duration` goes.
+/// Checks a time in s that must be positive and at most `most`; an infinite one becomes the longest `Duration`.
 pub(super) fn seconds(option: &str, value: f64, most: f64) -> Result<Duration> {
     if !(value > 0.0 && value <= most) {
         bad_input!("{option} {}: expected a positive number of seconds", number(value));

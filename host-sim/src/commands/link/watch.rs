@@ -19,7 +19,7 @@ pub(super) struct Arguments {
     /// Time between two samples, in s
     #[arg(long, default_value_t = 0.2, value_name = "S", allow_negative_numbers = true)]
     every: f64,
-    /// Stop after so many seconds; without it, with Ctrl-C
+    /// Stop after this many seconds; default: with Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
 }
@@ -35,7 +35,7 @@ impl Arguments {
     }
 }
 
-/// What `--json` prints at the end.
+/// The answer of `watch` with `--json`.
 #[derive(Serialize)]
 struct Watched {
     samples: u64,
@@ -55,11 +55,11 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         if Instant::now() >= next {
             samples += 1;
             match screen.show(&report) {
-                // Who closes the pipe has seen enough.
+                // A closed pipe ends the command without an error.
                 Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
                 shown => shown?,
             }
-            // From now on, should we have been late: no burst.
+            // After a delay, continue from now instead of catching up.
             next = (next + every).max(Instant::now());
         }
         let pause = next.saturating_duration_since(Instant::now());
