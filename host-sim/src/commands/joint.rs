@@ -8,7 +8,7 @@ use host_sim::output::files::Files;
 use host_sim::output::joint;
 use host_sim::output::terminal::{json, print, wrote};
 use paper::beam::cantilever::Beam;
-use paper::joint::report::{Report, Requirement};
+use paper::joint::report::{self, Requirement};
 use paper::joint::{Joint, MOST_SPRINGS, OuterEnd};
 use simulation::plant_file;
 use simulation::reference::Loop;
@@ -22,7 +22,7 @@ use super::option_names::named;
 Examples:
   vsj joint                                     12 springs of the report's size
   vsj joint --springs 24 --inner-radius-mm 40 --outer-end clamped
-  vsj joint --stiffness 0.02                    the spring constant for 0.02 N m/rad
+  vsj joint --stiffness 0.02                    spring constant for 0.02 N m/rad
   vsj joint --limit-v 1000 --within-s 1 --json  another amplifier, more time")]
 pub(crate) struct Arguments {
     /// Number of springs
@@ -102,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         range_v: (0.0, arguments.limit_v),
         slew_v_per_s: arguments.slew_v_per_s.unwrap_or(f64::INFINITY),
     };
-    let report = Report::new(geometry, requirement, &beam, &system, arguments.stiffness)
+    let report = report::Report::new(geometry, requirement, &beam, &system, arguments.stiffness)
         .map_err(|error| named(error, OPTIONS))?;
     let (json, text) = (json(&report)?, joint::text(&report));
     let mut written = String::new();
