@@ -10,7 +10,7 @@ use host_sim::output::{beam, figure};
 use paper::beam::cantilever::{Beam, Load};
 use paper::beam::layered::ELEMENTS;
 use paper::beam::readings;
-use paper::beam::report::{Report, Setup};
+use paper::beam::report::{self, Setup};
 use paper::beam::slip::tips;
 use paper::beam::stack::{self, ORDER, Stack, TABLE2};
 use simulation::csv_table::read;
@@ -83,7 +83,7 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let setup = setup(arguments)?;
-    let report = Report::new(&setup).map_err(|error| in_file(named(error, OPTIONS), arguments))?;
+    let report = report::Report::new(&setup).map_err(|error| in_file(named(error, OPTIONS), arguments))?;
     let text = beam::text(&report);
     let mut written = String::new();
     if let Some(folder) = &arguments.out {

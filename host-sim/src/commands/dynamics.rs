@@ -9,7 +9,7 @@ use host_sim::output::terminal::{json, print, wrote};
 use host_sim::output::{dynamics, figure};
 use paper::dynamics::input::Input;
 use paper::dynamics::plant::PlantGains;
-use paper::dynamics::report::{Model, Report, Setup};
+use paper::dynamics::report::{self, Model, Setup};
 use paper::dynamics::zener::{Changes, Start, Zener};
 use simulation::schedule::Between;
 
@@ -90,7 +90,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         start: if arguments.settled { Start::Settled } else { Start::Unloaded },
         every_s: arguments.every,
     };
-    let report = Report::new(&setup).map_err(|error| named(error, OPTIONS))?;
+    let report = report::Report::new(&setup).map_err(|error| named(error, OPTIONS))?;
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;

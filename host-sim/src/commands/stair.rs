@@ -11,7 +11,7 @@ use host_sim::output::terminal::{json, print, remark, wrote};
 use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Plant, Settings};
-use paper::stair::{Report, Rows};
+use paper::stair::Rows;
 use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::bad_input::number;
@@ -202,7 +202,7 @@ fn run_plant<P: HasReference>(
         None => Rows::Table3 { same: arguments.input == "stair" && is_the_reports(&experiment.settings) },
     };
     let controlled = arguments.controller != Controller::None;
-    let report = Report::new(&experiment, &run, &rows, controlled)?;
+    let report = paper::stair::Report::new(&experiment, &run, &rows, controlled)?;
     let paths = match &arguments.out {
         Some(folder) => write(folder, &experiment, &run, &report, controlled, stride)?,
         None => Vec::new(),
@@ -232,7 +232,7 @@ fn write<P>(
     folder: &Path,
     experiment: &Experiment<P>,
     run: &Run,
-    report: &Report,
+    report: &paper::stair::Report,
     controlled: bool,
     stride: usize,
 ) -> Result<Vec<PathBuf>> {

@@ -4,19 +4,19 @@ use std::fmt::Write;
 
 use paper::beam::readings::Reading;
 use paper::beam::regression::Interval;
-use paper::beam::report::{Layers, Report, Statics};
+use paper::beam::report::{self, Layers, Statics};
 use paper::beam::slip::Identified;
 
 /// Tables of the experiment, the beam of one material, and the stack.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &report::Report) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write(&mut text, report);
     text
 }
 
-fn write(out: &mut String, report: &Report) -> std::fmt::Result {
-    let Report { experiment, deflection, layers } = report;
+fn write(out: &mut String, report: &report::Report) -> std::fmt::Result {
+    let report::Report { experiment, deflection, layers } = report;
     writeln!(out, "Beam experiment (95 % intervals)")?;
     writeln!(out, "  voltage | spring constant, all readings |         without the outliers | Young's modulus")?;
     writeln!(out, "      [V] |                     [uN/mm] |                      [uN/mm] |           [GPa]")?;

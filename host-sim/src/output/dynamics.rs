@@ -2,18 +2,18 @@
 
 use std::fmt::Write;
 
-use paper::dynamics::report::{Model, Report};
+use paper::dynamics::report::{self, Model};
 use paper::dynamics::zener::Zener;
 
 /// Table of the response, followed by the equivalent parameters.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &report::Report) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = write(&mut text, report);
     text
 }
 
-fn write(out: &mut String, report: &Report) -> std::fmt::Result {
+fn write(out: &mut String, report: &report::Report) -> std::fmt::Result {
     writeln!(out, "{} driven by {}", report.model.name(), report.input)?;
     let unit = if report.model == Model::PiPlant { "  output [V]" } else { "stiffness [N/m]" };
     writeln!(out, "  time [s] |  level | elongation [m] | {unit}")?;
@@ -22,7 +22,7 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
         let stiffness = if row.stiffness.is_finite() { format!("{:.5}", row.stiffness) } else { "-".to_owned() };
         writeln!(out, "  {:8.2} | {:6.3} | {elongation:>14} | {stiffness:>12}", row.time_s, row.level)?;
     }
-    let Report { plant, share, tau_s, zener_of_plant, stand_in, .. } = report;
+    let report::Report { plant, share, tau_s, zener_of_plant, stand_in, .. } = report;
     if matches!(report.model, Model::Zener | Model::Analogue) {
         writeln!(
             out,
@@ -65,7 +65,7 @@ fn write(out: &mut String, report: &Report) -> std::fmt::Result {
 }
 
 /// The response as CSV.
-pub fn csv(report: &Report) -> String {
+pub fn csv(report: &report::Report) -> String {
     let mut csv =
         format!("# {} driven by {}\ntime_s,level,elongation_m,stiffness\n", report.model.name(), report.input);
     for row in &report.rows {

@@ -1,10 +1,10 @@
 //! The answer of `vsj joint` as text.
 
-use paper::joint::report::{Report, Requirement, Time};
+use paper::joint::report::{self, Requirement, Time};
 
 /// The joint's stiffness, and whether the requirement can be met.
-pub fn text(report: &Report) -> String {
-    let Report { joint, requirement, limit_v, springs_n_per_m: [soft, stiff], reach_n_m_per_rad, .. } = report;
+pub fn text(report: &report::Report) -> String {
+    let report::Report { joint, requirement, limit_v, springs_n_per_m: [soft, stiff], reach_n_m_per_rad, .. } = report;
     let Requirement { low_n_m_per_rad, high_n_m_per_rad, within_s, part } = requirement;
     let mut text = format!(
         "{} springs, inner radius {:.1} mm, outer {:.1} mm, outer end {}.\n\
@@ -68,7 +68,7 @@ mod tests {
                 range_v: (0.0, 700.0),
                 slew_v_per_s: f64::INFINITY,
             };
-            let said = text(&Report::new(joint, requirement, &SPRING, &system, Some(0.01)).unwrap());
+            let said = text(&report::Report::new(joint, requirement, &SPRING, &system, Some(0.01)).unwrap());
             assert!(said.contains(&format!("in {within_s} s, {verdict}")), "{said}");
         }
     }

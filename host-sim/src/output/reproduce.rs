@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use paper::reproduce::digits::short;
 use paper::reproduce::source::BearsOn;
-use paper::reproduce::{Item, Report};
+use paper::reproduce::{self, Item};
 
 /// Disagreements, most important first: by what depends on the number, then by their size.
-fn by_importance(report: &Report) -> Vec<&Item> {
+fn by_importance(report: &reproduce::Report) -> Vec<&Item> {
     let mut wrong: Vec<&Item> = report.items.iter().filter(|item| !item.agrees).collect();
     wrong.sort_by(|one, other| one.bears_on.cmp(&other.bears_on).then(distance(other).total_cmp(&distance(one))));
     wrong
@@ -34,7 +34,7 @@ fn computed(item: &Item) -> String {
 }
 
 /// The disagreements, most important first.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &reproduce::Report) -> String {
     let mut text = String::new();
     let mut last = None;
     for item in by_importance(report) {
@@ -50,7 +50,7 @@ pub fn text(report: &Report) -> String {
     text + &summary(report)
 }
 
-fn summary(report: &Report) -> String {
+fn summary(report: &reproduce::Report) -> String {
     let measured = report.items.iter().filter(|item| item.measured).count();
     let wrong = report.items.iter().filter(|item| item.measured && !item.agrees).count();
     format!(
@@ -63,14 +63,14 @@ fn summary(report: &Report) -> String {
 }
 
 /// A page in Markdown with every number.
-pub fn page(report: &Report) -> String {
+pub fn page(report: &reproduce::Report) -> String {
     let mut page = String::new();
     // Writing to a string cannot fail.
     let _ = write_page(&mut page, report);
     page
 }
 
-fn write_page(out: &mut String, report: &Report) -> std::fmt::Result {
+fn write_page(out: &mut String, report: &reproduce::Report) -> std::fmt::Result {
     writeln!(out, "# The printed numbers of the source report, recomputed\n")?;
     writeln!(
         out,

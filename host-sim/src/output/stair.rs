@@ -2,16 +2,16 @@
 
 use crate::output::cells::{line, optional, tidy};
 use crate::output::step_response;
-use paper::stair::{LimitedTicks, Report, Row};
+use paper::stair::{self, LimitedTicks, Row};
 use simulation::experiment::StartsFrom;
 use simulation::response::Response;
 
 /// The rows compared with printed and measured values, explanations of differences, and the steps.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &stair::Report) -> String {
     let mut text = String::new();
     rows(&mut text, &report.rows);
     if report.printed_compared > 0 {
-        let Report { printed_compared, printed_agree, .. } = report;
+        let stair::Report { printed_compared, printed_agree, .. } = report;
         line(
             &mut text,
             &format!("\n{printed_agree} of {printed_compared} printed numbers agree to the last digit (truncated)."),
@@ -22,7 +22,7 @@ pub fn text(report: &Report) -> String {
             }
         }
     }
-    let Report { max_fixed_point_error, max_fixed_point_error_without, limited_ticks, .. } = report;
+    let stair::Report { max_fixed_point_error, max_fixed_point_error_without, limited_ticks, .. } = report;
     line(
         &mut text,
         &format!(

@@ -52,7 +52,10 @@ fn on_a_damaged_socket_every_command_is_applied_once() {
 
 #[test]
 fn on_a_damaged_terminal_every_command_is_applied_once() {
-    every_command_is_applied_once_and_in_order(&Mcu::on_terminal(Setup { damage_one_in: Some(60), ..Setup::default() }));
+    every_command_is_applied_once_and_in_order(&Mcu::on_terminal(Setup {
+        damage_one_in: Some(60),
+        ..Setup::default()
+    }));
 }
 
 /// Sends 10 000 frames to an armed MCU, each flipped, truncated, spliced or padded with garbage.

@@ -8,7 +8,7 @@ use clap::Args;
 use host_sim::output::recording::Recording;
 use host_sim::output::terminal::{print, remark};
 use indicatif::{ProgressBar, ProgressStyle};
-use link::{Desired, Request, State};
+use link::{Desired, Request};
 use serde_json::json;
 use simulation::bad_input;
 use simulation::record::{MEASURED, Record};
@@ -67,7 +67,7 @@ impl Arguments {
 
 pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let schedule = arguments.schedule()?;
-    if schedule.is_some() && !arguments.arm && session.status.sample.state != State::Armed {
+    if schedule.is_some() && !arguments.arm && session.status.sample.state != link::State::Armed {
         bail!("{}: not armed ({}); expected --arm with --input", session.client.name(), session.status.sample.state);
     }
     if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use host_sim::link::{Client, Failure, StatusReport};
 use host_sim::output::terminal::{json, print};
-use link::{Desired, Reason, Request, State, Status, WireVolts};
+use link::{Desired, Reason, Request, Status, WireVolts};
 use serde::Serialize;
 use simulation::bad_input;
 use simulation::bad_input::number;
@@ -27,7 +27,7 @@ pub(super) struct Session {
 
 impl Session {
     /// Sends a request. A stiffness out of reach is bad input; any other error is a failure.
-    pub(super) fn order(&mut self, request: Request) -> Result<(State, WireVolts)> {
+    pub(super) fn order(&mut self, request: Request) -> Result<(link::State, WireVolts)> {
         match self.client.order(request) {
             Ok(done) => Ok(done),
             Err(Failure::Refused(reason @ Reason::OutOfRange { .. })) => {
@@ -52,7 +52,7 @@ impl Session {
         print(&if self.json { json(&report)? } else { report.text() })
     }
 
-    pub(super) fn show(&self, (state, target): (State, WireVolts)) -> Result<()> {
+    pub(super) fn show(&self, (state, target): (link::State, WireVolts)) -> Result<()> {
         let done = Done { state: state.name(), target_v: target.to_f64() };
         let text = format!("{}, target {:.3} V\n", done.state, done.target_v);
         print(&if self.json { json(&done)? } else { text })
@@ -65,8 +65,8 @@ impl Session {
     }
 
     /// Returns an error unless the MCU is armed. Ramping is accepted: the frame that reported it has ended it.
-    pub(super) fn still_armed(&mut self, state: State) -> Result<()> {
-        if !matches!(state, State::Armed | State::Ramping) {
+    pub(super) fn still_armed(&mut self, state: link::State) -> Result<()> {
+        if !matches!(state, link::State::Armed | link::State::Ramping) {
             self.refresh()?;
             bail!("{}: no longer armed: {state}, fault {}", self.client.name(), self.status.fault);
         }

@@ -5,7 +5,7 @@ use kuva::prelude::*;
 use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned};
-use identify::answer::Report;
+use identify::answer;
 use identify::record::data::Data;
 use identify::verdict::diagnosis::Diagnosis;
 
@@ -94,12 +94,12 @@ pub fn residual_by_voltage(diagnosis: &Diagnosis) -> String {
 }
 
 /// Autocorrelation of the whitened residual.
-pub fn autocorrelation(report: &Report) -> String {
+pub fn autocorrelation(report: &answer::Report) -> String {
     correlation(report, &report.residual.autocorrelation, 1, "Residual with itself")
 }
 
 /// Correlation of the whitened residual with the voltage's changes.
-pub fn input_correlation(report: &Report) -> String {
+pub fn input_correlation(report: &answer::Report) -> String {
     correlation(report, &report.residual.input_correlation, 0, "Residual with the voltage's changes")
 }
 
@@ -121,7 +121,7 @@ fn beyond(layout: Layout, low: f64, high: f64) -> Layout {
     layout.with_x_axis_min(low - more).with_x_axis_max(high + more)
 }
 
-fn correlation(report: &Report, values: &[f64], first_lag: usize, title: &str) -> String {
+fn correlation(report: &answer::Report, values: &[f64], first_lag: usize, title: &str) -> String {
     // Two rows are not farther apart than the record is long.
     let values = &values[..values.len().min(report.rows - first_lag)];
     let band = report.residual.band;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use identify::answer::Margins;
-use identify::answer::{Extended, Finding, Quality, Report, Verdict};
+use identify::answer::{self, Extended, Finding, Quality, Verdict};
 use identify::effects::effect::Stage;
 use identify::effects::{EFFECTS, index_of};
 use identify::verdict::export::SMALL_ERROR_V;
@@ -12,7 +12,7 @@ use identify::verdict::export::SMALL_ERROR_V;
 const SMALLEST_IMPROVEMENT: f64 = 0.005;
 
 /// The text for the terminal.
-pub fn text(name: &str, report: &Report) -> String {
+pub fn text(name: &str, report: &answer::Report) -> String {
     let mut text = String::new();
     for sentence in sentences(name, report) {
         let _ = writeln!(text, "{sentence}");
@@ -59,7 +59,7 @@ pub fn in_fixed_point(extended: &Extended) -> Option<String> {
 }
 
 /// States which parts of the plant file this spring does not have; `None` if it has all of them.
-fn parts_to_take_out(report: &Report) -> Option<String> {
+fn parts_to_take_out(report: &answer::Report) -> Option<String> {
     let parts = &report.take_out;
     let (are, them) = if parts.len() == 1 { ("is", "it") } else { ("are", "them") };
     let (before, after) = (&report.baseline, &report.extended.quality);
@@ -87,7 +87,7 @@ fn off_by(part: f64) -> String {
 }
 
 /// The findings, the held-out improvement, and the next experiment, one sentence each.
-pub fn sentences(name: &str, report: &Report) -> Vec<String> {
+pub fn sentences(name: &str, report: &answer::Report) -> Vec<String> {
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
     let in_readings = effects.clone().all(|effect| effect.stage() == Stage::Reading);
     let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.meaning())).collect();
@@ -203,7 +203,7 @@ mod tests {
             rmse_after: 7.86,
             evidence: String::new(),
         };
-        let report = Report {
+        let report = answer::Report {
             schema: SCHEMA,
             rows: 600,
             verdict,
