@@ -26,7 +26,7 @@ pub(super) fn columns(step: &Response) -> String {
 pub(super) fn shortest_possible(from: StartsFrom) -> &'static str {
     match from {
         StartsFrom::Settled => {
-            "Shortest possible: any controller within range and slew, from a spring settled at the old target."
+            "Shortest possible: any controller within range and slew, from a spring settled at the old value."
         }
         StartsFrom::Reached => {
             "Shortest possible: any controller within range and slew, from the state in which this loop has left the spring."
