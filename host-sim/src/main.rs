@@ -1,11 +1,12 @@
-//! `vsj`: the stiffness controller of a piezo variable-stiffness spring, on a host.
+//! `vsj`: host tools for the stiffness controller of a piezo variable-stiffness spring.
 
 mod commands;
 
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
+use host_sim::output::terminal::remark;
 use simulation::bad_input::BadInput;
 
 /// Simulates the variable-stiffness spring and its controller, with the code that runs in the amplifier's MCU.
@@ -15,7 +16,7 @@ use simulation::bad_input::BadInput;
 #[command(
     name = "vsj",
     version,
-    after_help = "Exit codes: 0 success, 1 the work itself failed, 2 bad arguments or bad input."
+    after_help = "Exit codes: 0 success, 1 the command failed, 2 bad arguments or bad input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -57,25 +58,24 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // What a file says may break lines; an error is one.
-            eprintln!("vsj: {}", format!("{error:#}").replace(['\n', '\r'], " "));
+            remark(&format!("{error:#}"));
             ExitCode::from(if error.is::<BadInput>() { 2 } else { 1 })
         }
     }
 }
 
-/// Help and version as they are; a wrong argument as one line.
+/// Prints help and version in full, and a wrong argument as one line; returns the exit code.
 fn usage(error: &clap::Error) -> ExitCode {
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
-        // A closed pipe is no failure of ours.
+        // A closed pipe is no failure.
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
-    eprintln!("{}: {}", Cli::command().get_name(), what_is_wrong(error));
+    remark(&one_line(error));
     ExitCode::from(2)
 }
 
-fn what_is_wrong(error: &clap::Error) -> String {
+fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let what: Vec<&str> = text
         .lines()
@@ -83,7 +83,7 @@ fn what_is_wrong(error: &clap::Error) -> String {
         .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
         .filter(|line| !line.is_empty())
         .collect();
-    // What comes before a command that is missing may be missing too.
+    // clap lists the missing subcommand, but not the arguments before it, which the usage line shows.
     let usage = text.lines().find(|line| line.starts_with("Usage:") && error.kind() == ErrorKind::MissingSubcommand);
     format!("{}; {}", what.join(" ").trim_start_matches("error: "), usage.unwrap_or("see `--help`"))
 }
@@ -91,30 +91,31 @@ fn what_is_wrong(error: &clap::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::CommandFactory;
 
-    /// Columns of a terminal: a longer line is broken, and cannot be copied.
+    /// Width of a terminal, in columns; a longer example would be wrapped and could not be copied.
     const COLUMNS: usize = 80;
 
     #[test]
-    fn what_is_missing_is_named() {
+    fn missing_arguments_are_named() {
         for (line, missing) in [
             ("vsj link", "'vsj link' requires a subcommand but one was not provided [subcommands: status,"),
             ("vsj link", "; Usage: vsj link [OPTIONS] <PORT> <COMMAND>"),
             ("vsj diagnose", "not provided: <DATA.csv>; see `--help`"),
         ] {
-            let said = what_is_wrong(&Cli::try_parse_from(line.split(' ')).err().expect("something is missing"));
+            let said = one_line(&Cli::try_parse_from(line.split(' ')).err().expect("something is missing"));
             assert!(said.contains(missing) && !said.contains('\n'), "{line}: {said}");
         }
     }
 
     #[test]
-    fn every_example_of_a_help_fits_the_terminal_and_is_a_command() {
+    fn every_example_in_a_help_text_fits_the_terminal_and_parses() {
         let mut examples = 0;
         for command in Cli::command().get_subcommands() {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             for line in help.lines().filter(|line| line.starts_with("  ")) {
                 assert!(line.len() <= COLUMNS, "{} columns: {line}", line.len());
-                // Without what is the shell's, and the comment.
+                // Without the other parts of the shell command and without the comment.
                 let words = &line[line.find("vsj").expect("an example of vsj")..];
                 let words = words.split("  ").next().into_iter().flat_map(|words| words.split(" |")).next();
                 let words = words.unwrap_or_default();

@@ -1,4 +1,4 @@
-//! `vsj stair --plant FILE` with everything that a plant file can hold.
+//! `vsj stair --plant FILE` with every table of a plant file.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -37,14 +37,14 @@ fn an_extended_spring_behind_its_recorded_amplifier() {
     for name in ["stair.csv", "stiffness.svg", "voltage.svg"] {
         assert!(folder.path().join("out").join(name).exists(), "{name}");
     }
-    // The options' amplifier where it is the stricter one.
+    // The options' amplifier applies where it is stricter.
     let report = json(&stair(folder.path(), &weaker, &["--json", "--slew-v-per-s", "50"]));
     assert!(report["limited_ticks"]["slew"].as_u64().unwrap() > 10_000, "{}", report["limited_ticks"]);
 }
 
-/// Each block changes the answer, so each of them runs.
+/// Every block changes the response, which shows that every block is simulated.
 #[test]
-fn every_table_has_its_effect() {
+fn every_table_changes_the_response() {
     let folder = tempdir().unwrap();
     let tables: Vec<&str> = WHOLE.split_inclusive('\n').collect();
     let without = |table: &str| {
@@ -68,7 +68,7 @@ fn every_table_has_its_effect() {
 }
 
 #[test]
-fn what_the_tick_refuses_is_named_with_its_place() {
+fn a_spring_that_the_tick_rejects_is_named_with_its_place() {
     let folder = tempdir().unwrap();
     for (from, to, expected) in [
         ("[10.0, 25.0]", "[10.0, -25.0]", "plant.toml, line 5, column 23: thresholds_v = -25 is not allowed"),

@@ -1,4 +1,4 @@
-//! Curves and points over common axes: data, drawn elsewhere.
+//! Curves and points over common axes, as data; `vsj` draws them.
 
 /// Curves and points over common axes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -9,7 +9,7 @@ pub struct Figure {
     pub x_label: String,
     /// Label of the vertical axis, with its unit.
     pub y_label: String,
-    /// What is drawn, in order.
+    /// Curves and points, in drawing order.
     pub series: Vec<Series>,
 }
 
@@ -24,12 +24,12 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// A solid curve.
     Solid,
-    /// A dashed curve, for what the solid ones are compared with.
+    /// A dashed curve, used for comparisons.
     Dashed,
     /// Single points.
     Points,
@@ -42,7 +42,7 @@ impl Figure {
         Self { title, x_label, y_label, series: Vec::new() }
     }
 
-    /// Adds a curve; `dashed` for what others are compared with.
+    /// Adds a curve, dashed if it is for comparison.
     pub fn curve(self, name: &str, points: impl IntoIterator<Item = (f64, f64)>, dashed: bool) -> Self {
         self.with(name, if dashed { Style::Dashed } else { Style::Solid }, points)
     }

@@ -1,22 +1,22 @@
-//! Why a printed number is not what the computation gives.
+//! Explanations of numbers of Table 3 that the computation does not reproduce.
 //!
-//! A printed number has two decimals, truncated. Each hypothesis is tested on the digits; what is said names the
-//! evidence, and says so when there is none.
+//! The printed numbers are truncated to two decimals. Each hypothesis is tested on the digits; the explanation states
+//! the evidence, or that there is none.
 
-/// A printed number and what was computed for it.
+/// A printed number and the computed one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
-    /// As printed, with two decimals.
+    /// The printed number, with two decimals.
     pub printed: f64,
-    /// As computed.
+    /// The computed number.
     pub computed: f64,
 }
 
-/// How far from the printed digits an integration error of the original is still likelier than a slip of the pen.
+/// Largest deviation, in V, for which an integration error of the original is more likely than a misprint.
 const SOLVER_ERROR: f64 = 1e-3;
 
 impl Pair {
-    /// True if `computed`, truncated to two decimals, is the printed number.
+    /// True if `computed`, truncated to two decimals, equals the printed number.
     pub fn agrees(&self) -> bool {
         hundredths(self.printed) == (self.computed * 100.0).floor()
     }
@@ -25,7 +25,7 @@ impl Pair {
         hundredths(self.printed) == (self.computed * 100.0).round()
     }
 
-    /// The likeliest explanation of a disagreement; `others` are the numbers of the same origin.
+    /// The most likely explanation of a disagreement; `others` are the numbers of the same column.
     pub fn explain(&self, others: &[Self]) -> String {
         let Self { printed, computed } = *self;
         let below = printed - computed;
@@ -65,7 +65,7 @@ fn hundredths(printed: f64) -> f64 {
     (printed * 100.0).round()
 }
 
-/// The two neighbouring digits of `expected` whose swap gives `found`.
+/// The two adjacent digits of `expected` whose exchange gives `found`.
 pub(crate) fn swapped_digits(expected: &str, found: &str) -> Option<(char, char)> {
     let digits = |text: &str| text.chars().filter(char::is_ascii_digit).collect::<Vec<_>>();
     let (expected, found) = (digits(expected), digits(found));
@@ -76,7 +76,7 @@ pub(crate) fn swapped_digits(expected: &str, found: &str) -> Option<(char, char)
     })
 }
 
-/// The one digit in which `found` differs from `expected`, and the right one.
+/// The single digit in which `found` differs from `expected`, as (wrong, right).
 pub(crate) fn single_digit(expected: &str, found: &str) -> Option<(char, char)> {
     if expected.len() != found.len() {
         return None;
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn each_kind_of_slip_is_told_apart() {
+    fn each_kind_of_misprint_is_distinguished() {
         assert!(explain(71.25, 17.259).contains("digits 1 and 7 swapped"));
         assert!(explain(17.28, 17.259).contains("one digit, 8 in place of 5"));
         let near = explain(17.26, 17.259_95);

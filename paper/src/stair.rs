@@ -1,4 +1,4 @@
-//! What a run says, laid beside what the report printed and measured.
+//! The answer of `vsj stair`: a run of the stair experiment compared with the report's printed and measured values.
 
 use anyhow::Result;
 use model::{Compensation, Limits, Settings};
@@ -6,39 +6,39 @@ use serde::Serialize;
 
 use crate::misprint::Pair;
 use crate::table3;
-use simulation::experiment::{Experiment, Judged, Run, Sample, StartsFrom, max_fixed_point_error};
+use simulation::experiment::{Experiment, HasReference, Run, Sample, StartsFrom, max_fixed_point_error};
 use simulation::record::Record;
 use simulation::response::{Response, responses};
 
-/// The whole answer of `vsj stair --json`.
+/// The answer of `vsj stair --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// One a row of the table or file.
+    /// One row per row of the table or file.
     pub rows: Vec<Row>,
-    /// One a change of the target.
+    /// One response per change of the target.
     pub steps: Vec<Response>,
-    /// Where the fastest drive of `bound_t97_s` starts.
+    /// Initial state of the spring for `bound_t97_s`.
     pub bound_from: StartsFrom,
-    /// Largest difference between fixed point and reference over every tick of the controlled loop, in V.
+    /// Largest difference between the fixed-point loop and its reference over all ticks, in V, with controller.
     pub max_fixed_point_error: f64,
-    /// The same of the spring left alone: nothing there corrects the rounding of the DAC.
+    /// Largest difference without controller, in V, where nothing corrects the rounding of the DAC.
     pub max_fixed_point_error_without: f64,
-    /// In how many ticks of the shown loop a limit acted.
+    /// Number of ticks of the selected loop in which a limit acted.
     pub limited_ticks: LimitedTicks,
-    /// How many printed numbers were compared, and how many of them the reference reproduces to the last digit.
+    /// Number of printed values that were compared.
     pub printed_compared: usize,
-    /// See `printed_compared`.
+    /// Number of printed values that the reference reproduces to the last digit.
     pub printed_agree: usize,
 }
 
 /// Ticks in which a limit acted, by limit.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct LimitedTicks {
-    /// The upper end of the amplifier's range.
+    /// At the upper end of the amplifier's range.
     pub upper: usize,
-    /// Its lower end.
+    /// At the lower end of the amplifier's range.
     pub lower: usize,
-    /// Its slew.
+    /// At the amplifier's slew limit.
     pub slew: usize,
 }
 
@@ -49,48 +49,53 @@ impl LimitedTicks {
     }
 }
 
-/// One moment of the experiment. Stiffness on the scale of volts.
+/// One time of the experiment; stiffness is expressed as the equivalent static voltage, in V.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// In s.
+    /// Time, in s.
     pub time_s: f64,
-    /// The voltage asked for, in V.
+    /// Commanded voltage, in V.
     pub voltage_v: f64,
-    /// Printed, with controller.
+    /// Stiffness printed in the report, with controller.
     pub printed_with: Option<f64>,
-    /// Printed, without controller.
+    /// Stiffness printed in the report, without controller.
     pub printed_without: Option<f64>,
-    /// Reference with controller.
+    /// Stiffness of the double-precision reference, with controller.
     pub with: f64,
-    /// Reference without.
+    /// Stiffness of the double-precision reference, without controller.
     pub without: f64,
-    /// Fixed point with controller.
+    /// Stiffness of the fixed-point loop, with controller.
     pub with_fixed: f64,
-    /// Fixed point without.
+    /// Stiffness of the fixed-point loop, without controller.
     pub without_fixed: f64,
-    /// Measured.
+    /// Measured stiffness.
     pub measured: Option<f64>,
-    /// Why a printed number is not reproduced, where the run is the printed one.
+    /// Explanation of a printed value that is not reproduced, for a run of the report's own experiment.
     pub note: Option<String>,
 }
 
-/// Where rows come from.
+/// Source of the rows.
 pub enum Rows<'a> {
-    /// Table 3; `same` says that the run is the report's own, so that its printed numbers should come out.
+    /// Table 3 of the report.
     Table3 {
-        /// See above.
+        /// True if the run is the report's own, so that its printed values should be reproduced.
         same: bool,
     },
-    /// A file of the user's.
+    /// A record of the user's.
     Record(&'a Record),
 }
 
 impl Report {
-    /// Reads the answer off a finished run; `controlled` says which loop the steps are measured on.
+    /// Evaluates a finished run; `controlled` selects the loop on which steps and limits are measured.
     ///
     /// # Errors
-    /// If the table that was built in is damaged.
-    pub fn new<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>, controlled: bool) -> Result<Self> {
+    /// If the built-in table is damaged.
+    pub fn new<P: HasReference>(
+        experiment: &Experiment<P>,
+        run: &Run,
+        source: &Rows<'_>,
+        controlled: bool,
+    ) -> Result<Self> {
         let compared = matches!(source, Rows::Table3 { same: true });
         let mut rows = rows(experiment, run, source)?;
         let (printed_compared, printed_agree) = if compared { explain(&mut rows) } else { (0, 0) };
@@ -108,8 +113,8 @@ impl Report {
     }
 }
 
-/// Rows at the moments of a table or file: the reference at the very moment, fixed point at the last tick before.
-fn rows<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>) -> Result<Vec<Row>> {
+/// Rows at the times of a table or record: the reference at that very time, fixed point at the last tick before it.
+fn rows<P: HasReference>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>) -> Result<Vec<Row>> {
     let blank = |time_s, voltage_v, measured| {
         let tick = run.tick_at(time_s);
         Row {
@@ -154,7 +159,7 @@ fn rows<P: Judged>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_>) -> 
     Ok(rows)
 }
 
-/// Notes why a printed number does not come out; returns how many were compared and how many agree.
+/// Explains printed values that are not reproduced; returns the numbers of compared and of reproduced values.
 fn explain(rows: &mut [Row]) -> (usize, usize) {
     let pairs = |row: &Row| {
         let pair = |printed: Option<f64>, computed| printed.map(|printed| Pair { printed, computed });

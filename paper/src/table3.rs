@@ -1,29 +1,29 @@
-//! Table 3 of the report: the stair experiment, measured and simulated, as printed.
+//! Table 3 of the report as printed: the stair experiment, measured and simulated.
 
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
-/// One row as printed. Stiffness on the scale of volts.
+/// One printed row; stiffness is expressed as the equivalent static voltage, in V.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct Printed {
-    /// In s.
+    /// Time, in s.
     pub time_s: f64,
-    /// Commanded, in V.
+    /// Commanded voltage, in V.
     pub voltage_v: f64,
-    /// The report's measurement.
+    /// Measured stiffness.
     pub measured: f64,
-    /// The report's simulation with its controller.
+    /// Simulated stiffness with the report's controller.
     #[serde(rename = "sim_with_controller")]
     pub with: f64,
-    /// The report's simulation without it.
+    /// Simulated stiffness without controller.
     #[serde(rename = "sim_without_controller")]
     pub without: f64,
 }
 
-/// The rows, in order of time.
+/// All rows, in order of time.
 ///
 /// # Errors
-/// If the file that was built in is damaged.
+/// If the built-in data file is damaged.
 pub fn rows() -> Result<Vec<Printed>> {
     csv::ReaderBuilder::new()
         .comment(Some(b'#'))

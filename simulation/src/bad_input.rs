@@ -1,14 +1,14 @@
-//! The error that is the caller's to mend: a wrong file, setting or schedule. Exit code 2.
+//! The error for invalid input: a wrong file, setting or schedule. `vsj` then exits with code 2.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 
 use anyhow::Result;
 
-/// Characters of a text that a message shows.
+/// Largest number of characters of a quoted text that a message shows.
 const MOST_SHOWN: usize = 40;
 
-/// One line that names what was given and what was expected.
+/// Invalid input, as one line that names what was given and what was expected.
 #[derive(Debug)]
 pub struct BadInput(pub String);
 
@@ -20,7 +20,7 @@ impl fmt::Display for BadInput {
 
 impl std::error::Error for BadInput {}
 
-/// Returns early with a [`BadInput`] made of a format string.
+/// Returns early with a [`BadInput`] made from a format string.
 #[macro_export]
 macro_rules! bad_input {
     ($($message:tt)*) => {
@@ -28,10 +28,10 @@ macro_rules! bad_input {
     };
 }
 
-/// Returns `value` if it is in `allowed`; NaN is in no range.
+/// Returns `value` if it lies in `allowed`; NaN lies in no range.
 ///
 /// # Errors
-/// [`BadInput`] that names the field, the value and what is expected.
+/// [`BadInput`] with the field, the value and the allowed range.
 pub fn check(field: &str, value: f64, allowed: RangeInclusive<f64>, unit: &str) -> Result<f64> {
     if allowed.contains(&value) {
         return Ok(value);
@@ -41,14 +41,14 @@ pub fn check(field: &str, value: f64, allowed: RangeInclusive<f64>, unit: &str) 
     bad_input!("{field} = {} is not allowed: expected {}", number(value), expected.trim_end())
 }
 
-/// A number as a message shows it: not with hundreds of digits.
+/// Formats a number for a message, in exponential form if it would have very many digits.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     let usual = size == 0.0 || (1e-9..1e15).contains(&size) || !value.is_finite();
     if usual { format!("{value}") } else { format!("{value:e}") }
 }
 
-/// A text as a message shows it: not whole pages of it.
+/// Shortens a text for a message.
 pub fn excerpt(text: &str) -> String {
     match text.char_indices().nth(MOST_SHOWN) {
         Some((end, _)) => format!("{}...", &text[..end]),
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_refused_is_shown_shortly() {
+    fn rejected_values_are_shown_in_short_form() {
         for (value, shown) in [
             (-1.0, "-1"),
             (-0.001, "-0.001"),

@@ -1,21 +1,21 @@
-//! The fastest that any controller could be.
+//! Lower bound on the time of a step under any controller.
 //!
-//! The spring's stiffness never falls when its voltage is raised, now or earlier. So no controller is faster than the
-//! one that goes to the end of the amplifier's range as fast as the slew allows and stays there; from a settled spring
-//! its response is known in closed form.
+//! The spring's stiffness increases monotonically with its present and past voltage. Therefore no controller is faster
+//! than one that drives to the end of the amplifier's range at the slew limit and stays there; from a settled spring
+//! the response to that drive has a closed form.
 //!
-//! An extended spring is seldom settled: it creeps, leaks and remembers. There the same drive starts from the state that
-//! the spring is really in when the target changes, brought there by the voltages that were applied until then, and the
-//! answer is computed tick by tick in double precision. No controller is faster from there, unless one of the spring's own
-//! properties makes less voltage give more: a falling law, a leakage faster than the relaxation.
+//! An extended spring is seldom settled: it has creep, leakage and hysteresis. For it the drive starts from the state
+//! that the voltages applied so far have produced, and the response is computed tick by tick in double precision. The
+//! bound then holds unless the spring itself is not monotonic: a falling static law, or a leakage faster than the
+//! relaxation.
 
 use crate::reference::Loop;
 use crate::run::{Run, Sample};
 use crate::sampled::{SampledLoop, spring};
 use crate::schedule::Change;
 
-/// Shortest time, in s, from an ideal step command until the stiffness has made `part` of the way from a settled
-/// `from_v` to `to_v`; `None` if it never gets there within the range.
+/// Shortest time, in s, from an ideal step command until the stiffness has completed `part` (0 to 1) of the way from a
+/// settled `from_v` to `to_v` (V); `None` if the amplifier's range does not suffice.
 pub fn shortest_time(system: &Loop, from_v: f64, to_v: f64, part: f64) -> Option<f64> {
     let direction = (to_v - from_v).signum();
     let end_v = if direction > 0.0 { system.range_v.1 } else { system.range_v.0 };
@@ -27,7 +27,7 @@ pub fn shortest_time(system: &Loop, from_v: f64, to_v: f64, part: f64) -> Option
     if goal >= travel {
         return None;
     }
-    // Everything below is measured from `from_v` in the direction of the step.
+    // All voltages below are relative to `from_v`, positive in the direction of the step.
     let tau = system.time_constant_s;
     let ramp_s = travel / system.slew_v_per_s;
     let response = |t: f64| {
@@ -41,7 +41,7 @@ pub fn shortest_time(system: &Loop, from_v: f64, to_v: f64, part: f64) -> Option
     if response(0.0) >= goal {
         return Some(0.0);
     }
-    // All but part in 1e15 of the travel is made after 35 time constants.
+    // After 35 time constants all but 1e-15 of the change is complete.
     let (mut early, mut late) = (0.0, ramp_s + 35.0 * tau);
     for _ in 0..100 {
         let middle = 0.5 * (early + late);
@@ -50,9 +50,9 @@ pub fn shortest_time(system: &Loop, from_v: f64, to_v: f64, part: f64) -> Option
     Some(late)
 }
 
-/// The same for each change of a run from the state that its `samples` brought the spring to; `None` if the stiffness is
-/// not there before the next change.
-pub fn from_where_it_is(
+/// Shortest time, in s, for each change of a run, from the state that the voltages of `samples` have produced; `None`
+/// if the next change comes first.
+pub fn shortest_times_from_state(
     system: &SampledLoop,
     run: &Run,
     samples: &[Sample],
@@ -64,7 +64,7 @@ pub fn from_where_it_is(
     let mut tick = 0;
     let mut bounds = Vec::new();
     for change in changes {
-        // A moment's rounding is no tick.
+        // Times may differ from ticks by rounding errors.
         let start_s = change.start_s + 1e-9;
         while tick + 1 < samples.len() && run.time_s(tick + 1) <= start_s {
             spring.apply(&mut state, samples[tick].applied.to_f64());
@@ -84,7 +84,8 @@ pub fn from_where_it_is(
     bounds
 }
 
-/// When the stiffness passes `goal` at full drive, up or down, in s; `None` if not within `longest_s`.
+/// Time in s at which the stiffness passes `goal` (V) under full drive upwards or downwards; `None` if not within
+/// `longest_s`.
 fn at_full_drive(system: &SampledLoop, mut state: spring::State, goal: f64, up: bool, longest_s: f64) -> Option<f64> {
     let spring = &system.spring;
     let step_v = system.slew_v_per_s * system.sample_s;
@@ -128,22 +129,22 @@ mod tests {
     }
 
     #[test]
-    fn closed_form_without_slew() {
+    fn without_slew_the_bound_is_the_closed_form() {
         for (limit, expected) in [(700.0, 1.62), (1000.0, 0.446)] {
             let got = shortest_time(&paper(limit, f64::INFINITY), 400.0, 500.0, 0.97).unwrap();
             let exact = 5.5 * (10.0 / 11.0 * (limit - 400.0) / (limit - 497.0)).ln();
             assert!((got - exact).abs() < 1e-9 && (got - expected).abs() < 0.005, "{limit}: {got} {exact}");
         }
         assert_eq!(shortest_time(&paper(490.0, f64::INFINITY), 400.0, 500.0, 0.97), None);
-        // Down is not the mirror of up: there is only 0 V below.
+        // Downwards is not the mirror image of upwards: the range ends at 0 V.
         assert_eq!(shortest_time(&paper(700.0, f64::INFINITY), 100.0, 0.0, 1.0), None);
         let down = shortest_time(&paper(700.0, f64::INFINITY), 500.0, 400.0, 0.97).unwrap();
         assert!((down - 5.5 * (10.0 / 11.0 * 500.0 / 403.0f64).ln()).abs() < 1e-9);
     }
 
-    /// A plain spring that has settled is a spring in some state.
+    /// A settled plain spring is a special case of a spring in a given state.
     #[test]
-    fn from_a_settled_state_it_is_the_closed_form() {
+    fn from_a_settled_state_the_bound_is_the_closed_form() {
         let samples: Vec<Sample> = (0..70_000)
             .map(|tick| Sample {
                 code: model::DacCode(0),
@@ -163,16 +164,16 @@ mod tests {
                 range_v: (0.0, 700.0),
                 slew_v_per_s,
             };
-            let got = from_where_it_is(&system, &run, &samples, &[change], 0.97)[0].unwrap();
+            let got = shortest_times_from_state(&system, &run, &samples, &[change], 0.97)[0].unwrap();
             let exact = shortest_time(&paper(700.0, slew_v_per_s), 400.0, 500.0, 0.97).unwrap();
-            // A tick makes its part of a slew at once.
+            // A tick makes its part of a slew in one jump.
             assert!((got - exact).abs() < 1e-3, "{slew_v_per_s}: {got} {exact}");
         }
     }
 
-    /// The bound is reached by the reference when it is simply told to go to the end of the range.
+    /// The reference reaches the bound if its target is the end of the range.
     #[test]
-    fn the_reference_at_full_drive_takes_exactly_that_long() {
+    fn the_reference_at_full_drive_reaches_the_bound() {
         for slew in [f64::INFINITY, 800.0, 100.0] {
             let system = paper(700.0, slew);
             let time = shortest_time(&system, 0.0, 100.0, 0.97).unwrap();

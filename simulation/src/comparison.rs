@@ -1,55 +1,55 @@
-//! The same steps under every controller: what each makes of them, and what none could better.
+//! All controllers on the same steps, compared with the lower bound for any controller.
 
 use anyhow::Result;
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Settings};
 use serde::Serialize;
 
-use crate::experiment::{Experiment, Judged, StartsFrom, with_plant};
+use crate::experiment::{Experiment, HasReference, StartsFrom, with_plant};
 use crate::plant_file::PlantFile;
 use crate::response::Response;
 use crate::response::responses;
 use crate::schedule::Schedule;
 
-/// The whole answer of `vsj compare --json`.
+/// The answer of `vsj compare --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
-    /// Where the fastest drive of each `bound_t97_s` starts.
+    /// Initial state of the spring for each `bound_t97_s`.
     pub bound_from: StartsFrom,
-    /// One an amplifier.
+    /// One entry per amplifier.
     pub limits: Vec<AtLimit>,
 }
 
-/// The steps behind one amplifier.
+/// The responses behind one amplifier.
 #[derive(Clone, Debug, Serialize)]
 pub struct AtLimit {
-    /// Its highest voltage, in V.
+    /// Highest voltage of the amplifier, in V.
     pub limit_v: f64,
-    /// One a change of the target.
+    /// One entry per change of the target.
     pub steps: Vec<Step>,
 }
 
-/// One change of the target under each controller.
+/// The responses to one change of the target.
 #[derive(Clone, Debug, Serialize)]
 pub struct Step {
-    /// The spring left alone.
+    /// Without a controller: the target is the voltage.
     pub none: Response,
-    /// The report's controller.
+    /// With the report's proportional-integral controller.
     pub paper: Response,
-    /// As fast as the amplifier allows.
+    /// With the time-optimal controller.
     pub fast: Response,
 }
 
 impl Step {
-    /// Each with its name.
+    /// The responses with the names of their controllers.
     pub fn each(&self) -> [(&'static str, &Response); 3] {
         [("none", &self.none), ("paper", &self.paper), ("fast", &self.fast)]
     }
 }
 
-/// Runs the stair of ideal steps on a spring, behind each of some amplifiers.
+/// Runs the stair of ideal steps on a spring behind each of the amplifiers.
 ///
 /// # Errors
-/// [`crate::bad_input::BadInput`] for what the controller refuses.
+/// [`crate::bad_input::BadInput`] for settings that the controller rejects.
 pub fn compare(file: &PlantFile, rate_hz: f64, amplifiers: &[Amplifier]) -> Result<Comparison> {
     let settings = |amplifier| Settings {
         rate_hz,
@@ -60,7 +60,8 @@ pub fn compare(file: &PlantFile, rate_hz: f64, amplifiers: &[Amplifier]) -> Resu
     };
     let limits = amplifiers.iter().map(|&amplifier| {
         let settings = settings(amplifier);
-        // As in `vsj stair`: below its end only the sampled reference takes a target at the end of the range.
+        // As in `vsj stair`: where the range ends below the limit, only the sampled reference accepts targets at its
+        // end.
         let steps = match settings.plant.plain().filter(|_| settings.amplifier.max_v == amplifier.max_v) {
             Some(plant) => steps(with_plant(&settings, plant))?,
             None => steps(settings)?,
@@ -71,7 +72,7 @@ pub fn compare(file: &PlantFile, rate_hz: f64, amplifiers: &[Amplifier]) -> Resu
     Ok(Comparison { bound_from, limits: limits.collect::<Result<_>>()? })
 }
 
-fn steps<P: Judged>(settings: Settings<P>) -> Result<Vec<Step>> {
+fn steps<P: HasReference>(settings: Settings<P>) -> Result<Vec<Step>> {
     let of = |compensation| {
         let settings = Settings { compensation, ..settings };
         let experiment =

@@ -1,6 +1,6 @@
-//! A table as CSV: one header row, columns by name in any order, lines that start with `#` are comments.
+//! CSV tables with one header row, columns by name in any order, and comment lines that start with `#`.
 //!
-//! Whatever is wrong is one line that names file, line, column and what was expected.
+//! Errors are one line that names file, line, column and what was expected.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
@@ -13,26 +13,26 @@ use csv::StringRecord;
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt};
 
-/// Longer files are refused: a row of a record takes 40 bytes, its diagnosis 500.
+/// Largest number of rows: a row of a record takes 40 bytes, its diagnosis 500.
 const MOST_ROWS: usize = 1_000_000;
-/// And so are longer texts, in bytes: a line may have no end.
+/// Largest size of a text, in bytes, since a single line may be very long.
 const MOST_BYTES: u64 = 1 << 29;
 
-/// The text of a file.
+/// Reads the text of a file.
 ///
 /// # Errors
-/// [`BadInput`] if it cannot be read, is not UTF-8, or has more than a million lines behind the first.
+/// [`BadInput`] if the file cannot be read, is not UTF-8, is too large, or has more than a million rows.
 pub fn read(path: &Path) -> Result<String> {
     let name = path.display();
     let unreadable = |error| BadInput(format!("{name}: cannot be read: {error}"));
     let mut file = BufReader::new(File::open(path).map_err(unreadable)?).take(MOST_BYTES);
     let mut text = String::new();
-    // Only once, for it may be a pipe, and no more of it than is allowed.
+    // The file is read once, since it may be a pipe, and no further than the limit.
     for line in 1..=MOST_ROWS + 2 {
         match file.read_line(&mut text) {
             Ok(1..) => (),
             _ if file.limit() == 0 => bad_input!(
-                "{name}: more than {} MiB; expected less: keep every tenth row, or a part of it",
+                "{name}: more than {} MiB; expected at most that: keep every tenth row, or a part of the record",
                 MOST_BYTES >> 20
             ),
             Ok(0) => return Ok(text),
@@ -42,7 +42,9 @@ pub fn read(path: &Path) -> Result<String> {
             Err(error) => return Err(unreadable(error).into()),
         }
     }
-    bad_input!("{name}: more than {MOST_ROWS} lines; expected fewer: keep every tenth row, or a part of it")
+    bad_input!(
+        "{name}: more than {MOST_ROWS} lines; expected at most that: keep every tenth row, or a part of the record"
+    )
 }
 
 /// A table, read row by row.
@@ -54,7 +56,7 @@ pub struct Table<'a> {
     lines: Lines<'a>,
 }
 
-/// A row of it.
+/// A row of a [`Table`].
 pub struct Row<'t> {
     name: &'t str,
     header: &'t StringRecord,
@@ -64,9 +66,9 @@ pub struct Row<'t> {
 }
 
 impl<'a> Table<'a> {
-    /// Starts with the header; `name` is what messages call the table.
+    /// Reads the header; `name` is what messages call the table.
     pub fn new(name: &'a str, text: &'a str) -> Result<Self> {
-        // Rows of another length are told where their cells can be seen.
+        // Rows of another length are reported by [`Table::next_row`], which knows their line.
         let mut builder = csv::ReaderBuilder::new();
         builder.comment(Some(b'#')).trim(csv::Trim::All).flexible(true);
         let mut reader = builder.from_reader(text.as_bytes());
@@ -77,32 +79,32 @@ impl<'a> Table<'a> {
         if let Some((_, column)) = header.iter().enumerate().find(twice) {
             let line = lines.at(header.position());
             let column = excerpt(column);
-            bad_input!("{name}, line {line}: column `{column}` stands there twice; expected every column once");
+            bad_input!("{name}, line {line}: column `{column}` appears twice; expected every column once");
         }
         Ok(Self { name, header, reader, record: StringRecord::new(), lines })
     }
 
-    /// What messages call it.
+    /// Name of the table in messages.
     pub fn name(&self) -> &'a str {
         self.name
     }
 
-    /// Names of the columns, in order.
+    /// Names of the columns, in their order.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.header.iter()
     }
 
-    /// The place of a column.
+    /// Index of a column, `None` if the table does not have it.
     pub fn find(&self, column: &str) -> Option<usize> {
         self.columns().position(|name| name == column)
     }
 
-    /// The same of a column that must be there; `expected` says what the header should have.
+    /// Index of a column that must exist; `expected` lists the columns for the error.
     pub fn require(&mut self, column: &str, expected: &str) -> Result<usize> {
         self.find(column).ok_or_else(|| self.lacks(column, expected).into())
     }
 
-    /// What to say if it is not.
+    /// The error for a missing column.
     pub fn lacks(&mut self, column: &str, expected: &str) -> BadInput {
         let name = self.name;
         if self.columns().all(str::is_empty) {
@@ -118,8 +120,8 @@ impl<'a> Table<'a> {
         ))
     }
 
-    /// The next row.
-    pub fn next(&mut self) -> Result<Option<Row<'_>>> {
+    /// Reads the next row; `None` after the last.
+    pub fn next_row(&mut self) -> Result<Option<Row<'_>>> {
         match self.reader.read_record(&mut self.record) {
             Ok(false) => Ok(None),
             Ok(true) => {
@@ -141,15 +143,15 @@ fn unreadable(name: &str, lines: &mut Lines<'_>, error: &csv::Error) -> BadInput
     BadInput(format!("{name}, line {}: {error}; expected CSV", lines.at(error.position())))
 }
 
-/// What a cell of several lines is called.
-const UNCLOSED: &str = "a line break, as behind a quote that is not closed";
+/// Describes a cell that contains a line break.
+const UNCLOSED: &str = "a line break, perhaps after an unclosed quote";
 
 fn unclosed(cell: &str) -> bool {
     cell.contains(['\n', '\r'])
 }
 
 impl Row<'_> {
-    /// A cell as it is.
+    /// The text of a cell.
     pub fn text(&self, column: usize) -> &str {
         &self.record[column]
     }
@@ -159,22 +161,22 @@ impl Row<'_> {
         self.value(column, "a finite number", |number: &f64| number.is_finite())
     }
 
-    /// A finite number of at most that magnitude.
+    /// A finite number of at most `most` in magnitude.
     pub fn number_within(&self, column: usize, most: f64) -> Result<f64> {
         self.number(column)?;
         self.value(column, &format!("a number from -{most} to {most}"), |number: &f64| number.abs() <= most)
     }
 
-    /// The same, or none where a dash says so.
+    /// A finite number of at most `most` in magnitude, or `None` for a cell with a dash.
     pub fn number_or_dash(&self, column: usize, most: f64) -> Result<Option<f64>> {
         match self.text(column) {
             "-" => Ok(None),
-            "" => self.value(column, "a finite number; expected `-` where nothing was read", |_: &f64| false).map(Some),
+            "" => self.value(column, "a finite number; expected `-` for a missing reading", |_: &f64| false).map(Some),
             _ => self.number_within(column, most).map(Some),
         }
     }
 
-    /// A whole number.
+    /// A whole number, 0 or more.
     pub fn whole(&self, column: usize) -> Result<usize> {
         self.value(column, "a whole number", |_| true)
     }
@@ -192,7 +194,7 @@ impl Row<'_> {
     }
 }
 
-/// Finds the lines of records, in order.
+/// Finds the line numbers of records, read in order.
 struct Lines<'a> {
     text: &'a str,
     byte: usize,
@@ -200,7 +202,7 @@ struct Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// The line of a record. Its position is where the reader stood before comments and blank lines.
+    /// Line number of a record. Its position is that of the reader before it skipped comments and blank lines.
     fn at(&mut self, position: Option<&csv::Position>) -> usize {
         let start = position.map_or(0, |at| at.byte() as usize).clamp(self.byte, self.text.len());
         self.line += self.text[self.byte..start].matches('\n').count();

@@ -1,7 +1,9 @@
-//! A schedule run through the fixed-point controller, tick by tick, beside a reference in double precision.
+//! Runs a schedule through the fixed-point controller, tick by tick, and compares it with a reference in double
+//! precision.
 //!
-//! The plain spring's reference is the exact solution in continuous time, the extended spring's the loop at the same rate.
-//! Both with the pre-compensator and without it, so that each run shows what the controller is worth.
+//! The reference of the plain spring is the exact solution in continuous time, that of the extended spring the loop at
+//! the same rate. Every run has one loop with the pre-compensator and one without, which shows the effect of the
+//! controller.
 
 use anyhow::Result;
 use model::estimator::Estimator;
@@ -9,29 +11,30 @@ use model::{Compensation, Config, Input, Output, Plant, Settings, Spring, State,
 
 use crate::bad_input;
 use crate::bad_input::{BadInput, number};
-pub use crate::judged::{Judged, StartsFrom, continuous, reference_at, with_plant};
+pub use crate::has_reference::{HasReference, StartsFrom, continuous, reference_at, with_plant};
 pub use crate::run::{Run, Sample};
 use crate::schedule::Schedule;
 
-/// More ticks than this are refused: a run keeps 48 bytes of each.
+/// Largest number of ticks: a run keeps 48 bytes of each.
 const MOST_TICKS: f64 = 10e6;
 
-/// What is run.
+/// A schedule and the settings of the loop that it is run through.
 #[derive(Clone, Debug)]
 pub struct Experiment<P = Plant> {
-    /// What the schedule is called in messages.
+    /// Name of the schedule in messages.
     pub name: String,
-    /// The voltages asked for.
+    /// The commanded voltage over time.
     pub schedule: Schedule,
     /// Spring, pre-compensator and amplifier of the controlled loop.
     pub settings: Settings<P>,
 }
 
-impl<P: Judged> Experiment<P> {
-    /// Runs it; `progress` hears of the ticks done, every few thousand, and of their total.
+impl<P: HasReference> Experiment<P> {
+    /// Runs both loops; `progress` receives the number of ticks done, every few thousand, and their total.
     ///
     /// # Errors
-    /// [`BadInput`] for settings that the model refuses and schedules beyond the amplifier's range.
+    /// [`BadInput`] for settings that the model rejects, schedules beyond the amplifier's range, and more than 10
+    /// million ticks.
     pub fn run(&self, mut progress: impl FnMut(usize, usize)) -> Result<Run> {
         let rate_hz = self.settings.rate_hz;
         let uncontrolled = Settings { compensation: Compensation::None, ..self.settings };
@@ -59,21 +62,21 @@ impl<P: Judged> Experiment<P> {
     }
 }
 
-/// Largest difference between fixed point and reference over every tick of a loop, in V.
+/// Largest difference between fixed point and reference over all ticks of a loop, in V.
 ///
-/// A tick makes its share of a slew at once, the reference in the time up to the next tick: the tick that starts a slew
-/// is ahead by as much.
+/// A tick makes its part of a slew in one jump, the reference during the time until the next tick; at the start of a
+/// slew the tick is therefore ahead.
 pub fn max_fixed_point_error(samples: &[Sample]) -> f64 {
     samples.iter().map(|sample| (sample.stiffness.to_f64() - sample.reference).abs()).fold(0.0, f64::max)
 }
 
-/// The report's leaf spring over the whole range of the model's amplifiers.
+/// The report's leaf spring over the largest range of the model's amplifiers, 0 to 1000 V.
 pub fn paper_spring() -> Result<Spring> {
     use model::stiffness::{Cantilever, YoungsModulus};
     Ok(Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 1000.0)?)
 }
 
-/// The fixed-point loop over one target a tick; its reference is not known yet.
+/// Runs the fixed-point loop over one target (V) per tick; the references of the samples are left at 0.
 pub fn one_loop<E: Estimator>(
     config: &Config<E>,
     targets: &[f64],

@@ -1,4 +1,5 @@
-//! The fixed-point loop of the `model` crate run over a schedule on a host, compared with references in double precision.
+//! Runs the fixed-point loop of the `model` crate over a schedule on a host and compares it with references in double
+//! precision.
 //!
 //! | module | what it is |
 //! | --- | --- |
@@ -7,7 +8,7 @@
 //! | [`plant_file`] | the spring as a file |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
-//! | [`run`], [`judged`], [`experiment`] | fixed point and reference over a schedule |
+//! | [`run`], [`has_reference`], [`experiment`] | fixed point and reference over a schedule |
 //! | [`open_loop`] | the fixed-point spring alone over a record |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the shortest possible t97 |
 //! | [`comparison`], [`tune`] | controllers compared on the same steps; gains for a spring and the cost of a model error |
@@ -17,8 +18,7 @@ pub mod bound;
 pub mod comparison;
 pub mod csv_table;
 pub mod experiment;
-pub mod judged;
-mod leap;
+pub mod has_reference;
 pub mod open_loop;
 pub mod plant_file;
 pub mod record;

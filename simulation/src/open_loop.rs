@@ -1,6 +1,6 @@
-//! The fixed-point spring alone over a record: what the estimator makes of its voltages.
+//! The fixed-point spring without a controller, driven by the voltages of a record.
 //!
-//! [`crate::sampled::simulate`] is the same in double precision.
+//! [`crate::sampled::simulate`] is the same computation in double precision.
 
 use anyhow::Result;
 use model::estimator::{Estimator, Model};
@@ -9,11 +9,12 @@ use model::{SampleTime, Volts};
 use crate::bad_input;
 use crate::bad_input::BadInput;
 
-/// The stiffness in V at increasing times in s, just after each of the voltages in V was put across the spring, each held
-/// until the next time. A time counts as its nearest tick.
+/// Returns the stiffness in V at the increasing times `time_s` (s), each just after `voltage_v` (V) of the same index
+/// was applied; every voltage is held until the next time. Times are rounded to the nearest tick.
 ///
 /// # Errors
-/// [`BadInput`] for a spring that the tick refuses at this rate, voltages beyond +-2000 V and times that do not increase.
+/// [`BadInput`] for a spring that the tick rejects at this rate, voltages beyond +-2000 V, and times that do not
+/// increase.
 pub fn simulate(spring: &impl Model, rate_hz: f64, time_s: &[f64], voltage_v: &[f64]) -> Result<Vec<f64>> {
     let refused = |error: model::OutOfRange| BadInput(error.to_string());
     let sample_time = SampleTime::from_rate(rate_hz).map_err(refused)?;
@@ -26,9 +27,9 @@ pub fn simulate(spring: &impl Model, rate_hz: f64, time_s: &[f64], voltage_v: &[
         let applied = Volts::new(voltage).map_err(refused)?;
         let next = time_s.get(row + 1).copied().unwrap_or(time);
         if next < time || next.is_nan() {
-            bad_input!("time_s = {next} after {time}; expected times that increase");
+            bad_input!("time_s = {next} after {time}; expected increasing times");
         }
-        // A copy: between two rows there may be no tick at all.
+        // Evaluated on a copy, since two rows may share a tick.
         let mut now = state;
         stiffness.push(config.run(&mut now, applied).to_f64());
         let until = ((next - start) * rate_hz).round() as u64;
@@ -47,11 +48,11 @@ mod tests {
     use model::Plant;
 
     #[test]
-    fn it_agrees_with_double_precision_over_uneven_rows() {
+    fn agrees_with_double_precision_over_uneven_rows() {
         let (times, volts) = ([3.0, 4.0, 4.0002, 6.5, 60.0, 61.0], [100.0, 500.0, 300.0, 20.0, 700.0, 0.0]);
         let got = simulate(&Plant::PAPER, 1000.0, &times, &volts).unwrap();
         let exact = sampled::simulate(&Spring::from(Plant::PAPER), &times, &volts);
-        // Two rows share a tick: 0.2 ms of a relaxation over 5.5 s.
+        // Two rows share a tick: 0.2 ms of a relaxation with 5.5 s.
         for (got, exact) in got.iter().zip(&exact) {
             assert!((got - exact).abs() < 0.02, "{got} {exact}");
         }
@@ -59,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_run_is_bad_input() {
+    fn invalid_springs_and_records_are_bad_input() {
         let paper = Plant::PAPER;
         for error in [
             simulate(&paper, 1.0, &[0.0], &[0.0]),

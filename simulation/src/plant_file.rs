@@ -1,4 +1,4 @@
-//! The spring as a TOML file, for `--plant FILE.toml`. Only `schema` and `[relaxation]` are needed; this is all of it:
+//! The spring as a TOML file, for `--plant FILE.toml`. `schema` and `[relaxation]` are required; the complete format is
 //!
 #![doc = concat!("```toml\n", include_str!("../../docs/plant.toml"), "```")]
 //!
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::bad_input;
 use crate::bad_input::BadInput;
 
-/// A plant file, in SI units. Optional tables stand for effects that the spring has; without them it is the plain one.
+/// A plant file, in SI units. Each optional table adds an effect to the plain spring.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlantFile {
@@ -26,18 +26,18 @@ pub struct PlantFile {
     /// Hysteresis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory: Option<Memory>,
-    /// Sensitivity over the voltage.
+    /// Static nonlinearity: stiffness over the voltage.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub law: Option<Law>,
-    /// Loss of charge.
+    /// Charge leakage.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leakage: Option<Leakage>,
-    /// What comes at once, and what later.
+    /// Instantaneous part and relaxation.
     pub relaxation: Relaxation,
-    /// What the record's amplifier did.
+    /// Limits of the amplifier with which the record was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub amplifier: Option<Amplifier>,
-    /// Effects that the tick does not run; kept as they are.
+    /// Effects that the tick does not simulate, kept unchanged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unmodelled: Option<toml::Table>,
 }
@@ -46,29 +46,29 @@ pub struct PlantFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// Weight of the voltage itself.
+    /// Weight of the voltage itself, dimensionless.
     pub direct: f64,
-    /// Half the width of each play, in V.
+    /// Half the width of each play operator, in V.
     pub thresholds_v: Vec<f64>,
-    /// Weight of each play.
+    /// Weight of each play operator, dimensionless.
     pub weights: Vec<f64>,
 }
 
-/// A static law, straight between points and beyond them.
+/// A static law, linear between its points and beyond them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Law {
-    /// Upwards from 0 V.
+    /// Voltages of the points, in V, increasing from 0 V.
     pub voltage_v: Vec<f64>,
-    /// At each of them, in V; from 0.
+    /// Stiffness at each point as the equivalent static voltage, in V; 0 at the first.
     pub stiffness: Vec<f64>,
 }
 
-/// Stiffness that is lost while the voltage stays.
+/// Loss of stiffness at constant voltage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Leakage {
-    /// Part that is lost in the end, 0 to 1.
+    /// Part that is finally lost, 0 to 1.
     pub share: f64,
     /// Time constant, in s.
     pub tau_s: f64,
@@ -78,30 +78,30 @@ pub struct Leakage {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Relaxation {
-    /// Part of a change that comes at once.
+    /// Part of a change that is instantaneous, 0 to 0.9.
     pub share: f64,
-    /// Time constants, in s; in the file a single one without weight is a number.
+    /// Time constants, in s; the file may give a single one as a plain number.
     #[serde(with = "one_or_more")]
     pub tau_s: Vec<f64>,
-    /// What each time constant brings; none for a single one that brings `1 - share`.
+    /// Share of each time constant; empty for a single one with the share `1 - share`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weights: Vec<f64>,
-    /// The first time constant at 500 V, in s.
+    /// Value of the first time constant at 500 V, in s; the time constant in `tau_s` is then its value at 0 V.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tau_high_s: Option<f64>,
 }
 
-/// The amplifier that a record was made with.
+/// The amplifier with which a record was made.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Amplifier {
-    /// Where its voltage ended, in V, 10 to 1000.
+    /// Highest voltage, in V, 10 to 1000.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_v: Option<f64>,
-    /// Its fastest change, in V/s, 1 to 1e9.
+    /// Slew limit, in V/s, 1 to 1e9.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slew_v_per_s: Option<f64>,
-    /// How late it answered, in s, 0 to 60.
+    /// Delay, in s, 0 to 60.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<f64>,
 }
@@ -119,7 +119,7 @@ impl From<Plant> for PlantFile {
 }
 
 impl PlantFile {
-    /// The spring as the estimator's extended tick takes it.
+    /// The spring in the form that the estimator's extended tick takes.
     pub fn extended(&self) -> ExtendedPlant<'_> {
         ExtendedPlant {
             memory: self.memory.as_ref().map(|memory| extended::Memory {
@@ -141,10 +141,10 @@ impl PlantFile {
         }
     }
 
-    /// As it is sent to the MCU.
+    /// The model in the form that is sent to the MCU.
     ///
     /// # Errors
-    /// [`OutOfRange`] as [`PlantFile::check`]: what that accepts can be sent.
+    /// [`OutOfRange`] under the conditions of [`PlantFile::check`]; a file that passes it can be sent.
     pub fn wire(&self) -> Result<WireModel, OutOfRange> {
         self.check()?;
         let amplifier = self.amplifier.clone().unwrap_or_default();
@@ -152,10 +152,11 @@ impl PlantFile {
         wire.ok_or(OutOfRange { field: "lists", value: f64::NAN, lowest: 0.0, highest: 9.0, unit: "numbers" })
     }
 
-    /// Whether the tick can run it: at the fastest rate; a slower one may refuse a short time constant later.
+    /// Checks whether the tick can run the spring at 10 kHz; at a lower rate a short time constant may still be
+    /// rejected.
     ///
     /// # Errors
-    /// [`OutOfRange`] names table and field as they are in the file, and what is allowed.
+    /// [`OutOfRange`] with table and field as named in the file, and the allowed range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         let refused = |field, value, lowest, highest, unit| Err(OutOfRange { field, value, lowest, highest, unit });
         if self.schema != 1 {
@@ -182,13 +183,13 @@ impl PlantFile {
         Ok(())
     }
 
-    /// An amplifier with the limit and slew that the file records, where they are stricter.
+    /// The amplifier with the file's limit and slew where they are stricter.
     pub fn behind(&self, amplifier: model::Amplifier) -> model::Amplifier {
         let Some(Amplifier { limit_v, slew_v_per_s, .. }) = self.amplifier else { return amplifier };
         amplifier.limited_to(limit_v, slew_v_per_s)
     }
 
-    /// What the file says of the record that neither the tick nor its amplifier stage runs, by name.
+    /// Names of the file's effects that neither the tick nor its amplifier stage simulates.
     pub fn left_out(&self) -> Vec<String> {
         let delayed = self.amplifier.as_ref().is_some_and(|amplifier| amplifier.delay_s.is_some());
         let unmodelled =
@@ -196,16 +197,16 @@ impl PlantFile {
         delayed.then(|| "amplifier.delay_s".to_owned()).into_iter().chain(unmodelled).collect()
     }
 
-    /// The file's text.
+    /// Formats the file as TOML.
     ///
     /// # Errors
-    /// If `unmodelled` holds what TOML cannot.
+    /// If `unmodelled` holds a value that TOML cannot represent.
     pub fn to_toml(&self) -> Result<String> {
         Ok(toml::to_string(self)?)
     }
 }
 
-/// `paper`, or the path of a file.
+/// Loads the report's spring for `paper`, or the plant file of that path.
 ///
 /// # Errors
 /// [`crate::bad_input::BadInput`] with file, line, column and what was expected.
@@ -222,10 +223,10 @@ pub fn load(plant: &str) -> Result<PlantFile> {
     parse(plant, &text)
 }
 
-/// The same where only the plain spring will do.
+/// Loads like [`load`], but accepts the plain spring only.
 ///
 /// # Errors
-/// As [`load`], and for a file with more than that.
+/// The errors of [`load`], and [`crate::bad_input::BadInput`] for an extended spring.
 pub fn load_plain(plant: &str) -> Result<Plant> {
     match load(plant)?.extended().plain() {
         Some(plain) => Ok(plain),
@@ -233,10 +234,10 @@ pub fn load_plain(plant: &str) -> Result<Plant> {
     }
 }
 
-/// The plant file `text`, called `name` in messages.
+/// Parses the plant file `text`, called `name` in messages.
 ///
 /// # Errors
-/// As [`load`].
+/// The errors of [`load`].
 pub fn parse(name: &str, text: &str) -> Result<PlantFile> {
     let file: PlantFile = toml::from_str(text).map_err(|error| {
         let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
@@ -245,7 +246,7 @@ pub fn parse(name: &str, text: &str) -> Result<PlantFile> {
     })?;
     if let Err(error) = file.check() {
         let at = place::of_field(text, error.field, error.value);
-        // The place says in which table.
+        // The position already tells the table.
         let field = error.field.rsplit('.').next().unwrap_or(error.field);
         bad_input!("{}: {}", place::line_and_column(name, text, at), OutOfRange { field, ..error });
     }

@@ -1,4 +1,4 @@
-//! Records of an experiment as CSV: `time_s`, `voltage_v` and perhaps a measured column.
+//! Records of an experiment as CSV: the columns `time_s`, `voltage_v` and optionally a measured one.
 
 use std::path::Path;
 
@@ -7,47 +7,44 @@ use anyhow::Result;
 use crate::bad_input;
 use crate::bad_input::number;
 use crate::csv_table::{Table, read};
-use crate::schedule::Schedule;
 
 /// One row of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Line of the file, from 1.
+    /// Line of the file, counted from 1.
     pub line: usize,
-    /// In s, increasing.
+    /// Time, in s, increasing from row to row.
     pub time_s: f64,
-    /// Commanded voltage in V.
+    /// Commanded voltage, in V.
     pub voltage_v: f64,
-    /// Scaled stiffness in V, where the file has the column, and in it a number: `-` says that nothing was read.
+    /// Measured stiffness as the equivalent static voltage, in V; `None` without such a column, or where it holds `-`.
     pub measured: Option<f64>,
 }
 
-/// A checked record: at least two rows, every number finite, time increasing.
+/// A validated record: at least two rows, all numbers finite, times increasing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    /// What to call it in messages.
+    /// Name of the record in messages.
     pub name: String,
     /// The rows in order of time.
     pub rows: Vec<Row>,
 }
 
-/// Larger magnitudes, in V, are a fault of the file: no spring and no amplifier has them.
+/// Largest magnitude accepted, in V; anything larger is an error of the file.
 const MOST_V: f64 = 1e6;
 
-/// Voltages that differ by less are the same, in V.
-const ROUNDING_V: f64 = 1.0;
-
-/// The voltage at the spring, where a file has that and not the commanded one.
+/// Column of the voltage across the spring, in files that lack the commanded voltage.
 pub const APPLIED: &str = "applied_v";
 
-/// The measured column unless another is asked for.
+/// Default name of the measured column.
 pub const MEASURED: &str = "stiffness";
 
 impl Record {
-    /// Checks that an amplifier can put out every voltage of the record.
+    /// Checks that all voltages lie within an amplifier's range.
     ///
     /// # Errors
-    /// [`crate::bad_input::BadInput`] with file, line and column of the first voltage outside of `lowest_v` to `highest_v`.
+    /// [`crate::bad_input::BadInput`] with file, line and column of the first voltage outside `lowest_v` to
+    /// `highest_v`.
     pub fn check_range(&self, lowest_v: f64, highest_v: f64) -> Result<()> {
         match self.rows.iter().find(|row| !(lowest_v..=highest_v).contains(&row.voltage_v)) {
             None => Ok(()),
@@ -58,25 +55,7 @@ impl Record {
         }
     }
 
-    /// Checks that the voltages are those of a schedule, between its lowest and highest within `near_s` of each row.
-    ///
-    /// # Errors
-    /// [`crate::bad_input::BadInput`] with file, line and column of the first that is not.
-    pub fn check_commanded(&self, schedule: &Schedule, name: &str, near_s: f64) -> Result<()> {
-        for &Row { line, time_s, voltage_v, .. } in &self.rows {
-            let [before, after] = [-near_s, near_s].map(|near| schedule.reader().at(time_s + near));
-            if !(before.min(after) - ROUNDING_V..=before.max(after) + ROUNDING_V).contains(&voltage_v) {
-                bad_input!(
-                    "{}, line {line}, column voltage_v: {voltage_v} V at {} s; expected {after} V as in {name}",
-                    self.name,
-                    number(time_s)
-                );
-            }
-        }
-        Ok(())
-    }
-
-    /// Reads a file; `measured` names the column of the measured stiffness, [`MEASURED`] unless the user says another.
+    /// Reads a record from a file. `measured` names the measured column, which may be absent if it is [`MEASURED`].
     ///
     /// # Errors
     /// [`crate::bad_input::BadInput`] with file, line, column and what was expected.
@@ -84,31 +63,32 @@ impl Record {
         Self::parse(&path.display().to_string(), &read(path)?, measured)
     }
 
-    /// The same of a record that must have readings. What `vsj stair` writes is one: it calls the voltage [`APPLIED`].
+    /// Reads a record that must have the column `measured`. Files of `vsj stair --out` are accepted: the voltage may be
+    /// in [`APPLIED`].
     ///
     /// # Errors
-    /// As [`Record::open`], and without the measured column.
+    /// The errors of [`Record::open`], and [`crate::bad_input::BadInput`] without the measured column.
     pub fn open_measured(path: &Path, measured: &str) -> Result<Self> {
         Self::parse_measured(&path.display().to_string(), &read(path)?, measured)
     }
 
-    /// Reads the text of a file; `name` is what messages call it.
+    /// Parses a record; `name` is what messages call it.
     ///
     /// # Errors
-    /// As [`Record::open`].
+    /// The errors of [`Record::open`].
     pub fn parse(name: &str, text: &str, measured: &str) -> Result<Self> {
         let table = Table::new(name, text)?;
-        // The usual column may be absent, one that was asked for must not.
+        // Only the default column may be absent.
         let measured = (measured != MEASURED || table.find(measured).is_some()).then_some(measured);
         Self::from_table(table, &["voltage_v"], measured)
     }
 
-    /// As [`Record::open_measured`].
+    /// Parses a record under the conditions of [`Record::open_measured`].
     fn parse_measured(name: &str, text: &str, measured: &str) -> Result<Self> {
         Self::from_table(Table::new(name, text)?, &["voltage_v", APPLIED], Some(measured))
     }
 
-    /// With the voltage in the first of these columns that is there.
+    /// Takes the voltage from the first of the columns `voltages` that exists.
     fn from_table(mut table: Table<'_>, voltages: &[&str], measured: Option<&str>) -> Result<Self> {
         let expected: Vec<&str> = ["time_s", "voltage_v"].into_iter().chain(measured).collect();
         let expected = expected.join(", ");
@@ -119,7 +99,7 @@ impl Record {
 
         let name = table.name();
         let mut rows: Vec<Row> = Vec::new();
-        while let Some(row) = table.next()? {
+        while let Some(row) = table.next_row()? {
             let row = Row {
                 line: row.line,
                 time_s: row.number(time)?,
@@ -152,18 +132,18 @@ mod tests {
 
     fn message(text: &str) -> String {
         let error = Record::parse("data.csv", text, MEASURED).unwrap_err();
-        error.downcast_ref::<BadInput>().expect("the caller's to mend").0.clone()
+        error.downcast_ref::<BadInput>().expect("bad input").0.clone()
     }
 
     #[test]
-    fn columns_come_in_any_order_with_comments_between() {
+    fn columns_may_be_in_any_order_with_comments_between() {
         let text = "# a\r\nstiffness,voltage_v,time_s\r\n0,100,1\r\n# b\r\n5, 200 ,2";
         let record = Record::parse("r", text, MEASURED).unwrap();
         assert_eq!(record.rows[1], Row { line: 5, time_s: 2.0, voltage_v: 200.0, measured: Some(5.0) });
     }
 
     #[test]
-    fn another_column_may_be_the_measured_one_if_it_is_there() {
+    fn another_existing_column_can_be_the_measured_one() {
         let text = "time_s,voltage_v,gauge\n0,0,7\n1,0,8\n";
         assert_eq!(Record::parse("r", text, "gauge").unwrap().rows[1].measured, Some(8.0));
         assert_eq!(Record::parse("r", text, MEASURED).unwrap().rows[1].measured, None);
@@ -174,34 +154,22 @@ mod tests {
     }
 
     #[test]
-    fn readings_may_be_required_and_go_with_the_voltage_that_was_applied() {
+    fn required_readings_accept_the_applied_voltage() {
         let error = Record::parse_measured("r", "# a\ntime_s,voltage_v\n0,1\n1,2\n", MEASURED).unwrap_err().to_string();
         assert!(error.starts_with("r, line 2: no column `stiffness`"), "{error}");
         let text = "time_s,target_v,applied_v,stiffness\n0,1,2,3\n1,1,2,3\n";
         assert_eq!(Record::parse_measured("r", text, MEASURED).unwrap().rows[1].voltage_v, 2.0);
-        assert!(Record::parse("r", text, MEASURED).is_err(), "a schedule says what is commanded");
+        assert!(Record::parse("r", text, MEASURED).is_err(), "a schedule needs the commanded voltage");
         let both = "time_s,applied_v,voltage_v,stiffness\n0,1,2,3\n1,1,2,3\n";
         assert_eq!(Record::parse_measured("r", both, MEASURED).unwrap().rows[1].voltage_v, 2.0);
     }
 
     #[test]
-    fn a_record_of_another_schedule_is_refused_with_its_first_row() {
-        let check = |text: &str| {
-            let record = Record::parse("r", text, MEASURED).unwrap();
-            record.check_commanded(&Schedule::stair(), "the stair", 0.1).map_err(|error| error.to_string())
-        };
-        // On the ramp, and at its ends, either voltage will do.
-        assert_eq!(check("time_s,voltage_v\n0,0\n20,0\n20.05,100\n20.1,100\n90,500\n"), Ok(()));
-        let expected = "r, line 3, column voltage_v: 0 V at 25 s; expected 100 V as in the stair";
-        assert_eq!(check("time_s,voltage_v\n0,0\n25,0\n"), Err(expected.to_owned()));
-    }
-
-    #[test]
-    fn every_fault_is_named_with_its_place() {
+    fn every_error_names_its_place() {
         for (text, expected) in [
             ("", "data.csv: no header; expected one with time_s, voltage_v"),
             ("\n# a\n\n", "data.csv: no header; expected one with time_s, voltage_v"),
-            ("# a\ntime_s,voltage_v,time_s\n0,1,2\n", "line 2: column `time_s` stands there twice"),
+            ("# a\ntime_s,voltage_v,time_s\n0,1,2\n", "line 2: column `time_s` appears twice"),
             ("time_s,voltage_v\n0,1\n  \n", "line 3: 1 field(s); expected 2"),
             ("time_s,volts\n0,1\n", "line 1: no column `voltage_v`"),
             ("time_s,voltage_v\n", "0 row(s) of data; expected at least 2"),
@@ -220,23 +188,23 @@ mod tests {
             ("time_s,voltage_v,stiffness\n0,1,1e300\n", "line 2, column stiffness: `1e300`"),
             (
                 "time_s,voltage_v,stiffness\n0,1,\n1,2,3\n",
-                "line 2, column stiffness: `` is not a finite number; expected `-` where nothing was read",
+                "line 2, column stiffness: `` is not a finite number; expected `-` for a missing reading",
             ),
             ("time_s,voltage_v\n1e300,1\n0,1\n", "line 3, column time_s: 0 follows 1e300; expected increasing times"),
             (&format!("time_s,voltage_v\n0,{}\n1,2\n", "7".repeat(400)), &format!("`{}...` is", "7".repeat(40))),
             (&format!("{}\n0,1\n", "t".repeat(400)), &format!("found `{}...`", "t".repeat(40))),
-            (&format!("{0},{0}\n0,1\n", "t".repeat(400)), &format!("column `{}...` stands", "t".repeat(40))),
+            (&format!("{0},{0}\n0,1\n", "t".repeat(400)), &format!("column `{}...` appears", "t".repeat(40))),
             (
                 "time_s,voltage_v\n0,\"1\n1,2\n",
-                "line 2, column voltage_v: a line break, as behind a quote that is not closed; expected a finite number",
+                "line 2, column voltage_v: a line break, perhaps after an unclosed quote; expected a finite number",
             ),
             (
                 "time_s,voltage_v\n0,1\n\"1,2\n2,3\n",
-                "line 3: 1 field(s) with a line break, as behind a quote that is not closed; expected 2",
+                "line 3: 1 field(s) with a line break, perhaps after an unclosed quote; expected 2",
             ),
             (
                 "time_s,\"voltage_v\n0,1\n",
-                "line 1: a line break, as behind a quote that is not closed; expected a header with time_s, voltage_v",
+                "line 1: a line break, perhaps after an unclosed quote; expected a header with time_s, voltage_v",
             ),
         ] {
             let got = message(text);

@@ -1,7 +1,7 @@
 //! The controlled spring in continuous time and double precision, solved exactly.
 //!
 //! Independent of the `model` crate: no ticks, no converter, no fixed point. With the relaxed part `w` and the
-//! integrator `z`,
+//! integrator `z` the loop is
 //!
 //! ```text
 //! y = w + share (u - w)          dw/dt = (u - w) / tau
@@ -9,58 +9,59 @@
 //! u = c within range and slew    (then dz/dt is Ki times the error)
 //! ```
 //!
-//! While `u = c` this is linear with a target that is straight between samples: one matrix exponential, computed once,
-//! is the exact step (first-order hold). At a limit, `u` is itself a straight line and `w`, `z` follow it in closed
-//! form; the moments at which limits begin and end to act are found by bisection.
+//! While `u = c` the system is linear with a piecewise linear target, and one matrix exponential, computed once, is the
+//! exact step (first-order hold). At a limit, `u` is itself linear in time, and `w`, `z` follow it in closed form; the
+//! times at which limits start and stop acting are found by bisection.
 
+mod kernel;
 mod mode;
 
 use nalgebra::Matrix4;
 
-use crate::leap::{Leap, Pair};
+use kernel::{Kernel, Pair};
 
 /// The loop to be solved, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loop {
     /// Instantaneous share of a change, 0 to 1.
     pub share: f64,
-    /// Time constant of the rest, in s.
+    /// Time constant of the relaxation, in s.
     pub time_constant_s: f64,
-    /// Proportional and integral gain (1/s) of the controller; `None` puts the target out as it is.
+    /// Proportional (dimensionless) and integral gain (1/s) of the controller; with `None` the target is the voltage.
     pub gains: Option<(f64, f64)>,
     /// Lowest and highest voltage, in V.
     pub range_v: (f64, f64),
-    /// Fastest change of the voltage, in V/s; infinite where there is no limit.
+    /// Slew limit, in V/s; infinite without one.
     pub slew_v_per_s: f64,
 }
 
-/// A solution in progress, sample by sample.
+/// A solution in progress, advanced in samples.
 #[derive(Clone, Debug)]
 pub struct Solution {
     system: Loop,
-    /// Commanded voltage by `w`, `z` and the target.
+    /// Coefficients of the commanded voltage for `w`, `z` and the target.
     law: [f64; 3],
-    /// Ki / Kp
+    /// Ki / Kp, in 1/s.
     reset_per_s: f64,
     sample_s: f64,
-    /// What one whole sample with `u = c` makes of `w`, `z`, the target and its slope: rows for `w` and `z`.
+    /// Exact transition over one sample with `u = c`: rows for `w` and `z`, columns for `w`, `z`, target and slope.
     whole: [[f64; 4]; 2],
-    /// The same for many samples.
-    leap: Leap,
+    /// The same transition for two samples at a time.
+    kernel: Kernel,
     w: f64,
     z: f64,
     u: f64,
-    /// Target at the end of the last sample.
+    /// Target at the end of the last sample, in V.
     target: f64,
-    /// True if the law is followed: nothing limits.
+    /// True while no limit acts.
     free: bool,
 }
 
-/// The shortest time that a mode lasts, in s: so the solution always gets on.
+/// Shortest duration of a mode, in s, which guarantees progress.
 const SHORTEST_S: f64 = 1e-9;
 
 impl Loop {
-    /// A spring at rest without voltage, to be solved in steps of `sample_s`.
+    /// A spring at rest at 0 V, to be solved in samples of `sample_s` seconds.
     pub fn at_rest(self, sample_s: f64) -> Solution {
         let (law, reset_per_s) = match self.gains {
             None => ([0.0, 0.0, 1.0], 0.0),
@@ -76,7 +77,7 @@ impl Loop {
             reset_per_s,
             sample_s,
             whole: [[0.0; 4]; 2],
-            leap: Leap::new([[0.0; 2]; 2], [0.0; 2], [0.0; 2]),
+            kernel: Kernel::new([[0.0; 2]; 2], [0.0; 2], [0.0; 2]),
             w: 0.0,
             z: 0.0,
             u: 0.0,
@@ -87,25 +88,25 @@ impl Loop {
         let columns = |a: usize, b: usize| solution.whole.map(|row| [row[a], row[b]]);
         let later = solution.whole.map(|row| row[3] / sample_s);
         let now = [0, 1].map(|state| solution.whole[state][2] - later[state]);
-        solution.leap = Leap::new(columns(0, 1), now, later);
+        solution.kernel = Kernel::new(columns(0, 1), now, later);
         solution
     }
 }
 
-/// The loop at one moment, in V.
+/// The loop at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moment {
-    /// Scaled stiffness.
+    /// Stiffness as the equivalent static voltage, in V.
     pub stiffness: f64,
-    /// Voltage across the spring.
+    /// Voltage across the spring, in V.
     pub voltage: f64,
 }
 
 impl Solution {
-    /// Whole samples pass, the target going straight from each of `targets` to the next; `moments` are the loop at all
+    /// Advances by whole samples with targets (V) that are linear in between; `moments` receives the loop at all
     /// targets but the first.
     ///
-    /// The first may differ from where the target was: it has jumped.
+    /// The first target may differ from the current one, which is a jump.
     pub fn run(&mut self, targets: &[f64], moments: &mut [Moment]) {
         if let Some(&first) = targets.first() {
             self.jump(first);
@@ -113,7 +114,7 @@ impl Solution {
         let mut done = 0;
         while done + 1 < targets.len() {
             done += self.run_free(&targets[done..], &mut moments[done..]);
-            // Here a limit acts, or too few samples are left: one the long way.
+            // A limit acts here, or too few samples are left for a pair: advance one sample.
             if let [from_v, to_v, ..] = targets[done..] {
                 self.advance(from_v, (to_v - from_v) / self.sample_s, self.sample_s);
                 moments[done] = self.moment();
@@ -122,15 +123,15 @@ impl Solution {
         }
     }
 
-    /// As many pairs of samples as pass before a limit acts; returns the number of samples.
+    /// Advances by pairs of samples until a limit acts; returns the number of samples.
     fn run_free(&mut self, targets: &[f64], moments: &mut [Moment]) -> usize {
         let ([first, second, ..], true) = (targets, self.free) else { return 0 };
         let (lowest, highest) = (Pair::splat(self.system.range_v.0), Pair::splat(self.system.range_v.1));
-        let (leap, share, [by_w, by_z, by_target]) = (self.leap, self.system.share, self.law);
-        let voltage = leap.output([by_w, by_z], by_target);
-        let stiffness = leap.output([1.0 - share + share * by_w, share * by_z], share * by_target);
+        let (kernel, share, [by_w, by_z, by_target]) = (self.kernel, self.system.share, self.law);
+        let voltage = kernel.output([by_w, by_z], by_target);
+        let stiffness = kernel.output([1.0 - share + share * by_w, share * by_z], share * by_target);
 
-        let mut pair = leap.start([self.w, self.z], [*first, *second]);
+        let mut pair = kernel.start([self.w, self.z], [*first, *second]);
         let mut samples = 0;
         for (targets, moments) in targets[1..].windows(3).step_by(2).zip(moments.chunks_exact_mut(2)) {
             let (now, next) = (Pair::new([targets[0], targets[1]]), Pair::new([targets[1], targets[2]]));
@@ -142,7 +143,7 @@ impl Solution {
             moments[0] = Moment { stiffness, voltage };
             moments[1] = Moment { stiffness: later_stiffness, voltage: later_voltage };
             samples += 2;
-            pair = leap.next(pair, now, next);
+            pair = kernel.next(pair, now, next);
         }
         if samples > 0 {
             self.rejoin(moments[samples - 1], targets[samples]);
@@ -150,7 +151,7 @@ impl Solution {
         samples
     }
 
-    /// Takes up the states that a moment of the free loop came from.
+    /// Restores the states from the output of the loop at one time.
     fn rejoin(&mut self, moment: Moment, target: f64) {
         let Moment { stiffness, voltage } = moment;
         let [by_w, by_z, by_target] = self.law;
@@ -162,9 +163,9 @@ impl Solution {
         (self.u, self.target) = (voltage, target);
     }
 
-    /// Any stretch of time passes, the target starting at `from_v` with a `slope` in V/s.
+    /// Advances by `duration_s` seconds, with a target that starts at `from_v` (V) and changes by `slope` (V/s).
     ///
-    /// Limits are looked for at the end of each sample: one that is touched and left again within a sample is not seen.
+    /// Limits are checked at the end of each sample; one that is reached and left within a sample is not seen.
     pub fn advance(&mut self, from_v: f64, slope: f64, duration_s: f64) {
         let mut passed = 0.0;
         while passed < duration_s {
@@ -173,7 +174,7 @@ impl Solution {
             let rest = (duration_s - passed).min(self.sample_s);
             let mut lasts = rest;
             if self.after(mode, target, slope, rest).broken(mode, target + slope * rest, slope) {
-                // The mode ends within: find where, but always get on.
+                // The mode ends within this sample: bisect, with a minimum duration.
                 let (mut good, mut bad) = (0.0, rest);
                 for _ in 0..60 {
                     let middle = 0.5 * (good + bad);
@@ -191,13 +192,14 @@ impl Solution {
         self.jump(from_v + slope * duration_s);
     }
 
-    /// The target jumps to `target_v` now. Without a slew limit the voltage, and part of the stiffness, follow at once.
+    /// Sets the target to `target_v` (V). Without a slew limit the voltage and the instantaneous part of the stiffness
+    /// follow.
     ///
-    /// A voltage outside of the range is brought to its end, whatever the slew.
+    /// A voltage outside the range is clamped to its end regardless of the slew.
     pub fn jump(&mut self, target_v: f64) {
         let (lowest, highest) = self.system.range_v;
         let wanted = self.law_at(self.w, self.z, target_v);
-        // The range wins over the slew.
+        // The range takes precedence over the slew.
         self.u = self.u.clamp(lowest, highest);
         if self.system.slew_v_per_s.is_infinite() || (wanted - self.u).abs() <= self.system.slew_v_per_s * SHORTEST_S {
             self.u = wanted.clamp(lowest, highest);
@@ -206,7 +208,7 @@ impl Solution {
         self.free = self.system.slew_v_per_s.is_infinite() && (lowest..=highest).contains(&wanted);
     }
 
-    /// The loop now.
+    /// The loop at the current time.
     pub fn moment(&self) -> Moment {
         Moment { stiffness: self.w + self.system.share * (self.u - self.w), voltage: self.u }
     }
@@ -218,13 +220,13 @@ impl Solution {
 
     #[inline]
     fn moved(&self, transition: &[[f64; 4]; 2], target: f64, slope: f64) -> [f64; 2] {
-        // The states last: their sum is what the next sample waits for.
+        // The states come last, since the next sample depends on their sum.
         transition.map(|[by_w, by_z, by_target, by_slope]| {
             by_target * target + by_slope * slope + by_w * self.w + by_z * self.z
         })
     }
 
-    /// The exact transition over `duration_s` while the law is followed.
+    /// The exact transition over `duration_s` seconds while no limit acts.
     fn transition(&self, duration_s: f64) -> [[f64; 4]; 2] {
         let (relaxation, reset) = (1.0 / self.system.time_constant_s, self.reset_per_s);
         let [by_w, by_z, by_target] = self.law;

@@ -1,39 +1,39 @@
-//! How a loop answers each change of its target.
+//! Characteristics of a loop's response to each change of its target.
 
 use serde::Serialize;
 
-use crate::experiment::{Experiment, Judged};
+use crate::experiment::{Experiment, HasReference};
 use crate::run::{Run, Sample};
 use crate::schedule::Change;
 
-/// The answer to one change. Times are in s from the moment the target starts to change.
+/// The response to one change. Times are in s from the start of the change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Response {
-    /// The plateau before, in V.
+    /// Target before the change, in V.
     pub from_v: f64,
-    /// The plateau after, in V.
+    /// Target after the change, in V.
     pub to_v: f64,
-    /// When half of the change is first reached; `None` if never before the next change.
+    /// Time to 50 % of the change; `None` if the next change comes first.
     pub t50_s: Option<f64>,
-    /// When 90 % is first reached.
+    /// Time to 90 % of the change.
     pub t90_s: Option<f64>,
-    /// When 97 % is first reached.
+    /// Time to 97 % of the change.
     pub t97_s: Option<f64>,
-    /// How far the stiffness goes beyond, in percent of the change.
+    /// Largest overshoot, in percent of the change, 0 or more.
     pub overshoot_percent: f64,
-    /// The voltage that goes farthest in the direction of the change, in V.
+    /// Extreme voltage in the direction of the change, in V.
     pub peak_v: f64,
-    /// The shortest `t97_s` that any controller could reach within the amplifier's limits, with an ideal step: from a
-    /// settled spring, or for an extended one from the state that this loop has brought it to (see [`crate::bound`]).
-    /// `None` if out of reach.
+    /// Lower bound on `t97_s` for any controller behind this amplifier, for an ideal step: from a settled spring, or
+    /// for an extended spring from the state that this loop has produced (see [`crate::bound`]). `None` if out of
+    /// reach.
     pub bound_t97_s: Option<f64>,
 }
 
-/// Measures one loop of a run, tick by tick, straight between ticks.
+/// Measures one loop of a run; the stiffness is interpolated linearly between ticks.
 pub fn measure(run: &Run, samples: &[Sample], change: &Change, bound_t97_s: Option<f64>) -> Response {
     let Change { start_s, end_s, from_v, to_v } = *change;
     let first = run.tick_at(start_s);
-    // The tick at the end may show the next change already.
+    // The tick at the end may already belong to the next change.
     let last = run.tick_at(end_s).max(first + 1);
     let part = |sample: &Sample| (sample.stiffness.to_f64() - from_v) / (to_v - from_v);
     let window = &samples[first..last];
@@ -62,8 +62,8 @@ pub fn measure(run: &Run, samples: &[Sample], change: &Change, bound_t97_s: Opti
     }
 }
 
-/// The answer of one loop of a run to each change of its target.
-pub fn responses<P: Judged>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> Vec<Response> {
+/// Responses of one loop of a run to all changes of its target.
+pub fn responses<P: HasReference>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> Vec<Response> {
     let changes = experiment.schedule.changes();
     let bounds = P::bounds(&experiment.settings, run, samples, &changes);
     let each = |(change, bound): (&Change, _)| measure(run, samples, change, bound);
@@ -91,7 +91,7 @@ mod tests {
         Run { start_s: 2.0, rate_hz, with: (0..ticks).map(sample).collect(), without: Vec::new() }
     }
 
-    /// Straight lines at a rate that no time falls on: the crossings lie between ticks.
+    /// Straight lines, at a rate at which no crossing falls on a tick.
     #[test]
     fn crossings_lie_between_ticks() {
         let run = run(333.0, 3330, |t| (50.0 * (t - 3.0)).clamp(0.0, 110.0), |t| if t < 4.0 { 300.0 } else { 100.0 });
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(got.peak_v, 300.0);
     }
 
-    /// Downwards, never complete, and the next change right behind: its first tick does not count.
+    /// Downwards, incomplete, and directly followed by the next change, whose first tick does not count.
     #[test]
     fn a_step_down_has_its_peak_below() {
         let stiffness = |t: f64| if t < 5.0 { 300.0 - 30.0 * (t - 3.0).max(0.0) } else { 0.0 };

@@ -1,32 +1,32 @@
-//! A finished run of the fixed-point loop: one sample a tick.
+//! A finished run of the fixed-point loop, one sample per tick.
 
 use model::{DacCode, Limits, ScaledStiffness, Volts};
 
 /// One tick of one loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// What the DAC was told.
+    /// Code sent to the DAC.
     pub code: DacCode,
-    /// The voltage of that code.
+    /// Voltage of that code.
     pub applied: Volts,
-    /// The fixed-point estimate just after.
+    /// Fixed-point estimate of the stiffness just after the voltage was applied.
     pub stiffness: ScaledStiffness,
-    /// The limits that acted.
+    /// Limits that acted.
     pub limits: Limits,
-    /// The reference's stiffness at the same moment, in V.
+    /// Stiffness of the reference at the same time, in V.
     pub reference: f64,
 }
 
-/// A finished run: one sample a tick, first and last moment included.
+/// A finished run, first and last tick included.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Time of the first tick, in s.
     pub start_s: f64,
-    /// Ticks per second.
+    /// Ticks per second, in Hz.
     pub rate_hz: f64,
-    /// With the pre-compensator.
+    /// The loop with the pre-compensator.
     pub with: Vec<Sample>,
-    /// The target put out as it is.
+    /// The loop without it: the target is the voltage.
     pub without: Vec<Sample>,
 }
 
@@ -36,7 +36,7 @@ impl Run {
         self.start_s + tick as f64 / self.rate_hz
     }
 
-    /// The last tick at or before `time_s`.
+    /// Index of the last tick at or before `time_s`.
     pub fn tick_at(&self, time_s: f64) -> usize {
         let tick = ((time_s - self.start_s) * self.rate_hz + 1e-6).floor().max(0.0) as usize;
         tick.min(self.with.len() - 1)

@@ -1,44 +1,44 @@
-//! The loop at the controller's own rate in double precision: what the fixed-point tick must agree with.
+//! The loop at the controller's rate in double precision, which the fixed-point tick must agree with.
 //!
-//! Written from the equations, not from the `model` crate, of which it takes numbers only: limits by clamping, and the
-//! [spring]'s exact step for a voltage held between ticks.
+//! Written from the equations, independently of the `model` crate, from which it takes numbers only. Limits are
+//! clamped, and the [spring]'s step is exact for a voltage held between ticks.
 //!
-//! - The textbook PI: a proportional and an integral part, back-calculation as anti-windup. Where the spring's answer to a
-//!   voltage is a curve, the controller takes it for straight, from the last voltage on and as steep as it is anywhere.
-//! - Time-optimal: the voltage that brings the spring to its target by the end of the tick, found by running copies of the
-//!   spring through that tick.
+//! - Proportional-integral: a proportional and an integral part with back-calculation as anti-windup. A nonlinear spring is
+//!   linearised around the last voltage with the steepest slope that it has anywhere.
+//! - Time-optimal: the voltage that brings the spring to its target at the end of the tick, found by simulating copies of
+//!   the spring over that tick.
 
 pub mod spring;
 
-pub use spring::Spring;
+pub use spring::{Spring, simulate};
 
-/// Settings in SI units.
+/// Settings of the loop, in SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledLoop {
     /// Time between ticks, in s.
     pub sample_s: f64,
     /// The spring.
     pub spring: Spring,
-    /// How the voltage is led to the target.
+    /// The controller.
     pub controller: Controller,
     /// Lowest and highest voltage, in V.
     pub range_v: (f64, f64),
-    /// Fastest change, in V/s; infinite where there is no limit.
+    /// Slew limit, in V/s; infinite without one.
     pub slew_v_per_s: f64,
 }
 
-/// The controllers.
+/// A controller and its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Controller {
-    /// Puts the target out as it is.
+    /// The target is the voltage.
     None,
-    /// Proportional and integral gain (1/s).
+    /// Proportional gain (dimensionless) and integral gain (1/s).
     ProportionalIntegral(f64, f64),
-    /// Time constant of the approach, in s.
+    /// Time-optimal, with the time constant of its approach in s.
     TimeOptimal(f64),
 }
 
-/// State of the spring, the controller and the amplifier, all in V.
+/// State of spring, controller and amplifier, in V.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     spring: spring::State,
@@ -47,21 +47,21 @@ pub struct State {
 }
 
 impl SampledLoop {
-    /// Without voltage, settled.
+    /// The state at rest at 0 V.
     pub fn at_rest(&self) -> State {
         State { spring: self.spring.at_rest(), integral: 0.0, voltage: 0.0 }
     }
 
-    /// First half of a tick: the limited voltage before rounding, in V.
+    /// First half of a tick: returns the limited voltage before rounding, in V, for a target in V.
     pub fn drive(&self, state: &mut State, target: f64) -> f64 {
         let (lowest, highest) = self.range_v;
         let target = target.clamp(lowest, highest);
         let wanted = match self.controller {
             Controller::None => target,
-            Controller::TimeOptimal(approach_s) => self.leading_to(&state.spring, target, approach_s),
+            Controller::TimeOptimal(approach_s) => self.voltage_to_reach(&state.spring, target, approach_s),
             Controller::ProportionalIntegral(proportional, _) => {
                 // u = Kp (target - y) + z with y = y0 + s (u - u0)
-                let (before, steepest) = (state.spring.voltage(), self.spring.steepest());
+                let (before, steepest) = (state.spring.voltage(), self.spring.steepest_slope());
                 let error = target - self.spring.stiffness(&state.spring) + steepest * before;
                 (proportional * error + state.integral) / (1.0 + proportional * steepest)
             }
@@ -77,9 +77,9 @@ impl SampledLoop {
         state.voltage
     }
 
-    /// The voltage, within the range, that makes up as much of the way to the target in the coming tick as the approach
-    /// says; by regula falsi (Illinois), since more voltage always gives more stiffness.
-    fn leading_to(&self, spring: &spring::State, target: f64, approach_s: f64) -> f64 {
+    /// The voltage within the range that covers the approach's part of the distance to the target in the coming tick,
+    /// found by regula falsi (Illinois), since the stiffness increases with the voltage.
+    fn voltage_to_reach(&self, spring: &spring::State, target: f64, approach_s: f64) -> f64 {
         let now = self.spring.stiffness(spring);
         let part = if approach_s > 0.0 { -(-self.sample_s / approach_s).exp_m1() } else { 1.0 };
         let ahead = |volts: f64| {
@@ -88,7 +88,7 @@ impl SampledLoop {
             self.spring.hold(&mut tried, self.sample_s);
             self.spring.stiffness(&tried)
         };
-        let aim = self.braked(now, ahead(spring.voltage()), target, now + part * (target - now));
+        let aim = self.limited_by_slew(now, ahead(spring.voltage()), target, now + part * (target - now));
         let missed = |volts: f64| ahead(volts) - aim;
         let (mut low, mut high) = self.range_v;
         let (mut at_low, mut at_high) = (missed(low), missed(high));
@@ -119,43 +119,29 @@ impl SampledLoop {
         0.5 * (low + high)
     }
 
-    /// What of an aim for the end of the tick leaves the slew time to stop at the target; the stiffness is `now`, and
-    /// `then` at the end of the tick if the voltage stays. While the voltage turns back at the slew, each tick takes the
-    /// same from the drift, and the relaxation its part.
-    fn braked(&self, now: f64, then: f64, target: f64, aim: f64) -> f64 {
+    /// Limits the `aim` for the end of the tick so that the slew limit leaves time to stop at the target; the stiffness
+    /// is `now`, and `then` at the end of the tick under constant voltage. While the voltage turns back at the slew
+    /// limit, every tick reduces the drift by the same amount and by the part that relaxes.
+    fn limited_by_slew(&self, now: f64, then: f64, target: f64, aim: f64) -> f64 {
         let step = self.slew_v_per_s * self.sample_s;
         let (sign, drift) = ((then - now).signum(), (then - now).abs());
-        let spring::Turning { within_a_tick, in_each_later, relaxed } = self.spring.turning(self.sample_s);
+        let spring::Reversal { within_a_tick, in_each_later, relaxed } = self.spring.reversal(self.sample_s);
         let beyond = drift - within_a_tick * step;
         if beyond <= 0.0 || step.is_infinite() {
             return aim;
         }
         let slower = in_each_later * step + relaxed * (drift + within_a_tick * step) / 2.0;
         let allowed = (2.0 * slower * (sign * (target - then)).max(0.0)).sqrt();
-        let braked = then + sign * within_a_tick / in_each_later * (allowed - beyond);
-        if sign > 0.0 { aim.min(braked) } else { aim.max(braked) }
+        let limited = then + sign * within_a_tick / in_each_later * (allowed - beyond);
+        if sign > 0.0 { aim.min(limited) } else { aim.max(limited) }
     }
 
-    /// Second half: `applied` volts are put across the spring and held; returns the stiffness just after, in V.
+    /// Second half of a tick: holds `applied` (V) across the spring; returns the stiffness just after it was applied,
+    /// in V.
     pub fn apply(&self, state: &mut State, applied: f64) -> f64 {
         self.spring.apply(&mut state.spring, applied);
         let stiffness = self.spring.stiffness(&state.spring);
         self.spring.hold(&mut state.spring, self.sample_s);
         stiffness
     }
-}
-
-/// The spring alone: its stiffness in V at increasing times in s, just after each of the voltages in V was put across it,
-/// each held until the next time.
-pub fn simulate(spring: &Spring, time_s: &[f64], voltage_v: &[f64]) -> Vec<f64> {
-    let mut state = spring.at_rest();
-    let lasts = time_s.windows(2).map(|pair| pair[1] - pair[0]).chain([0.0]);
-    let points = voltage_v.iter().zip(lasts);
-    let at = |(&voltage, lasts): (&f64, f64)| {
-        spring.apply(&mut state, voltage);
-        let stiffness = spring.stiffness(&state);
-        spring.hold(&mut state, lasts);
-        stiffness
-    };
-    points.map(at).collect()
 }

@@ -1,70 +1,74 @@
-//! What voltage is asked for, and when: straight pieces with jumps between them.
+//! The commanded voltage over time, piecewise linear with jumps.
 
 use anyhow::Result;
 
 use crate::bad_input;
 use crate::bad_input::number;
-use crate::record::Record;
+use crate::record::{Record, Row};
 
-/// One straight piece, from `start_s` up to but not including `end_s`.
+/// A linear piece of a schedule, from `start_s` to before `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
-    /// In s.
+    /// Start, in s.
     pub start_s: f64,
-    /// In s, after `start_s`.
+    /// End, in s, after `start_s`.
     pub end_s: f64,
     /// Voltage at the start, in V.
     pub from_v: f64,
-    /// Voltage towards the end, in V.
+    /// Voltage at the end, in V.
     pub to_v: f64,
 }
 
-/// A voltage over time. Adjoining pieces, in order.
+/// A voltage over time: adjoining pieces in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     pieces: Vec<Piece>,
-    /// Voltage from the last moment on, in V.
+    /// Voltage at and after the end of the last piece, in V.
     end_v: f64,
 }
 
 /// A change from one plateau to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
-    /// When the voltage starts to change, in s.
+    /// Start of the change, in s.
     pub start_s: f64,
-    /// When the next change starts or the schedule ends, in s.
+    /// Start of the next change or end of the schedule, in s.
     pub end_s: f64,
-    /// The plateau before, in V.
+    /// Voltage of the plateau before, in V.
     pub from_v: f64,
-    /// The plateau after, in V.
+    /// Voltage of the plateau after, in V.
     pub to_v: f64,
 }
 
-/// What the voltage does between two rows of a file.
+/// Interpolation of the voltage between two rows of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Between {
-    /// It stays at the earlier row's.
+    /// The earlier row's voltage is held.
     #[default]
     Hold,
-    /// It goes straight to the later row's.
+    /// Linear interpolation.
     Linear,
 }
 
-/// A plateau shorter than this belongs to the change that it interrupts.
+/// A shorter plateau, in s, counts as part of the change that it interrupts.
 const SHORTEST_PLATEAU_S: f64 = 1.0;
 
-/// The stair: up by 100 V every 10 s, from 20 s on.
+/// Voltages that differ by less than this, in V, count as equal when a record is compared with a schedule.
+const ROUNDING_V: f64 = 1.0;
+
+/// Steps of the report's stair: 100 V every 10 s, from 20 s on.
 const STAIR_STARTS_S: [f64; 5] = [20.0, 30.0, 40.0, 50.0, 60.0];
 const STAIR_STEP_V: f64 = 100.0;
 const STAIR_END_S: f64 = 70.0;
 
 impl Schedule {
-    /// The stair of the report's Appendix 8.1.2: sampled every 0.1 s and interpolated, so each step is a 0.1 s ramp.
+    /// The stair of the report's Appendix 8.1.2, whose steps are 0.1 s ramps because it is sampled every 0.1 s and
+    /// interpolated.
     pub fn stair() -> Self {
         Self::stair_with_ramps(0.1)
     }
 
-    /// The same stair with ideal steps.
+    /// The stair of [`Schedule::stair`] with ideal steps.
     pub fn ideal_stair() -> Self {
         Self::stair_with_ramps(0.0)
     }
@@ -79,40 +83,40 @@ impl Schedule {
         Self::new(points, Between::Linear)
     }
 
-    /// The schedule that a record commanded.
+    /// The commanded voltage of a record.
     pub fn from_record(record: &Record, between: Between) -> Self {
         Self::new(record.rows.iter().map(|row| (row.time_s, row.voltage_v)).collect(), between)
     }
 
-    /// Through points of time in s and voltage in V, at least two; two at the same time make a jump.
+    /// The voltage through points of time (s) and voltage (V), at least two; two points at the same time are a jump.
     pub fn new(points: Vec<(f64, f64)>, between: Between) -> Self {
         let end_v = points.last().map_or(0.0, |last| last.1);
         Self { pieces: pieces(points, between), end_v }
     }
 
-    /// First moment, in s.
+    /// Start, in s.
     pub fn start_s(&self) -> f64 {
         self.pieces.first().map_or(0.0, |piece| piece.start_s)
     }
 
-    /// Last moment, in s.
+    /// End, in s.
     pub fn end_s(&self) -> f64 {
         self.pieces.last().map_or(0.0, |piece| piece.end_s)
     }
 
-    /// Voltages in V at ticks `rate_hz` a second, the first moment and the last that falls on a tick included.
+    /// Voltages, in V, at `rate_hz` ticks per second, from the start to the last tick within the schedule.
     pub fn at_ticks(&self, rate_hz: f64) -> Vec<f64> {
         let mut reader = self.reader();
         let ticks = 0..=self.last_tick(rate_hz) as usize;
         ticks.map(|tick| reader.at(self.start_s() + tick as f64 / rate_hz)).collect()
     }
 
-    /// Number of the last of those ticks, from 0: a whole number, however large.
+    /// Index of the last tick within the schedule, from 0, as a whole number of any size.
     pub fn last_tick(&self, rate_hz: f64) -> f64 {
         ((self.end_s() - self.start_s()) * rate_hz + 1e-6).floor()
     }
 
-    /// The pieces in order.
+    /// The pieces, in order.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
@@ -139,16 +143,16 @@ impl Schedule {
         changes
     }
 
-    /// Checks that an amplifier can put out every voltage of the schedule.
+    /// Checks that all voltages lie within an amplifier's range; `name` is what messages call the schedule.
     ///
     /// # Errors
-    /// [`crate::bad_input::BadInput`] with the first voltage outside of `lowest_v` to `highest_v`.
+    /// [`crate::bad_input::BadInput`] with the first voltage outside `lowest_v` to `highest_v`.
     pub fn check_range(&self, name: &str, lowest_v: f64, highest_v: f64) -> Result<()> {
         let ends = self.pieces.iter().flat_map(|piece| [(piece.start_s, piece.from_v), (piece.end_s, piece.to_v)]);
         for (time, volts) in ends.chain([(self.end_s(), self.end_v)]) {
             if !(lowest_v..=highest_v).contains(&volts) {
                 bad_input!(
-                    "{name} asks for {volts} V at {} s; expected {lowest_v} to {highest_v} V, the amplifier's range",
+                    "{name} commands {volts} V at {} s; expected {lowest_v} to {highest_v} V, the amplifier's range",
                     number(time)
                 );
             }
@@ -156,13 +160,32 @@ impl Schedule {
         Ok(())
     }
 
-    /// The voltage at increasing moments, each call O(1).
+    /// Checks that the record's voltages are those of this schedule: each row must lie between the lowest and the highest
+    /// scheduled voltage within `near_s` seconds of it, give or take 1 V. `name` is what messages call the schedule.
+    ///
+    /// # Errors
+    /// [`crate::bad_input::BadInput`] with file, line and column of the first row that differs.
+    pub fn check_commanded(&self, name: &str, record: &Record, near_s: f64) -> Result<()> {
+        for &Row { line, time_s, voltage_v, .. } in &record.rows {
+            let [before, after] = [-near_s, near_s].map(|near| self.reader().at(time_s + near));
+            if !(before.min(after) - ROUNDING_V..=before.max(after) + ROUNDING_V).contains(&voltage_v) {
+                bad_input!(
+                    "{}, line {line}, column voltage_v: {voltage_v} V at {} s; expected {after} V as in {name}",
+                    record.name,
+                    number(time_s)
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the voltage at increasing times, each in constant time.
     pub fn reader(&self) -> Reader<'_> {
         Reader { schedule: self, index: 0 }
     }
 }
 
-/// Reads a schedule in order of time.
+/// Reads a schedule at increasing times.
 #[derive(Clone, Debug)]
 pub struct Reader<'a> {
     schedule: &'a Schedule,
@@ -170,7 +193,7 @@ pub struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// The voltage just after `time_s`, in V; later calls must not ask for earlier times.
+    /// Voltage just after `time_s`, in V; times must not decrease from call to call.
     pub fn at(&mut self, time_s: f64) -> f64 {
         let pieces = &self.schedule.pieces;
         while self.index + 1 < pieces.len() && pieces[self.index].end_s <= time_s {
@@ -179,7 +202,8 @@ impl Reader<'_> {
         if time_s >= self.schedule.end_s() { self.schedule.end_v } else { self.piece().at(time_s) }
     }
 
-    /// The straight stretches from `from_s`, not before the last moment read, to `until_s`.
+    /// Splits the time from `from_s` to `until_s` into linear stretches; `from_s` must not be before the last time
+    /// read.
     pub fn stretches(mut self, from_s: f64, until_s: f64) -> impl Iterator<Item = Stretch> {
         let mut time = from_s;
         std::iter::from_fn(move || {
@@ -199,14 +223,14 @@ impl Reader<'_> {
     }
 }
 
-/// A straight piece of a schedule, seen from one moment on.
+/// A part of a linear piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
     /// Voltage at its start, in V.
     pub from_v: f64,
-    /// In V/s.
+    /// Slope, in V/s.
     pub slope: f64,
-    /// In s.
+    /// Duration, in s.
     pub duration_s: f64,
 }
 
@@ -218,19 +242,19 @@ impl Stretch {
 }
 
 impl Piece {
-    /// The voltage at a moment of the piece, in V.
+    /// Voltage at a time within the piece, in V.
     pub fn at(&self, time_s: f64) -> f64 {
         let part = ((time_s - self.start_s) / (self.end_s - self.start_s)).clamp(0.0, 1.0);
         self.from_v + part * (self.to_v - self.from_v)
     }
 
-    /// In V/s.
+    /// Slope, in V/s.
     pub fn slope(&self) -> f64 {
         (self.to_v - self.from_v) / (self.end_s - self.start_s)
     }
 }
 
-/// Pieces between points.
+/// The pieces between points.
 fn pieces(points: impl IntoIterator<Item = (f64, f64)>, between: Between) -> Vec<Piece> {
     let mut points = points.into_iter();
     let Some(mut last) = points.next() else { return Vec::new() };
@@ -245,7 +269,7 @@ fn pieces(points: impl IntoIterator<Item = (f64, f64)>, between: Between) -> Vec
     pieces
 }
 
-/// Flat pieces, those of the same voltage that adjoin taken together.
+/// Constant pieces, adjoining ones of equal voltage merged.
 fn merged_plateaus(pieces: &[Piece]) -> Vec<Piece> {
     let mut plateaus: Vec<Piece> = Vec::new();
     for piece in pieces.iter().filter(|piece| piece.from_v == piece.to_v) {
@@ -277,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_held_or_straight_between_its_rows() {
+    fn a_file_is_held_or_interpolated_between_its_rows() {
         let text = "time_s,voltage_v\n0,0\n2,100\n4,100\n6,50\n9,50\n";
         let record = Record::parse("f", text, MEASURED).unwrap();
         let held = Schedule::from_record(&record, Between::Hold);
@@ -290,12 +314,24 @@ mod tests {
         let straight = Schedule::from_record(&record, Between::Linear);
         assert_eq!([1.0, 3.0, 5.0].map(|time| straight.reader().at(time)), [50.0, 100.0, 75.0]);
         let change = Change { start_s: 4.0, end_s: 9.0, from_v: 100.0, to_v: 50.0 };
-        assert_eq!(straight.changes(), [change], "the first ramp starts on no plateau");
+        assert_eq!(straight.changes(), [change], "the first ramp does not start on a plateau");
     }
 
     #[test]
-    fn a_schedule_beyond_the_amplifier_is_refused_with_time_and_range() {
+    fn a_record_of_another_schedule_is_rejected_at_its_first_different_row() {
+        let check = |text: &str| {
+            let record = Record::parse("r", text, MEASURED).unwrap();
+            Schedule::stair().check_commanded("the stair", &record, 0.1).map_err(|error| error.to_string())
+        };
+        // On the ramp and at its ends, either voltage is accepted.
+        assert_eq!(check("time_s,voltage_v\n0,0\n20,0\n20.05,100\n20.1,100\n90,500\n"), Ok(()));
+        let expected = "r, line 3, column voltage_v: 0 V at 25 s; expected 100 V as in the stair";
+        assert_eq!(check("time_s,voltage_v\n0,0\n25,0\n"), Err(expected.to_owned()));
+    }
+
+    #[test]
+    fn a_schedule_beyond_the_amplifier_is_rejected_with_time_and_range() {
         let error = Schedule::stair().check_range("the stair", 0.0, 400.0).unwrap_err().to_string();
-        assert_eq!(error, "the stair asks for 500 V at 60.1 s; expected 0 to 400 V, the amplifier's range");
+        assert_eq!(error, "the stair commands 500 V at 60.1 s; expected 0 to 400 V, the amplifier's range");
     }
 }

@@ -1,14 +1,15 @@
-//! Which gains and settings for a spring and an amplifier, and what an error of the spring's model costs.
+//! Tunes both controllers for a spring and an amplifier, and evaluates their sensitivity to model errors.
 //!
-//! - The proportional-integral controller: the gains with the shortest t97 of the slowest step of the ideal stair, at most
-//!   so much overshoot on any, and [`margins`] of the linearised loop that are not below [`Margins::LEAST`]. Found on the
-//!   controller's own fixed-point tick, limits included: a grid, then a compass search.
-//! - The fast controller: the longest approach that leaves every step within [`WITHIN`] of the dead-beat t97, and of the
-//!   overshoot that is allowed. It is the smoothest of those that are as good as the fastest.
-//! - [`trade`]: both, built for the spring as it is said to be, on springs that are not.
+//! - Proportional-integral controller: the gains with the shortest t97 of the slowest step of the ideal stair, subject to a
+//!   limit on the overshoot of every step and to the margins [`Margins::LEAST`] of the linearised loop. Found on the
+//!   fixed-point tick, limits included, by a grid and a compass search.
+//! - Time-optimal controller: the longest approach time constant whose steps stay within [`WITHIN`] of the dead-beat t97
+//!   and within the overshoot limit, which is the smoothest that is nearly as fast as dead-beat.
+//! - [`trade`]: both controllers on springs that differ from their model.
 
 pub mod margins;
 pub mod trade;
+mod worst;
 
 use anyhow::Result;
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Settings};
@@ -22,70 +23,62 @@ use crate::schedule::Schedule;
 
 pub use margins::Margins;
 pub use trade::Trade;
+pub use worst::Worst;
 
-/// How much longer than dead-beat a smoother approach may take.
+/// Largest ratio of a step's t97 to that of the dead-beat controller.
 pub const WITHIN: f64 = 1.05;
 
-/// What is tuned for.
+/// The spring, amplifier and limits to tune for.
 #[derive(Clone, Debug)]
-pub struct Question<'a> {
+pub struct Specification<'a> {
     /// The spring.
     pub file: &'a PlantFile,
-    /// The amplifier that it is behind.
+    /// The amplifier.
     pub amplifier: Amplifier,
-    /// Ticks per second.
+    /// Ticks per second, in Hz.
     pub rate_hz: f64,
-    /// The most overshoot of any step, in percent.
+    /// Largest overshoot of any step, in percent.
     pub overshoot_percent: f64,
 }
 
 /// The answer of `vsj tune --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tuning {
-    /// Highest voltage that the amplifier gives, in V.
+    /// Highest voltage of the amplifier, in V.
     pub limit_v: f64,
-    /// Gains of the proportional-integral controller; `None` if no gains keep what is asked.
+    /// Gains of the proportional-integral controller; `None` if no gains meet the limits.
     pub proportional_integral: Option<TunedGains>,
-    /// Settings of the fast controller.
+    /// Settings of the time-optimal controller.
     pub fast: TunedApproach,
-    /// The trade against model error.
+    /// Responses under model errors.
     pub trade: Vec<Trade>,
 }
 
-/// Gains and what they are worth.
+/// Gains and their performance.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct TunedGains {
-    /// For `--kp`.
+    /// Proportional gain, dimensionless, for `--kp`.
     pub proportional: f64,
-    /// For `--ki`, in 1/s.
+    /// Integral gain, in 1/s, for `--ki`.
     pub integral_per_s: f64,
-    /// Of the linearised loop.
+    /// Stability margins of the linearised loop.
     pub margins: Margins,
-    /// On the stair.
+    /// Worst response on the stair.
     #[serde(flatten)]
     pub worst: Worst,
 }
 
-/// An approach and what it is worth.
+/// An approach time constant and its performance.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct TunedApproach {
-    /// For `--approach-s`, in s.
+    /// Time constant of the approach, in s, for `--approach-s`.
     pub approach_s: f64,
-    /// On the stair.
+    /// Worst response on the stair.
     #[serde(flatten)]
     pub worst: Worst,
 }
 
-/// The worst of the steps of the stair.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Worst {
-    /// In s; `None` if a step does not get there.
-    pub t97_s: Option<f64>,
-    /// In percent of the step.
-    pub overshoot_percent: f64,
-}
-
-impl Question<'_> {
+impl Specification<'_> {
     fn settings(&self, compensation: Compensation) -> Settings<ExtendedPlant<'_>> {
         Settings {
             rate_hz: self.rate_hz,
@@ -96,10 +89,10 @@ impl Question<'_> {
         }
     }
 
-    /// The fixed-point loop over the stair: its voltages, and stiffness by its own model.
+    /// Runs the fixed-point loop over the ideal stair; the stiffness is that of its own model.
     ///
     /// # Errors
-    /// [`BadInput`] for what the tick refuses.
+    /// [`BadInput`] for settings that the tick rejects.
     fn run(&self, compensation: Compensation) -> Result<Run> {
         let config = self.settings(compensation).validate().map_err(|error| BadInput(error.to_string()))?.quantize();
         let schedule = Schedule::ideal_stair();
@@ -107,21 +100,22 @@ impl Question<'_> {
         Ok(Run { start_s: schedule.start_s(), rate_hz: self.rate_hz, with, without: Vec::new() })
     }
 
-    /// The worst step; `None` if the tick refuses the settings.
+    /// The worst response on the stair; `None` if the tick rejects the settings.
     fn worst(&self, compensation: Compensation) -> Option<Worst> {
         Some(worst(&self.run(compensation).ok()?))
     }
 
-    /// The fastest gains.
+    /// The gains with the shortest t97; `None` if no gains meet the limits.
     fn gains(&self) -> Option<TunedGains> {
         let tried = |proportional, integral_per_s| {
             let gains = Gains { proportional, integral_per_s };
             let margins = Margins::of(self.file, &gains, self.rate_hz);
-            let worst = margins.enough().then(|| self.worst(Compensation::ProportionalIntegral(gains))).flatten()?;
+            let worst =
+                margins.sufficient().then(|| self.worst(Compensation::ProportionalIntegral(gains))).flatten()?;
             let t97 = worst.t97_s.filter(|_| worst.overshoot_percent <= self.overshoot_percent)?;
             Some((t97, TunedGains { proportional, integral_per_s, margins, worst }))
         };
-        // Decades of the gain and of the reset time.
+        // In decades of the gain and of the reset time.
         let at_point = |[gain, reset]: [f64; 2]| tried(10f64.powf(gain), 10f64.powf(gain - reset));
         let better = |one: &(f64, TunedGains), other: &(f64, TunedGains)| one.0.total_cmp(&other.0);
         let grid = (0..9).flat_map(|row| {
@@ -139,12 +133,12 @@ impl Question<'_> {
                 _ => step *= 0.5,
             }
         }
-        // Three digits are what a person types.
+        // Rounded to three digits, if they still meet the limits.
         let rounded = tried(three_digits(best.1.proportional), three_digits(best.1.integral_per_s));
         rounded.or(Some(best)).map(|(_, found)| found)
     }
 
-    /// The longest approach that is as good as none.
+    /// The longest approach that meets the limits.
     fn approach(&self) -> Result<TunedApproach> {
         let with = |time_constant_s| Compensation::TimeOptimal(Approach { time_constant_s });
         let steps = |compensation| self.run(compensation).map(|run| responses(&run));
@@ -168,42 +162,32 @@ impl Question<'_> {
     }
 }
 
-/// Answers it.
+/// Tunes both controllers.
 ///
 /// # Errors
-/// [`BadInput`] for a spring or amplifier that the tick refuses.
-pub fn tune(question: &Question<'_>) -> Result<Tuning> {
-    let fast = question.approach()?;
-    let proportional_integral = question.gains();
+/// [`BadInput`] for a spring or amplifier that the tick rejects.
+pub fn tune(specification: &Specification<'_>) -> Result<Tuning> {
+    let fast = specification.approach()?;
+    let proportional_integral = specification.gains();
     let compensations = [
         proportional_integral.map(|TunedGains { proportional, integral_per_s, .. }| {
             Compensation::ProportionalIntegral(Gains { proportional, integral_per_s })
         }),
         Some(Compensation::TimeOptimal(Approach { time_constant_s: fast.approach_s })),
     ];
-    let runs = compensations.map(|compensation| compensation.map(|it| question.run(it)).transpose());
+    let runs = compensations.map(|compensation| compensation.map(|it| specification.run(it)).transpose());
     let [with_gains, with_approach] = runs;
-    let trade = trade::over_errors(question.file, with_gains?.as_ref(), with_approach?.as_ref());
-    Ok(Tuning { limit_v: question.amplifier.max_v, proportional_integral, fast, trade })
+    let trade = trade::over_model_errors(specification.file, with_gains?.as_ref(), with_approach?.as_ref());
+    Ok(Tuning { limit_v: specification.amplifier.max_v, proportional_integral, fast, trade })
 }
 
 fn responses(run: &Run) -> Vec<crate::response::Response> {
     Schedule::ideal_stair().changes().iter().map(|change| measure(run, &run.with, change, None)).collect()
 }
 
-/// The worst step of a run over the stair.
+/// The worst response of a run over the stair.
 fn worst(run: &Run) -> Worst {
     Worst::of(responses(run).iter().map(|step| (step.t97_s, step.overshoot_percent)))
-}
-
-impl Worst {
-    fn of(steps: impl Iterator<Item = (Option<f64>, f64)>) -> Self {
-        let start = Self { t97_s: Some(0.0), overshoot_percent: 0.0 };
-        steps.fold(start, |worst, (t97_s, overshoot)| Self {
-            t97_s: worst.t97_s.zip(t97_s).map(|(one, other)| f64::max(one, other)),
-            overshoot_percent: worst.overshoot_percent.max(overshoot),
-        })
-    }
 }
 
 fn three_digits(value: f64) -> f64 {

@@ -1,8 +1,8 @@
-//! The fast controller on random springs such as identification finds, each block alone and all together: no step slower
-//! than 1.05 times the bound, none more than 1 % beyond, never outside of range and slew; and its fixed point beside a
-//! double-precision loop that finds each voltage by trying.
+//! The time-optimal controller on random springs in the range of identified ones, each block alone and all together: no
+//! step is slower than 1.05 times the lower bound or overshoots by more than 1 %, range and slew are kept, and the
+//! fixed-point loop agrees with a double-precision loop that searches for each voltage.
 //!
-//! `cargo test -p host-sim --test fast -- --nocapture` prints the worst cases.
+//! `cargo test -p simulation --test fast -- --nocapture` prints the worst cases.
 
 mod springs;
 
@@ -16,7 +16,7 @@ use simulation::response::responses;
 use simulation::schedule::Schedule;
 use springs::{SETS, plant};
 
-/// The stair of ideal steps, and the answer to each.
+/// Runs the stair of ideal steps; returns the run and the response to each step.
 fn stair(file: &PlantFile, rate_hz: f64, amplifier: Amplifier, approach_s: f64) -> (Run, Vec<Response>) {
     let compensation = Compensation::TimeOptimal(Approach { time_constant_s: approach_s });
     let settings: Settings<ExtendedPlant<'_>> =
@@ -27,11 +27,11 @@ fn stair(file: &PlantFile, rate_hz: f64, amplifier: Amplifier, approach_s: f64) 
     (run, steps)
 }
 
-/// Seconds beyond 1.05 times the bound, and percent of overshoot, of the worst step.
+/// Excess over 1.05 times the bound in s, and overshoot in percent, of the worst step.
 fn worst(steps: &[Response], rate_hz: f64) -> (f64, f64) {
     steps.iter().fold((f64::NEG_INFINITY, 0.0f64), |(late, overshoot), step| {
         let beyond = match (step.t97_s, step.bound_t97_s) {
-            // A tick is as exact as a tick can be.
+            // A time is resolved to one tick.
             (Some(t97), Some(bound)) => t97 - 1.05 * bound - 1.0 / rate_hz,
             (None, Some(_)) => f64::INFINITY,
             (_, None) => f64::NEG_INFINITY,
@@ -41,7 +41,7 @@ fn worst(steps: &[Response], rate_hz: f64) -> (f64, f64) {
 }
 
 #[test]
-fn as_fast_as_the_amplifier_allows() {
+fn steps_reach_the_lower_bound_on_their_time() {
     println!("worst of random springs    late [s]   overshoot [%]   fixed point off by [V]");
     for (name, blocks) in SETS {
         for (rate_hz, limit_v, count) in [(100.0, 700.0, 12), (1000.0, 700.0, 3), (1000.0, 1000.0, 3)] {
@@ -58,19 +58,20 @@ fn as_fast_as_the_amplifier_allows() {
             }
             println!("{name:12} {rate_hz:4} Hz {limit_v:4} V {latest:10.4} {most:15.3} {off:24.4}");
             assert!(most <= 1.0, "{name} {rate_hz} Hz: {most} % beyond");
-            // At 100 Hz what comes at once falls by more than 3 % of a step where the voltage comes back from tick to tick.
+            // At 100 Hz the instantaneous part changes by more than 3 % of a step when the voltage returns between two
+            // ticks.
             assert!(rate_hz < 1000.0 || latest <= 0.0, "{name} {rate_hz} Hz: {latest} s late");
-            // The tick takes the rate of a varying time constant at the last voltage and its inverse for straight: coming
-            // back from the end of the range it is slower by some ticks than one that tries.
+            // The tick evaluates a varying time constant at the last voltage and linearises its inverse, so it returns
+            // from the end of the range some ticks later than the search.
             let allowed = if !blocks.varying { 0.05 } else { 1000.0 / rate_hz };
             assert!(off > 0.0 && off < allowed, "{name} {rate_hz} Hz: {off} V");
         }
     }
 }
 
-/// A slow amplifier: what is late is reported, what is too much is not there.
+/// With a slow amplifier steps are late, but do not overshoot.
 #[test]
-fn a_slew_does_not_make_it_overshoot() {
+fn a_slew_limit_causes_no_overshoot() {
     for (name, blocks) in SETS {
         for slew in [200.0, 600.0, 3000.0] {
             let mut runner = TestRunner::deterministic();

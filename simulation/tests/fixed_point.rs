@@ -1,8 +1,8 @@
-//! The fixed-point tick against a double-precision loop of the same rate, over random rates, springs, gains, amplifiers
-//! and stairs: stiffness, and voltage before rounding, within 0.01 V at every tick.
+//! Compares the fixed-point tick with a double-precision loop of the same rate over random rates, springs, gains,
+//! amplifiers and stairs: stiffness, and voltage before rounding, agree within 0.01 V at every tick.
 //!
-//! The double-precision loop is told which code was put out, after it has been checked that no other code could have
-//! been: a voltage half-way between two codes may be rounded either way.
+//! The double-precision loop follows the DAC code of the tick, after a check that this code is the nearest: a voltage
+//! half-way between two codes may be rounded either way.
 
 use std::cell::Cell;
 
@@ -14,7 +14,7 @@ use simulation::sampled::{Controller, SampledLoop};
 
 const ALLOWED_V: f64 = 0.01;
 
-/// A loop, and levels of the range (0 to 1) with the number of ticks that each is asked for.
+/// A loop, and levels of the range (0 to 1), each with its number of ticks.
 #[derive(Clone, Debug)]
 struct Case {
     settings: Settings,
@@ -53,7 +53,7 @@ prop_compose! {
     }
 }
 
-/// Largest differences of stiffness and voltage, in V; `None` if the settings are refused.
+/// Largest differences of stiffness and voltage, in V; `None` if the settings are rejected.
 fn disagreement(case: &Case) -> Option<(f64, f64)> {
     let Settings { rate_hz, plant, compensation, amplifier, .. } = case.settings;
     let config = case.settings.validate().ok()?.quantize();
@@ -97,7 +97,7 @@ proptest! {
     }
 }
 
-/// Prints the worst of 1000 loops, always the same ones: `cargo test -p host-sim --test fixed_point -- --nocapture`.
+/// Prints the worst of 1000 loops, the same in every run: `cargo test -p simulation --test fixed_point -- --nocapture`.
 #[test]
 fn worst_case_of_a_thousand_loops() {
     let mut runner = TestRunner::deterministic();
@@ -112,6 +112,6 @@ fn worst_case_of_a_thousand_loops() {
     let (count, stiffness, voltage) = worst.get();
     println!("worst of {count} loops: stiffness {:.3} mV, voltage {:.3} mV", stiffness * 1e3, voltage * 1e3);
     assert!(stiffness < ALLOWED_V && voltage < ALLOWED_V);
-    // Exact agreement would mean that both are the same code.
+    // Exact agreement would mean that both run the same code.
     assert!(stiffness > 0.0 && voltage > 0.0);
 }

@@ -113,7 +113,7 @@ fn bad_input_gives_one_error_line_and_writes_no_file() {
         (&["zener", "--every", "0"], "--every: every_s = 0"),
         (&["zener", "--every", "1e-5"], "--every: every_s = 0.00001 is not allowed: expected at least a millionth"),
         (&["analogue", "--damper", "1e-6"], "time constant of 0.00000014"),
-        (&["zener", "--input", "zero.csv"], "zero.csv: level 0 at 1 s is no stiffness"),
+        (&["zener", "--input", "zero.csv"], "zero.csv: level 0 at 1 s is not a stiffness"),
         (&["zener", "--input", "no.csv"], "no.csv: cannot be read"),
         (&["rubber"], "invalid value 'rubber' for '<MODEL>'"),
         (&[], "<MODEL>"),

@@ -135,7 +135,7 @@ fn bad_arguments() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("file"), "").unwrap();
     for (arguments, expected) in
-        [(&["reproduce", "--out", "file/sub"][..], "file/sub: cannot be made"), (&["reproduce", "--no"], "'--no'")]
+        [(&["reproduce", "--out", "file/sub"][..], "file/sub: cannot be created"), (&["reproduce", "--no"], "'--no'")]
     {
         let output = run(folder.path(), arguments);
         assert_eq!(output.status.code(), Some(2));

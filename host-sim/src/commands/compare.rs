@@ -2,14 +2,15 @@
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::output::comparison;
+use host_sim::output::compare::text;
+use host_sim::output::terminal::{json, print};
 use model::Amplifier;
 use simulation::comparison::compare;
 use simulation::plant_file;
 
-use super::{SETTINGS, named, print};
+use super::option_names::{SETTINGS, named};
 
-/// Compare all controllers on the stair of ideal steps, and with the fastest that any could be
+/// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -17,13 +18,13 @@ Examples:
   vsj compare --limit-v 850 --slew-v-per-s 500
   vsj compare --plant spring.toml --json  on another spring")]
 pub(crate) struct Arguments {
-    /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
+    /// The spring: `paper`, or a plant file; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// Highest voltages of the amplifier, in V
     #[arg(long, default_values_t = [700.0, 1000.0], value_delimiter = ',', value_name = "V,V", allow_negative_numbers = true)]
     limit_v: Vec<f64>,
-    /// Fastest change of the amplifier, in V/s; without it, no limit
+    /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// Ticks per second, 100 to 10 000
@@ -40,8 +41,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
     let comparison = compare(&file, arguments.rate_hz, &amplifiers).map_err(|error| named(error, SETTINGS))?;
-    if arguments.json {
-        return print(&format!("{}\n", serde_json::to_string(&comparison)?));
-    }
-    print(&comparison::text(&comparison))
+    print(&if arguments.json { json(&comparison)? } else { text(&comparison) })
 }

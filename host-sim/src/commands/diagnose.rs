@@ -1,4 +1,4 @@
-//! `vsj diagnose`: what the simulation gets wrong on measured data.
+//! `vsj diagnose`: differences between the simulation and measured data.
 
 use std::iter;
 use std::path::PathBuf;
@@ -8,46 +8,47 @@ use clap::Args;
 use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
+use host_sim::output::terminal::{json, print, wrote};
 use identify::plant::base::Base;
-use identify::{Options, examine};
+use identify::{Input, Options, examine};
 use indicatif::ProgressBar;
 use simulation::plant_file;
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::Schedule;
 
-use super::voltage::Input;
-use super::{print, wrote};
+use super::choice::{INPUT, one_of};
 
-/// Within this time, in s, a row of the stair may have the voltage before a step or that after it.
+/// Tolerance in s within which a row of the stair may have the voltage before or after a step.
 const RAMP_S: f64 = 0.1;
 
-/// Show what the simulation gets wrong on measured data, name the cause, measure the gain of the cure
+/// Find out how the simulation differs from measured data, name the cause, and measure the held-out improvement
 ///
-/// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (volts of equivalent static voltage, or - where
-/// nothing was read). Every change of the voltage belongs in it. A row's voltage is there from its time on, and its reading is
-/// taken just after: of a step to this voltage, it has the part that comes at once. Without voltage_v, applied_v is taken, as
-/// `vsj stair --out` writes it.
+/// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (as the equivalent static voltage in V, or -
+/// for a missing reading). It must contain every change of the voltage. The voltage of a row applies from its time on,
+/// and its reading is taken just after, so that it includes the instantaneous part of a step to this voltage. If
+/// voltage_v is missing, applied_v is used, as written by `vsj stair --out`.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj diagnose record.csv                      three sentences and a table
   vsj diagnose record.csv --out out/diagnosis  with a page, plots, residuals
-  vsj stair --plant out/diagnosis/plant.toml   the controller on what was found
+  vsj stair --plant out/diagnosis/plant.toml   the controller on the result
   vsj diagnose record.csv --json | jq .findings
   vsj diagnose data/table3_stair.csv --column measured --input stair
 
-Verdicts: consistent (nothing is wrong), explained, ambiguous (rival causes explain it as well), unexplained (no known \
-cause does), insufficient (the record cannot tell). All of them exit with 0.")]
+Verdicts: consistent (no difference beyond noise), explained, ambiguous (other causes explain it as well), unexplained (no \
+known cause does), insufficient (too little excitation to decide). All of them exit with 0.")]
 pub(crate) struct Arguments {
     /// The record
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
-    /// The simulation to be judged: `paper`, or a plant file. What of that is not in the spring (memory, law, leakage, amplifier,
-    /// further time constants) is named in a sentence, `take_out` in JSON, and left out of the extended spring
+    /// The simulation to compare with: `paper`, or a plant file. Parts of the file (memory, law, leakage, amplifier,
+    /// further time constants) that the spring does not have are named in a sentence and in the field `take_out` of the
+    /// JSON, and omitted from the extended spring
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
-    /// What the voltage did between the rows
-    #[arg(long, value_enum, default_value_t)]
+    /// Interpolation of the voltage between the rows
+    #[arg(long, default_value = "hold", value_parser = one_of(INPUT))]
     input: Input,
     /// Column with the measured stiffness
     #[arg(long, default_value = MEASURED, value_name = "NAME")]
@@ -62,19 +63,19 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     fn origin(&self, record: &Record) -> Origin {
-        // Not where the program lies: the page may be read elsewhere.
+        // The path of the program is omitted, since the page may be read elsewhere.
         let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
         let command: Vec<String> = iter::once("vsj".to_owned()).chain(words).collect();
         Origin {
             record: record.name.clone(),
             column: self.column.clone(),
-            input: self.input.into(),
+            input: self.input,
             command: command.join(" "),
         }
     }
 }
 
-/// A word as a shell takes it.
+/// Quotes a word for a shell where necessary.
 fn quoted(word: &str) -> String {
     let plain = |letter: char| letter.is_alphanumeric() || "-_./=:,+@%".contains(letter);
     if !word.is_empty() && word.chars().all(plain) {
@@ -89,10 +90,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let base = Base::new(plant_file::load(&arguments.plant)?)?;
     let record = Record::open_measured(&arguments.data, &arguments.column)?;
     if arguments.input == Input::Stair {
-        record.check_commanded(&Schedule::stair(), "the report's stair (--input stair)", RAMP_S)?;
+        Schedule::stair().check_commanded("the report's stair (--input stair)", &record, RAMP_S)?;
     }
-    let options = Options { input: arguments.input.into(), base };
-    // A folder that cannot be made is known before the search begins.
+    let options = Options { input: arguments.input, base };
+    // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
@@ -105,9 +106,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Some(files) => output::write(files, &diagnosis, &arguments.origin(&record))?,
         None => Vec::new(),
     };
-    if arguments.json {
-        print(&format!("{}\n", serde_json::to_string(&diagnosis.report)?))
+    print(&if arguments.json {
+        json(&diagnosis.report)?
     } else {
-        print(&(text::text(&record.name, &diagnosis.report) + &wrote(&paths)))
-    }
+        text::text(&record.name, &diagnosis.report) + &wrote(&paths)
+    })
 }

@@ -4,17 +4,19 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::output::figure;
 use host_sim::output::files::Files;
+use host_sim::output::terminal::{json, print, wrote};
+use host_sim::output::{dynamics, figure};
 use paper::dynamics::input::Input;
 use paper::dynamics::plant::PlantGains;
-use paper::dynamics::report::{Model, Question, Report};
+use paper::dynamics::report::{self, Model, Setup};
 use paper::dynamics::zener::{Changes, Start, Zener};
+use simulation::schedule::Between;
 
-use super::voltage::Between;
-use super::{named, print, wrote};
+use super::choice::{BETWEEN, CHANGES, MODEL, one_of};
+use super::option_names::named;
 
-/// Run one of the report's dynamic models, and say what it is in terms of the others
+/// Run one of the report's dynamic models, and give the equivalent parameters of the others
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -24,8 +26,8 @@ Examples:
   vsj dynamics pi-plant --input stair  the plant alone on the stair of Table 3
   vsj dynamics zener --k1 5 --k2 0.5 --input levels.csv --between linear")]
 pub(crate) struct Arguments {
-    /// The model
-    #[arg(value_enum)]
+    /// The dynamic model
+    #[arg(value_parser = one_of(MODEL))]
     model: Model,
     /// Series spring at level 1, in N/m
     #[arg(long, default_value_t = 10.0, value_name = "N/M", allow_negative_numbers = true)]
@@ -43,7 +45,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 1.0, value_name = "M", allow_negative_numbers = true)]
     length: f64,
     /// The springs of the Zener model that follow the level
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = "k2", value_parser = one_of(CHANGES))]
     changes: Changes,
     /// Proportional gain of the plant
     #[arg(long, default_value_t = 0.1, value_name = "GAIN", allow_negative_numbers = true)]
@@ -54,10 +56,10 @@ pub(crate) struct Arguments {
     /// The report's levels, the stair, or a file with columns time_s,voltage_v
     #[arg(long, default_value = "report", value_name = "report|stair|FILE.csv")]
     input: String,
-    /// What the level does between two rows of an input file
-    #[arg(long, value_enum, default_value_t)]
+    /// Interpolation of the level between two rows of an input file
+    #[arg(long, default_value = "hold", value_parser = one_of(BETWEEN))]
     between: Between,
-    /// Start at rest under force and first level, not just loaded
+    /// Start in equilibrium under the force and the first level, instead of just loaded
     #[arg(long)]
     settled: bool,
     /// Time between two rows, in s
@@ -73,7 +75,7 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let question = Question {
+    let setup = Setup {
         model: arguments.model,
         zener: Zener {
             k1_n_per_m: arguments.k1,
@@ -84,23 +86,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         },
         length_m: arguments.length,
         gains: PlantGains { proportional: arguments.kp, integral_per_s: arguments.ki },
-        input: Input::open(&arguments.input, arguments.between.into())?,
+        input: Input::open(&arguments.input, arguments.between)?,
         start: if arguments.settled { Start::Settled } else { Start::Unloaded },
         every_s: arguments.every,
     };
-    let report = Report::new(&question).map_err(|error| named(error, OPTIONS))?;
+    let report = report::Report::new(&setup).map_err(|error| named(error, OPTIONS))?;
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
-        files.add("response.csv", |out| out.write_all(report.csv().as_bytes()))?;
+        files.add("response.csv", |out| out.write_all(dynamics::csv(&report).as_bytes()))?;
         files.add("response.svg", |out| out.write_all(figure::svg(&report.figure()).as_bytes()))?;
         written = wrote(&files.finish()?);
     }
-    if arguments.json {
-        print(&format!("{}\n", serde_json::to_string(&report)?))
-    } else {
-        print(&(report.text() + &written))
-    }
+    print(&if arguments.json { json(&report)? } else { dynamics::text(&report) + &written })
 }
 
 /// The option of each field that an error may begin with.

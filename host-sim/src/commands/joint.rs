@@ -1,25 +1,28 @@
-//! `vsj joint`: what springs between two rings can do.
+//! `vsj joint`: the stiffness of a joint with springs between two rings.
 
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
+use host_sim::output::joint;
+use host_sim::output::terminal::{json, print, wrote};
 use paper::beam::cantilever::Beam;
-use paper::joint::report::{Report, Requirement};
+use paper::joint::report::{self, Requirement};
 use paper::joint::{Joint, MOST_SPRINGS, OuterEnd};
 use simulation::plant_file;
 use simulation::reference::Loop;
 
-use super::{named, print, wrote};
+use super::choice::{OUTER_END, one_of};
+use super::option_names::named;
 
-/// Joint stiffness of springs set radially between two rings, against what the report requires
+/// Joint stiffness of springs set radially between two rings, compared with the report's requirement
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj joint                                     12 springs of the report's size
   vsj joint --springs 24 --inner-radius-mm 40 --outer-end clamped
-  vsj joint --stiffness 0.02                    what makes 0.02 N m/rad, if any
+  vsj joint --stiffness 0.02                    spring constant for 0.02 N m/rad
   vsj joint --limit-v 1000 --within-s 1 --json  another amplifier, more time")]
 pub(crate) struct Arguments {
     /// Number of springs
@@ -28,34 +31,34 @@ pub(crate) struct Arguments {
     /// Radius of the inner ring, in mm
     #[arg(long, default_value_t = 20.0, value_name = "MM", allow_negative_numbers = true)]
     inner_radius_mm: f64,
-    /// How the outer end of a spring is held
-    #[arg(long, value_enum, default_value_t)]
+    /// Support of the outer end of a spring
+    #[arg(long, default_value = "supported", value_parser = one_of(OUTER_END))]
     outer_end: OuterEnd,
     /// Free length of a spring, in mm
     #[arg(long, default_value_t = 59.8, value_name = "MM", allow_negative_numbers = true)]
     length_mm: f64,
-    /// Its width, in mm
+    /// Width of a spring, in mm
     #[arg(long, default_value_t = 19.8, value_name = "MM", allow_negative_numbers = true)]
     width_mm: f64,
-    /// Its thickness, in um
+    /// Thickness of a spring, in um
     #[arg(long, default_value_t = 190.0, value_name = "UM", allow_negative_numbers = true)]
     thickness_um: f64,
-    /// A joint stiffness to be made, in N m/rad
+    /// A joint stiffness to be realised, in N m/rad
     #[arg(long, value_name = "N_M/RAD", allow_negative_numbers = true)]
     stiffness: Option<f64>,
-    /// Softest joint required, in N m/rad
+    /// Lowest required joint stiffness, in N m/rad
     #[arg(long, default_value_t = Requirement::PAPER.low_n_m_per_rad, value_name = "N_M/RAD", allow_negative_numbers = true)]
     low: f64,
-    /// Stiffest joint required, in N m/rad
+    /// Highest required joint stiffness, in N m/rad
     #[arg(long, default_value_t = Requirement::PAPER.high_n_m_per_rad, value_name = "N_M/RAD", allow_negative_numbers = true)]
     high: f64,
-    /// Time required, in s
+    /// Time allowed for a change, in s
     #[arg(long, default_value_t = Requirement::PAPER.within_s, value_name = "S", allow_negative_numbers = true)]
     within_s: f64,
     /// Highest voltage of the amplifier, in V
     #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
     limit_v: f64,
-    /// Fastest change of the amplifier, in V/s; without it, no limit
+    /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// The spring's relaxation: `paper`, or a plant file
@@ -71,17 +74,17 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let joint = Joint {
+    let geometry = Joint {
         inner_radius_m: 1e-3 * arguments.inner_radius_mm,
         spring_length_m: 1e-3 * arguments.length_mm,
         springs: arguments.springs,
         outer_end: arguments.outer_end,
     };
     let beam = Beam {
-        length_m: joint.spring_length_m,
+        length_m: geometry.spring_length_m,
         width_m: 1e-3 * arguments.width_mm,
         thickness_m: 1e-6 * arguments.thickness_um,
-        // Young's modulus is what the experiment says.
+        // Replaced by the Young's modulus of the experiment.
         youngs_modulus_pa: 1.0,
         density_kg_per_m3: 0.0,
     };
@@ -99,9 +102,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         range_v: (0.0, arguments.limit_v),
         slew_v_per_s: arguments.slew_v_per_s.unwrap_or(f64::INFINITY),
     };
-    let report =
-        Report::new(joint, requirement, &beam, &system, arguments.stiffness).map_err(|error| named(error, OPTIONS))?;
-    let (json, text) = (format!("{}\n", serde_json::to_string(&report)?), report.text());
+    let report = report::Report::new(geometry, requirement, &beam, &system, arguments.stiffness)
+        .map_err(|error| named(error, OPTIONS))?;
+    let (json, text) = (json(&report)?, joint::text(&report));
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;

@@ -1,19 +1,16 @@
 //! `vsj log`: the firmware's log as text.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, IsTerminal, Read, StdoutLock, Write};
+use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::log::{
-    CSV_HEADER, Decoder, Encoding, Formats, Item, Line, Summary, TABLE_HEADER, csv_row, more_damage_csv_row,
-    more_damage_table_row, summary_text, table_row,
-};
-use serde::Serialize;
+use host_sim::log::{Decoder, Formats, Summary};
+use host_sim::output::log::{Format, Printer};
 use simulation::bad_input;
 
-/// Decode the firmware's log into a table and a summary, from a file or as it comes
+/// Decode the firmware's log into a table and a summary, from a file or while it arrives
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -22,37 +19,20 @@ Examples:
   vsj log firmware.elf capture.bin --csv      time_s,level,event,message
   vsj log firmware.elf capture.bin --json     one object, summary included
 
-Exit codes: 0 all read, 1 damaged or cut off but what could be read is printed, 2 not the log of this ELF.")]
+Exit codes: 0 decoded completely, 1 damaged or cut off, with the readable part printed, 2 not the log of this ELF file.")]
 pub(crate) struct Arguments {
-    /// The ELF file of the very build that wrote the log
+    /// The ELF file of the build that wrote the log
     #[arg(value_name = "ELF")]
     elf: PathBuf,
-    /// The log as it left the MCU; `-` is stdin
+    /// The log as sent by the MCU; `-` is stdin
     #[arg(value_name = "FILE", default_value = "-")]
     file: PathBuf,
-    /// Columns time_s,level,event,message; the summary as comments
+    /// Print CSV with the columns time_s,level,event,message, and the summary as comments
     #[arg(long, conflicts_with = "json")]
     csv: bool,
     /// One JSON object on stdout, at the end
     #[arg(long)]
     json: bool,
-}
-
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    encoding: Encoding,
-    lines: Vec<Line>,
-    damaged: Vec<Damage>,
-    summary: Summary,
-}
-
-/// A stretch of the log that is no frame.
-#[derive(Serialize)]
-struct Damage {
-    offset: u64,
-    /// Not known where a raw log stops to make sense; the summary has them.
-    bytes: Option<u64>,
 }
 
 /// Runs the command.
@@ -66,10 +46,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Err(error) => bad_input!("{}: {error:#}", arguments.elf.display()),
     };
     let source = open(&arguments.file)?;
-    let mut printer =
-        Printer { arguments, out: io::stdout().lock(), lines: Vec::new(), damaged: Vec::new(), run: None };
-    match decode(source, formats, &mut printer) {
-        // Who closes the pipe has seen enough.
+    match decode(source, formats, arguments) {
+        // A closed pipe ends the command without an error.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
         done => done,
     }
@@ -80,7 +58,7 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
         if io::stdin().is_terminal() {
             bad_input!("stdin is a terminal; expected a FILE, or a log from a pipe");
         }
-        // Ctrl-C goes to the whole pipe. Who writes to it ends, and then so do we, with the summary; the second ends us.
+        // Ctrl-C reaches the whole pipeline: the writer ends first, then this program prints its summary. A second one ends it.
         let mut before = false;
         ctrlc::set_handler(move || {
             if std::mem::replace(&mut before, true) {
@@ -89,7 +67,7 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
         })?;
         return Ok(Box::new(io::stdin()));
     }
-    // A folder opens like a file, and fails only when it is read.
+    // A folder can be opened like a file and fails only when it is read.
     let file = match std::fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => Err(ErrorKind::IsADirectory.into()),
         _ => File::open(path),
@@ -100,13 +78,17 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
     }
 }
 
-fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>) -> Result<()> {
+fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) -> Result<()> {
     let encoding = formats.encoding();
     let mut decoder = Decoder::new(formats);
     let mut summary = Summary::default();
     let mut buffer = [0; 1 << 13];
     let mut broken = None;
-    printer.start()?;
+    let mut printer = Printer::start(match (arguments.json, arguments.csv) {
+        (true, _) => Format::Json,
+        (_, true) => Format::Csv,
+        _ => Format::Table,
+    })?;
     loop {
         let read = match source.read(&mut buffer) {
             Ok(0) => break,
@@ -121,22 +103,24 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, printer: &mut Printer<'_>
             summary.add(&item);
             printer.item(item)?;
         }
-        printer.out.flush()?;
+        printer.flush()?;
     }
     if let Some(item) = decoder.finish() {
         summary.add(&item);
         printer.item(item)?;
     }
-    let verdict = verdict(printer.arguments, &summary);
+    let verdict = verdict(arguments, &summary);
     printer.end(encoding, summary)?;
-    let name = name(&printer.arguments.file);
+    let name = name(&arguments.file);
     match broken {
-        Some(error) => Err(anyhow::Error::msg(error.to_string())).with_context(|| format!("{name}: cannot be read on")),
+        Some(error) => {
+            Err(anyhow::Error::msg(error.to_string())).with_context(|| format!("{name}: cannot be read further"))
+        }
         None => verdict,
     }
 }
 
-/// What is wrong with the log.
+/// The error of a log that is empty, damaged, cut off, or of another build.
 fn verdict(arguments: &Arguments, summary: &Summary) -> Result<()> {
     let (name, elf) = (name(&arguments.file), arguments.elf.display());
     let Summary { lines, damaged_frames, damaged_bytes, cut_off_bytes, .. } = summary;
@@ -144,17 +128,17 @@ fn verdict(arguments: &Arguments, summary: &Summary) -> Result<()> {
         bad_input!("{name}: empty; expected the log of the firmware");
     }
     if *lines == 0 && *damaged_frames > 0 {
-        bad_input!("{name}: none of its frames fits {elf}; expected the log of this very build");
+        bad_input!("{name}: none of its frames fits {elf}; expected the log of this build");
     }
     let mut wrong = Vec::new();
     if let Some(first) = summary.first_damage {
         wrong.push(format!("{damaged_frames} damaged frames ({damaged_bytes} bytes), the first at byte {first}"));
     }
     if *cut_off_bytes > 0 {
-        wrong.push(format!("cut off, the last {cut_off_bytes} bytes are no whole frame"));
+        wrong.push(format!("cut off, the last {cut_off_bytes} bytes are an incomplete frame"));
     }
     if !wrong.is_empty() {
-        // Frames have no checksum: a few of another build's may pass.
+        // Frames have no checksum: a few frames of another build may be decoded.
         let foreign = if damaged_frames > lines { "; is it the log of another build?" } else { "" };
         bail!("{name}: {}; {lines} lines were read{foreign}", wrong.join("; "));
     }
@@ -163,71 +147,4 @@ fn verdict(arguments: &Arguments, summary: &Summary) -> Result<()> {
 
 fn name(path: &Path) -> String {
     if path == Path::new("-") { "stdin".to_owned() } else { path.display().to_string() }
-}
-
-/// Prints what the options ask for.
-struct Printer<'a> {
-    arguments: &'a Arguments,
-    out: StdoutLock<'static>,
-    /// For `--json`, which is one object.
-    lines: Vec<Line>,
-    damaged: Vec<Damage>,
-    /// In a run of damaged frames: how many after its first, and their bytes. Another build's log is nothing else.
-    run: Option<(u64, u64)>,
-}
-
-impl Printer<'_> {
-    fn start(&mut self) -> io::Result<()> {
-        match (self.arguments.json, self.arguments.csv) {
-            (true, _) => return Ok(()),
-            (_, true) => writeln!(self.out, "{CSV_HEADER}")?,
-            _ => writeln!(self.out, "{TABLE_HEADER}")?,
-        }
-        self.out.flush()
-    }
-
-    fn item(&mut self, item: Item) -> io::Result<()> {
-        if self.arguments.json {
-            match item {
-                Item::Line(line) => self.lines.push(line),
-                Item::Damaged { offset, bytes } => self.damaged.push(Damage { offset, bytes: Some(bytes) }),
-                Item::Lost { offset } => self.damaged.push(Damage { offset, bytes: None }),
-                Item::Unread { .. } | Item::CutOff { .. } => {}
-            }
-            return Ok(());
-        }
-        match (&item, &mut self.run) {
-            (Item::Damaged { bytes: more, .. }, Some((frames, bytes))) => {
-                *frames += 1;
-                *bytes += more;
-                return Ok(());
-            }
-            (Item::Damaged { .. }, None) => self.run = Some((0, 0)),
-            _ => self.end_run()?,
-        }
-        let row = if self.arguments.csv { csv_row(&item) } else { table_row(&item) };
-        writeln!(self.out, "{row}")
-    }
-
-    fn end_run(&mut self) -> io::Result<()> {
-        let Some((frames @ 1.., bytes)) = self.run.take() else { return Ok(()) };
-        let row = if self.arguments.csv { more_damage_csv_row } else { more_damage_table_row };
-        writeln!(self.out, "{}", row(frames, bytes))
-    }
-
-    fn end(&mut self, encoding: Encoding, summary: Summary) -> Result<()> {
-        self.end_run()?;
-        if self.arguments.json {
-            let (lines, damaged) = (std::mem::take(&mut self.lines), std::mem::take(&mut self.damaged));
-            let report = Report { encoding, lines, damaged, summary };
-            writeln!(self.out, "{}", serde_json::to_string(&report)?)?;
-        } else if self.arguments.csv {
-            for line in summary_text(&summary).lines() {
-                writeln!(self.out, "# {line}")?;
-            }
-        } else {
-            write!(self.out, "\n{}", summary_text(&summary))?;
-        }
-        Ok(self.out.flush()?)
-    }
 }

@@ -5,19 +5,19 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
+use host_sim::output::reproduce::{page, text};
+use host_sim::output::terminal::{json, print, wrote};
 use paper::reproduce::reproduce;
 
-use super::{print, wrote};
-
-/// Compute every printed number of the source report again, and say which do not come out and why
+/// Recompute every printed number of the source report; list and explain those that disagree
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj reproduce                       what does not come out, and why
+  vsj reproduce                       disagreements, with explanations
   vsj reproduce --json                every number
   vsj reproduce --out docs/reproduce  as a page
 
-The printed numbers are in data/printed.toml and the tables beside it.")]
+The printed numbers are in data/printed.toml and the tables that it names.")]
 pub(crate) struct Arguments {
     /// Write README.md, a page with every number, to this folder
     #[arg(long, value_name = "DIR")]
@@ -33,12 +33,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
-        files.add("README.md", |out| out.write_all(report.page().as_bytes()))?;
+        files.add("README.md", |out| out.write_all(page(&report).as_bytes()))?;
         written = wrote(&files.finish()?);
     }
-    if arguments.json {
-        print(&format!("{}\n", serde_json::to_string(&report)?))
-    } else {
-        print(&(report.text() + &written))
-    }
+    print(&if arguments.json { json(&report)? } else { text(&report) + &written })
 }

@@ -2,51 +2,50 @@
 
 use std::path::{Path, PathBuf};
 
-use super::voltage::Between;
-use super::{SETTINGS, named, print, wrote};
+use super::choice::{BETWEEN, one_of};
+use super::option_names::{SETTINGS, named};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::output::files::{Files, write_csv};
-use host_sim::output::{plots, terminal};
+use host_sim::output::terminal::{json, print, remark, wrote};
+use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
 use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Plant, Settings};
-use paper::stair::{Report, Rows};
+use paper::stair::Rows;
 use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::bad_input::number;
-use simulation::experiment::{Experiment, Judged, Run, paper_spring, with_plant};
+use simulation::experiment::{Experiment, HasReference, Run, paper_spring, with_plant};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
-use simulation::schedule::Schedule;
+use simulation::schedule::{Between, Schedule};
 
-/// Run the stair experiment in closed loop on the fixed-point controller, beside the report's Table 3
+/// Run the stair experiment in closed loop on the fixed-point controller, compared with the report's Table 3
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj stair                                 the report's experiment
   vsj stair --out out/stair                 with CSV and plots
-  vsj stair --controller none --input step  the spring left alone, ideal steps
+  vsj stair --controller none --input step  no controller, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7  another amplifier, other gains
   vsj stair --controller fast --input step  as fast as the amplifier allows
   vsj stair --plant spring.toml             another spring: hysteresis, creep
-  vsj stair --input schedule.csv --json     any with columns time_s,voltage_v")]
+  vsj stair --input schedule.csv --json     columns time_s,voltage_v")]
 pub(crate) struct Arguments {
-    /// Whose steps, CSV and voltage are shown: the spring left alone, the report's controller, or one as fast as the
-    /// amplifier allows
+    /// Controller whose steps, CSV and voltage are shown
     #[arg(long, value_enum, default_value_t = Controller::Paper)]
     controller: Controller,
-    /// The spring: `paper`, or a plant file; the limit and slew that it records act where they are stricter than the
-    /// options'
+    /// The spring: `paper`, or a plant file; its recorded limit and slew apply where they are stricter than the options
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns
     /// time_s,voltage_v
     #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
     input: String,
-    /// What the voltage does between two rows of an input file; without it, hold
-    #[arg(long, value_enum)]
+    /// Interpolation of the voltage between two rows of an input file; default: hold
+    #[arg(long, value_parser = one_of(BETWEEN))]
     between: Option<Between>,
-    /// Column of an input file with the measured stiffness; without it, stiffness, if there is one
+    /// Column of an input file with the measured stiffness; default: stiffness, if it exists
     #[arg(long, value_name = "NAME")]
     column: Option<String>,
     /// Highest voltage of the amplifier, in V
@@ -55,7 +54,7 @@ pub(crate) struct Arguments {
     /// Lowest voltage of the amplifier, in V
     #[arg(long, default_value_t = 0.0, value_name = "V", allow_negative_numbers = true)]
     min_v: f64,
-    /// Fastest change of the amplifier, in V/s; without it, no limit
+    /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// Width of the DAC, in bits
@@ -67,7 +66,7 @@ pub(crate) struct Arguments {
     /// Integral gain of the controller, in 1/s
     #[arg(long, default_value_t = Gains::PAPER.integral_per_s, value_name = "GAIN", allow_negative_numbers = true)]
     ki: f64,
-    /// Time constant with which the fast controller makes the last part of the way, in s, 0 to 1; without it, 0
+    /// Time constant of the fast controller's approach to the target, in s, 0 to 1; default: 0
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     approach_s: Option<f64>,
     /// Ticks per second, 100 to 10 000
@@ -76,7 +75,7 @@ pub(crate) struct Arguments {
     /// Write stair.csv, stiffness.svg and voltage.svg to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Time between two rows of the CSV, in s; without it, every tick
+    /// Time between two rows of the CSV, in s; default: every tick
     #[arg(long, value_name = "S", allow_negative_numbers = true, requires = "out")]
     every: Option<f64>,
     /// One JSON object on stdout
@@ -86,15 +85,15 @@ pub(crate) struct Arguments {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Controller {
-    /// The target is the voltage
+    /// No controller: the target is the voltage
     None,
     /// The report's proportional-integral pre-compensator
     Paper,
-    /// The end of the range until the target can be held, then exactly that
+    /// Time-optimal: the end of the range until the target can be held, then the holding voltage
     Fast,
 }
 
-/// Lets the main job be what the command line says without arguments.
+/// Makes the arguments without a command line equal to the defaults of the options.
 #[derive(Parser)]
 struct Defaults {
     #[command(flatten)]
@@ -102,7 +101,7 @@ struct Defaults {
 }
 
 impl Arguments {
-    /// What `vsj` does when it is told nothing: the report's experiment, with files.
+    /// The arguments of `vsj` without a command: the report's experiment, with files in out/stair.
     pub(crate) fn main_job() -> Self {
         Defaults::parse_from(["vsj", "--out", "out/stair"]).arguments
     }
@@ -128,21 +127,21 @@ impl Arguments {
         }
     }
 
-    /// Refuses what would not be looked at.
+    /// Rejects options that would be ignored.
     fn check(&self) -> Result<()> {
         let no_file = ["stair", "step"].contains(&self.input.as_str());
         for (option, given) in [("--between", self.between.is_some()), ("--column", self.column.is_some())] {
             if given && no_file {
-                bad_input!("{option} is of no use with --input {}: expected --input FILE.csv", self.input);
+                bad_input!("{option} has no effect with --input {}: expected --input FILE.csv", self.input);
             }
         }
         if self.approach_s.is_some() && self.controller != Controller::Fast {
-            bad_input!("--approach-s is the fast controller's: expected --controller fast");
+            bad_input!("--approach-s applies to the fast controller only: expected --controller fast");
         }
         Ok(())
     }
 
-    /// Ticks between two rows of the CSV.
+    /// Number of ticks between two rows of the CSV.
     fn stride(&self) -> Result<usize> {
         match self.every {
             None => Ok(1),
@@ -158,18 +157,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let left_out = file.left_out();
     if !left_out.is_empty() {
-        eprintln!("vsj: {}: not simulated: {}", arguments.plant, left_out.join(", "));
+        remark(&format!("{}: not simulated: {}", arguments.plant, left_out.join(", ")));
     }
     let settings = arguments.settings(&file);
-    // Where the range ends below what may be asked for, only the sampled reference takes the target at its end.
+    // Where the range ends below the limit asked for, only the sampled reference accepts targets at its end.
     match settings.plant.plain().filter(|_| settings.amplifier.max_v == arguments.limit_v) {
         Some(plant) => run_plant(arguments, with_plant(&settings, plant), is_the_reports),
         None => run_plant(arguments, settings, |_| false),
     }
 }
 
-/// Runs the command for one kind of spring; `is_the_reports` says whether Table 3's simulated columns should come out.
-fn run_plant<P: Judged>(
+/// Runs the command for one kind of spring; `is_the_reports` tells whether Table 3's simulated columns should be
+/// reproduced.
+fn run_plant<P: HasReference>(
     arguments: &Arguments,
     settings: Settings<P>,
     is_the_reports: impl Fn(&Settings<P>) -> bool,
@@ -182,7 +182,7 @@ fn run_plant<P: Judged>(
         file => {
             let read = record.insert(Record::open(Path::new(file), arguments.column.as_deref().unwrap_or(MEASURED))?);
             read.check_range(arguments.min_v, arguments.limit_v)?;
-            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default().into()))
+            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default()))
         }
     };
     let experiment = Experiment { name, schedule, settings };
@@ -202,19 +202,15 @@ fn run_plant<P: Judged>(
         None => Rows::Table3 { same: arguments.input == "stair" && is_the_reports(&experiment.settings) },
     };
     let controlled = arguments.controller != Controller::None;
-    let report = Report::new(&experiment, &run, &rows, controlled)?;
+    let report = paper::stair::Report::new(&experiment, &run, &rows, controlled)?;
     let paths = match &arguments.out {
         Some(folder) => write(folder, &experiment, &run, &report, controlled, stride)?,
         None => Vec::new(),
     };
-    if arguments.json {
-        print(&format!("{}\n", serde_json::to_string(&report)?))
-    } else {
-        print(&(terminal::text(&report) + &wrote(&paths)))
-    }
+    print(&if arguments.json { json(&report)? } else { stair::text(&report) + &wrote(&paths) })
 }
 
-/// The options that no other command has for fields of the settings.
+/// The options, other than [`SETTINGS`], that set fields of the settings.
 const OWN: &[(&str, &str)] = &[
     ("min_v", "--min-v"),
     ("dac_bits", "--dac-bits"),
@@ -223,7 +219,7 @@ const OWN: &[(&str, &str)] = &[
     ("approach_s", "--approach-s"),
 ];
 
-/// True if Table 3's simulated columns should come out.
+/// True if the settings are those of the report, so that Table 3's simulated columns should be reproduced.
 fn is_the_reports(settings: &Settings) -> bool {
     settings.plant == Plant::PAPER
         && settings.compensation == Compensation::ProportionalIntegral(Gains::PAPER)
@@ -236,7 +232,7 @@ fn write<P>(
     folder: &Path,
     experiment: &Experiment<P>,
     run: &Run,
-    report: &Report,
+    report: &paper::stair::Report,
     controlled: bool,
     stride: usize,
 ) -> Result<Vec<PathBuf>> {

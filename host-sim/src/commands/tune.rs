@@ -5,36 +5,37 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
-use host_sim::output::tuning;
+use host_sim::output::terminal::{json, print, wrote};
+use host_sim::output::tune as output;
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::plant_file;
-use simulation::tune::{Question, tune};
+use simulation::tune::{Specification, tune};
 
-use super::{SETTINGS, named, print, wrote};
+use super::option_names::{SETTINGS, named};
 
-/// Choose gains and settings for a spring and an amplifier, with margins, and what an error of the model costs
+/// Choose gains and settings for a spring and an amplifier, with stability margins and the effect of model errors
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj tune                                     the report's spring at 700 V
   vsj tune --limit-v 1000 --overshoot-percent 1
-  vsj tune --plant spring.toml --out out/tune  with plots of the cost of errors
+  vsj tune --plant spring.toml --out out/tune  with plots over model errors
   vsj tune --json | jq .fast")]
 pub(crate) struct Arguments {
-    /// The spring: `paper`, or a plant file, whose recorded amplifier acts where it is stricter
+    /// The spring: `paper`, or a plant file; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// Highest voltage of the amplifier, in V
     #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
     limit_v: f64,
-    /// Fastest change of the amplifier, in V/s; without it, no limit
+    /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// Ticks per second, 100 to 10 000
     #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// The most overshoot that a step may have, in percent
+    /// Largest overshoot allowed for a step, in percent
     #[arg(long, default_value_t = 5.0, value_name = "PERCENT", allow_negative_numbers = true)]
     overshoot_percent: f64,
     /// Write tune.json, tune.txt, trade.csv, t97.svg and overshoot.svg to this folder
@@ -54,16 +55,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let amplifier =
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
-    let question = Question { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent };
-    let answer = tune(&question).map_err(|error| named(error, SETTINGS))?;
-    let json = format!("{}\n", serde_json::to_string(&answer)?);
-    let text = tuning::text(&answer, &arguments.plant);
+    let specification = Specification { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent };
+    let answer = tune(&specification).map_err(|error| named(error, SETTINGS))?;
+    let json = json(&answer)?;
+    let text = output::text(&answer, &arguments.plant);
     let mut written = String::new();
     if let Some(folder) = &arguments.out {
         let mut files = Files::new(folder)?;
         files.add("tune.json", |out| out.write_all(json.as_bytes()))?;
         files.add("tune.txt", |out| out.write_all(text.as_bytes()))?;
-        tuning::write(&mut files, &answer)?;
+        output::write(&mut files, &answer)?;
         written = wrote(&files.finish()?);
     }
     print(&if arguments.json { json } else { text + &written })

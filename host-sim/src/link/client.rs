@@ -1,7 +1,7 @@
-//! Asks, waits, asks again.
+//! The host's side of a request: send, wait for the answer, repeat.
 //!
-//! A request is sent again with the same sequence number until its answer comes or patience ends: the MCU applies it once
-//! however often it arrives. Telemetry that comes meanwhile is kept in order.
+//! A request is repeated with the same sequence number until it is answered or the retries end; the MCU applies it
+//! once, however often it arrives. Telemetry that arrives meanwhile is kept in order.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -13,17 +13,18 @@ use link::{Frame, Models, Reason, Receiver, Reply, Request, Sequence, Status, Te
 
 use crate::link::Port;
 
-/// How long to wait for an answer, and how often to ask.
+/// How long to wait for an answer, and how often to repeat a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// Wait for one answer.
+    /// Time to wait for one answer.
     pub each: Duration,
-    /// Most times that a request is sent.
+    /// Largest number of times that a request is sent.
     pub tries: u32,
 }
 
 impl Patience {
-    /// Asks every 0.1 s, for `whole` in all: an answer takes a few milliseconds, USB converters may add some tens.
+    /// Repeats a request every 0.1 s, for `whole` in total: an answer takes a few milliseconds, USB converters some
+    /// tens more.
     pub fn of(whole: Duration) -> Self {
         let each = Duration::from_millis(100).min(whole);
         Self { each, tries: (whole.as_secs_f64() / each.as_secs_f64()).ceil() as u32 }
@@ -33,17 +34,17 @@ impl Patience {
 /// Why a request failed.
 #[derive(Debug)]
 pub enum Failure {
-    /// The MCU answered that it will not.
+    /// The MCU rejected the request.
     Refused(Reason),
-    /// The MCU speaks another version of the protocol.
+    /// The MCU uses another version of the protocol.
     Version(u8),
-    /// A sound answer that does not fit the request.
+    /// A valid answer that does not belong to the request.
     Unexpected(Box<Reply>),
-    /// Nothing sound came.
+    /// No valid answer arrived.
     NoAnswer {
-        /// How often it was asked for.
+        /// Number of times that the request was sent.
         tries: u32,
-        /// Bytes that came all the same, the answer's or not.
+        /// Number of bytes that arrived nevertheless.
         bytes: u64,
     },
     /// The port failed.
@@ -55,14 +56,16 @@ impl fmt::Display for Failure {
         match self {
             Self::Refused(reason) => write!(f, "refused: {reason}"),
             Self::Version(version) => write!(f, "{}", Reason::BadVersion(*version)),
-            Self::Unexpected(reply) => write!(f, "answered with something else: {reply:?}"),
+            Self::Unexpected(reply) => write!(f, "unexpected answer: {reply:?}"),
             Self::NoAnswer { tries, bytes: 0 } => {
-                write!(f, "no answer to {tries} requests; is the MCU running, and this its port?")
+                write!(f, "no answer to {tries} requests; is the MCU running on this port?")
             }
             Self::NoAnswer { tries, bytes } => {
-                write!(f, "no sound answer to {tries} requests, but {bytes} bytes; is the baud rate right?")
+                write!(f, "no valid answer to {tries} requests, but {bytes} bytes; is the baud rate right?")
             }
-            Self::Port(error) if error.kind() == io::ErrorKind::UnexpectedEof => f.write_str("the other side hung up"),
+            Self::Port(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+                f.write_str("the other side closed the connection")
+            }
             Self::Port(error) => write!(f, "the port failed: {error}"),
         }
     }
@@ -70,48 +73,48 @@ impl fmt::Display for Failure {
 
 impl std::error::Error for Failure {}
 
-/// A greeted MCU.
+/// A connection to an MCU.
 pub struct Client {
     port: Port,
     patience: Patience,
     receiver: Receiver,
     sequence: Sequence,
-    /// Bytes that were read and not yet looked at.
+    /// Bytes received but not decoded yet.
     read: VecDeque<u8>,
     bytes: u64,
     samples: VecDeque<Telemetry>,
 }
 
-/// What came back.
+/// An answer of the MCU.
 struct Answer {
     sequence: Sequence,
-    /// The reply, or the version of a protocol that is not ours.
+    /// The reply, or the version of an unknown protocol.
     reply: Result<Reply, u8>,
 }
 
 impl Client {
-    /// Greets the MCU.
+    /// Connects to the MCU and returns its status.
     ///
     /// # Errors
-    /// [`Failure`], if it does not answer.
+    /// [`Failure`] if it does not answer.
     pub fn greet(port: Port, patience: Patience) -> Result<(Self, Status), Failure> {
-        // Not the same number each time: an answer to the program before us may still be on its way.
+        // Start at a varying number: an answer to an earlier program may still be on its way.
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let sequence = Sequence((now.as_micros() as u16).wrapping_add(std::process::id() as u16));
         let (receiver, read, samples) = (Receiver::new(), VecDeque::new(), VecDeque::new());
         let mut client = Self { port, patience, receiver, sequence, read, bytes: 0, samples };
         let status = client.status_by(Request::Hello)?;
-        // What was pushed before the MCU heard us was another program's.
+        // Telemetry sent before the greeting belongs to an earlier program.
         client.samples.clear();
         Ok((client, status))
     }
 
-    /// The port's name.
+    /// Name of the port.
     pub fn name(&self) -> &str {
         self.port.name()
     }
 
-    /// Asks for the status.
+    /// Requests the status.
     ///
     /// # Errors
     /// [`Failure`]
@@ -119,7 +122,7 @@ impl Client {
         self.status_by(Request::Status)
     }
 
-    /// Asks for something that is answered with an acknowledgement; gives state and target in it.
+    /// Sends a request that is answered with an acknowledgement; returns the state and target in it.
     ///
     /// # Errors
     /// [`Failure`]
@@ -130,7 +133,7 @@ impl Client {
         }
     }
 
-    /// The model that runs, and the one that the next start will find.
+    /// The model that runs now, and the one stored for the next start.
     ///
     /// # Errors
     /// [`Failure`]
@@ -141,12 +144,12 @@ impl Client {
         }
     }
 
-    /// Has a model checked and stored, restarts the MCU, and greets it anew.
+    /// Sends a model to be checked and stored, restarts the MCU, and connects again.
     ///
     /// # Errors
-    /// [`Failure`]; refused, the old model stays.
+    /// [`Failure`]; if the model is rejected, the old one stays.
     pub fn install(&mut self, model: &WireModel) -> Result<Models, Failure> {
-        // What does not fit is not sent, and refused as incomplete.
+        // An oversized payload is not sent; the MCU then rejects the model as incomplete.
         let payload = model.payload().unwrap_or_default();
         for (number, part) in (0..).zip(payload.chunks(PART)) {
             let mut bytes = [0; PART];
@@ -159,13 +162,13 @@ impl Client {
         self.models()
     }
 
-    /// The telemetry that has come, after listening for `wait`.
+    /// Waits for `wait` and returns all telemetry received.
     ///
     /// # Errors
     /// [`Failure::Port`]
     pub fn samples(&mut self, wait: Duration) -> Result<impl Iterator<Item = Telemetry>, Failure> {
         let until = Instant::now() + wait;
-        // Answers that come now are late copies of answers that were asked for twice.
+        // Answers that arrive now are copies of earlier ones.
         while self.next_answer(until)?.is_some() {}
         Ok(self.samples.drain(..))
     }
@@ -199,7 +202,7 @@ impl Client {
         Err(Failure::NoAnswer { tries: self.patience.tries, bytes: self.bytes - before })
     }
 
-    /// The next answer before `until`.
+    /// The next answer before `until`, `None` if none arrives.
     fn next_answer(&mut self, until: Instant) -> Result<Option<Answer>, Failure> {
         loop {
             while let Some(byte) = self.read.pop_front() {
@@ -210,7 +213,7 @@ impl Client {
                     Err(Unreadable::Version(version)) => {
                         return Ok(Some(Answer { sequence: packet.sequence, reply: Err(version) }));
                     }
-                    // Our own echo, or a message that this version does not have: nothing we have asked for.
+                    // An echo of our own frame, or a message unknown to this version.
                     Err(Unreadable::Kind | Unreadable::Message) => {}
                 }
             }

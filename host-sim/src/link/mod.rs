@@ -1,18 +1,15 @@
-//! The host's side of the serial link to the MCU. The messages are those of the `link` crate.
+//! The host's side of the serial link to the MCU; the messages are defined in the `link` crate.
 //!
 //! | item | what it is |
 //! | --- | --- |
 //! | [`Port`] | a serial device, a unix socket or a TCP socket, as bytes |
-//! | [`Client`] | asks, waits, asks again; collects telemetry |
-//! | [`Recording`] | telemetry as CSV, complete to the last row whenever it stops |
-//! | [`StatusReport`], [`Row`] | what the MCU says, as text and JSON |
+//! | [`Client`] | sends requests and repeats them until they are answered; collects telemetry |
+//! | [`StatusReport`], [`Row`] | status and telemetry of the MCU, as text and JSON |
 
 mod client;
 mod port;
-mod recording;
 mod report;
 
 pub use client::{Client, Failure, Patience};
 pub use port::Port;
-pub use recording::Recording;
 pub use report::{Row, StatusReport};

@@ -1,4 +1,5 @@
-//! Where the MCU is: a serial device or pseudo-terminal by its path, `unix:PATH` or `tcp:HOST:PORT` for the emulator.
+//! A port to the MCU: a serial device or pseudo-terminal by its path, or `unix:PATH` and `tcp:HOST:PORT` for the
+//! emulator.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -8,9 +9,9 @@ use anyhow::Result;
 
 use simulation::bad_input;
 
-/// Longest wait for a byte.
+/// Longest wait for received bytes.
 const POLL: Duration = Duration::from_millis(5);
-/// Longest wait until bytes are taken.
+/// Longest wait for bytes to be sent.
 const WRITE: Duration = Duration::from_secs(1);
 
 /// An open port.
@@ -23,7 +24,7 @@ trait Stream: Read + Write {}
 impl<T: Read + Write> Stream for T {}
 
 impl Port {
-    /// Opens a port by its name. `baud` counts for serial devices only.
+    /// Opens a port by its name; `baud` (bit/s) applies to serial devices only.
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] if it cannot be opened.
@@ -43,15 +44,15 @@ impl Port {
         }
     }
 
-    /// What it was called.
+    /// Name of the port, as given.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Bytes that have come; none after a few milliseconds without.
+    /// Reads received bytes; returns 0 if none arrive within a few milliseconds.
     ///
     /// # Errors
-    /// If the other side is gone.
+    /// If the other side has closed the connection.
     pub fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.stream.read(buffer) {
             Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
@@ -64,17 +65,17 @@ impl Port {
         }
     }
 
-    /// Sends all of `bytes`.
+    /// Sends all bytes.
     ///
     /// # Errors
-    /// If they are not taken within a second, or the other side is gone.
+    /// If they are not taken within a second, or the other side has closed the connection.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.stream.write_all(bytes)
     }
 }
 
 fn serial(path: &str, baud: u32) -> io::Result<Box<dyn Stream>> {
-    // The open port is locked against a second program: two hosts would talk across each other.
+    // The open port is locked against other programs, which would interfere.
     Ok(Box::new(serialport::new(path, baud).timeout(POLL).open()?))
 }
 

@@ -1,70 +1,70 @@
-//! What the MCU says, as text and JSON.
+//! Status and telemetry of the MCU as text and JSON.
 
 use link::session::Counters;
 use link::{Status, Telemetry};
 use model::Limits;
 use serde::Serialize;
 
-/// One sample of the loop.
+/// One telemetry sample of the loop.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Time of the tick since the MCU started, in s.
+    /// Time since the MCU started, in s.
     pub time_s: f64,
     /// Number of the tick.
     pub tick: u64,
-    /// `disarmed`, `armed`, `ramping` (armed, host silent) or `faulted`.
+    /// `disarmed`, `armed`, `ramping` (armed, the host is silent) or `faulted`.
     pub state: &'static str,
-    /// Target, in V.
+    /// Target stiffness, in V.
     pub target_v: f64,
     /// Voltage across the spring, in V.
     pub applied_v: f64,
-    /// Estimated scaled stiffness, in V.
+    /// Estimated stiffness, in V.
     pub estimate_v: f64,
-    /// The sensor's scaled stiffness in V, where there is one.
+    /// Measured stiffness, in V; `None` without a sensor.
     pub measured_v: Option<f64>,
-    /// DAC code.
+    /// Code of the DAC.
     pub dac_code: u16,
-    /// Limits that acted.
+    /// Names of the limits that acted.
     pub limits: Vec<&'static str>,
 }
 
-/// Everything about the MCU.
+/// The status of the MCU.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StatusReport {
-    /// Protocol version.
+    /// Version of the protocol.
     pub protocol: u8,
-    /// Version and git revision of the program.
+    /// Version and git revision of the firmware.
     pub firmware: String,
-    /// Who leads the spring: `paper` or `fast`.
+    /// Name of the controller: `paper` or `fast`.
     pub controller: &'static str,
     /// Ticks per second, in Hz.
     pub rate_hz: u32,
-    /// Host silence that is allowed, in s.
+    /// Longest silence of the host before the voltage ramps down, in s.
     pub silence_limit_s: f64,
-    /// Lowest scaled stiffness in reach, in V.
+    /// Lowest stiffness within reach, in V.
     pub lowest_v: f64,
-    /// Highest scaled stiffness in reach, in V.
+    /// Highest stiffness within reach, in V.
     pub highest_v: f64,
-    /// Late ticks.
+    /// Number of late ticks.
     pub overruns: u32,
-    /// The fault that is present.
+    /// Name of the present fault.
     pub fault: &'static str,
-    /// Its stable number, 0 for none.
+    /// Stable number of the present fault, 0 for none.
     pub fault_code: u8,
-    /// The fault that caused the last reset.
+    /// Name of the fault that caused the last reset.
     pub last_fault: &'static str,
     /// The latest sample.
     pub sample: Row,
-    /// What came over the link, the MCU's count.
+    /// Counters of received frames.
     pub link: Counters,
 }
 
 impl Row {
-    /// Heads a table of rows.
+    /// Header of a table of rows.
     pub const HEADER: &'static str = "    time  state       target   applied  estimate  measured   DAC  limits\n     \
                                       [s]                [V]       [V]       [V]       [V]  code";
 
-    /// A sample of an MCU that makes `rate_hz` ticks a second.
+    /// Converts a sample of an MCU with `rate_hz` ticks per second.
     pub fn new(sample: &Telemetry, rate_hz: u32) -> Self {
         Self {
             time_s: sample.tick as f64 / f64::from(rate_hz.max(1)),
@@ -88,7 +88,7 @@ impl Row {
         }
     }
 
-    /// One line of a table.
+    /// The sample as a line of the table.
     pub fn line(&self) -> String {
         let measured = self.measured_v.map_or_else(|| "-".to_owned(), |volts| format!("{volts:.3}"));
         let Self { time_s, state, target_v, applied_v, estimate_v, dac_code, .. } = self;
@@ -100,7 +100,7 @@ impl Row {
 }
 
 impl StatusReport {
-    /// What a status says.
+    /// Converts a status.
     pub fn new(status: &Status) -> Self {
         let firmware = &status.firmware;
         let revision = match firmware.revision {
@@ -124,7 +124,7 @@ impl StatusReport {
         }
     }
 
-    /// A few lines of text.
+    /// The status as several lines of text.
     pub fn text(&self) -> String {
         let Self { firmware, protocol, rate_hz, silence_limit_s, overruns, fault, last_fault, sample, link, .. } = self;
         let Self { controller, lowest_v, highest_v, .. } = self;

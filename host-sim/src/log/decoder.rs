@@ -1,64 +1,64 @@
-//! Bytes in, lines out.
+//! Decodes a stream of bytes into lines.
 
 use crate::log::formats::{Encoding, Formats};
 use crate::log::frames::{Frames, Packed};
 use crate::log::line::Line;
 use crate::log::shape::Stop;
 
-/// Bytes that unpacking may leave behind a frame, all zero: the last seven are packed together.
+/// Bytes that unpacking may append to a frame, all zero, because seven bytes are packed together.
 const MOST_PADDING: usize = 6;
 
-/// What a log is made of.
+/// A part of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
-    /// A frame that could be read.
+    /// A decoded frame.
     Line(Line),
-    /// Bytes that are no frame. Reading went on after them.
+    /// Bytes that are not a valid frame; decoding continues after them.
     Damaged {
-        /// Place of the first in the stream.
+        /// Position of the first byte in the stream.
         offset: u64,
-        /// How many.
+        /// Number of bytes.
         bytes: u64,
     },
-    /// A frame is damaged, and the encoding does not tell where the next one starts.
+    /// A damaged frame of an encoding that does not mark where the next frame starts.
     Lost {
-        /// Place of the frame in the stream.
+        /// Position of the frame in the stream.
         offset: u64,
     },
-    /// At the end of the stream: all the bytes after [`Item::Lost`].
+    /// The bytes after [`Item::Lost`], reported at the end of the stream.
     Unread {
-        /// How many.
+        /// Number of bytes.
         bytes: u64,
     },
-    /// At the end of the stream: a frame that is not whole.
+    /// An incomplete frame at the end of the stream.
     CutOff {
-        /// Place of its first byte in the stream.
+        /// Position of its first byte in the stream.
         offset: u64,
-        /// How many bytes of it are there.
+        /// Number of its bytes that exist.
         bytes: u64,
     },
 }
 
-/// Decodes a stream of frames as it comes.
+/// Decodes a stream of frames while it arrives.
 pub struct Decoder {
     formats: Formats,
     frames: Frames,
-    /// Where a raw stream stopped to make sense, and how many bytes came since.
+    /// Position of the first damaged frame of a raw stream, from which nothing can be decoded.
     lost: Option<u64>,
 }
 
 impl Decoder {
-    /// A decoder for the log of the firmware that the formats are from.
+    /// Creates a decoder for logs of the firmware that the formats belong to.
     pub fn new(formats: Formats) -> Self {
         Self { formats, frames: Frames::default(), lost: None }
     }
 
-    /// How the frames are packed.
+    /// Encoding of the frames.
     pub fn encoding(&self) -> Encoding {
         self.formats.encoding()
     }
 
-    /// All that is complete with the next `bytes` of the stream.
+    /// Adds bytes; returns all items that they complete.
     pub fn feed(&mut self, bytes: &[u8]) -> Vec<Item> {
         if let Some(lost) = &mut self.lost {
             *lost += bytes.len() as u64;
@@ -71,7 +71,7 @@ impl Decoder {
         }
     }
 
-    /// What the end of the stream leaves.
+    /// Ends the stream; returns what remains.
     pub fn finish(self) -> Option<Item> {
         match (self.lost, self.frames.rest().len() as u64) {
             (Some(bytes), _) => Some(Item::Unread { bytes }),

@@ -1,125 +1,126 @@
-//! What the lines of the controller's firmware say, told by their format strings.
+//! The meaning of log lines, recognised by their format strings.
 
 use defmt_parser::Fragment;
 use serde::{Serialize, Serializer};
 
-/// A line with a meaning. One whose words or values are others than expected is [`Event::Text`]; further values are fine.
+/// The meaning of a line; a line with other words or values than expected is [`Event::Text`], additional values are
+/// allowed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "lowercase")]
 pub enum Event {
-    /// `boot version=.. git=.. reset=.. last_fault=.. rate_hz=.. controller=..`: the firmware starts.
+    /// `boot version=.. git=.. reset=.. last_fault=.. rate_hz=.. controller=..`: the firmware has started.
     Boot(Boot),
-    /// `state .. -> ..`: the supervisor goes from one state to another.
+    /// `state .. -> ..`: the supervisor has changed its state.
     State {
-        /// Old state.
+        /// State before.
         from: String,
-        /// New state.
+        /// State after.
         to: String,
     },
-    /// `fault code=.. name=.. tick=..`: the output goes off.
+    /// `fault code=.. name=.. tick=..`: a fault has switched the output off.
     Fault {
         /// Number of the fault.
         code: u8,
-        /// Its name.
+        /// Name of the fault.
         name: String,
-        /// When.
+        /// Tick of the fault.
         tick: u32,
     },
-    /// `limit bits=.. tick=..`: other limits act than in the tick before.
+    /// `limit bits=.. tick=..`: the set of acting limits has changed.
     Limit {
-        /// As [`model::Limits::bits`].
+        /// The limits, encoded as [`model::Limits::bits`].
         bits: u8,
-        /// When.
+        /// Tick of the change.
         tick: u32,
     },
-    /// `summary tick=.. ..`: once a second. Counts are since the start.
+    /// `summary tick=.. ..`: sent once a second; counts are since the start.
     Summary {
-        /// Ticks so far.
+        /// Number of ticks.
         tick: u32,
-        /// Ticks that came too late.
+        /// Number of late ticks.
         overruns: u32,
-        /// The latest of them.
+        /// Largest lateness of a tick, in us.
         worst_lateness_us: u32,
-        /// Root mean square over the last second, to 6 %; older firmware does not tell.
+        /// Root mean square of the lateness over the last second, in us, within 6 %; `None` for older firmware.
         #[serde(skip_serializing_if = "Option::is_none")]
         rms_lateness_us: Option<f32>,
-        /// Ticks in which a limit acted.
+        /// Number of ticks in which a limit acted.
         limited_ticks: u32,
-        /// Of the supervisor.
+        /// State of the supervisor.
         state: String,
-        /// Asked for.
+        /// Target stiffness, in mV.
         target_mv: i32,
-        /// Put across the spring.
+        /// Voltage across the spring, in mV.
         applied_mv: i32,
-        /// Estimated.
+        /// Estimated stiffness, in mV.
         stiffness_mv: i32,
     },
-    /// `done ticks=.. ..`: an emulated run is over.
+    /// `done ticks=.. ..`: an emulated run has ended.
     Done(Done),
-    /// `dropped events=..`: so many lines since the last are missing, because they came too fast.
+    /// `dropped events=..`: lines are missing because they came too fast.
     Dropped {
-        /// How many.
+        /// Number of missing lines since the last such event.
         events: u32,
     },
-    /// `panic at ..:..`: the program stopped itself.
+    /// `panic at ..:..`: the program has stopped itself.
     Panic {
         /// Source file.
         file: String,
-        /// Line in it.
+        /// Line in the source file.
         line: u32,
     },
-    /// Anything else.
+    /// Any other line.
     Text,
 }
 
 /// A start of the firmware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Boot {
-    /// Of the firmware.
+    /// Version of the firmware.
     pub version: String,
-    /// Revision it is built from.
+    /// Git revision of the firmware.
     pub git: String,
-    /// What the start comes from.
+    /// Cause of the reset.
     pub reset: String,
-    /// Code of the fault before it, 0 for none.
+    /// Code of the fault before the reset, 0 for none.
     pub last_fault: u8,
-    /// Ticks per second.
+    /// Ticks per second, in Hz.
     pub rate_hz: u32,
-    /// Who leads the spring; older firmware does not tell.
+    /// Name of the controller; `None` for older firmware.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controller: Option<String>,
 }
 
-/// End of an emulated run.
+/// The end of an emulated run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Done {
-    /// All ticks.
+    /// Number of ticks.
     pub ticks: u32,
-    /// Ticks that never came.
+    /// Number of missed ticks.
     pub missed: u32,
-    /// Of every DAC code and every estimate.
+    /// Digest over all DAC codes and estimates.
     #[serde(serialize_with = "hexadecimal")]
     pub digest: u64,
-    /// Fewest instructions in a tick.
+    /// Smallest number of instructions in a tick.
     pub min: u32,
-    /// Instructions of a tick on average.
+    /// Mean number of instructions in a tick.
     pub mean: u32,
-    /// Most instructions in a tick.
+    /// Largest number of instructions in a tick.
     pub max: u32,
 }
 
-/// JSON numbers do not hold 64 bits everywhere.
+/// As a text, because JSON numbers do not hold 64 bits everywhere.
 fn hexadecimal<S: Serializer>(digest: &u64, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&format_args!("{digest:016x}"))
 }
 
 impl Event {
-    /// The event of a line, from the fragments of its format string and the text that each became.
+    /// The event of a line, from the fragments of its format string and the text of each argument.
     pub(super) fn of(fragments: &[Fragment<'_>], shown: impl Iterator<Item = String>) -> Self {
         Values::new(fragments, shown).and_then(|values| values.event()).unwrap_or(Self::Text)
     }
 
-    /// The word that JSON and CSV call it.
+    /// Name of the event in JSON and CSV.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Boot(_) => "boot",
@@ -135,7 +136,7 @@ impl Event {
     }
 }
 
-/// The values of a line, under the words before them.
+/// The values of a line, by the words before them.
 struct Values {
     /// First word of the line.
     head: String,
@@ -241,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn older_firmware_does_not_tell_its_controller() {
+    fn a_boot_line_without_controller_is_recognised() {
         let format = "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32}";
         let values = ["0.1.0", "36094dc", "power-on", "0", "1000", "fast"];
         let controller = |event| if let Event::Boot(boot) = event { boot.controller } else { panic!("{event:?}") };
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_has_a_place() {
+    fn a_panic_line_gives_file_and_line() {
         let panic = Event::Panic { file: "src/a.rs".into(), line: 7 };
         assert_eq!(event("panic at {=str}:{=u32}", &["src/a.rs", "7"]), panic);
     }

@@ -1,4 +1,4 @@
-//! The format strings of a firmware image: what its frames mean.
+//! The format strings of a firmware image, which define the meaning of its frames.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,17 +12,17 @@ use crate::log::line::Line;
 use crate::log::shape::{Formatted, Shape, Stop, Walk};
 use simulation::bad_input;
 
-/// How the frames are packed, as the image says.
+/// Encoding of the frames, as recorded in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Encoding {
-    /// Frames follow each other without a mark: after a damaged one nothing more can be found.
+    /// Frames follow each other without a mark; nothing can be decoded after a damaged one.
     Raw,
-    /// Frames end with a zero byte that occurs nowhere else: reading goes on after a damaged one.
+    /// Frames end with a zero byte that occurs nowhere else; decoding continues after a damaged one.
     Rzcobs,
 }
 
-/// What the log of one firmware image is decoded with.
+/// The tables for decoding the log of one firmware image.
 pub struct Formats {
     table: Table,
     encoding: Encoding,
@@ -30,7 +30,7 @@ pub struct Formats {
     formatted: BTreeMap<u16, Formatted>,
 }
 
-/// The part of a defmt symbol's name that is needed here.
+/// The used part of a defmt symbol's name.
 #[derive(Deserialize)]
 struct Symbol {
     tag: String,
@@ -38,10 +38,11 @@ struct Symbol {
 }
 
 impl Formats {
-    /// Reads them from the bytes of an ELF file.
+    /// Reads the tables from an ELF file.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] if it is not one, or not of a firmware that logs with defmt 0.3 to 1.x.
+    /// [`simulation::bad_input::BadInput`] if it is not an ELF file, or not that of firmware that logs with defmt 0.3
+    /// to 1.x.
     pub fn parse(elf: &[u8]) -> Result<Self> {
         let table = match Table::parse(elf) {
             Ok(Some(table)) => table,
@@ -61,12 +62,12 @@ impl Formats {
         Ok(formats)
     }
 
-    /// How the frames are packed.
+    /// Encoding of the frames.
     pub fn encoding(&self) -> Encoding {
         self.encoding
     }
 
-    /// The table keeps its strings to itself, so they are read once more.
+    /// Reads the format strings again, since defmt's table does not expose them.
     fn collect(&mut self, elf: &[u8]) -> Result<()> {
         let elf = object::File::parse(elf)?;
         let is_defmt = |name: &str| name == ".defmt" || name.starts_with(".defmt.");
@@ -77,7 +78,7 @@ impl Formats {
             if !sections.contains(&section) {
                 continue;
             }
-            // Markers of the linker script are no strings.
+            // Symbols of the linker script are not format strings.
             let Ok(Symbol { tag, data }) = serde_json::from_str(name) else { continue };
             match (tag.as_str(), u16::try_from(symbol.address())) {
                 ("defmt_timestamp", _) => self.timestamp = Shape::of(&data),
@@ -90,9 +91,9 @@ impl Formats {
         Ok(())
     }
 
-    /// The frame at the start of `bytes`, and how many bytes it has.
+    /// Decodes the frame at the start of `bytes`; returns its line and length in bytes.
     pub(super) fn decode(&self, bytes: &[u8]) -> Result<(Line, usize), Stop> {
-        // The decoder allocates and recurses as a frame tells it to; one that is damaged would tell it anything.
+        // The decoder allocates and recurses as the frame says, so the frame is checked first: it may be damaged.
         self.walk(bytes)?;
         let decoded = catch_unwind(AssertUnwindSafe(|| {
             let (frame, length) = self.table.decode(bytes)?;
@@ -101,7 +102,7 @@ impl Formats {
         match decoded {
             Ok(Ok(decoded)) => Ok(decoded),
             Ok(Err(DecodeError::UnexpectedEof)) => Err(Stop::More),
-            // A panic: a value that the decoder cannot show, such as a date beyond the year 9999.
+            // A panic: a value that the decoder cannot format, such as a date beyond the year 9999.
             Ok(Err(DecodeError::Malformed)) | Err(_) => Err(Stop::Damaged),
         }
     }

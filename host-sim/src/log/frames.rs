@@ -1,32 +1,32 @@
-//! Where frames start and end in a stream of bytes.
+//! Splits a stream of bytes into frames.
 
-/// Longest frame in bytes; what is longer is damaged, and need not be kept.
+/// Longest frame, in bytes; anything longer is damaged and not stored.
 const LONGEST: usize = 1 << 16;
 
-/// Bytes that have come and are not read yet.
+/// Received bytes that are not decoded yet.
 #[derive(Default)]
 pub(super) struct Frames {
     buffer: Vec<u8>,
-    /// Start of what is not read, in `buffer`.
+    /// Index in `buffer` of the first byte not decoded.
     start: usize,
-    /// How far the search for a mark got.
+    /// Index in `buffer` up to which the end mark was searched for.
     searched: usize,
-    /// Place of `buffer[0]` in the stream.
+    /// Position of `buffer[0]` in the stream.
     offset: u64,
 }
 
-/// A stretch of the stream between two marks.
+/// The bytes between two end marks.
 pub(super) struct Packed {
     pub(super) offset: u64,
-    /// Without its mark.
+    /// Number of bytes without the end mark.
     pub(super) length: u64,
-    /// Nothing if the packing itself is broken.
+    /// The unpacked frame; `None` if the packing is damaged.
     pub(super) unpacked: Option<Vec<u8>>,
 }
 
 impl Frames {
     pub(super) fn push(&mut self, bytes: &[u8]) {
-        // Once a call, not once a frame.
+        // Once per call instead of once per frame.
         self.buffer.drain(..self.start);
         self.offset += self.start as u64;
         self.searched = self.searched.saturating_sub(self.start);
@@ -34,7 +34,7 @@ impl Frames {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The next stretch that is ended by a mark, or too long for a frame.
+    /// The next bytes that end with a mark or exceed the longest frame; `None` if incomplete.
     pub(super) fn packed(&mut self) -> Option<Packed> {
         loop {
             let from = self.searched.max(self.start);
@@ -53,19 +53,19 @@ impl Frames {
             let unpacked = if mark.is_some() { rzcobs::decode(packed).ok() } else { None };
             self.start = end + usize::from(mark.is_some());
             self.searched = self.start;
-            // Marks in a row: each start of the firmware sends one.
+            // Several marks may follow each other: each start of the firmware sends one.
             if length > 0 {
                 return Some(Packed { offset, length, unpacked });
             }
         }
     }
 
-    /// What is not read yet.
+    /// Bytes not decoded yet.
     pub(super) fn rest(&self) -> &[u8] {
         &self.buffer[self.start..]
     }
 
-    /// Place of [`rest`](Self::rest) in the stream.
+    /// Position of [`rest`](Self::rest) in the stream.
     pub(super) fn position(&self) -> u64 {
         self.offset + self.start as u64
     }

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use crate::log::event::Event;
 
-/// How grave a line is.
+/// Severity of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[expect(missing_docs, reason = "the names say it")]
@@ -34,14 +34,14 @@ impl fmt::Display for Level {
 /// A decoded frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Line {
-    /// Since the MCU's start, if the firmware sends times.
+    /// Time since the MCU's start, in us, if the firmware sends times.
     #[serde(rename = "time_s", serialize_with = "in_seconds")]
     pub time_us: Option<u64>,
-    /// `println!` has none.
+    /// Severity; `None` for lines of `println!`.
     pub level: Option<Level>,
-    /// As the firmware put it.
+    /// Text of the line.
     pub message: String,
-    /// What it says.
+    /// Meaning of the line.
     #[serde(flatten)]
     pub event: Event,
 }
@@ -67,13 +67,13 @@ fn in_seconds<S: Serializer>(time_us: &Option<u64>, serializer: S) -> Result<S::
     time_us.map(|us| us as f64 / 1e6).serialize(serializer)
 }
 
-/// A time as defmt shows it: `1.000250`, `00:01:01.000250`, or a bare number, which is in microseconds.
+/// Parses a time as defmt formats it: `1.000250`, `00:01:01.000250`, or a plain number of microseconds.
 fn microseconds(text: &str) -> Option<u64> {
     if !text.contains(['.', ':']) {
         return text.parse().ok();
     }
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
-    // Days only, hours or minutes may come before the seconds.
+    // Hours and minutes, or days, may precede the seconds.
     let units = [1, 60, 3600, 86_400];
     let mut seconds: u64 = 0;
     for (part, unit) in whole.rsplit(':').zip(units) {
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_as_defmt_shows_them() {
+    fn times_formatted_by_defmt_are_parsed() {
         for (text, expected) in [
             ("0.000000", Some(0)),
             ("1.000250", Some(1_000_250)),

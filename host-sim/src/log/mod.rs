@@ -1,10 +1,10 @@
-//! The firmware's log: [defmt](https://defmt.ferrous-systems.com) frames, decoded as they come.
+//! Decodes the firmware's log, a stream of [defmt](https://defmt.ferrous-systems.com) frames, while it arrives.
 //!
-//! A [`Decoder`] is fed bytes, in pieces of any size, and gives [`Item`]s: lines, and stretches that could not be read.
-//! A [`Summary`] adds them up. Neither knows where the bytes come from.
+//! A [`Decoder`] receives bytes in pieces of any size and returns [`Item`]s: lines, and ranges that are not valid
+//! frames. A [`Summary`] accumulates them. Both are independent of the source of the bytes.
 //!
 //! ```no_run
-//! use crate::log::{Decoder, Formats, Item, Summary};
+//! use host_sim::log::{Decoder, Formats, Item, Summary};
 //!
 //! let mut decoder = Decoder::new(Formats::parse(&std::fs::read("firmware.elf")?)?);
 //! let mut summary = Summary::default();
@@ -19,7 +19,7 @@
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 //!
-//! defmt frames carry no checksum: a damaged frame that happens to have the form of a whole one is taken for one.
+//! defmt frames have no checksum: a damaged frame may be decoded as a valid one.
 
 mod decoder;
 mod event;

@@ -1,28 +1,28 @@
-//! How long a frame is, found without building anything: a damaged frame may claim billions of elements.
+//! Length of a frame, found without allocating: a damaged frame may claim billions of elements.
 
 use std::collections::BTreeMap;
 
 use defmt_parser::{Fragment, Parameter, ParserMode, Type, get_max_bitfield_range};
 
-/// Deepest nesting that is taken for real.
+/// Deepest nesting accepted.
 const DEEPEST: usize = 32;
-/// Most elements of all slices in a frame.
+/// Largest number of elements of all slices in a frame.
 const MOST_ELEMENTS: u32 = 1 << 16;
 
 /// Why no frame was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stop {
-    /// The bytes end before the frame does.
+    /// The frame is incomplete.
     More,
-    /// No frame looks like this.
+    /// The bytes are not a valid frame.
     Damaged,
 }
 
-/// The arguments of a format string, in the order of their bytes.
+/// Types of the arguments of a format string, in the order of their bytes.
 pub(super) struct Shape(Vec<Type>);
 
 impl Shape {
-    /// Nothing if it is no format string.
+    /// Parses a format string; `None` if it is invalid.
     pub(super) fn of(format: &str) -> Option<Self> {
         let fragments = defmt_parser::parse(format, ParserMode::ForwardsCompatible).ok()?;
         let mut arguments: BTreeMap<usize, Vec<Parameter>> = BTreeMap::new();
@@ -32,7 +32,7 @@ impl Shape {
             }
         }
         let types = arguments.into_values().map(|uses| {
-            // Several bit fields of one argument are sent as the bytes that hold them all.
+            // Several bit fields of one argument are sent as the bytes that contain all of them.
             let fields: Vec<&Parameter> = uses.iter().filter(|p| matches!(p.ty, Type::BitField(_))).collect();
             match get_max_bitfield_range(fields.into_iter()) {
                 Some((start, end)) => Type::BitField(start..end),
@@ -43,14 +43,14 @@ impl Shape {
     }
 }
 
-/// An entry of the table: a line, or what stands for an argument inside one.
+/// An entry of the table: a line, or a formatted argument within a line.
 pub(super) struct Formatted {
-    /// A frame may start with it.
+    /// True if a frame may start with it.
     pub(super) is_line: bool,
-    /// A levelled line stands for no argument.
+    /// True if it may be an argument; lines with a level may not.
     is_argument: bool,
     pub(super) whole: Option<Shape>,
-    /// Those of an enum, which are told apart by a leading number; empty if it is none.
+    /// The variants of an enum, selected by a leading number; empty if it is no enum.
     variants: Vec<Option<Shape>>,
 }
 
@@ -68,7 +68,7 @@ impl Formatted {
     }
 }
 
-/// A walk over the bytes of one frame.
+/// Position within the bytes of a frame, and the limits that remain.
 pub(super) struct Walk<'a> {
     formatted: &'a BTreeMap<u16, Formatted>,
     bytes: &'a [u8],
@@ -132,7 +132,7 @@ impl<'a> Walk<'a> {
     }
 
     fn slice(&mut self, length: u32) -> Result<(), Stop> {
-        // Elements may have no bytes of their own, so the frame's length bounds nothing.
+        // Elements may have no bytes, so the frame's length does not limit their number.
         self.elements = self.elements.saturating_add(length);
         if self.elements > MOST_ELEMENTS {
             return Err(Stop::Damaged);
@@ -169,7 +169,7 @@ impl<'a> Walk<'a> {
         let shape = match formatted.variants.len() {
             0 => &formatted.whole,
             variants => {
-                // As wide as the number of the last variant needs.
+                // The number is as wide as the last variant needs.
                 let width = match variants - 1 {
                     0..=0xff => 1,
                     0x100..=0xffff => 2,
@@ -182,7 +182,7 @@ impl<'a> Walk<'a> {
         shape.as_ref().ok_or(Stop::Damaged)
     }
 
-    /// A little-endian number of `width` bytes.
+    /// Reads a little-endian number of `width` bytes.
     fn number(&mut self, width: usize) -> Result<u32, Stop> {
         let (bytes, rest) = self.bytes.split_at_checked(width).ok_or(Stop::More)?;
         self.bytes = rest;

@@ -1,4 +1,4 @@
-//! What a whole log says.
+//! Totals over a log.
 
 use model::Limits;
 use serde::Serialize;
@@ -7,46 +7,48 @@ use crate::log::Item;
 use crate::log::event::{Boot, Done, Event};
 use crate::log::line::{Level, Line};
 
-/// All the lines of a log, added up. The firmware counts from its start, so each start is added to those before.
+/// Totals over all lines of a log. The firmware counts from its start, so the counts of all starts are added.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// Frames that could be read.
+    /// Number of decoded frames.
     pub lines: u64,
-    /// Lines of level error.
+    /// Number of lines with the level error.
     pub errors: u64,
-    /// Lines of level warn.
+    /// Number of lines with the level warn.
     pub warnings: u64,
-    /// Starts of the firmware.
+    /// The starts of the firmware.
     pub boots: Vec<Boot>,
-    /// Starts whose boot line is missing: counts went back without it.
+    /// Number of starts without a boot line, detected by counts that decreased.
     pub boots_not_seen: u64,
-    /// Ticks, as far as a line tells.
+    /// Number of ticks, as far as the lines tell.
     pub ticks: u64,
-    /// Ticks that were missed; none if no line tells, as in the next three. As of each start's last summary line.
+    /// Number of missed ticks as of each start's last summary line; `None` without such a line, like the next three
+    /// fields.
     pub overruns: Option<u64>,
-    /// How late the latest tick came.
+    /// Largest lateness of a tick, in us.
     pub worst_lateness_us: Option<u32>,
-    /// Ticks in which a limit acted.
+    /// Number of ticks in which a limit acted.
     pub limited_ticks: Option<u64>,
-    /// The same as a time; none if a start's rate is not known.
+    /// Time in which a limit acted, in s; `None` if the rate of a start is unknown.
     pub limited_s: Option<f64>,
-    /// How many limit lines name each limit.
+    /// Number of limit lines that name each limit.
     pub limit_lines: LimitLines,
-    /// In the order of their first. One that is told again after the restart it led to counts once.
+    /// The kinds of faults, in order of first occurrence; a fault reported again after the restart that it caused
+    /// counts once.
     pub faults: Vec<Fault>,
-    /// Times that the program stopped itself.
+    /// Number of panics.
     pub panics: u64,
-    /// Lines that the firmware says it did not send.
+    /// Number of lines that the firmware reports as dropped.
     pub dropped: u64,
-    /// The end of an emulated run, if the log has it.
+    /// End of an emulated run, if the log contains it.
     pub done: Option<Done>,
-    /// Stretches that are no frame.
+    /// Number of byte ranges that are not valid frames.
     pub damaged_frames: u64,
-    /// Their bytes.
+    /// Number of bytes in those ranges.
     pub damaged_bytes: u64,
-    /// Place of the first of them in the log.
+    /// Position in the log of the first such range.
     pub first_damage: Option<u64>,
-    /// Bytes of a last frame that is not whole.
+    /// Bytes of an incomplete frame at the end.
     pub cut_off_bytes: u64,
     #[serde(skip)]
     start: Start,
@@ -54,18 +56,18 @@ pub struct Summary {
     before: Start,
 }
 
-/// One kind of fault.
+/// A kind of fault.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Fault {
     /// Number of the fault.
     pub code: u8,
     /// Its name.
     pub name: String,
-    /// How many.
+    /// Number of occurrences.
     pub count: u64,
 }
 
-/// How many limit lines name each limit; a line can name several.
+/// Number of limit lines that name each limit; a line may name several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "as in model::Limits")]
 pub struct LimitLines {
@@ -75,27 +77,27 @@ pub struct LimitLines {
     pub target: u64,
 }
 
-/// Counts since one start, or of all the starts before.
+/// Counts since one start, or totals over all earlier starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Start {
     rate_hz: Option<u32>,
     ticks: u64,
-    /// Tick of the newest summary line.
+    /// Tick of the latest summary line.
     last_summary: u32,
-    /// Code of the newest fault line.
+    /// Code of the latest fault line.
     last_fault: Option<u8>,
-    /// Code of a fault that the start before told already.
-    told: Option<u8>,
+    /// Code of a fault that the previous start has already reported.
+    reported: Option<u8>,
     overruns: u64,
     limited_ticks: u64,
-    /// Of the starts before.
+    /// Time in limits of the earlier starts, in s.
     limited_s: f64,
-    /// A limited tick of a start before has no known length.
+    /// True if the rate of an earlier start with limited ticks is unknown.
     unknown_rate: bool,
 }
 
 impl Start {
-    /// None if ticks of unknown length are in it.
+    /// Time in limits, in s; `None` if it contains ticks of unknown length.
     fn limited_s(&self) -> Option<f64> {
         match self.rate_hz {
             _ if self.limited_ticks == 0 => Some(0.0),
@@ -106,7 +108,7 @@ impl Start {
 }
 
 impl Summary {
-    /// Adds the next item of the log.
+    /// Adds an item of the log.
     pub fn add(&mut self, item: &Item) {
         match *item {
             Item::Line(ref line) => self.line(line),
@@ -125,7 +127,7 @@ impl Summary {
         self.total();
     }
 
-    /// True if nothing of the log is missing, as far as can be told.
+    /// True if no part of the log is known to be missing.
     pub fn is_whole(&self) -> bool {
         self.damaged_frames == 0 && self.cut_off_bytes == 0
     }
@@ -136,17 +138,17 @@ impl Summary {
         self.warnings += u64::from(line.level == Some(Level::Warn));
         match &line.event {
             Event::Boot(boot) => {
-                // The fault that led here is told once more; its first line may have got lost in the crash.
-                let told = self.start.last_fault.filter(|code| *code == boot.last_fault);
+                // The fault that caused the restart is reported again; its first line may have been lost in the crash.
+                let reported = self.start.last_fault.filter(|code| *code == boot.last_fault);
                 self.next_start();
                 self.start.rate_hz = Some(boot.rate_hz);
-                self.start.told = told;
+                self.start.reported = reported;
                 self.boots.push(boot.clone());
             }
             Event::Fault { code, name, tick } => {
                 self.tick(*tick);
                 self.start.last_fault = Some(*code);
-                if self.start.told.take() == Some(*code) {
+                if self.start.reported.take() == Some(*code) {
                     return;
                 }
                 match self.faults.iter_mut().find(|fault| fault.code == *code && fault.name == *name) {
@@ -164,7 +166,7 @@ impl Summary {
                 }
             }
             Event::Summary { tick, overruns, worst_lateness_us, limited_ticks, .. } => {
-                // Only summaries are sure to come in order.
+                // Only summary lines are guaranteed to be in order.
                 if *tick < self.start.last_summary {
                     self.next_start();
                     self.boots_not_seen += 1;
@@ -186,18 +188,18 @@ impl Summary {
         }
     }
 
-    /// So many were missed since the start.
+    /// Updates the number of missed ticks since the start.
     fn missed(&mut self, ticks: u32) {
         self.start.overruns = self.start.overruns.max(ticks.into());
         self.overruns = Some(0);
     }
 
-    /// So many ticks since the start.
+    /// Updates the number of ticks since the start.
     fn tick(&mut self, tick: u32) {
         self.start.ticks = self.start.ticks.max(tick.into());
     }
 
-    /// What was counted since the last start is final.
+    /// Adds the counts of the last start to the totals.
     fn next_start(&mut self) {
         let Start { ticks, overruns, limited_ticks, .. } = self.start;
         self.before.ticks += ticks;

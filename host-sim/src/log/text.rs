@@ -7,13 +7,13 @@ use model::Limits;
 
 use crate::log::{Event, Item, Line, Summary};
 
-/// First line of the table.
+/// Header of the table.
 pub const TABLE_HEADER: &str = "    time [s]  level  message";
 
-/// First line of the CSV.
+/// Header of the CSV file.
 pub const CSV_HEADER: &str = "time_s,level,event,message";
 
-/// A line of the table, without its end.
+/// An item as a line of the table, without line break.
 pub fn table_row(item: &Item) -> String {
     match item {
         Item::Line(line) => {
@@ -25,7 +25,7 @@ pub fn table_row(item: &Item) -> String {
     }
 }
 
-/// A row of the CSV, without its end; damage as a comment.
+/// An item as a row of the CSV file, without line break; damage is a comment.
 pub fn csv_row(item: &Item) -> String {
     match item {
         Item::Line(line) => {
@@ -37,7 +37,7 @@ pub fn csv_row(item: &Item) -> String {
     }
 }
 
-/// The summary, several lines.
+/// The summary as several lines of text.
 pub fn summary_text(summary: &Summary) -> String {
     let mut text = String::from("summary\n");
     let Summary { lines, errors, warnings, .. } = summary;
@@ -111,7 +111,7 @@ fn faults(summary: &Summary) -> String {
     text
 }
 
-/// The names of a limit line's bits.
+/// Names of the limits in a limit line.
 fn limits(line: &Line) -> String {
     let Event::Limit { bits, .. } = line.event else { return String::new() };
     let names =
@@ -120,12 +120,12 @@ fn limits(line: &Line) -> String {
     if names.is_empty() { " (none)".to_owned() } else { format!(" ({})", names.join(", ")) }
 }
 
-/// What stands for a run of damaged frames after its first, as a line of the table.
+/// A line of the table that stands for a run of damaged frames after its first.
 pub fn more_damage_table_row(frames: u64, bytes: u64) -> String {
     format!("{:>12}  {:<5}  {}", "-", "-", more_damage(frames, bytes))
 }
 
-/// The same as a comment of the CSV.
+/// A comment of the CSV file that stands for a run of damaged frames after its first.
 pub fn more_damage_csv_row(frames: u64, bytes: u64) -> String {
     format!("# {}", more_damage(frames, bytes))
 }
@@ -137,10 +137,12 @@ fn more_damage(frames: u64, bytes: u64) -> String {
 fn damage(item: &Item) -> String {
     match item {
         Item::Line(_) => String::new(),
-        Item::Damaged { offset, bytes } => format!("damaged: {bytes} bytes at byte {offset} are no frame"),
-        Item::Lost { offset } => format!("damaged: no frame at byte {offset}, and a raw log has no mark to go on from"),
+        Item::Damaged { offset, bytes } => format!("damaged: {bytes} bytes at byte {offset} are not a valid frame"),
+        Item::Lost { offset } => {
+            format!("damaged: invalid frame at byte {offset}, after which a raw log has no marks to continue from")
+        }
         Item::Unread { bytes } => format!("damaged: {bytes} bytes not read"),
-        Item::CutOff { offset, bytes } => format!("cut off: {bytes} bytes at byte {offset} are no whole frame"),
+        Item::CutOff { offset, bytes } => format!("cut off: {bytes} bytes at byte {offset} are an incomplete frame"),
     }
 }
 
@@ -157,7 +159,7 @@ fn seconds(us: u64) -> String {
     format!("{}.{:06}", us / 1_000_000, us % 1_000_000)
 }
 
-/// A damaged frame must not be able to steer a terminal.
+/// Escapes control characters, which in a damaged frame could control the terminal.
 fn one_line(text: &str) -> Cow<'_, str> {
     if !text.contains(char::is_control) {
         return Cow::Borrowed(text);

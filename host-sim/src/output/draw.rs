@@ -1,23 +1,23 @@
-//! What all plots share: thinned lines, axes, size.
+//! Common parts of the plots: thinned lines, axes, size.
 
 use kuva::prelude::*;
 
-/// Stretches that a line is drawn by, each with its lowest and highest point; more cannot be seen.
+/// Number of stretches of a line, each drawn by its lowest and highest point; more cannot be resolved.
 const STRETCHES: usize = 500;
 
-/// What a plot says around its lines.
+/// Title and axis labels of a plot.
 pub(super) struct Axes<'a> {
     pub(super) title: &'a str,
     pub(super) x: &'a str,
     pub(super) y: &'a str,
 }
 
-/// The lowest and the highest point of each stretch, and the last of all: peaks stay.
+/// Keeps the lowest and highest point of each stretch and the last point, so that peaks remain.
 pub(super) fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     thinned_to(STRETCHES, points)
 }
 
-/// The same with another number of stretches.
+/// Thins a line like [`thinned`], to another number of stretches.
 pub(super) fn thinned_to(stretches: usize, points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let last = points.last().copied();
     let stretches = points.chunks(points.len().div_ceil(stretches).max(1));
@@ -36,7 +36,7 @@ pub(super) fn line(data: Vec<(f64, f64)>, colour: &str, name: &str) -> LinePlot 
     LinePlot::new().with_data(data).with_color(colour).with_stroke_width(1.5).with_legend(name)
 }
 
-/// A layout of the usual size.
+/// A layout of the default size.
 pub(super) fn layout(plots: &[Plot], Axes { title, x, y }: Axes) -> Layout {
     Layout::auto_from_plots(plots)
         .with_title(title)
@@ -46,7 +46,7 @@ pub(super) fn layout(plots: &[Plot], Axes { title, x, y }: Axes) -> Layout {
         .with_height(480.0)
 }
 
-/// Plots in one pair of axes of the usual size.
+/// Plots in common axes of the default size, as SVG.
 pub(super) fn svg(plots: Vec<Plot>, axes: Axes) -> String {
     let layout = layout(&plots, axes);
     render_to_svg(plots, layout)

@@ -33,7 +33,7 @@ pub fn svg(figure: &Figure) -> String {
     render_to_svg(plots, layout)
 }
 
-/// Rounds to seven digits, more than can be seen and the same on every machine.
+/// Rounds to seven digits, which is finer than the drawing and the same on every machine.
 fn rounded((x, y): (f64, f64)) -> (f64, f64) {
     let short = |value: f64| format!("{value:.6e}").parse().unwrap_or(value);
     (short(x), short(y))

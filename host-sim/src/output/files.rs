@@ -1,4 +1,4 @@
-//! Files of a run: all of them, or none.
+//! Files of one run: all of them are written, or none.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -10,28 +10,28 @@ use tempfile::NamedTempFile;
 use simulation::bad_input;
 use simulation::experiment::{Experiment, Run, Sample};
 
-/// Files that are written beside their place and moved there only when all are complete.
+/// Files that are written under temporary names and moved to their places when all are complete.
 pub struct Files {
     folder: PathBuf,
     written: Vec<(NamedTempFile, PathBuf)>,
 }
 
 impl Files {
-    /// Files for `folder`, which is made if it does not exist.
+    /// Prepares files for `folder`, which is created if it does not exist.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] if it cannot be made.
+    /// [`simulation::bad_input::BadInput`] if the folder cannot be created.
     pub fn new(folder: &Path) -> Result<Self> {
         if let Err(error) = std::fs::create_dir_all(folder) {
-            bad_input!("{}: cannot be made: {error}; expected a folder to write to", folder.display());
+            bad_input!("{}: cannot be created: {error}; expected a writable folder", folder.display());
         }
         Ok(Self { folder: folder.to_owned(), written: Vec::new() })
     }
 
-    /// Writes one file, for now under another name.
+    /// Writes one file under a temporary name.
     ///
     /// # Errors
-    /// If the disk is full or not writable.
+    /// If the file cannot be written.
     pub fn add(&mut self, name: &str, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
         let path = self.folder.join(name);
         let complete = || -> std::io::Result<NamedTempFile> {
@@ -44,12 +44,13 @@ impl Files {
         Ok(())
     }
 
-    /// Moves every file to its place and tells their paths.
+    /// Moves all files to their places; returns their paths.
     ///
     /// # Errors
-    /// If one of them cannot be; then none is moved. [`simulation::bad_input::BadInput`] if something else than a file is in its place.
+    /// If a file cannot be moved; [`simulation::bad_input::BadInput`] if its place is taken by something that is not a
+    /// file.
     pub fn finish(self) -> Result<Vec<PathBuf>> {
-        // What could go wrong in a folder that was just written to is known before the first file is moved.
+        // Foreseeable errors are checked before the first file is moved.
         for (_, path) in &self.written {
             if path.exists() && !path.is_file() {
                 bad_input!("{} cannot be written: it is not a file; expected another folder", path.display());
@@ -65,7 +66,7 @@ impl Files {
     }
 }
 
-/// Temporary files are private; results are not.
+/// Temporary files are readable by their owner only; results should be readable by all.
 #[cfg(unix)]
 fn readable_by_all(file: &std::fs::File) -> std::io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
@@ -77,10 +78,10 @@ fn readable_by_all(_: &std::fs::File) -> std::io::Result<()> {
     Ok(())
 }
 
-/// The run as CSV, one row every `stride` ticks.
+/// Writes the run as CSV, one row every `stride` ticks.
 ///
 /// # Errors
-/// As the sink's.
+/// If `out` cannot be written.
 pub fn write_csv<P>(
     out: &mut dyn Write,
     experiment: &Experiment<P>,
@@ -101,7 +102,7 @@ pub fn write_csv<P>(
         writeln!(
             out,
             "{},{:.6},{:.6},{},{:.6},{:.1}",
-            // Ticks fall on decimal times at most rates; nine decimals hide what floats make of them.
+            // Nine decimals hide floating-point errors of decimal times.
             (time * 1e9).round() / 1e9,
             reader.at(time),
             sample.applied.to_f64(),

@@ -1,11 +1,28 @@
-//! What a person gets to see: text on the terminal, files in a folder.
+//! Everything `vsj` writes: text on the terminal, files in a folder. Results come in, nothing is computed here.
+//!
+//! | module | what it writes |
+//! | --- | --- |
+//! | [`terminal`], [`screen`] | stdout and stderr; a status that is refreshed in place |
+//! | [`files`] | the files of one run: all of them or none |
+//! | [`beam`], [`compare`], [`diagnosis`], [`dynamics`], [`joint`], [`log`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
+//! | [`recording`] | telemetry as CSV while it arrives |
+//! | [`figure`], [`plots`] | plots as SVG |
 
-pub mod comparison;
+pub mod beam;
+mod cells;
+pub mod compare;
 pub mod diagnosis;
 mod draw;
+pub mod dynamics;
 pub mod figure;
 pub mod files;
+pub mod joint;
+pub mod log;
 pub mod plots;
+pub mod recording;
+pub mod reproduce;
+pub mod screen;
+pub mod stair;
 mod step_response;
 pub mod terminal;
-pub mod tuning;
+pub mod tune;

@@ -2,7 +2,7 @@
 
 use kuva::prelude::*;
 
-use paper::stair::Report;
+use paper::stair;
 use simulation::experiment::{Experiment, Run, Sample};
 
 use crate::output::draw::{self, Axes, line, thinned};
@@ -13,7 +13,7 @@ const WITHOUT: &str = "#d55e00";
 const MEASURED: &str = "#000000";
 
 /// Target, stiffness with and without controller, and the measured points.
-pub fn stiffness<P>(experiment: &Experiment<P>, run: &Run, report: &Report) -> String {
+pub fn stiffness<P>(experiment: &Experiment<P>, run: &Run, report: &stair::Report) -> String {
     let measured: Vec<(f64, f64)> = report.rows.iter().filter_map(|row| Some((row.time_s, row.measured?))).collect();
     let mut plots: Vec<Plot> = vec![
         line(target(experiment, run), TARGET, "target").with_dashed().into(),

@@ -1,12 +1,12 @@
-//! The answer to one step as columns of a table: times, overshoot, peak, and the bound on t97.
+//! The response to one step as columns of a table: times, overshoot, peak, and lower bound on t97.
 
-use crate::output::terminal::optional;
+use crate::output::cells::optional;
 use simulation::experiment::StartsFrom;
 use simulation::response::Response;
 
-/// Names of the columns.
+/// Headings of the columns.
 pub(super) const NAMES: &str = "    t50     t90     t97 | overshoot     peak | shortest possible t97";
-/// Their units.
+/// Units of the columns.
 pub(super) const UNITS: &str = "    [s]     [s]     [s] |       [%]      [V] |                   [s]";
 
 /// The columns of a step.
@@ -22,14 +22,14 @@ pub(super) fn columns(step: &Response) -> String {
     )
 }
 
-/// What the bound says.
+/// Explains the column of the lower bound.
 pub(super) fn shortest_possible(from: StartsFrom) -> &'static str {
     match from {
         StartsFrom::Settled => {
             "Shortest possible: any controller within range and slew, from a spring settled at the old value."
         }
         StartsFrom::Reached => {
-            "Shortest possible: any controller within range and slew, from where this loop has brought the spring."
+            "Shortest possible: any controller within range and slew, from the state in which this loop has left the spring."
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The command as its users call it.
+//! The command line of `vsj link`.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -49,13 +49,13 @@ fn a_session(mcu: &Mcu) {
 }
 
 #[test]
-fn a_target_lives_as_long_as_somebody_keeps_talking() {
+fn the_voltage_ramps_down_once_the_host_is_silent() {
     let mcu = Mcu::on_socket(Setup { silence_ms: 1000, ..Setup::default() });
     let begin = Instant::now();
     good(&mcu.port, &["set", "200", "--arm", "--keep", "2.5"]);
     assert!(begin.elapsed() > Duration::from_secs_f64(2.5));
     assert!(mcu.wait_for(State::Armed).estimate.to_f64() > 150.0);
-    // Now nobody does.
+    // Nobody does any more.
     assert!(mcu.wait_for(State::Ramping).target.to_f64() <= 200.0);
     assert_eq!(mcu.wait_for(State::Disarmed).code, 0);
 }
@@ -84,7 +84,7 @@ fn an_open_interlock_and_its_fault() {
 }
 
 #[test]
-fn a_restart_of_the_mcu_is_noticed() {
+fn a_restart_of_the_mcu_is_reported() {
     let mcu = Mcu::on_socket(Setup::default());
     let kept = start(&mcu.port, &["set", "100", "--arm", "--keep", "inf"]);
     mcu.wait_for(State::Armed);
@@ -109,7 +109,7 @@ fn watch_without_a_terminal_is_a_table() {
 }
 
 #[test]
-fn watch_on_a_terminal_writes_over_itself() {
+fn watch_on_a_terminal_refreshes_in_place() {
     let mcu = Mcu::on_socket(Setup::default());
     let (mut screen, slave) = TTYPort::pair().unwrap();
     screen.set_timeout(Duration::from_secs(10)).unwrap();
@@ -145,10 +145,10 @@ fn a_recording_follows_a_schedule_and_is_a_record() {
     let record = Record::open(Path::new(out), MEASURED).unwrap();
     assert_eq!(summary["rows"].as_u64().unwrap() as usize, record.rows.len());
     assert_eq!(summary["stiffness"], "measured");
-    // A busy machine may keep the MCU's thread from some; they are counted then.
+    // On a busy machine the MCU's thread may miss samples, which are then counted as lost.
     let samples = record.rows.len() as u64 + summary["lost"].as_u64().unwrap();
     assert!(samples > 90 && record.rows.len() > 60, "{summary}");
-    // The controller drives past the target while the spring is on its way to it.
+    // The controller overshoots the target voltage deliberately while the spring relaxes.
     let at = |time: f64| *record.rows.iter().find(|row| row.time_s >= time).unwrap();
     let (early, late) = (at(0.4), at(1.0));
     assert!((51.0..200.0).contains(&early.voltage_v) && late.voltage_v > early.voltage_v + 80.0, "{early:?} {late:?}");
@@ -196,11 +196,11 @@ fn a_lost_connection_keeps_the_rows() {
     let out = folder.path().join("out.csv");
     let text = bad(1, &mcu.port, &["record", out.to_str().unwrap()]);
     let rows = Record::open(&out, MEASURED).unwrap().rows.len();
-    assert!(rows > 10 && text.contains(&format!("keeps {rows} rows")), "{rows}: {text}");
+    assert!(rows > 10 && text.contains(&format!("contains {rows} rows")), "{rows}: {text}");
 }
 
 #[test]
-fn what_never_answers_is_said_in_time() {
+fn a_missing_answer_is_reported_within_the_timeout() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("deaf");
     let listener = UnixListener::bind(&path).unwrap();
@@ -212,7 +212,7 @@ fn what_never_answers_is_said_in_time() {
     assert!(bad(2, &port, &["status"]).contains("cannot be opened"));
 }
 
-/// Answers the first request with `bytes`.
+/// Answers the first request with the bytes that `answer` makes of it.
 fn fake(path: &Path, answer: impl FnOnce(&[u8]) -> Vec<u8> + Send + 'static) -> String {
     let listener = UnixListener::bind(path).unwrap();
     std::thread::spawn(move || {
@@ -233,13 +233,13 @@ fn another_version_and_a_wrong_baud_rate_are_named() {
         let sequence = request.iter().find_map(|&byte| receiver.on_byte(byte).map(|packet| packet.sequence));
         Frame::with_version(7, sequence.unwrap(), &Reply::Status(Status::default())).as_bytes().to_vec()
     });
-    let told = format!("the MCU speaks version 7 of the protocol, this program {}", link::VERSION);
-    assert!(bad(1, &port, &["status"]).contains(&told));
+    let expected = format!("the MCU speaks version 7 of the protocol, this program {}", link::VERSION);
+    assert!(bad(1, &port, &["status"]).contains(&expected));
     let port = fake(&folder.path().join("baud"), |_| vec![0xf3; 90]);
-    assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no sound answer to 2 requests, but 90 bytes"));
-    // A line that echoes.
+    assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no valid answer to 2 requests, but 90 bytes"));
+    // A line that echoes its input.
     let port = fake(&folder.path().join("echo"), <[u8]>::to_vec);
-    assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no sound answer"));
+    assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no valid answer"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Damage on a real byte stream.
+//! Damaged frames on a real byte stream.
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
@@ -29,8 +29,8 @@ fn order(number: u16) -> Command {
     Command { heard: true, arming: None, target: Some(Volts::new(volts(number)).unwrap()) }
 }
 
-/// One byte in 60 is wrong in both directions: most answers and many requests are lost, and asked for again.
-fn every_order_is_applied_once_and_in_order(mcu: &Mcu) {
+/// One byte in 60 is damaged in both directions: most answers and many requests are lost and repeated.
+fn every_command_is_applied_once_and_in_order(mcu: &Mcu) {
     let mut client = greet(mcu);
     client.order(Request::Arm).unwrap();
     for number in 0..150 {
@@ -46,16 +46,19 @@ fn every_order_is_applied_once_and_in_order(mcu: &Mcu) {
 }
 
 #[test]
-fn on_a_bad_socket_every_order_is_applied_once() {
-    every_order_is_applied_once_and_in_order(&Mcu::on_socket(Setup { damage_one_in: Some(60), ..Setup::default() }));
+fn on_a_damaged_socket_every_command_is_applied_once() {
+    every_command_is_applied_once_and_in_order(&Mcu::on_socket(Setup { damage_one_in: Some(60), ..Setup::default() }));
 }
 
 #[test]
-fn on_a_bad_terminal_every_order_is_applied_once() {
-    every_order_is_applied_once_and_in_order(&Mcu::on_terminal(Setup { damage_one_in: Some(60), ..Setup::default() }));
+fn on_a_damaged_terminal_every_command_is_applied_once() {
+    every_command_is_applied_once_and_in_order(&Mcu::on_terminal(Setup {
+        damage_one_in: Some(60),
+        ..Setup::default()
+    }));
 }
 
-/// 10 000 frames to an armed MCU, each flipped, cut short, spliced or with garbage inside, as fast as the socket takes them.
+/// Sends 10 000 frames to an armed MCU, each flipped, truncated, spliced or padded with garbage.
 #[test]
 fn ten_thousand_damaged_frames_over_a_socket_apply_nothing_that_was_not_sent() {
     let mcu = Mcu::on_socket(Setup::default());
@@ -84,7 +87,7 @@ fn ten_thousand_damaged_frames_over_a_socket_apply_nothing_that_was_not_sent() {
         }
         stream.write_all(&bytes).unwrap();
     }
-    // The first whole frame is understood.
+    // The first valid frame is accepted.
     stream.write_all(Frame::new(Sequence(20_000), &Request::Disarm).as_bytes()).unwrap();
     let disarm = Command { heard: true, arming: Some(supervisor::Command::Disarm), target: None };
     while mcu.with(|shared| shared.ordered.last() != Some(&disarm)) {

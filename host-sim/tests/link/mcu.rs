@@ -19,44 +19,44 @@ use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Settings, Spring, supervisor};
 use serialport::{SerialPort, TTYPort};
 
-/// What goes wrong, and what it is.
+/// Properties of the MCU and its line.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Setup {
-    /// One in so many bytes arrives with a flipped bit, in both directions.
+    /// Bits are flipped in one of this number of bytes, in both directions.
     pub(crate) damage_one_in: Option<u32>,
-    /// There is a stiffness sensor.
+    /// True if there is a stiffness sensor.
     pub(crate) sensor: bool,
-    /// It hangs up after so many ticks.
+    /// The connection closes after this number of ticks.
     pub(crate) hang_up_after: Option<u64>,
-    /// How long the host may be silent, in ms.
+    /// Longest allowed silence of the host, in ms.
     pub(crate) silence_ms: u32,
 }
 
 impl Default for Setup {
     fn default() -> Self {
-        // Longer than a busy machine takes to start one command after the other.
+        // Longer than a busy machine needs to start one command after another.
         Self { damage_one_in: None, sensor: false, hang_up_after: None, silence_ms: 5000 }
     }
 }
 
-/// What the test can see and do while the MCU runs.
+/// State of the MCU that the test can read and change while it runs.
 #[derive(Default)]
 pub(crate) struct Shared {
     /// What reached the control tick.
     pub(crate) ordered: Vec<Command>,
     /// The latest sample.
     pub(crate) sample: Telemetry,
-    /// What came over the link.
+    /// Counters of received frames.
     pub(crate) counters: Counters,
-    /// The interlock is open.
+    /// True if the interlock is open.
     pub(crate) interlock_open: bool,
-    /// Restart at the next tick.
+    /// True if the MCU is to restart at the next tick.
     pub(crate) restart: bool,
-    /// What outlives a restart.
+    /// Memory that survives a restart.
     pub(crate) flash: Flash,
 }
 
-/// Two pages.
+/// Two pages of flash memory.
 #[derive(Clone, Debug)]
 pub(crate) struct Flash([[u8; PAGE]; 2]);
 
@@ -82,22 +82,22 @@ impl Pages for Flash {
     }
 }
 
-/// A running MCU; it ends with the test.
+/// A running MCU, stopped when dropped.
 pub(crate) struct Mcu {
-    /// For `vsj link`.
+    /// Name of the port for `vsj link`.
     pub(crate) port: String,
     pub(crate) shared: Arc<Mutex<Shared>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     _folder: Option<tempfile::TempDir>,
-    /// A pseudo-terminal that nobody holds open hangs up.
+    /// Keeps the pseudo-terminal open; it hangs up when nobody holds it.
     _terminal: Option<File>,
 }
 
 const POLL: Duration = Duration::from_micros(500);
 
 impl Mcu {
-    /// On a unix socket; one host at a time.
+    /// Runs on a unix socket, for one host at a time.
     pub(crate) fn on_socket(setup: Setup) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path: PathBuf = folder.path().join("mcu");
@@ -133,12 +133,12 @@ impl Mcu {
         mcu
     }
 
-    /// On a pseudo-terminal.
+    /// Runs on a pseudo-terminal.
     pub(crate) fn on_terminal(setup: Setup) -> Self {
         let (mut master, slave) = TTYPort::pair().unwrap();
         master.set_timeout(POLL).unwrap();
         let mut mcu = Self::new(slave.name().unwrap());
-        // Instead of `slave`, which is locked against others.
+        // In place of `slave`, which is locked against other programs.
         mcu._terminal = Some(File::options().read(true).write(true).open(&mcu.port).unwrap());
         drop(slave);
         mcu.run(setup, move |bytes, out| {
@@ -163,12 +163,12 @@ impl Mcu {
         Self { port, shared, stop, thread: None, _folder: None, _terminal: None }
     }
 
-    /// Looks at the MCU, or does something to it.
+    /// Reads or changes the state of the MCU.
     pub(crate) fn with<T>(&self, look: impl FnOnce(&mut Shared) -> T) -> T {
         look(&mut self.shared.lock().unwrap())
     }
 
-    /// Waits until the MCU is in `state`.
+    /// Waits until the MCU is in `state`, at most 10 s.
     pub(crate) fn wait_for(&self, state: State) -> Telemetry {
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(10) {
@@ -219,7 +219,7 @@ impl Drop for Mcu {
     }
 }
 
-/// The MCU's program.
+/// The program of the MCU.
 struct Chip {
     setup: Setup,
     shared: Arc<Mutex<Shared>>,
@@ -303,13 +303,13 @@ impl Chip {
     }
 }
 
-/// As the firmware's.
+/// The check of a model, as in the firmware.
 fn check(payload: &[u8]) -> Result<(), Reason> {
     let found = WireModel::read(payload).ok_or(Reason::ModelDamaged)?;
     Control::check(&Settings::PAPER, &found).map_err(|error| Reason::of_model(&error))
 }
 
-/// A bad line, always bad in the same way.
+/// Damage on the line, the same in every run.
 struct Noise {
     one_in: Option<u32>,
     state: u64,

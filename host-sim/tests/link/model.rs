@@ -24,7 +24,7 @@ fn a_model_is_sent_checked_stored_and_run() {
     let models = json(&mcu.port, &["model"]);
     assert_eq!((&models["active"], &models["active"]["number"]), (&models["stored"], &Value::from(1)));
 
-    // Fine at the fastest rate, but too prompt for the gains that are built in: the MCU's own check says so.
+    // Valid at 10 kHz, but its instantaneous part is too large for the built-in gains, which the MCU detects.
     let steep = file(
         "steep.toml",
         "schema = 1\n[law]\nvoltage_v = [0, 100]\nstiffness = [0, 900]\n[relaxation]\nshare = 0.1\ntau_s = 0.004\n",

@@ -29,7 +29,7 @@ pub(crate) fn json(port: &str, arguments: &[&str]) -> Value {
     serde_json::from_str(&good(port, &[arguments, &["--json"]].concat())).unwrap()
 }
 
-/// Asserts an exit code and one line on stderr, nothing on stdout; that line.
+/// Asserts an exit code, one line on stderr and nothing on stdout; returns that line.
 pub(crate) fn bad(code: i32, port: &str, arguments: &[&str]) -> String {
     let output = run(port, arguments);
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {output:?}");

@@ -1,7 +1,7 @@
-//! Droop: the linear result is no longer valid, and the exact one takes its place.
+//! Droop: the deflection at which the linear theory is no longer valid and the exact one replaces it.
 //!
-//! The linear displacement is compared with the exact one all along the beam. Where the largest difference exceeds a
-//! tolerated part of the largest exact displacement, the beam droops.
+//! Linear and exact displacement are compared all along the beam. The beam droops where their largest difference
+//! exceeds a tolerated part of the largest exact displacement.
 
 use anyhow::Result;
 use serde::Serialize;
@@ -10,58 +10,58 @@ use crate::beam::cantilever::{Beam, Load};
 use crate::beam::elastica::{self, Point};
 use simulation::bad_input::check;
 
-/// A loaded beam, solved by the simplest theory that is valid.
+/// A loaded cantilever, solved by the linear and the exact theory.
 #[derive(Clone, Debug)]
 pub struct Deflection {
     beam: Beam,
     load: Load,
     exact: Vec<Point>,
-    /// Largest difference between linear and exact displacement, by the largest exact one.
+    /// Largest difference between linear and exact displacement, as a part of the largest exact displacement.
     pub linear_error: f64,
-    /// True if that is more than was tolerated.
+    /// True if `linear_error` exceeds the tolerance: the exact displacement is the valid one.
     pub droops: bool,
 }
 
-/// One place along the beam.
+/// The displacement at one place along the beam.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Place {
-    /// Along the beam from the clamp, in mm.
+    /// Length along the beam from the clamp, in mm.
     pub at_mm: f64,
-    /// By the linear theory, upwards, in mm.
+    /// Displacement by the linear theory, in mm, positive upwards.
     pub linear_mm: f64,
-    /// By the exact theory, upwards, in mm.
+    /// Displacement by the exact theory, in mm, positive upwards.
     pub exact_mm: f64,
-    /// Distance from the clamp in the direction of the straight beam, in mm: shorter than `at_mm` when bent.
+    /// Distance from the clamp in the direction of the unbent beam, in mm; less than `at_mm` where the beam is bent.
     pub exact_x_mm: f64,
-    /// The valid one of the two.
+    /// The valid displacement, `exact_mm` if the beam droops and `linear_mm` otherwise, in mm.
     pub valid_mm: f64,
 }
 
 impl Deflection {
-    /// Solves by both theories.
+    /// Solves the beam by both theories; `tolerance` is a part of the largest displacement, 0.0001 to 1.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] for what is no beam, load or tolerance (0.0001 to 1); another if the exact theory finds no
-    /// equilibrium.
+    /// [`simulation::bad_input::BadInput`] for a beam, load or tolerance out of range; another error if the exact
+    /// theory finds no equilibrium.
     pub fn new(beam: &Beam, load: &Load, tolerance: f64) -> Result<Self> {
         checked(beam, load, tolerance)?;
         Self::of(beam, load, tolerance)
     }
 
-    /// The same of a load that may be beyond what is allowed.
+    /// Solves like [`Deflection::new`], without checking the ranges: the search of [`limit`] passes them.
     fn of(beam: &Beam, load: &Load, tolerance: f64) -> Result<Self> {
         let exact = elastica::shape(beam, load)?;
         let linear_error = linear_error(beam, load, &exact);
         Ok(Self { beam: *beam, load: *load, exact, linear_error, droops: linear_error > tolerance })
     }
 
-    /// Displacement at a distance along the beam, in m.
+    /// Displacement at `arc_m` (m) along the beam from the clamp.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] for a place that is not on the beam.
+    /// [`simulation::bad_input::BadInput`] for a place beyond the ends of the beam.
     pub fn at(&self, arc_m: f64) -> Result<Place> {
         let length = self.beam.length_m;
-        // In mm as it is asked for; a last bit beyond the end is still the end.
+        // Checked in mm, as users enter it; a rounding error beyond the tip still counts as the tip.
         let last_bit = if arc_m <= length * (1.0 + 1e-12) { arc_m.min(length) } else { arc_m };
         check("at_mm", 1e3 * last_bit, 0.0..=1e3 * length, "mm along the beam")?;
         let cells = (self.exact.len() - 1) as f64;
@@ -79,7 +79,7 @@ impl Deflection {
         })
     }
 
-    /// The shape by the exact theory.
+    /// The bent shape by the exact theory, clamp first.
     pub fn exact(&self) -> &[Point] {
         &self.exact
     }
@@ -101,11 +101,11 @@ fn linear_error(beam: &Beam, load: &Load, exact: &[Point]) -> f64 {
     largest(&|point| point.y_m - beam.linear_m(load, point.arc_m)) / displacement
 }
 
-/// How many times the load (force and weight together) the linear result is off by just the tolerated part; `None` if
-/// nothing acts.
+/// The factor on the load (force and weight together) at which the error of the linear theory equals `tolerance`;
+/// `None` if the load is zero.
 ///
 /// # Errors
-/// As [`Deflection::new`].
+/// Returns the errors of [`Deflection::new`].
 pub fn limit(beam: &Beam, load: &Load, tolerance: f64) -> Result<Option<f64>> {
     checked(beam, load, tolerance)?;
     let droops = |factor: f64| Ok::<_, anyhow::Error>(Deflection::of(beam, &load.scaled(factor), tolerance)?.droops);
@@ -115,7 +115,7 @@ pub fn limit(beam: &Beam, load: &Load, tolerance: f64) -> Result<Option<f64>> {
     if size == 0.0 {
         return Ok(None);
     }
-    // From a load that bends by a hundredth upwards.
+    // Start from a load that bends the beam by about a hundredth of its length.
     let mut high = 0.03 / size;
     while !droops(high)? {
         high *= 1.5;
@@ -138,9 +138,9 @@ mod tests {
 
     const PUSHED: Load = Load { tip_n: 1e-6, gravity_m_per_s2: 0.0 };
 
-    /// For a tip force the exact tip is at y/L = 0.30172 at P L^2 / E I = 1, where the linear one is at 1/3: 10.5 % off.
+    /// Under a tip force with P L^2 / E I = 1 the exact tip is at y/L = 0.30172, the linear one at 1/3: 10.5 % off.
     #[test]
-    fn the_limit_of_a_tip_load_is_where_the_elastica_says() {
+    fn the_limit_of_a_tip_load_agrees_with_the_elastica() {
         let unit = FOIL.bending_stiffness_n_m2() / FOIL.length_m.powi(2);
         let factor = limit(&FOIL, &PUSHED, (1.0 / 3.0 - 0.301_720_774) / 0.301_720_774).unwrap().unwrap();
         assert!((factor * PUSHED.tip_n / unit - 1.0).abs() < 1e-3, "{}", factor * PUSHED.tip_n / unit);
@@ -159,16 +159,16 @@ mod tests {
         assert_eq!(limit(&FOIL, &PUSHED.scaled(0.0), 0.05).unwrap(), None);
     }
 
-    /// Bending goes by P L^2 / E I, however large the force that it takes.
+    /// Bending depends on P L^2 / E I only, whatever force that takes.
     #[test]
-    fn a_beam_that_bends_under_no_allowed_load_has_its_limit() {
+    fn a_beam_too_stiff_for_any_allowed_load_still_has_a_limit() {
         let thick = Beam { thickness_m: 1e5 * FOIL.thickness_m, ..FOIL };
         let [usual, limit] = [FOIL, thick].map(|beam| limit(&beam, &PUSHED, 0.05).unwrap().unwrap());
         assert!((limit / usual / 1e15 - 1.0).abs() < 1e-6, "{}", limit / usual);
     }
 
     #[test]
-    fn a_place_off_the_beam_is_refused() {
+    fn a_place_beyond_the_tip_is_rejected() {
         let bent = Deflection::new(&FOIL, &PUSHED, 0.05).unwrap();
         for at in [-1e-3, 0.06, f64::NAN] {
             assert!(bent.at(at).unwrap_err().is::<simulation::bad_input::BadInput>());

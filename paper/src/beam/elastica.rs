@@ -1,44 +1,45 @@
-//! The same beam however far it bends: the geometrically exact, inextensible beam (elastica).
+//! The cantilever at any deflection: the geometrically exact, inextensible beam (elastica).
 //!
-//! With the angle `theta(s)` along the arc, the beam takes the shape of least energy
+//! With the angle `theta(s)` along the arc, the beam takes the shape of least energy `U`:
 //!
 //! ```text
 //! U = integral of  E I theta'^2 / 2 - V(s) sin theta  ds,   V(s) = P - w (L - s),   theta(0) = 0
 //! ```
 //!
-//! whose Euler equation is `E I theta'' + V cos theta = 0` with a moment-free tip. The angle is linear in each of
-//! [`ELEMENTS`] elements (two Gauss points); Newton's method follows the shape as the load grows from nothing, so the
-//! branch found is the one that a slowly loaded beam takes. Euler 1744; Bisshopp and Drucker 1945 for the tip load.
+//! Its Euler equation is `E I theta'' + V cos theta = 0` with a moment-free tip. The angle is linear in each of
+//! [`ELEMENTS`] elements (two Gauss points each). Newton's method follows the shape while the load grows from zero,
+//! which selects the branch that a slowly loaded beam takes. Sources: Euler 1744; Bisshopp and Drucker 1945 for the tip
+//! load.
 
 use anyhow::{Result, bail};
 
 use crate::beam::cantilever::{Beam, Load};
 
-/// Elements along the beam.
+/// Number of elements along the beam.
 pub const ELEMENTS: usize = 1000;
 
-/// A point of a bent beam.
+/// A point of the bent beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Length along the beam from the clamp, in m.
     pub arc_m: f64,
     /// Distance from the clamp in the direction of the straight beam, in m.
     pub x_m: f64,
-    /// Upwards, in m.
+    /// Displacement, in m, positive upwards.
     pub y_m: f64,
-    /// Angle with the straight beam, in rad.
+    /// Angle to the unbent beam, in rad, positive upwards.
     pub angle_rad: f64,
 }
 
-/// Offset of the two Gauss points of an element from its middle, in elements: half of 1/sqrt 3.
+/// Distance of the two Gauss points from the middle of an element, in element lengths: 1 / (2 sqrt 3).
 const GAUSS: f64 = 0.288_675_134_594_812_9;
-/// Newton steps before a load is tried in smaller portions.
+/// Newton steps before the load increment is reduced.
 const MOST_STEPS: usize = 30;
 
-/// The bent beam, clamp first, [`ELEMENTS`] + 1 points.
+/// The bent shape under a load, [`ELEMENTS`] + 1 points, clamp first.
 ///
 /// # Errors
-/// If no shape is found.
+/// If Newton's method does not converge to a shape.
 pub fn shape(beam: &Beam, load: &Load) -> Result<Vec<Point>> {
     let (length, stiffness) = (beam.length_m, beam.bending_stiffness_n_m2());
     let tip = load.tip_n * length.powi(2) / stiffness;
@@ -58,14 +59,14 @@ pub fn shape(beam: &Beam, load: &Load) -> Result<Vec<Point>> {
     Ok(points)
 }
 
-/// Angles at the nodes under the dimensionless loads `P L^2 / E I` and `w L^3 / E I`.
+/// Angles in rad at the nodes under the dimensionless loads `P L^2 / E I` and `w L^3 / E I`.
 fn angles(tip: f64, weight: f64) -> Result<Vec<f64>> {
     let mut angles = vec![0.0; ELEMENTS + 1];
     let size = tip.abs().max(weight.abs());
     if size == 0.0 {
         return Ok(angles);
     }
-    // Small loads bend little: from there the load doubles, or grows by less where that is too much at once.
+    // A small load bends the beam little; from there the load doubles, or grows by less where Newton's method fails.
     let (mut reached, mut next) = (0.0, (0.5 / size).min(1.0));
     while reached < 1.0 {
         match settle(&angles, next * tip, next * weight) {
@@ -82,13 +83,13 @@ fn angles(tip: f64, weight: f64) -> Result<Vec<f64>> {
     Ok(angles)
 }
 
-/// Newton's method from a nearby shape.
+/// Newton's method from a nearby shape; `None` if it does not converge.
 fn settle(from: &[f64], tip: f64, weight: f64) -> Option<Vec<f64>> {
     let n = from.len();
     let step = 1.0 / (n - 1) as f64;
     let mut angles = from.to_vec();
     for _ in 0..MOST_STEPS {
-        // Gradient and Hessian of the energy; the clamped angle stays.
+        // Gradient and Hessian of the energy; the clamped angle is fixed.
         let (mut gradient, mut diagonal, mut off) = (vec![0.0; n], vec![0.0; n], vec![0.0; n - 1]);
         for element in 0..n - 1 {
             let bend = (angles[element + 1] - angles[element]) / step;
@@ -110,7 +111,7 @@ fn settle(from: &[f64], tip: f64, weight: f64) -> Option<Vec<f64>> {
         }
         let change = solve_tridiagonal(&diagonal[1..], &off[1..], &gradient[1..])?;
         let largest = change.iter().fold(0.0f64, |most, change| most.max(change.abs()));
-        // A leap over a quarter turn leaves the branch.
+        // A step of more than about a quarter turn would leave the branch.
         if !largest.is_finite() || largest > 1.5 {
             return None;
         }
@@ -122,12 +123,12 @@ fn settle(from: &[f64], tip: f64, weight: f64) -> Option<Vec<f64>> {
     None
 }
 
-/// Place within the element (0 to 1) and angle at both Gauss points.
+/// Position within the element (0 to 1) and angle in rad at both Gauss points.
 fn gauss_points(from: f64, to: f64) -> [(f64, f64); 2] {
     [0.5 - GAUSS, 0.5 + GAUSS].map(|part| (part, from + part * (to - from)))
 }
 
-/// Solves a symmetric tridiagonal system by elimination; `None` if a pivot is lost.
+/// Solves a symmetric tridiagonal system by elimination; `None` if a pivot is zero.
 fn solve_tridiagonal(diagonal: &[f64], off: &[f64], right: &[f64]) -> Option<Vec<f64>> {
     let (mut pivots, mut solution) = (diagonal.to_vec(), right.to_vec());
     for i in 1..pivots.len() {
@@ -149,7 +150,7 @@ mod tests {
     use super::*;
     use crate::beam::cantilever::tests::FOIL;
 
-    /// The tip of a soft beam of length 1 under dimensionless loads.
+    /// The tip of a beam of length 1 under dimensionless loads.
     fn tip(tip: f64, weight: f64) -> Point {
         let soft = Beam { youngs_modulus_pa: 1e6, ..FOIL };
         let (stiffness, length) = (soft.bending_stiffness_n_m2(), soft.length_m);
@@ -163,7 +164,7 @@ mod tests {
 
     /// Deflection and shortening by elliptic integrals (table of Mattiasson 1981).
     #[test]
-    fn tip_load_against_elliptic_integrals() {
+    fn a_tip_load_agrees_with_elliptic_integrals() {
         for (load, down, shorter) in [
             (1.0, 0.301_720_774_0, 0.056_433_236_2),
             (2.0, 0.493_457_480_4, 0.160_641_719_8),
@@ -183,9 +184,9 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
-        /// Small loads: the linear result, all along the beam.
+        /// Under small loads the shape agrees with the linear theory all along the beam.
         #[test]
-        fn small_loads_are_linear(force in -1.0..1.0f64, gravity in -1.0..1.0f64) {
+        fn small_loads_agree_with_the_linear_theory(force in -1.0..1.0f64, gravity in -1.0..1.0f64) {
             let load = Load { tip_n: 1e-6 * force, gravity_m_per_s2: 0.01 * gravity };
             let scale = FOIL.linear_m(&Load { tip_n: 2e-6, gravity_m_per_s2: -0.02 }, FOIL.length_m);
             for point in shape(&FOIL, &load).unwrap() {
@@ -193,7 +194,7 @@ mod tests {
             }
         }
 
-        /// Up and down are mirror images, and the length stays.
+        /// Opposite loads give mirror images, and the length is constant.
         #[test]
         fn mirrored_and_inextensible(force in 0.0..3.0f64, weight in 0.0..3.0f64) {
             let (up, down) = (tip(force, weight), tip(-force, -weight));
@@ -201,7 +202,7 @@ mod tests {
             prop_assert!(up.x_m.hypot(up.y_m) <= 1.0 + 1e-9);
         }
 
-        /// Moment balance of the whole beam: the clamp carries tip force and weight with the levers of the bent shape.
+        /// Moment balance of the whole beam: the clamp carries force and weight with the lever arms of the bent shape.
         #[test]
         fn clamp_moment_balances_the_loads(force in 0.1..20.0f64, gravity in 0.0..9.8f64) {
             let load = Load { tip_n: 1e-5 * force, gravity_m_per_s2: gravity };

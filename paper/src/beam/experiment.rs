@@ -1,13 +1,14 @@
-//! The beam experiment (section 2.5, Table 1): supporting force against displacement of the free end, at several voltages.
+//! The beam experiment (section 2.5, Table 1): force on the free end by its displacement, at several voltages.
 //!
-//! Each voltage is a line through the origin, all with one scatter; readings out of line are set aside one by one. Then
+//! For each voltage a line through the origin is fitted, all with one common scatter, and outliers are removed one by
+//! one. Then
 //!
 //! ```text
 //! F = (a + c V) x,   E(V) = (a + c V) L^3 / (3 I)
 //! ```
 //!
-//! is fitted to all remaining readings at once: the report fits three Young's moduli, which leaves its interval one
-//! degree of freedom.
+//! is fitted to all remaining readings together. The report instead fits a line through three Young's moduli, which
+//! leaves its interval a single degree of freedom.
 
 use anyhow::Result;
 use serde::Serialize;
@@ -18,57 +19,58 @@ use crate::beam::regression::{self, Fit, Interval, chance_beyond};
 use simulation::bad_input;
 use simulation::bad_input::BadInput;
 
-/// The report's spring taken as one piece (section 2.5). Its Young's modulus is what the experiment finds.
+/// The report's spring as one uniform beam (section 2.5); its Young's modulus is a result of the experiment.
 pub const SPRING: Beam =
     Beam { length_m: 59.8e-3, width_m: 19.8e-3, thickness_m: 190e-6, youngs_modulus_pa: 1.0, density_kg_per_m3: 0.0 };
 
-/// What an experiment says. Intervals hold with 95 %.
+/// The results of a beam experiment; all intervals are 95 % intervals.
 #[derive(Clone, Debug, Serialize)]
 pub struct Experiment {
-    /// One a voltage, ascending.
+    /// One line per voltage, in ascending order.
     pub lines: Vec<Line>,
-    /// Readings set aside, worst first.
+    /// Outliers that were removed, the most significant first.
     pub out_of_line: Vec<OutOfLine>,
-    /// Young's modulus of the whole beam without voltage, in Pa.
+    /// Young's modulus of the whole beam at 0 V, in Pa.
     pub at_zero_pa: Interval,
-    /// Its growth, in Pa/V.
+    /// Increase of Young's modulus with the voltage, in Pa/V.
     pub per_volt_pa: Interval,
-    /// Chance of a curvature of E(V) as large as the readings show, if E(V) is straight.
+    /// p-value of the quadratic term of E(V): the probability of so large a curvature if E(V) is linear; `None` without
+    /// a test.
     pub straight_chance: Option<f64>,
-    /// Stiffness at the highest voltage by stiffness without.
+    /// Ratio of the stiffness at the highest voltage to that at 0 V.
     pub reach_ratio: Interval,
-    /// Spring constant at the lowest and highest voltage, in N/m.
+    /// Spring constants at the lowest and the highest voltage, in N/m.
     pub reach_n_per_m: [Interval; 2],
 }
 
-/// One voltage.
+/// The line of one voltage.
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
-    /// In V.
+    /// Voltage across the spring, in V.
     pub voltage_v: f64,
-    /// Spring constant through the origin from all readings, in uN/mm (mN/m).
+    /// Spring constant from all readings, in uN/mm (1 uN/mm = 1 mN/m).
     pub all_un_per_mm: Interval,
-    /// Without the readings that are out of line.
+    /// Spring constant without the outliers, in uN/mm.
     pub un_per_mm: Interval,
-    /// Young's modulus of the whole beam from that, in Pa.
+    /// Young's modulus of the whole beam from `un_per_mm`, in Pa.
     pub youngs_modulus_pa: Interval,
 }
 
-/// A reading that the others contradict.
+/// A reading that is an outlier of its experiment.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct OutOfLine {
-    /// The reading.
+    /// The reading itself.
     pub reading: Reading,
-    /// What the others say, in uN.
+    /// Prediction of the other readings, in uN, with its 95 % prediction interval.
     pub expected_un: Interval,
-    /// Chance of that, if all readings are alike.
+    /// Probability of so large a deviation if the reading has the scatter of the others.
     pub chance: f64,
 }
 
-/// Lines through the origin, one a voltage, with one scatter for all.
+/// Fits lines through the origin, one per voltage, with one scatter for all.
 ///
 /// # Errors
-/// If there are too few readings.
+/// If there are no more readings than voltages.
 pub fn lines(readings: &[Reading], voltages: &[f64]) -> Result<Fit> {
     let row = |reading: &Reading| {
         voltages.iter().map(|&v| if v == reading.voltage_v { reading.displacement_mm } else { 0.0 }).collect()
@@ -77,10 +79,10 @@ pub fn lines(readings: &[Reading], voltages: &[f64]) -> Result<Fit> {
     Fit::new(&readings.iter().map(row).collect::<Vec<_>>(), &forces)
 }
 
-/// The readings that are in line, the lines through them, and what was set aside, one by one.
+/// Removes outliers one by one; returns the remaining readings, the lines through them, and the outliers.
 ///
 /// # Errors
-/// [`BadInput`] if there are too few.
+/// [`BadInput`] if there are too few readings.
 pub fn in_line(readings: &[Reading], voltages: &[f64]) -> Result<(Vec<Reading>, Fit, Vec<OutOfLine>)> {
     let (mut kept, mut set_aside) = (readings.to_vec(), Vec::new());
     loop {
@@ -91,7 +93,7 @@ pub fn in_line(readings: &[Reading], voltages: &[f64]) -> Result<(Vec<Reading>, 
     }
 }
 
-/// The voltages of a table, ascending.
+/// The voltages of a table in V, ascending, each once.
 pub fn voltages(readings: &[Reading]) -> Vec<f64> {
     let mut voltages: Vec<f64> = readings.iter().map(|reading| reading.voltage_v).collect();
     voltages.sort_by(f64::total_cmp);
@@ -100,20 +102,20 @@ pub fn voltages(readings: &[Reading]) -> Vec<f64> {
 }
 
 impl Experiment {
-    /// The report's: Table 1, on its spring.
+    /// The results of the report's Table 1 on its spring.
     ///
     /// # Errors
-    /// If the file that was built in is damaged.
+    /// If the built-in data file is damaged.
     pub fn paper() -> Result<Self> {
         Self::new(&table1()?, &SPRING)
     }
 
-    /// Young's modulus of the whole beam at a voltage, in Pa.
+    /// Young's modulus of the whole beam, in Pa, at a voltage in V, by the fitted line.
     pub fn youngs_modulus_pa(&self, voltage_v: f64) -> f64 {
         self.at_zero_pa.value + self.per_volt_pa.value * voltage_v
     }
 
-    /// Evaluates readings made on `beam`, whose own Young's modulus is not looked at.
+    /// Evaluates readings of a beam with the dimensions of `beam`, whose Young's modulus is ignored.
     ///
     /// # Errors
     /// [`BadInput`] for fewer than two voltages or too few readings.
@@ -141,7 +143,7 @@ impl Experiment {
         let law = law(&kept, 1)?;
         let ratio_at = |value: f64| (law.coefficients[0] + law.coefficients[1] * highest) / value;
         let at_lowest = law.combined(&[1.0, lowest])?;
-        // To first order: the interval of the difference of numerator and ratio times denominator.
+        // To first order: the interval of the difference between the numerator and the ratio times the denominator.
         let ratio = ratio_at(at_lowest.value);
         let difference = law.combined(&[1.0 - ratio, highest - ratio * lowest])?;
         let half = (difference.high - difference.value) / at_lowest.value;
@@ -158,7 +160,7 @@ impl Experiment {
     }
 }
 
-/// Force as displacement times a polynomial of the voltage.
+/// Fits the force as the displacement times a polynomial of the voltage.
 fn law(readings: &[Reading], degree: i32) -> Result<Fit> {
     let rows: Vec<Vec<f64>> = readings
         .iter()
@@ -168,15 +170,15 @@ fn law(readings: &[Reading], degree: i32) -> Result<Fit> {
     determined(Fit::new(&rows, &forces))
 }
 
-/// Readings that determine no fit are the caller's to mend.
+/// Turns the error of a fit that the readings do not determine into one of bad input.
 fn determined(fit: Result<Fit>) -> Result<Fit> {
     let expected = "expected displacements other than 0 at each voltage, three readings or more";
     fit.map_err(|error| BadInput(format!("the beam experiment: {error}; {expected}")).into())
 }
 
-/// Two-sided chance of the quadratic term.
+/// Two-sided p-value of the quadratic term of the voltage.
 fn curvature_chance(readings: &[Reading]) -> Result<f64> {
-    // In kV, so that the normal equations stay well conditioned.
+    // Voltages in kV keep the normal equations well conditioned.
     let scaled: Vec<Reading> = readings.iter().map(|r| Reading { voltage_v: 1e-3 * r.voltage_v, ..*r }).collect();
     let fit = law(&scaled, 2)?;
     chance_beyond(fit.standard_errors_from(2, 0.0), fit.degrees_of_freedom)
@@ -187,9 +189,9 @@ mod tests {
     use super::*;
     use crate::beam::readings::parse;
 
-    /// By hand: sum F x / sum x^2 with sum x^2 = 45.65.
+    /// Computed by hand: sum F x / sum x^2 with sum x^2 = 45.65.
     #[test]
-    fn slopes_of_table_1() {
+    fn slopes_of_table_1_agree_with_hand_computation() {
         let found = Experiment::paper().unwrap();
         for (line, expected) in found.lines.iter().zip([9350.1 / 45.65, 12579.9 / 45.65, 14725.3 / 45.65]) {
             assert!((line.all_un_per_mm.value - expected).abs() < 1e-9, "{line:?} {expected}");
@@ -202,14 +204,14 @@ mod tests {
     }
 
     #[test]
-    fn readings_made_from_a_law_give_it_back() {
+    fn readings_simulated_from_a_law_recover_it() {
         let readings: Vec<Reading> = [0.0, 300.0, 600.0]
             .into_iter()
             .flat_map(|voltage_v| {
                 [1.0, 2.0, 3.0, 4.0].map(|displacement_mm| Reading {
                     voltage_v,
                     displacement_mm,
-                    // With a little that cancels.
+                    // A small scatter that cancels out.
                     force_un: (200.0 + 0.2 * voltage_v) * displacement_mm
                         + if displacement_mm == 2.0 {
                             1e-3
@@ -229,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_is_bad_input() {
+    fn too_few_readings_are_bad_input() {
         let parse = |text: &str| Experiment::new(&parse("t", text).unwrap(), &SPRING);
         for text in [
             "displacement_mm,force_un_0v\n1,1\n2,2\n3,3\n",
@@ -240,9 +242,9 @@ mod tests {
         }
     }
 
-    /// Readings without any scatter, and a reading that stands alone, accuse nobody.
+    /// Readings without scatter, and the only reading of a voltage, are no outliers.
     #[test]
-    fn readings_without_scatter_are_in_line() {
+    fn readings_without_scatter_are_no_outliers() {
         for text in [
             "displacement_mm,force_un_0v,force_un_9v\n1,100,150\n2,200,300\n3,300,450\n",
             "displacement_mm,force_un_0v,force_un_9v,force_un_12v\n1,100,150,160\n2,200,300,320\n3,300,450,480\n",

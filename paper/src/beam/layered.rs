@@ -1,15 +1,15 @@
 //! The stack as a layered beam with slip between its layers, by finite elements.
 //!
-//! Every layer is a beam of its own; all share the deflection `w`, each has its axial displacement `u`. Two layers whose
-//! middles are `d` apart slip by `s` and resist it with the shear stress `K s` (Newmark 1951 for two layers):
+//! Every layer is a beam; all share the deflection `w`, and each has its own axial displacement `u`. Two layers whose
+//! midplanes are `d` apart slip by `s` and resist it with the shear stress `K s` (Newmark 1951 for two layers):
 //!
 //! ```text
 //! U = 1/2 integral of  sum EA u'^2 + sum EI w''^2 + sum K b s^2  dx,   s = u(above) - u(below) + d w'
 //! ```
 //!
-//! `K` = 0 lets the layers slide freely, a large `K` bonds them. `w` is cubic and `u` quadratic in each element, so `s`
-//! can vanish exactly and a large `K` does not lock. Elements end where a layer ends; a layer resists slip against the
-//! next one that is there. Three Gauss points integrate all of it exactly.
+//! `K` = 0 lets the layers slide freely; a large `K` bonds them. In each element `w` is cubic and `u` quadratic, so `s`
+//! can vanish exactly and a large `K` does not lock the element. Elements end where a layer ends; a layer resists slip
+//! against the next layer present. Three Gauss points integrate the energy exactly.
 
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};
@@ -19,36 +19,36 @@ use crate::beam::limits::section_ends;
 use crate::beam::stack::Stack;
 use simulation::bad_input::check;
 
-/// Elements that give the tip displacement of the report's spring to better than 0.01 %.
+/// Number of elements that gives the tip displacement of the report's spring to better than 0.01 %.
 pub const ELEMENTS: usize = 24;
 
 /// A stack bent by a force at its tip.
 #[derive(Clone, Debug)]
 pub struct Bent {
-    /// Nodes: distance from the clamp and deflection, in m.
+    /// Distance from the clamp and deflection of each node, in m.
     pub nodes: Vec<(f64, f64)>,
-    /// Slip between the lowest layer and the next, in m, at each node.
+    /// Slip between the lowest layer and the next at each node, in m.
     pub slip_m: Vec<f64>,
     /// Elastic energy, in J.
     pub energy_j: f64,
 }
 
 impl Bent {
-    /// Deflection of the tip, in m.
+    /// Deflection of the tip, in m, positive in the direction of the force.
     pub fn tip_m(&self) -> f64 {
         self.nodes.last().map_or(0.0, |node| node.1)
     }
 }
 
-/// An interlayer as good as bonded.
+/// Interlayer stiffness that is equivalent to perfect bonding, in Pa/m.
 pub const BONDED_PA_PER_M: f64 = 1e14;
-/// Stiffest interlayer that is solved for.
+/// Largest interlayer stiffness accepted, in Pa/m.
 const STIFFEST_PA_PER_M: f64 = 1e18;
 
-/// Bends a stack by `tip_n` at its tip; `interlayer_pa_per_m` is `K`.
+/// Bends a stack by the force `tip_n` (N) at its tip, with the interlayer stiffness `interlayer_pa_per_m` (`K`).
 ///
 /// # Errors
-/// [`simulation::bad_input::BadInput`] that names what is out of range.
+/// [`simulation::bad_input::BadInput`] names the argument that is out of range.
 pub fn bend(stack: &Stack, interlayer_pa_per_m: f64, tip_n: f64, elements: usize) -> Result<Bent> {
     check("interlayer_pa_per_m", interlayer_pa_per_m, 0.0..=STIFFEST_PA_PER_M, "Pa/m")?;
     check("tip_n", tip_n, -1e6..=1e6, "N")?;
@@ -57,7 +57,7 @@ pub fn bend(stack: &Stack, interlayer_pa_per_m: f64, tip_n: f64, elements: usize
     let stiffness = mesh.stiffness(stack, interlayer_pa_per_m);
     let mut force = DVector::zeros(mesh.unknowns);
     force[mesh.deflection(mesh.x_m.len() - 1).context("the tip moves")?] = tip_n;
-    // Unknowns of very different size: solve for them in units in which each has stiffness 1.
+    // The unknowns differ in size by many decades: scale them so that each diagonal stiffness is 1.
     let unit = stiffness.diagonal().map(|stiffness| 1.0 / stiffness.sqrt());
     let scaled = DMatrix::from_fn(mesh.unknowns, mesh.unknowns, |i, j| stiffness[(i, j)] * unit[i] * unit[j]);
     let solved = scaled.cholesky().context("the stack does not hold")?.solve(&force.component_mul(&unit));
@@ -79,19 +79,20 @@ pub fn bend(stack: &Stack, interlayer_pa_per_m: f64, tip_n: f64, elements: usize
     Ok(Bent { nodes, slip_m, energy_j: 0.5 * moved.dot(&(&stiffness * &moved)) })
 }
 
-/// Tip force by tip deflection, in N/m.
+/// Spring constant at the tip, in N/m.
 ///
 /// # Errors
-/// As [`bend`].
+/// Returns the errors of [`bend`].
 pub fn spring_constant_n_per_m(stack: &Stack, interlayer_pa_per_m: f64, elements: usize) -> Result<f64> {
     Ok(1.0 / bend(stack, interlayer_pa_per_m, 1.0, elements)?.tip_m())
 }
 
-/// Nodes and the numbers of the unknowns.
+/// The nodes and the numbering of the unknowns.
 struct Mesh {
-    /// Places of the nodes.
+    /// Distances of the nodes from the clamp, in m.
     x_m: Vec<f64>,
-    /// For node 0, middle of the first element, node 1, ...: the axial unknown of each layer, if it is there and free.
+    /// Axial unknown of each layer at node 0, the middle of element 0, node 1, and so on; `None` if the layer is absent
+    /// or clamped there.
     axial: Vec<Vec<Option<usize>>>,
     unknowns: usize,
 }
@@ -104,13 +105,14 @@ impl Mesh {
             let parts = (share * elements as f64).round().max(1.0);
             x_m.extend((1..=parts as usize).map(|part| ends[0] + (ends[1] - ends[0]) * part as f64 / parts));
         }
-        // Two for the deflection of each node but the clamped one, then the axial ones.
+        // Two unknowns for the deflection of each node but the clamped one, then the axial ones.
         let mut unknowns = 2 * (x_m.len() - 1);
         let axial = (0..2 * x_m.len() - 1)
             .map(|place| {
                 let x = 0.5 * (x_m[place / 2] + x_m[place.div_ceil(2)]);
                 let number = |layer: &crate::beam::stack::Layer| {
-                    // The clamp holds all layers; a sum of parts may miss an end by a last bit.
+                    // All layers are clamped at the first node; sums of lengths may exceed a layer's length by a
+                    // rounding error.
                     (place > 0 && x <= layer.length_m * (1.0 + 1e-12)).then(|| {
                         unknowns += 1;
                         unknowns - 1
@@ -122,7 +124,7 @@ impl Mesh {
         Self { x_m, axial, unknowns }
     }
 
-    /// Number of a node's deflection; its slope is the next.
+    /// Index of a node's deflection, `None` for the clamped node; its slope has the next index.
     fn deflection(&self, node: usize) -> Option<usize> {
         node.checked_sub(1).map(|free| 2 * free)
     }
@@ -169,7 +171,7 @@ impl Mesh {
     }
 }
 
-/// Adds the stiffness of `(sum of factor times unknown)^2 / 2`.
+/// Adds the stiffness of the energy `stiffness (sum of factor times unknown)^2 / 2`.
 fn add(matrix: &mut DMatrix<f64>, stiffness: f64, terms: &[(usize, f64)]) {
     for &(row, one) in terms {
         for &(column, other) in terms {
@@ -203,13 +205,13 @@ mod tests {
         let a = (k * width * (1.0 / axial + apart * apart / bending)).sqrt();
         let c = k * width * apart / (bending * a * a);
         let (al, b) = (a * length, c / a);
-        // Force 1: N = c (L - x) - b tanh(aL) cosh(ax) + b sinh(ax).
+        // For a unit force: N = c (L - x) - b tanh(aL) cosh(ax) + b sinh(ax).
         let moment_of_n = c * length.powi(3) / 3.0 + b * (al.tanh() - al) / (a * a);
         1.0 / (length.powi(3) / (3.0 * bending) - apart / bending * moment_of_n)
     }
 
     #[test]
-    fn two_layers_against_the_closed_form() {
+    fn two_layers_agree_with_the_closed_form() {
         let (one, other) = (layer(3e9, 0.06, 0.02, 80e-6), layer(50e9, 0.06, 0.01, 30e-6));
         let stack = Stack::new(vec![one.clone(), other.clone()]).unwrap();
         for k in [1e6, 1e8, 1e9, 1e10, 1e11] {
@@ -220,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_report_s_stack_between_its_limits() {
+    fn the_stack_of_the_report_lies_between_bonded_and_sliding() {
         let stack = Stack::paper().unwrap();
         let (bonded, sliding) = (bonded_n_per_m(&stack), sliding_n_per_m(&stack));
         assert!(close(spring_constant_n_per_m(&stack, 0.0, ELEMENTS).unwrap(), sliding, 1e-9));
@@ -230,7 +232,7 @@ mod tests {
         assert!(close(bonded, 0.15 / 0.137_15, 1e-3), "{bonded}");
     }
 
-    /// Halving the elements leaves at most a tenth of the error, where layers end together; elsewhere it falls too.
+    /// Halving the elements reduces the error at least tenfold where layers end together; elsewhere it decreases too.
     #[test]
     fn the_mesh_converges() {
         let even = Stack::new(vec![layer(3e9, 0.06, 0.02, 80e-6), layer(50e9, 0.06, 0.01, 30e-6)]).unwrap();
@@ -244,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_bent_is_named() {
+    fn arguments_out_of_range_are_rejected_with_their_field() {
         let stack = Stack::paper().unwrap();
         for (k, force, elements, field) in
             [(-1.0, 1.0, 9, "interlayer_pa_per_m"), (1.0, f64::NAN, 9, "tip_n"), (1.0, 1.0, 0, "elements")]
@@ -255,9 +257,9 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
-        /// One layer is a beam; work is energy; twice the force is twice the way.
+        /// A single layer is a beam; work equals energy; twice the force gives twice the deflection.
         #[test]
-        fn simple_truths(modulus in 1e8..1e11f64, thickness in 1e-5..1e-3f64, force in 1e-6..1e-3f64, log_k in 5.0..13.0f64) {
+        fn a_single_layer_is_a_beam_and_work_equals_energy(modulus in 1e8..1e11f64, thickness in 1e-5..1e-3f64, force in 1e-6..1e-3f64, log_k in 5.0..13.0f64) {
             let single = layer(modulus, 0.06, 0.02, thickness);
             let stack = Stack::new(vec![single.clone()]).unwrap();
             let constant = spring_constant_n_per_m(&stack, 0.0, 4).unwrap();

@@ -1,8 +1,9 @@
-//! The stack between its limits, in closed form: bonded, so that sections stay plane, and sliding freely.
+//! Closed forms for the two limits of the stack: layers bonded so that sections stay plane, and layers that slide
+//! freely.
 
 use crate::beam::stack::Stack;
 
-/// Tip force by tip deflection, in N/m, where nothing slips: plane sections, `1 / integral of (L - x)^2 / EI(x)`.
+/// Spring constant at the tip, in N/m, of bonded layers with plane sections: `1 / integral of (L - x)^2 / EI(x)`.
 pub fn bonded_n_per_m(stack: &Stack) -> f64 {
     by_section(stack, |axial, bending, heights| {
         let total: f64 = axial.iter().sum();
@@ -12,12 +13,13 @@ pub fn bonded_n_per_m(stack: &Stack) -> f64 {
     })
 }
 
-/// The same in closed form where everything slides: the layers bend side by side.
+/// Spring constant at the tip, in N/m, of layers that slide freely, so that their bending stiffnesses add.
 pub fn sliding_n_per_m(stack: &Stack) -> f64 {
     by_section(stack, |_, bending, _| bending.iter().sum())
 }
 
-/// Spring constant by the bending stiffness of each section, from axial and bending stiffness and height of its layers.
+/// Spring constant in N/m from the bending stiffness of each section, a function of the axial stiffness, bending
+/// stiffness and height of its layers.
 fn by_section(stack: &Stack, bending_stiffness: impl Fn(&[f64], &[f64], &[f64]) -> f64) -> f64 {
     let length = stack.length_m();
     let heights = stack.heights_m();
@@ -36,7 +38,7 @@ fn by_section(stack: &Stack, bending_stiffness: impl Fn(&[f64], &[f64], &[f64]) 
     1.0 / compliance
 }
 
-/// The clamp and where layers end, ascending.
+/// The clamp and the ends of the layers, in m from the clamp, ascending.
 pub(super) fn section_ends(stack: &Stack) -> Vec<f64> {
     let mut ends: Vec<f64> = stack.layers().iter().map(|layer| layer.length_m).chain([0.0]).collect();
     ends.sort_by(f64::total_cmp);

@@ -1,18 +1,18 @@
-//! The leaf spring as a beam, clamped at one end: what was measured, what theory says, and the stack of its layers.
+//! The leaf spring as a cantilever: the measurements, beam theory, and the stack of layers it is made of.
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`readings`] | Table 1, or one like it |
-//! | [`regression`] | straight lines through readings, with intervals and a test for readings out of line |
-//! | [`experiment`] | Table 1: spring constants, Young's modulus against voltage, the range within reach |
-//! | [`cantilever`] | deflection under tip load and own weight, linear |
-//! | [`elastica`] | the same, geometrically exact |
-//! | [`droop`] | where the linear result stops being valid, and the exact one takes over |
+//! | [`readings`] | readings of Table 1, or of a file like it |
+//! | [`regression`] | linear regression with 95 % intervals and an outlier test |
+//! | [`experiment`] | Table 1 evaluated: spring constants, Young's modulus over the voltage, stiffness range |
+//! | [`cantilever`] | deflection under tip force and own weight, linear theory |
+//! | [`elastica`] | the same deflection, geometrically exact |
+//! | [`droop`] | the load at which the linear theory stops being valid |
 //! | [`stack`] | the layers of the spring |
-//! | [`limits`] | the stack bonded and sliding, in closed form |
-//! | [`layered`], `element` | the stack by finite elements, with slip between its layers |
-//! | [`slip`] | how much slip the measured stiffness says there is |
-//! | [`report`], `text` | what `vsj beam` says and draws |
+//! | [`limits`] | the stack with bonded and with sliding layers, in closed form |
+//! | [`layered`], `element` | the stack with slip between its layers, by finite elements |
+//! | [`slip`] | the interlayer stiffness identified from the measured spring constants |
+//! | [`report`] | the answer of `vsj beam` |
 
 pub mod cantilever;
 pub mod droop;
@@ -26,4 +26,3 @@ pub mod regression;
 pub mod report;
 pub mod slip;
 pub mod stack;
-mod text;

@@ -1,4 +1,4 @@
-//! Readings of the beam experiment (section 2.5, Table 1): supporting force against displacement of the free end.
+//! Readings of the beam experiment (section 2.5, Table 1): force on the free end by its displacement.
 
 use anyhow::Result;
 use serde::Serialize;
@@ -9,18 +9,18 @@ use simulation::csv_table::Table;
 /// One reading of the balance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Reading {
-    /// Across the spring, in V.
+    /// Voltage across the spring, in V.
     pub voltage_v: f64,
-    /// Of the free end, in mm.
+    /// Displacement of the free end, in mm.
     pub displacement_mm: f64,
-    /// In uN.
+    /// Force, in uN.
     pub force_un: f64,
 }
 
-/// What a header has.
+/// Columns that messages expect in a header.
 const COLUMNS: &str = "displacement_mm, force_un_0v, force_un_400v, ...";
 
-/// Reads a table with the columns `displacement_mm` and one `force_un_<V>v` a voltage.
+/// Parses a table with the columns `displacement_mm` and `force_un_<V>v`, one for each voltage.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] with file, line, column and what was expected.
@@ -37,7 +37,7 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
         return Err(table.lacks("force_un_<V>v", COLUMNS).into());
     }
     let mut readings = Vec::new();
-    while let Some(row) = table.next()? {
+    while let Some(row) = table.next_row()? {
         let displacement_mm = row.number(displacement)?;
         for &(column, voltage_v) in &voltages {
             readings.push(Reading { voltage_v, displacement_mm, force_un: row.number(column)? });
@@ -49,10 +49,10 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
     Ok(readings)
 }
 
-/// The readings of Table 1.
+/// The readings of the report's Table 1.
 ///
 /// # Errors
-/// If the file that was built in is damaged.
+/// If the built-in data file is damaged.
 pub fn table1() -> Result<Vec<Reading>> {
     parse("data/table1_bending.csv", include_str!("../../../data/table1_bending.csv"))
 }
@@ -62,12 +62,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bad_table_is_one_line_with_its_place() {
+    fn an_invalid_table_is_rejected_in_one_line_with_its_place() {
         for (text, expected) in [
             ("force_un_0v\n1\n", "t, line 1: no column `displacement_mm`"),
             ("# a\ndisplacement_mm\n1\n", "t, line 2: no column `force_un_<V>v`"),
             ("displacement_mm,force_un_infv\n1,2\n", "t, line 1: no column `force_un_<V>v`"),
-            ("displacement_mm,force_un_0v,force_un_0v\n1,2,3\n", "t, line 1: column `force_un_0v` stands there twice"),
+            ("displacement_mm,force_un_0v,force_un_0v\n1,2,3\n", "t, line 1: column `force_un_0v` appears twice"),
             ("displacement_mm,force_un_0v\n", "t: 0 rows of data"),
             ("# a\n", "t: no header; expected one with displacement_mm"),
             (

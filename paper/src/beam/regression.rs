@@ -1,11 +1,11 @@
-//! Least squares with intervals (Student's t), and a test for readings that are out of line with the others.
+//! Linear least squares with intervals by Student's t, and an outlier test.
 
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// A value and the 95 % interval around it.
+/// An estimate with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
     /// Best estimate.
@@ -16,37 +16,37 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// A linear model fitted to readings: the value is the sum of a row's terms, each with its coefficient.
+/// A linear model fitted to readings: each value is the sum of a row's terms times the coefficients.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// One a column.
+    /// Estimated coefficients, one per column.
     pub coefficients: Vec<f64>,
     covariance: DMatrix<f64>,
-    /// Readings less coefficients.
+    /// Number of readings minus number of coefficients.
     pub degrees_of_freedom: usize,
-    /// One a reading.
+    /// Diagnostics of each reading, in the order of the rows.
     pub readings: Vec<Reading>,
 }
 
-/// A reading seen from the others.
+/// A reading compared with the prediction of all other readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// What the others say it should be, with the interval in which one more reading falls with 95 %.
+    /// Prediction of the other readings, with the interval that contains a further reading with 95 % probability.
     pub expected: Interval,
-    /// Chance that a reading falls so far off if all of them are alike.
+    /// Two-sided p-value of the reading's deviation from that prediction.
     pub chance: f64,
 }
 
-/// How often a table may be accused wrongly.
+/// Probability that the outlier test names any reading of a table without outliers.
 pub const FALSE_ALARM: f64 = 0.05;
 
 impl Interval {
-    /// True if it holds `value`.
+    /// True if the interval contains `value`.
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
-    /// In another unit.
+    /// The interval in another unit: all values multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Self {
         Self { value: factor * self.value, low: factor * self.low, high: factor * self.high }
     }
@@ -58,10 +58,10 @@ impl Interval {
 }
 
 impl Fit {
-    /// Fits `values` by the columns of `rows`.
+    /// Fits `values` by the columns of `rows`, one row per value.
     ///
     /// # Errors
-    /// If there are no more readings than coefficients, or the columns depend on each other.
+    /// If there are no more readings than coefficients, or the columns are linearly dependent.
     pub fn new(rows: &[Vec<f64>], values: &[f64]) -> Result<Self> {
         let columns = rows.first().map_or(0, Vec::len);
         let design = DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column]);
@@ -71,7 +71,7 @@ impl Fit {
         let inverse = (design.transpose() * &design).cholesky().context("readings do not determine the fit")?.inverse();
         let coefficients = &inverse * design.transpose() * &values;
         let residuals = &values - &design * &coefficients;
-        // What scatters by less is not told from the computer's own rounding.
+        // A smaller scatter cannot be distinguished from rounding errors.
         let rounding = (1e-12 * values.amax()).powi(2);
         let squares = residuals.norm_squared().max(rounding);
         let leverage: Vec<f64> = design.row_iter().map(|row| (row * &inverse * row.transpose())[0]).collect();
@@ -79,9 +79,9 @@ impl Fit {
         let mut readings = Vec::new();
         if degrees_of_freedom > 1 {
             for ((&value, &residual), &leverage) in values.iter().zip(&residuals).zip(&leverage) {
-                // A reading that alone determines a coefficient is contradicted by none.
+                // A reading that alone determines a coefficient cannot deviate from the others.
                 let alone = 1.0 - leverage < 1e-9;
-                // What the fit without this reading would be, without making it.
+                // The deviation from the fit without this reading, without computing that fit.
                 let missed = if alone { 0.0 } else { residual / (1.0 - leverage) };
                 let variance = (squares - residual * missed).max(rounding) / (degrees_of_freedom - 1) as f64;
                 let deviation = if alone { f64::INFINITY } else { (variance / (1.0 - leverage)).sqrt() };
@@ -94,10 +94,10 @@ impl Fit {
         Ok(Self { coefficients: coefficients.iter().copied().collect(), covariance, degrees_of_freedom, readings })
     }
 
-    /// A sum of coefficients, weighted, with its interval.
+    /// A weighted sum of the coefficients with its 95 % interval.
     ///
     /// # Errors
-    /// If Student's distribution does not exist, which it does.
+    /// If there is no degree of freedom.
     pub fn combined(&self, weights: &[f64]) -> Result<Interval> {
         let value = self.coefficients.iter().zip(weights).map(|(coefficient, weight)| coefficient * weight).sum();
         let weights = DVector::from_column_slice(weights);
@@ -105,21 +105,22 @@ impl Fit {
         Interval::around(value, variance.sqrt(), self.degrees_of_freedom)
     }
 
-    /// One coefficient with its interval.
+    /// One coefficient with its 95 % interval.
     ///
     /// # Errors
-    /// As [`Fit::combined`].
+    /// Returns the errors of [`Fit::combined`].
     pub fn coefficient(&self, index: usize) -> Result<Interval> {
         let weights: Vec<f64> = (0..self.coefficients.len()).map(|i| f64::from(i == index)).collect();
         self.combined(&weights)
     }
 
-    /// How many standard errors a value is away from a coefficient.
+    /// Distance of `value` from a coefficient, in standard errors.
     pub fn standard_errors_from(&self, index: usize, value: f64) -> f64 {
         (value - self.coefficients[index]) / self.covariance[(index, index)].sqrt()
     }
 
-    /// The reading that is most out of line, if one is even when every reading is given a chance to be (Bonferroni).
+    /// Index of the most significant outlier, if it remains significant after Bonferroni's correction for the number of
+    /// readings.
     pub fn out_of_line(&self) -> Option<usize> {
         let (index, worst) =
             self.readings.iter().enumerate().min_by(|(_, one), (_, other)| one.chance.total_cmp(&other.chance))?;
@@ -127,10 +128,10 @@ impl Fit {
     }
 }
 
-/// Two-sided chance of lying so many standard errors off; 1 where nothing scatters and nothing is off.
+/// Two-sided p-value of a deviation given in standard errors; 1 if neither scatter nor deviation exists.
 ///
 /// # Errors
-/// If Student's distribution does not exist: without a degree of freedom.
+/// If there is no degree of freedom.
 pub fn chance_beyond(standard_errors: f64, degrees_of_freedom: usize) -> Result<f64> {
     match standard_errors.abs() {
         off if off.is_nan() => Ok(1.0),
@@ -143,7 +144,7 @@ fn student(degrees_of_freedom: usize) -> Result<StudentsT> {
     Ok(StudentsT::new(0.0, 1.0, degrees_of_freedom as f64)?)
 }
 
-/// Term by term: (intercept, x).
+/// Rows of a straight line: the terms (1, x) of each point.
 pub fn straight_line(x: &[f64]) -> Vec<Vec<f64>> {
     x.iter().map(|&x| vec![1.0, x]).collect()
 }
@@ -154,9 +155,9 @@ mod tests {
 
     use super::*;
 
-    /// Anscombe's first set: 3.0001 + 0.5001 x, standard errors 1.1247 and 0.1179, 9 degrees of freedom.
+    /// Anscombe's first data set: 3.0001 + 0.5001 x, standard errors 1.1247 and 0.1179, 9 degrees of freedom.
     #[test]
-    fn anscombe() {
+    fn coefficients_and_errors_agree_with_anscombes_first_set() {
         let x = [10.0, 8.0, 13.0, 9.0, 11.0, 14.0, 6.0, 4.0, 12.0, 7.0, 5.0];
         let y = [8.04, 6.95, 7.58, 8.81, 8.33, 9.96, 7.24, 4.26, 10.84, 4.82, 5.68];
         let fit = Fit::new(&straight_line(&x), &y).unwrap();
@@ -168,15 +169,15 @@ mod tests {
     }
 
     #[test]
-    fn too_little_is_said() {
+    fn too_few_readings_are_an_error() {
         assert!(Fit::new(&straight_line(&[1.0, 2.0]), &[1.0, 2.0]).is_err());
         assert!(Fit::new(&straight_line(&[1.0, 1.0, 1.0]), &[1.0, 2.0, 3.0]).is_err());
     }
 
     proptest! {
-        /// What a reading is expected to be is what a fit without it predicts.
+        /// The expected value of a reading is the prediction of the fit without that reading.
         #[test]
-        fn expected_is_the_fit_without(values in prop::collection::vec(-1.0..1.0f64, 6), left_out in 0usize..6) {
+        fn expected_value_is_the_prediction_without_the_reading(values in prop::collection::vec(-1.0..1.0f64, 6), left_out in 0usize..6) {
             let x = [1.0, 2.0, 3.0, 4.5, 5.0, 7.0];
             let whole = Fit::new(&straight_line(&x), &values).unwrap();
             let others: Vec<usize> = (0..6).filter(|&i| i != left_out).collect();
@@ -187,7 +188,7 @@ mod tests {
         }
 
         #[test]
-        fn a_spoilt_reading_is_found(noise in prop::collection::vec(-1.0..1.0f64, 12), spoilt in 0usize..12) {
+        fn an_outlier_is_found(noise in prop::collection::vec(-1.0..1.0f64, 12), spoilt in 0usize..12) {
             let x: Vec<f64> = (0..12).map(f64::from).collect();
             let mut y: Vec<f64> = x.iter().zip(&noise).map(|(x, noise)| 3.0 * x + noise).collect();
             y[spoilt] += 30.0;

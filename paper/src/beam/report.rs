@@ -1,4 +1,4 @@
-//! What `vsj beam` finds out, as JSON and figures; `text` puts it in words.
+//! The answer of `vsj beam`: data for JSON, text and figures.
 
 use anyhow::Result;
 use serde::Serialize;
@@ -14,88 +14,88 @@ use crate::beam::stack::{ACTIVE, Stack, active_modulus_pa};
 use crate::figure::Figure;
 use simulation::bad_input::check;
 
-/// What is asked.
-pub struct Question {
+/// Inputs of `vsj beam`.
+pub struct Setup {
     /// Readings of the beam experiment.
     pub readings: Vec<Reading>,
-    /// Displacements that were measured apart from them.
+    /// Tip displacements measured separately from `readings`, for checking the model.
     pub tips: Vec<Tip>,
-    /// The stack they were made on, without voltage.
+    /// The stack of layers at 0 V.
     pub stack: Stack,
-    /// A beam of one material.
+    /// The beam of one material.
     pub beam: Beam,
-    /// Its load; the tip force also bends the stack.
+    /// Load of the beam; its tip force also bends the stack.
     pub load: Load,
-    /// Error of the linear theory that is tolerated, by the largest displacement.
+    /// Tolerated error of the linear theory, as a part of the largest displacement, 0.0001 to 1.
     pub tolerance: f64,
-    /// Places to print, in m from the clamp.
+    /// Places along the beam at which displacements are printed, in m from the clamp.
     pub at_m: Vec<f64>,
-    /// Voltage across the stack, in V.
+    /// Voltage across the stack, in V, 0 to 1000.
     pub voltage_v: f64,
-    /// Interlayer stiffness, in Pa/m; `None` for the identified one.
+    /// Interlayer stiffness, in Pa/m; `None` takes the identified one.
     pub interlayer_pa_per_m: Option<f64>,
-    /// Finite elements along the stack.
+    /// Number of finite elements along the stack.
     pub elements: usize,
 }
 
-/// The whole answer of `vsj beam --json`.
+/// The answer of `vsj beam --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The beam experiment and the voltage law.
+    /// Results of the beam experiment, with Young's modulus over the voltage.
     pub experiment: Experiment,
-    /// The beam of one material under its load.
+    /// Deflection of the beam of one material under its load.
     pub deflection: Statics,
-    /// The stack of layers.
+    /// Deflection of the stack of layers.
     pub layers: Layers,
 }
 
-/// The beam of one material.
+/// Deflection of the beam of one material.
 #[derive(Clone, Debug, Serialize)]
 pub struct Statics {
-    /// Largest difference between linear and exact displacement, by the largest exact one.
+    /// Largest difference between linear and exact displacement, as a part of the largest exact displacement.
     pub linear_error: f64,
-    /// What of it is tolerated.
+    /// Tolerated `linear_error`.
     pub tolerance: f64,
-    /// True if the linear result is not valid: the large-deflection one is the answer.
+    /// True if `linear_error` exceeds `tolerance`: the large-deflection result is the valid one.
     pub droops: bool,
-    /// How many times this load the linear theory is just valid; `None` without load.
+    /// Factor on this load up to which the linear theory is valid; `None` without a load.
     pub limit_factor: Option<f64>,
-    /// Places along the beam.
+    /// Displacements at the places asked for.
     pub places: Vec<Place>,
     #[serde(skip)]
     shape: Vec<[f64; 4]>,
 }
 
-/// The stack.
+/// Deflection of the stack of layers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Layers {
-    /// Slip as the experiment says.
+    /// Interlayer stiffness identified from the experiment.
     pub identified: Identified,
-    /// Bonded, by measured spring constant without voltage.
+    /// Spring constant of bonded layers divided by the measured one, at 0 V.
     pub bonded_by_measured: f64,
-    /// The voltage asked for, in V.
+    /// Voltage across the stack, in V.
     pub voltage_v: f64,
-    /// The interlayer stiffness used, in Pa/m.
+    /// Interlayer stiffness used, in Pa/m.
     pub interlayer_pa_per_m: f64,
-    /// Tip displacement under the force asked for, in mm.
+    /// Tip displacement under the given force, in mm.
     pub tip_mm: f64,
-    /// The same with bonded layers.
+    /// Tip displacement with bonded layers, in mm.
     pub bonded_mm: f64,
-    /// The same with layers that slide freely.
+    /// Tip displacement with layers that slide freely, in mm.
     pub sliding_mm: f64,
-    /// Name and points, in mm, of the shapes to be drawn.
+    /// Names and points, in mm, of the bent shapes for the figure.
     #[serde(skip)]
     shapes: Vec<(&'static str, Vec<(f64, f64)>)>,
 }
 
 impl Report {
-    /// Answers.
+    /// Computes the answer.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] that names what cannot be.
-    pub fn new(question: &Question) -> Result<Self> {
-        let Question { readings, tips, stack, beam, load, tolerance, at_m, voltage_v, interlayer_pa_per_m, elements } =
-            question;
+    /// [`simulation::bad_input::BadInput`] names the input that is out of range.
+    pub fn new(setup: &Setup) -> Result<Self> {
+        let Setup { readings, tips, stack, beam, load, tolerance, at_m, voltage_v, interlayer_pa_per_m, elements } =
+            setup;
         let bent = Deflection::new(beam, load, *tolerance)?;
         let deflection = Statics {
             linear_error: bent.linear_error,
@@ -140,7 +140,7 @@ impl Report {
         Ok(Self { experiment, deflection, layers })
     }
 
-    /// The figures, each with the name of its file.
+    /// The figures, each with its file name.
     pub fn figures(&self, readings: &[Reading]) -> Vec<(&'static str, Figure)> {
         let measured = |reading: &Reading| (reading.displacement_mm, reading.force_un);
         let mut experiment = Figure::new("Beam experiment", "displacement [mm]", "force [uN]")

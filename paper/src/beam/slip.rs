@@ -1,12 +1,13 @@
-//! How much the layers slip: the interlayer stiffness that a measured spring constant asks for.
+//! Slip between the layers: the interlayer stiffness identified from measured spring constants.
 //!
-//! Perfect bonding is several times too stiff, free sliding several times too soft. Slip is identified on one part of the
-//! data, the lines of the beam experiment at its lowest and highest voltage, and checked on the rest: the lines between,
-//! and displacements that were measured separately (section 4.1.4).
+//! Perfect bonding gives a spring several times too stiff, free sliding one several times too soft. The slip is
+//! identified from the lines of the beam experiment at its lowest and highest voltage and checked on the remaining
+//! data: the lines between, and displacements that were measured separately (section 4.1.4).
 //!
-//! What the voltage does is asked in two ways: it stiffens the active layer and nothing else, or it couples the layers
-//! more strongly too, `K(V) = K(0) + growth V^n`: `n` = 2 if electrodes press the layers together (their pressure grows
-//! with the square of the voltage), `n` = 1 if the coupling grows as Young's modulus of the whole beam does.
+//! Two hypotheses on the effect of the voltage are compared: it stiffens the active layer only, or it also increases
+//! the coupling of the layers, `K(V) = K(0) + growth V^n`. The exponent is `n` = 2 if electrodes press the layers
+//! together (the pressure is proportional to the squared voltage), `n` = 1 if the coupling grows like Young's modulus
+//! of the whole beam.
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
@@ -18,26 +19,26 @@ use crate::beam::regression::Interval;
 use crate::beam::stack::{ACTIVE, Stack, active_modulus_pa};
 use simulation::bad_input;
 
-/// Section 4.1.4 as it was printed.
+/// The report's section 4.1.4, as printed.
 const TIPS: &str = include_str!("../../../data/section414_tip_displacement.csv");
 
-/// A displacement under a force, measured and by the report's finite elements.
+/// A tip displacement under a force: measured, and computed by the report's finite elements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tip {
-    /// At the tip, in uN.
+    /// Force at the tip, in uN.
     pub force_un: f64,
-    /// Across the spring, in V.
+    /// Voltage across the spring, in V.
     pub voltage_v: f64,
-    /// In mm.
+    /// Measured displacement, in mm.
     pub measured_mm: f64,
-    /// The report's solid model, in mm.
+    /// Displacement by the report's three-dimensional finite elements, in mm.
     pub fem_mm: f64,
 }
 
 /// The printed rows of section 4.1.4.
 ///
 /// # Errors
-/// If the file that was built in is damaged.
+/// If the built-in data file is damaged.
 pub fn tips() -> Result<Vec<Tip>> {
     csv::ReaderBuilder::new()
         .comment(Some(b'#'))
@@ -47,13 +48,13 @@ pub fn tips() -> Result<Vec<Tip>> {
         .context("data/section414_tip_displacement.csv")
 }
 
-/// The interlayer stiffness, in Pa/m, with which a stack has a spring constant.
+/// The interlayer stiffness, in Pa/m, at which the stack has the spring constant `measured_n_per_m` (N/m).
 ///
 /// # Errors
-/// [`simulation::bad_input::BadInput`] if no slip gives it: it must lie between free sliding and bonding.
+/// [`simulation::bad_input::BadInput`] if the spring constant does not lie between free sliding and bonding.
 pub fn identify_pa_per_m(stack: &Stack, measured_n_per_m: f64) -> Result<f64> {
     let (sliding, bonded) = (sliding_n_per_m(stack), bonded_n_per_m(stack));
-    // Nearly bonded, the interlayer stiffness means nothing any more.
+    // Close to bonding, the spring constant hardly depends on the interlayer stiffness.
     let highest = 0.99 * bonded;
     if !(measured_n_per_m > sliding && measured_n_per_m < highest) {
         bad_input!(
@@ -70,75 +71,76 @@ pub fn identify_pa_per_m(stack: &Stack, measured_n_per_m: f64) -> Result<f64> {
     Ok((low * high).sqrt())
 }
 
-/// The identified spring.
+/// The spring with identified interlayer stiffness.
 #[derive(Clone, Debug, Serialize)]
 pub struct Identified {
-    /// Interlayer stiffness at the lowest voltage, in Pa/m, by the line there and its 95 % interval.
+    /// Interlayer stiffness at the lowest voltage, in Pa/m, with the 95 % interval that the line there implies.
     pub at_lowest_pa_per_m: Interval,
-    /// The lowest voltage, in V.
+    /// The lowest voltage of the experiment, in V.
     pub lowest_v: f64,
-    /// Interlayer stiffness at the highest voltage, in Pa/m.
+    /// Interlayer stiffness at the highest voltage, in Pa/m, with its 95 % interval.
     pub at_highest_pa_per_m: Interval,
-    /// The highest voltage, in V.
+    /// The highest voltage of the experiment, in V.
     pub highest_v: f64,
-    /// Spring constants in uN/mm, one row a voltage of the experiment.
+    /// Spring constants, one row for each voltage of the experiment.
     pub lines: Vec<Line>,
-    /// Displacements that were measured apart: never used for the identification.
+    /// Separately measured displacements compared with the model; the identification does not use them.
     pub tips: Vec<Predicted>,
-    /// Young's modulus, in Pa, that the active layer would need at the highest voltage to explain it alone; `None` if none.
+    /// Young's modulus, in Pa, that the active layer alone would need at the highest voltage; `None` if no value
+    /// suffices.
     pub active_alone_pa: Option<f64>,
 }
 
-/// One voltage of the experiment. Spring constants in uN/mm.
+/// Spring constants at one voltage of the experiment, in uN/mm.
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
-    /// In V.
+    /// Voltage across the spring, in V.
     pub voltage_v: f64,
-    /// Measured.
+    /// Measured spring constant.
     pub measured: f64,
-    /// Layers bonded.
+    /// Spring constant with bonded layers.
     pub bonded: f64,
-    /// Layers slide freely.
+    /// Spring constant with layers that slide freely.
     pub sliding: f64,
-    /// Slip as without voltage: only the active layer gets stiffer.
+    /// Spring constant with the interlayer stiffness of 0 V and a stiffer active layer.
     pub active_only: f64,
-    /// The active layer gets stiffer, and the coupling grows with the voltage.
+    /// Spring constant with a stiffer active layer and a coupling that grows linearly with the voltage.
     pub linear: f64,
-    /// The same, growing with its square.
+    /// Spring constant with a stiffer active layer and a coupling that grows with the squared voltage.
     pub quadratic: f64,
-    /// True if the line was used to identify.
+    /// True if the line was used for the identification.
     pub used: bool,
 }
 
-/// One row of section 4.1.4. Displacements in mm.
+/// One row of section 4.1.4 compared with the model; displacements in mm.
 #[derive(Clone, Debug, Serialize)]
 pub struct Predicted {
-    /// As printed.
+    /// The printed row.
     #[serde(flatten)]
     pub printed: Tip,
-    /// Layers bonded.
+    /// Displacement with bonded layers.
     pub bonded_mm: f64,
-    /// By the identified spring, its coupling growing with the voltage.
+    /// Displacement with the identified interlayer stiffness, which grows linearly with the voltage.
     pub slip_mm: f64,
 }
 
 impl Identified {
-    /// Interlayer stiffness at a voltage, growing with it, in Pa/m.
+    /// Interlayer stiffness in Pa/m at a voltage in V, growing linearly with the voltage.
     pub fn interlayer_pa_per_m(&self, voltage_v: f64) -> f64 {
         self.growing(voltage_v, 1)
     }
 
-    /// The same, growing with a power of the voltage.
+    /// Interlayer stiffness in Pa/m at a voltage in V, growing with a power of the voltage.
     fn growing(&self, voltage_v: f64, power: i32) -> f64 {
         let [lowest, highest, here] = [self.lowest_v, self.highest_v, voltage_v].map(|volts| volts.powi(power));
         let (low, high) = (self.at_lowest_pa_per_m.value, self.at_highest_pa_per_m.value);
         (low + (high - low) * (here - lowest) / (highest - lowest)).max(0.0)
     }
 
-    /// Identifies slip on an experiment; `tips` were measured apart, and are only compared.
+    /// Identifies the interlayer stiffness from an experiment; `tips` are only compared with the result.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] if no slip explains it.
+    /// [`simulation::bad_input::BadInput`] if a measured spring constant does not lie between free sliding and bonding.
     pub fn new(stack: &Stack, experiment: &Experiment, tips: &[Tip]) -> Result<Self> {
         let at = |voltage_v: f64| stack.with_modulus(ACTIVE, active_modulus_pa(voltage_v)?);
         let (lowest, highest) =
@@ -191,7 +193,7 @@ impl Identified {
     }
 }
 
-/// Young's modulus of the active layer that gives a spring constant while the slip stays; `None` beyond 10 TPa.
+/// Young's modulus in Pa of the active layer that gives a spring constant at unchanged slip; `None` above 10 TPa.
 fn active_alone(stack: &Stack, interlayer_pa_per_m: f64, n_per_m: f64) -> Result<Option<f64>> {
     let stiff = |pascal: f64| {
         Ok::<_, anyhow::Error>(
@@ -214,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slip_that_was_put_in_is_found() {
+    fn a_known_interlayer_stiffness_is_recovered() {
         let stack = Stack::paper().unwrap();
         for slip in [1e7, 1e9, 1e10] {
             let constant = spring_constant_n_per_m(&stack, slip, ELEMENTS).unwrap();
@@ -226,9 +228,9 @@ mod tests {
         }
     }
 
-    /// Identified at 0 and 700 V, checked at 400 V: growing with the voltage it comes out within 2 %, with the square not.
+    /// Identified at 0 and 700 V, checked at 400 V: linear growth predicts it within 2 %, quadratic growth does not.
     #[test]
-    fn the_line_between_decides_how_the_coupling_grows() {
+    fn the_middle_voltage_supports_linear_growth_of_the_coupling() {
         let found = Identified::new(&Stack::paper().unwrap(), &Experiment::paper().unwrap(), &[]).unwrap();
         let [low, between, high] = &found.lines[..] else { panic!("three voltages") };
         for used in [low, high] {

@@ -6,57 +6,58 @@ use simulation::bad_input;
 use simulation::bad_input::check;
 use simulation::csv_table::Table;
 
-/// Table 2 as it was printed.
+/// The report's Table 2, as printed.
 pub const TABLE2: &str = include_str!("../../../data/table2_layers.csv");
-/// The order of the report's spring: covers outside, the two electrodes around active and insulating layer.
+/// Order of the layers in the report's spring: covers outside, the two electrodes around the active and the insulating
+/// layer.
 pub const ORDER: &str = "PET,aluminium,PVdF,nylon,aluminium,PET";
-/// The layer that a voltage stiffens.
+/// Material of the active layer, which a voltage stiffens.
 pub const ACTIVE: &str = "PVdF";
-/// Young's modulus of the active layer against voltage (section 4.1.2), as printed.
+/// Young's modulus of the active layer over the voltage (section 4.1.2), as printed.
 const ACTIVE_LAW: &str = include_str!("../../../data/section412_active_layer.csv");
 
-/// More would take minutes and gigabytes to bend.
+/// Largest number of layers; more would take minutes and gigabytes to bend.
 const MOST_LAYERS: usize = 20;
 
-/// One layer.
+/// A layer of the stack.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
     /// Name of its material.
     pub material: String,
-    /// In Pa.
+    /// Young's modulus, in Pa.
     pub youngs_modulus_pa: f64,
-    /// From the clamp, in m.
+    /// Length from the clamp, in m.
     pub length_m: f64,
-    /// In m.
+    /// Width, in m.
     pub width_m: f64,
-    /// In m.
+    /// Thickness, in m.
     pub thickness_m: f64,
 }
 
-/// Layers that lie on each other.
+/// Layers on top of each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stack {
     layers: Vec<Layer>,
 }
 
-/// A kind of layer as tables list it.
+/// A kind of layer, as a table lists it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kind {
-    /// Name.
+    /// Name of its material.
     pub material: String,
-    /// In GPa.
+    /// Young's modulus, in GPa.
     pub youngs_modulus_gpa: f64,
-    /// In mm.
+    /// Length, in mm.
     pub length_mm: f64,
-    /// In mm.
+    /// Width, in mm.
     pub width_mm: f64,
-    /// Of one layer, in um.
+    /// Thickness of one layer, in um.
     pub thickness_um: f64,
-    /// Layers of this kind.
+    /// Number of layers of this kind.
     pub count: usize,
 }
 
-/// Reads the kinds of layers from CSV text.
+/// Parses the kinds of layers from CSV text; `name` is what messages call the table.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] with file, line, column and what was expected.
@@ -69,7 +70,7 @@ pub fn kinds(name: &str, text: &str) -> Result<Vec<Kind>> {
     }
     let [material, youngs_modulus, length, width, thickness, count] = at;
     let mut kinds = Vec::new();
-    while let Some(row) = table.next()? {
+    while let Some(row) = table.next_row()? {
         kinds.push(Kind {
             material: row.text(material).to_owned(),
             youngs_modulus_gpa: row.number(youngs_modulus)?,
@@ -86,22 +87,23 @@ pub fn kinds(name: &str, text: &str) -> Result<Vec<Kind>> {
 }
 
 impl Layer {
-    /// Young's modulus times area, in N.
+    /// Axial stiffness `E A`, in N.
     pub fn axial_n(&self) -> f64 {
         self.youngs_modulus_pa * self.width_m * self.thickness_m
     }
 
-    /// Bending stiffness about its own middle, in N m2.
+    /// Bending stiffness about the layer's own midplane, in N m2.
     pub fn bending_n_m2(&self) -> f64 {
         self.axial_n() * self.thickness_m * self.thickness_m / 12.0
     }
 }
 
 impl Stack {
-    /// Layers bottom to top; the first must be the longest, for it carries the load to the clamp.
+    /// Creates a stack from layers, bottom to top. The first must be the longest, since it carries the load to the
+    /// clamp.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] that names layer and field.
+    /// [`simulation::bad_input::BadInput`] names layer and field.
     pub fn new(layers: Vec<Layer>) -> Result<Self> {
         let Some(first) = layers.first() else { bad_input!("the stack has no layers; expected at least one") };
         if layers.len() > MOST_LAYERS {
@@ -118,10 +120,11 @@ impl Stack {
         Ok(Self { layers })
     }
 
-    /// The kinds in the order of a list such as [`ORDER`].
+    /// Creates a stack from the kinds in the order of a list such as [`ORDER`].
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] for a layer that is missing, or listed more or less often than its kind is there.
+    /// [`simulation::bad_input::BadInput`] for an unknown layer, and for one listed more or less often than its kind's
+    /// count.
     pub fn in_order(kinds: &[Kind], order: &str) -> Result<Self> {
         let names: Vec<&str> = order.split(',').map(str::trim).collect();
         for kind in kinds {
@@ -150,10 +153,10 @@ impl Stack {
         Self::new(names.iter().map(layer).collect::<Result<_>>()?)
     }
 
-    /// The report's spring.
+    /// The report's spring: Table 2 in the order [`ORDER`].
     ///
     /// # Errors
-    /// If the file that was built in is damaged.
+    /// If the built-in data file is damaged.
     pub fn paper() -> Result<Self> {
         Self::in_order(&kinds("data/table2_layers.csv", TABLE2)?, ORDER)
     }
@@ -168,12 +171,12 @@ impl Stack {
         self.layers[0].length_m
     }
 
-    /// Thickness, in m.
+    /// Total thickness, in m.
     pub fn thickness_m(&self) -> f64 {
         self.layers.iter().map(|layer| layer.thickness_m).sum()
     }
 
-    /// Height of the middle of each layer over the bottom, in m.
+    /// Height of each layer's midplane above the bottom of the stack, in m.
     pub fn heights_m(&self) -> Vec<f64> {
         let tops = self.layers.iter().scan(0.0, |top, layer| {
             *top += layer.thickness_m;
@@ -182,10 +185,10 @@ impl Stack {
         tops.zip(&self.layers).map(|(top, layer)| top - 0.5 * layer.thickness_m).collect()
     }
 
-    /// The stack with another Young's modulus of every layer of a material.
+    /// The stack with Young's modulus `pascal` (Pa) in every layer of a material.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] if there is no such layer.
+    /// [`simulation::bad_input::BadInput`] if no layer has that material.
     pub fn with_modulus(&self, material: &str, pascal: f64) -> Result<Self> {
         if !self.layers.iter().any(|layer| layer.material == material) {
             bad_input!("the stack has no layer of `{material}`, the active one");
@@ -198,10 +201,11 @@ impl Stack {
     }
 }
 
-/// Young's modulus of the active layer, in Pa, straight between the report's voltages and beyond the last.
+/// Young's modulus of the active layer, in Pa, at a voltage in V: linear between the report's values and beyond the
+/// last.
 ///
 /// # Errors
-/// If the file that was built in is damaged.
+/// If the built-in data file is damaged.
 pub fn active_modulus_pa(voltage_v: f64) -> Result<f64> {
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(ACTIVE_LAW.as_bytes());
     let points: Vec<(f64, f64)> =
@@ -218,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_report_s_stack_is_as_thick_as_its_beam() {
+    fn the_stack_of_the_report_has_the_thickness_of_its_beam() {
         let stack = Stack::paper().unwrap();
         assert!((stack.thickness_m() - 190e-6).abs() < 1e-12);
         assert!((stack.heights_m()[5] - 167.5e-6).abs() < 1e-12);
@@ -232,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_stack_is_named() {
+    fn an_invalid_stack_is_rejected_with_layer_and_field() {
         let kinds = kinds("k", TABLE2).unwrap();
         let with = |change: fn(&mut Vec<Kind>)| {
             let mut changed = kinds.clone();

@@ -1,8 +1,9 @@
-//! The electrical analogue (Appendix 8.1.7): force is voltage, elongation is charge, a spring is a capacitor of `1/K`, a
-//! damper a resistor.
+//! The electrical analogue of the Zener model (Appendix 8.1.7): force corresponds to voltage, elongation to charge, a
+//! spring `K` to a capacitor `1/K`, a damper `D` to a resistor `D`.
 //!
-//! Springs in series share their force, so their capacitors share their voltage: `1/K1` lies across the source, beside it
-//! the resistor `D` in series with `1/K2`. Solved as a circuit by [`crate::dynamics::circuit`], which knows nothing of springs.
+//! Springs in series carry the same force, so their capacitors have the same voltage: `1/K1` lies across the source, in
+//! parallel with the resistor `D` in series with `1/K2`. The circuit is solved by [`crate::dynamics::circuit`],
+//! independently of the mechanical equations.
 
 use anyhow::Result;
 
@@ -10,13 +11,14 @@ use crate::dynamics::circuit::{Circuit, Component};
 use crate::dynamics::input::{Input, follow};
 use crate::dynamics::zener::{Sample, Start, Zener};
 
-/// Steps of the circuit between two samples.
+/// Smallest number of steps of the circuit between two samples.
 const STEPS: usize = 40;
 
-/// The response of the circuit that is analogous to a Zener model: its charges as elongation.
+/// The response of the circuit analogous to a Zener model, its charges as elongations in m, one sample every `every_s`
+/// seconds.
 ///
 /// # Errors
-/// [`simulation::bad_input::BadInput`] as the Zener model's.
+/// [`simulation::bad_input::BadInput`] as for the Zener model.
 pub fn response(zener: &Zener, input: &Input, start: Start, every_s: f64) -> Result<Vec<Sample>> {
     let zener = zener.checked()?;
     input.check_positive()?;
@@ -25,7 +27,7 @@ pub fn response(zener: &Zener, input: &Input, start: Start, every_s: f64) -> Res
     let charge = if start == Start::Settled { volt / zener.springs_at(input.first())[1] } else { 0.0 };
 
     let mut failed = None;
-    // The damped capacitor's charge passes from step to step.
+    // The state carried from step to step is the charge of the damped capacitor.
     let states = follow(input, every_s, charge, |piece, t, charge, h| {
         let farad = |spring: usize, time: f64| 1.0 / zener.springs_at(piece.at(time))[spring];
         let (series, damped) = (|time: f64| farad(0, time), |time: f64| farad(1, time));
@@ -58,7 +60,7 @@ pub fn response(zener: &Zener, input: &Input, start: Start, every_s: f64) -> Res
     Ok(states.into_iter().map(sample).collect())
 }
 
-/// Largest difference of two responses by the largest elongation.
+/// Largest difference between two responses, as a part of the largest elongation of the first.
 pub fn largest_difference(one: &[Sample], other: &[Sample]) -> f64 {
     let elongation = |sample: &Sample| sample.elongation_m.unwrap_or(f64::NAN);
     let scale = one.iter().map(|sample| elongation(sample).abs()).fold(0.0, f64::max);
@@ -72,9 +74,9 @@ mod tests {
     use super::*;
     use crate::dynamics::zener::Changes;
 
-    /// The series spring's capacitor lies across the source: what the rest does is the same without it.
+    /// The capacitor of the series spring lies across the source, so the rest of the circuit does not depend on it.
     #[test]
-    fn the_series_capacitor_changes_nothing_else() {
+    fn the_series_capacitor_does_not_affect_the_rest() {
         let zener = |k1_n_per_m| Zener {
             k1_n_per_m,
             k2_n_per_m: 1.0,
@@ -86,16 +88,16 @@ mod tests {
         let [soft, hard] = [0.5, 1e9].map(|k1| response(&zener(k1), &input, Start::Unloaded, 1.0).unwrap());
         for (soft, hard) in soft.iter().zip(&hard) {
             let rest = soft.elongation_m.unwrap() - 10.0 / 0.5 - hard.elongation_m.unwrap() + 10.0 / 1e9;
-            // Of 10 m, and 20 m beside it.
+            // Elongations are about 10 m, plus 20 m of the soft series spring.
             assert!(rest.abs() < 1e-6, "{soft:?} {hard:?}");
         }
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
-        /// Whatever the springs, the damper and what changes: the same response.
+        /// The responses agree for any springs, damper and changing spring.
         #[test]
-        fn the_circuit_answers_as_the_springs_do(
+        fn the_circuit_response_equals_the_mechanical_response(
             k1 in 0.5..50.0f64, k2 in 0.2..5.0f64, damper in 1.0..30.0f64, force in 0.1..20.0f64,
             settled: bool, which in 0usize..3,
         ) {

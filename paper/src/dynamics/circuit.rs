@@ -1,33 +1,34 @@
-//! Circuits of resistors, capacitors and voltage sources, by nodal analysis as circuit simulators do it.
+//! Circuits of resistors, capacitors and voltage sources, solved by modified nodal analysis.
 //!
-//! A capacitor that changes its capacitance keeps its charge `q = C(t) v`. In a step of length `h` it is a resistor
-//! `h / (2 C)` beside a current source (trapezoidal rule on the charge); sources add their currents to the unknowns
-//! (modified nodal analysis, Ho, Ruehli and Brennan 1975).
+//! A capacitor whose capacitance changes keeps its charge `q = C(t) v`. Within a step of length `h` it is a resistor `h
+//! / (2 C)` in parallel with a current source (trapezoidal rule on the charge); the currents of the sources are
+//! unknowns (modified nodal analysis, Ho, Ruehli and Brennan 1975).
 
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};
 
 /// A component between two nodes; node 0 is ground.
 pub enum Component<'a> {
-    /// In ohm.
+    /// A resistance, in ohm.
     Resistor(usize, usize, f64),
-    /// In F, at a moment in s.
+    /// A capacitance, in F, as a function of the time in s.
     Capacitor(usize, usize, &'a dyn Fn(f64) -> f64),
-    /// In V, of the first node above the second.
+    /// A voltage of the first node above the second, in V.
     Source(usize, usize, f64),
 }
 
-/// A circuit in progress.
+/// A circuit and its state.
 pub struct Circuit<'a> {
     components: Vec<Component<'a>>,
     nodes: usize,
-    /// Charge and current of each component at the last moment; only capacitors have a charge.
+    /// Charge (C) and current (A) of each component at the last time; only capacitors have a charge.
     charge: Vec<f64>,
     current: Vec<f64>,
 }
 
 impl<'a> Circuit<'a> {
-    /// Starts with the charges given, one a component; [`Circuit::find_currents`] before the first step.
+    /// Creates a circuit from its components and their initial charges in C; call [`Circuit::find_currents`] before the
+    /// first step.
     pub fn new(components: Vec<Component<'a>>, charge: Vec<f64>) -> Self {
         let ends = |component: &Component<'_>| match *component {
             Component::Resistor(a, b, _) | Component::Capacitor(a, b, _) | Component::Source(a, b, _) => a.max(b),
@@ -37,17 +38,17 @@ impl<'a> Circuit<'a> {
         Self { components, nodes, charge, current }
     }
 
-    /// Charge of a component, in C.
+    /// Charge of a component, in C, by its index.
     pub fn charge(&self, component: usize) -> f64 {
         self.charge[component]
     }
 
-    /// Current through a component from its first to its second node, in A.
+    /// Current through a component, in A, from its first to its second node.
     pub fn current(&self, component: usize) -> f64 {
         self.current[component]
     }
 
-    /// Finds the currents that flow at a moment, by a trial step of `h` seconds that is taken back.
+    /// Finds the currents at a time in s by a trial step of `h` seconds that is undone.
     ///
     /// # Errors
     /// If the circuit has no unique solution.
@@ -58,7 +59,8 @@ impl<'a> Circuit<'a> {
         Ok(())
     }
 
-    /// One step of `h` seconds that ends at `time_s`; `implicit` only (backward Euler) after a jump, trapezoidal otherwise.
+    /// Advances by `h` seconds to `time_s`. `implicit` selects backward Euler, needed after a jump, instead of the
+    /// trapezoidal rule.
     ///
     /// # Errors
     /// If the circuit has no unique solution.
@@ -72,7 +74,7 @@ impl<'a> Circuit<'a> {
             match component {
                 Component::Resistor(a, b, ohm) => conduct(&mut matrix, *a, *b, 1.0 / ohm),
                 Component::Capacitor(a, b, farad) => {
-                    // C v = charge + h (now i + (1 - now) i before).
+                    // C v = charge + h (now i + (1 - now) i at the last time).
                     conduct(&mut matrix, *a, *b, farad(time_s) / (now * h));
                     let pushed = (self.charge[index] + h * (1.0 - now) * self.current[index]) / (now * h);
                     for (node, sign) in [(*a, 1.0), (*b, -1.0)] {
@@ -115,7 +117,7 @@ impl<'a> Circuit<'a> {
     }
 }
 
-/// Adds a conductance between two nodes.
+/// Adds a conductance in siemens between two nodes.
 fn conduct(matrix: &mut DMatrix<f64>, a: usize, b: usize, siemens: f64) {
     for (row, column, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
         if row > 0 && column > 0 {
@@ -129,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_divider() {
+    fn a_divider_splits_the_voltage() {
         let mut circuit = Circuit::new(
             vec![Component::Source(1, 0, 6.0), Component::Resistor(1, 2, 1.0), Component::Resistor(2, 0, 2.0)],
             vec![0.0; 3],
@@ -138,7 +140,7 @@ mod tests {
         assert!((circuit.current(1) - 2.0).abs() < 1e-12 && (circuit.current(0) + 2.0).abs() < 1e-12);
     }
 
-    /// 1 V, 2 ohm, 3 F: charge 3 (1 - e^(-t/6)); second order in the step.
+    /// 1 V, 2 ohm, 3 F: the charge is 3 (1 - e^(-t/6)); the error is of second order in the step.
     #[test]
     fn charging_converges_with_the_square_of_the_step() {
         let error = |steps: usize| {

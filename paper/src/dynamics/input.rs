@@ -1,6 +1,6 @@
-//! What drives a model: a level over time, straight pieces with jumps between them.
+//! The input of a dynamic model: a dimensionless level over time, piecewise linear with jumps.
 //!
-//! A schedule whose voltage is the level.
+//! It is a schedule whose voltage is the level.
 
 use std::path::Path;
 
@@ -11,28 +11,28 @@ use simulation::bad_input::{check, number};
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::{Between, Piece, Schedule};
 
-/// The report's parameters of section 8.2.1.
+/// The report's input of section 8.2.1.
 const REPORT: &str = include_str!("../../../data/section821_input.csv");
 
 /// A level over time.
 #[derive(Clone, Debug)]
 pub struct Input {
-    /// What it is called in messages.
+    /// Name of the input in messages.
     pub name: String,
     schedule: Schedule,
 }
 
 impl Input {
-    /// The report's levels 1, 4, 7 and 1, 30 s each.
+    /// The report's input: levels 1, 4, 7 and 1, each for 30 s.
     ///
     /// # Errors
-    /// If the file that was built in is damaged.
+    /// If the built-in data file is damaged.
     pub fn report() -> Result<Self> {
         let record = Record::parse("data/section821_input.csv", REPORT, MEASURED)?;
         Ok(Self { name: "section 8.2.1".to_owned(), schedule: Schedule::from_record(&record, Between::Linear) })
     }
 
-    /// `report`, `stair`, or a file with columns `time_s,voltage_v`.
+    /// Opens the input `report`, `stair`, or a file with the columns `time_s,voltage_v`.
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] for a bad file.
@@ -47,30 +47,32 @@ impl Input {
         }
     }
 
-    /// Levels that jump, each held until the next moment; the last of at least two moments ends it.
+    /// Levels that jump at the given times in s and hold until the next one; the last of at least two times ends the
+    /// input.
     pub fn held(moments: &[(f64, f64)]) -> Self {
         Self { name: "levels".to_owned(), schedule: Schedule::new(moments.to_vec(), Between::Hold) }
     }
 
-    /// The straight pieces, in order.
+    /// The linear pieces, in order of time.
     pub fn pieces(&self) -> &[Piece] {
         self.schedule.pieces()
     }
 
-    /// From the first moment to the last, in s.
+    /// Duration from the first time to the last, in s.
     pub fn duration_s(&self) -> f64 {
         self.schedule.end_s() - self.schedule.start_s()
     }
 
-    /// The first level.
+    /// Level at the start.
     pub fn first(&self) -> f64 {
         self.pieces().first().map_or(0.0, |piece| piece.from_v)
     }
 
-    /// Checks that a model whose fastest change takes `shortest_s` can be followed, a row every `every_s`.
+    /// Checks that a response can be computed whose shortest time constant is `shortest_s` (s) and whose rows are
+    /// `every_s` (s) apart.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] for more than a million rows, or a change faster than a hundred thousandth of the input.
+    /// [`simulation::bad_input::BadInput`] for more than a million rows, or a time constant below 1e-5 of the duration.
     pub fn check_pace(&self, every_s: f64, shortest_s: f64) -> Result<()> {
         check("every_s", every_s, 1e-6..=1e6, "s")?;
         let duration = self.duration_s();
@@ -88,12 +90,12 @@ impl Input {
         Ok(())
     }
 
-    /// The highest level.
+    /// Highest level.
     pub fn highest(&self) -> f64 {
         self.pieces().iter().flat_map(|piece| [piece.from_v, piece.to_v]).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Checks that every level can be a stiffness.
+    /// Checks that every level is positive, as a stiffness must be.
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] names the first level that is not positive.
@@ -102,7 +104,7 @@ impl Input {
             for (time, level) in [(piece.start_s, piece.from_v), (piece.end_s, piece.to_v)] {
                 if level.is_nan() || level <= 0.0 {
                     bad_input!(
-                        "{}: level {} at {} s is no stiffness; expected more than 0 (or the model pi-plant)",
+                        "{}: level {} at {} s is not a stiffness; expected more than 0 (or the model pi-plant)",
                         self.name,
                         number(level),
                         number(time)
@@ -114,7 +116,7 @@ impl Input {
     }
 }
 
-/// Steps through a piece: start and length of each, all but the last `every_s` long.
+/// Splits a piece into steps, each with its start and length in s; all but the last are `every_s` long.
 fn steps(piece: &Piece, every_s: f64) -> impl Iterator<Item = (f64, f64)> {
     let (start, end) = (piece.start_s, piece.end_s);
     let count = ((end - start) / every_s - 1e-9).ceil().max(1.0) as usize;
@@ -122,8 +124,8 @@ fn steps(piece: &Piece, every_s: f64) -> impl Iterator<Item = (f64, f64)> {
     (0..count).map(move |index| (at(index), at(index + 1) - at(index)))
 }
 
-/// Follows a state `y` through an input: `step(piece, t, y, h)` makes one step. Returns the moments asked for, which are
-/// `every_s` apart, and every end of a piece, as (time, level, y); at a jump the time comes twice.
+/// Integrates a state `y` over an input; `step(piece, t, y, h)` advances it by `h` seconds. Returns (time, level, y)
+/// every `every_s` seconds and at both ends of every piece; at a jump the same time occurs twice.
 pub(crate) fn follow(
     input: &Input,
     every_s: f64,

@@ -1,15 +1,16 @@
-//! Which Zener model is the proportional-integral plant, and when the plant cannot stand in for it.
+//! The Zener model that is equivalent to the proportional-integral plant, and the limits of that equivalence.
 //!
-//! The plant answers a voltage with `(Kp s + Ki) / ((1 + Kp) s + Ki)`, the Zener model (elongation by force, scaled to 1 at
-//! rest) with `K2/(K1+K2) (D s + K1 + K2) / (D s + K2)`. They are the same when
+//! The plant's transfer function from voltage to stiffness is `(Kp s + Ki) / ((1 + Kp) s + Ki)`; that of the Zener
+//! model, elongation by force with static gain 1, is `K2/(K1+K2) (D s + K1 + K2) / (D s + K2)`. They are equal for
 //!
 //! ```text
 //! share = Kp / (1 + Kp) = K2 / (K1 + K2),   tau = (1 + Kp) / Ki = D / K2     that is   Kp = K2 / K1
 //! ```
 //!
-//! That holds for a changing force. A changing *stiffness* under a constant force is another matter: the Zener model then
-//! has the time constant `D / K2` of the new stiffness, and its stiffness is the inverse of what relaxes exponentially. The
-//! plant has one time constant. So it stands in for small changes only.
+//! This holds for a changing force. If instead the *stiffness* changes under a constant force, the Zener model has the
+//! time constant `D / K2` of the new stiffness, and its stiffness is the reciprocal of a quantity that relaxes
+//! exponentially, whereas the plant keeps one time constant. The plant therefore approximates the Zener model for small
+//! changes only.
 
 use anyhow::Result;
 use model::Plant;
@@ -20,7 +21,7 @@ use crate::dynamics::zener::{Changes, Start, Zener};
 use simulation::bad_input::check;
 
 impl PlantGains {
-    /// The Zener model that is this plant, by its damped spring at level 1.
+    /// The Zener model equivalent to this plant, given the damped spring at level 1 (N/m) and the force (N).
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] for gains that are not positive.
@@ -37,20 +38,20 @@ impl PlantGains {
     }
 }
 
-/// The plant that a Zener model is at level 1, under a changing force.
+/// The plant that is equivalent to a Zener model at level 1 under a changing force.
 pub fn plant_of(zener: &Zener) -> PlantGains {
     let proportional = zener.k2_n_per_m / zener.k1_n_per_m;
     let time_constant_s = zener.damper_n_s_per_m / zener.k2_n_per_m;
     PlantGains { proportional, integral_per_s: (1.0 + proportional) / time_constant_s }
 }
 
-/// Largest difference, as part of the change, between plant and Zener model when both springs change by `ratio` at once.
+/// Largest difference between plant and Zener model, as a part of the change, after both springs step by `ratio`.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a ratio that is not positive.
 pub fn stand_in_error(zener: &Zener, ratio: f64) -> Result<f64> {
     check("ratio", ratio, 1e-3..=1e3, "")?;
-    // Only ratios matter: with the damper as strong as its spring, times are in time constants.
+    // Only ratios matter: with a damper numerically equal to its spring, times are in units of the time constant.
     let both = Zener { changes: Changes::Both, damper_n_s_per_m: zener.k2_n_per_m, ..*zener };
     let Plant { share, time_constant_s: tau } = plant_of(&both).plant();
     let end_s = 8.0 * tau * ratio.recip().max(1.0);
@@ -66,7 +67,7 @@ pub fn stand_in_error(zener: &Zener, ratio: f64) -> Result<f64> {
     Ok(after.map(error).fold(0.0, f64::max))
 }
 
-/// The largest ratio of stiffness, upwards and at most 100, by which the springs may change before the plant is off by `tolerance`.
+/// Largest ratio, 1 to 100, by which both springs may step up before the plant's error exceeds `tolerance`.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a tolerance that is not between 0.0001 and 0.2.
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_paper_s_plant() {
+    fn the_plant_of_the_report_has_its_zener_model() {
         let gains = PlantGains::of(&Plant::PAPER);
         assert!((gains.proportional - 0.1).abs() < 1e-9 && (gains.integral_per_s - 0.2).abs() < 1e-9, "{gains:?}");
         let zener = gains.zener(1.0, 10.0).unwrap();
@@ -97,15 +98,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn there_and_back(kp in 0.01..10.0f64, ki in 0.01..10.0f64, k2 in 0.1..10.0f64) {
+        fn converting_to_a_zener_model_and_back_recovers_the_gains(kp in 0.01..10.0f64, ki in 0.01..10.0f64, k2 in 0.1..10.0f64) {
             let gains = PlantGains { proportional: kp, integral_per_s: ki };
             let back = plant_of(&gains.zener(k2, 1.0).unwrap());
             prop_assert!((back.proportional / kp - 1.0).abs() < 1e-9 && (back.integral_per_s / ki - 1.0).abs() < 1e-9);
         }
 
-        /// At every frequency the two transfer functions are one.
+        /// At every frequency the two transfer functions are equal.
         #[test]
-        fn the_same_transfer_function(kp in 0.01..10.0f64, ki in 0.01..10.0f64, omega in 0.001..100.0f64) {
+        fn transfer_functions_are_equal(kp in 0.01..10.0f64, ki in 0.01..10.0f64, omega in 0.001..100.0f64) {
             use nalgebra::Complex;
             let zener = PlantGains { proportional: kp, integral_per_s: ki }.zener(1.0, 1.0).unwrap();
             let s = Complex::new(0.0, omega);
@@ -117,9 +118,9 @@ mod tests {
         }
     }
 
-    /// The error vanishes with the change, and has a first-order part: tau is that of the new stiffness.
+    /// The error vanishes with the size of the change and is of first order in it, because the time constant changes.
     #[test]
-    fn small_changes_only() {
+    fn the_error_vanishes_with_the_size_of_the_change() {
         let zener = PlantGains::of(&Plant::PAPER).zener(1.0, 1.0).unwrap();
         let [tenth, hundredth] = [1.1, 1.01].map(|ratio| stand_in_error(&zener, ratio).unwrap());
         assert!(tenth > 0.01 && hundredth < 0.15 * tenth, "{tenth} {hundredth}");

@@ -1,14 +1,14 @@
-//! How the stiffness changes in time: the report's four models, and what one says about another.
+//! The report's four models of how the stiffness changes over time, and the relations between them.
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`input`] | the level over time that drives a model |
+//! | [`input`] | the level over time that is a model's input |
 //! | [`zener`] | spring in series with spring and damper (sections 3.2.3 and 8.1.5) |
-//! | [`spring_damper`] | the same without the series spring (8.1.6) |
+//! | [`spring_damper`] | spring and damper in parallel, without the series spring (8.1.6) |
 //! | [`circuit`], [`analogue`] | the electrical analogue (8.1.7), by nodal analysis |
 //! | [`plant`] | the proportional-integral plant (4.2.2) |
-//! | [`mapping`] | which Zener model is the proportional-integral plant, and when the plant cannot stand in for it |
-//! | [`report`] | what `vsj dynamics` says |
+//! | [`mapping`] | the Zener model equivalent to the proportional-integral plant, and the limits of that equivalence |
+//! | [`report`] | the answer of `vsj dynamics` |
 
 pub mod analogue;
 pub mod circuit;

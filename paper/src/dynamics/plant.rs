@@ -1,4 +1,4 @@
-//! The proportional-integral plant (section 4.2.2) on its own, driven by the level as a voltage:
+//! The proportional-integral plant (section 4.2.2) without a controller; its input is the level as a voltage `u` in V.
 //!
 //! ```text
 //! (Kp s + Ki) / ((1 + Kp) s + Ki),   that is   y = w + share (u - w),   tau dw/dt = u - w
@@ -15,41 +15,41 @@ use simulation::bad_input::check;
 /// Gains of the proportional-integral plant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PlantGains {
-    /// Kp.
+    /// Proportional gain Kp, dimensionless.
     pub proportional: f64,
-    /// Ki, in 1/s.
+    /// Integral gain Ki, in 1/s.
     pub integral_per_s: f64,
 }
 
 impl PlantGains {
-    /// Of a plant by instantaneous share and time constant.
+    /// The gains of a plant given by instantaneous share and time constant.
     pub fn of(plant: &Plant) -> Self {
         let proportional = plant.share / (1.0 - plant.share);
         Self { proportional, integral_per_s: (1.0 + proportional) / plant.time_constant_s }
     }
 
-    /// Instantaneous share and time constant.
+    /// Instantaneous share and time constant of these gains.
     pub fn plant(&self) -> Plant {
         let sum = 1.0 + self.proportional;
         Plant { share: self.proportional / sum, time_constant_s: sum / self.integral_per_s }
     }
 
-    /// Returns the gains if they make a plant.
+    /// Returns the gains if both are positive and within range.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] names the one that is not positive.
+    /// [`simulation::bad_input::BadInput`] names the gain that is out of range.
     pub fn checked(self) -> Result<Self> {
         check("proportional", self.proportional, 1e-9..=1e9, "")?;
         check("integral_per_s", self.integral_per_s, 1e-9..=1e9, "1/s")?;
         Ok(self)
     }
 
-    /// The response, solved exactly.
+    /// The exact response, one sample every `every_s` seconds.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] names what cannot be.
+    /// [`simulation::bad_input::BadInput`] names the gain or interval that is out of range.
     pub fn response(&self, input: &Input, start: Start, every_s: f64) -> Result<Vec<Sample>> {
-        // Whatever the time constant.
+        // The solution is exact, so any time constant can be followed.
         input.check_pace(every_s, f64::INFINITY)?;
         let Plant { share, time_constant_s: tau } = self.checked()?.plant();
         let relaxed = if start == Start::Settled { input.first() } else { 0.0 };
@@ -70,9 +70,9 @@ mod tests {
     use super::*;
     use crate::table3;
 
-    /// The plant on the stair is the column "without controller" of Table 3, to the last digit but one number.
+    /// On the stair, the plant gives the column "without controller" of Table 3 to the last digit but for one number.
     #[test]
-    fn the_plant_gives_table_3() {
+    fn the_plant_reproduces_table_3_without_controller() {
         let gains = PlantGains { proportional: 0.1, integral_per_s: 0.2 };
         let stair = Input::open("stair", Default::default()).unwrap();
         let samples = gains.response(&stair, Start::Unloaded, 0.1).unwrap();

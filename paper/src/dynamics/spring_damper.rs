@@ -1,4 +1,5 @@
-//! The simplified model (Appendix 8.1.6): spring and damper side by side, of relaxed length `l`, under a constant force.
+//! The simplified model (Appendix 8.1.6): a spring and a damper in parallel, of relaxed length `l`, under a constant
+//! force.
 //!
 //! ```text
 //! K (l - x) - D dx/dt = F
@@ -12,24 +13,24 @@ use crate::dynamics::runge_kutta;
 use crate::dynamics::zener::{Sample, Start};
 use simulation::bad_input::check;
 
-/// Spring, whose stiffness is the level times `k_n_per_m`, and damper.
+/// A damper parallel to a spring whose stiffness is the level times `k_n_per_m`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SpringDamper {
-    /// At level 1, in N/m.
+    /// Spring at level 1, in N/m.
     pub k_n_per_m: f64,
-    /// In N s/m.
+    /// Damper, in N s/m.
     pub damper_n_s_per_m: f64,
     /// Relaxed length, in m.
     pub length_m: f64,
-    /// Compressing, in N.
+    /// Constant force, in N, compressive.
     pub force_n: f64,
 }
 
 impl SpringDamper {
-    /// The response; `elongation_m` is the compression `l - x`.
+    /// The response, one sample every `every_s` seconds; its `elongation_m` is the compression `l - x`.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] names what cannot be.
+    /// [`simulation::bad_input::BadInput`] names the parameter that is out of range.
     pub fn response(&self, input: &Input, start: Start, every_s: f64) -> Result<Vec<Sample>> {
         let Self { k_n_per_m, damper_n_s_per_m: damper, length_m: length, force_n: force } = *self;
         check("k2_n_per_m", k_n_per_m, 1e-9..=1e12, "N/m")?;
@@ -48,7 +49,7 @@ impl SpringDamper {
         });
         let sample = |(time_s, level, x): (f64, f64, f64)| {
             let compression = length - x;
-            // Before anything has moved nothing seems to give way.
+            // Before any motion the apparent stiffness F / 0 is infinite.
             Sample { time_s, level, elongation_m: Some(compression), stiffness: force / compression }
         };
         Ok(states.into_iter().map(sample).collect())
@@ -62,7 +63,7 @@ mod tests {
 
     const PAPER: SpringDamper = SpringDamper { k_n_per_m: 1.0, damper_n_s_per_m: 10.0, length_m: 1.0, force_n: 10.0 };
 
-    /// Section 8.2.1: settles at l - F/K = -9, -1.5, -0.43 and -9 m.
+    /// Section 8.2.1: the position settles at l - F/K = -9, -1.5, -0.43 and -9 m.
     #[test]
     fn settles_where_the_spring_carries_the_force() {
         let samples = PAPER.response(&Input::report().unwrap(), Start::Settled, 0.1).unwrap();
@@ -74,7 +75,7 @@ mod tests {
         }
     }
 
-    /// A rigid series spring leaves this model.
+    /// A rigid series spring reduces the Zener model to this one.
     #[test]
     fn it_is_the_zener_model_with_a_rigid_series_spring() {
         let zener =

@@ -1,12 +1,12 @@
-//! The full Zener model: spring `K1` in series with spring `K2` and damper `D` side by side, under a constant force.
+//! The Zener model: spring `K1` in series with a spring `K2` parallel to a damper `D`, under a constant force.
 //!
 //! ```text
 //! e = F / K1 + y,   D dy/dt + K2 y = F
 //! ```
 //!
-//! `e` is the elongation, `y` that of the damped part; what is seen as stiffness is `F / e`. Appendix 8.1.5 prints the
-//! damper's force with the sign of a motor (`F_D = -D d(x2 - x1)/dt` where `-F1 + F2 + F_D = 0` needs plus); its next
-//! equation is right again, and agrees with the above.
+//! `e` is the elongation, `y` that of the damped part, and `F / e` the apparent stiffness. Appendix 8.1.5 prints the
+//! damper's force with the wrong sign (`F_D = -D d(x2 - x1)/dt`, where `-F1 + F2 + F_D = 0` needs plus); its next
+//! equation is correct and agrees with the above.
 
 use anyhow::Result;
 use serde::Serialize;
@@ -15,7 +15,7 @@ use crate::dynamics::input::{Input, follow};
 use crate::dynamics::runge_kutta;
 use simulation::bad_input::check;
 
-/// A Zener model. What changes with the level is the level times what is given here.
+/// A Zener model; a spring that follows the level has the stiffness given here times the level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Zener {
     /// Series spring at level 1, in N/m.
@@ -26,50 +26,50 @@ pub struct Zener {
     pub damper_n_s_per_m: f64,
     /// Constant force, in N.
     pub force_n: f64,
-    /// Which springs follow the level.
+    /// The springs that follow the level.
     pub changes: Changes,
 }
 
-/// The springs that a voltage changes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+/// The springs that follow the level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Changes {
-    /// The series spring: the whole change comes at once
+    /// The series spring: the whole change is instantaneous.
     K1,
-    /// The damped spring: all of it comes slowly
+    /// The damped spring: the whole change is delayed.
     #[default]
     K2,
-    /// Both in proportion: part of it at once, as measured
+    /// Both in the same ratio: part of the change is instantaneous, as measured.
     Both,
 }
 
-/// One moment of a response.
+/// One sample of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sample {
-    /// In s.
+    /// Time, in s.
     pub time_s: f64,
     /// Level of the input.
     pub level: f64,
-    /// Elongation, in m; the proportional-integral plant has none.
+    /// Elongation, in m; `None` for the proportional-integral plant.
     pub elongation_m: Option<f64>,
-    /// Force by elongation, in N/m; of the plant, its output in V.
+    /// Apparent stiffness, force by elongation, in N/m; for the plant its output in V.
     pub stiffness: f64,
 }
 
-/// Where a response starts.
+/// Initial state of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// The force has just come: the damper has not moved.
+    /// The force has just been applied: the damper has not moved.
     Unloaded,
-    /// At rest under force and first level.
+    /// In equilibrium under the force and the first level.
     Settled,
 }
 
 impl Zener {
-    /// Returns the model if it is one.
+    /// Returns the model if all parameters are within range.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] names the field.
+    /// [`simulation::bad_input::BadInput`] names the field, its value and the allowed range.
     pub fn checked(self) -> Result<Self> {
         check("k1_n_per_m", self.k1_n_per_m, 1e-9..=1e12, "N/m")?;
         check("k2_n_per_m", self.k2_n_per_m, 1e-9..=1e12, "N/m")?;
@@ -78,7 +78,7 @@ impl Zener {
         Ok(self)
     }
 
-    /// Both springs, in N/m, at a level.
+    /// Stiffness of both springs, in N/m, at a level.
     pub fn springs_at(&self, level: f64) -> [f64; 2] {
         let [first, second] = match self.changes {
             Changes::K1 => [level, 1.0],
@@ -88,17 +88,17 @@ impl Zener {
         [first * self.k1_n_per_m, second * self.k2_n_per_m]
     }
 
-    /// The response, a sample every `every_s` and at every kink of the input.
+    /// The response, one sample every `every_s` seconds and at both ends of every piece of the input.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] names what cannot be.
+    /// [`simulation::bad_input::BadInput`] names the parameter that is out of range.
     pub fn response(&self, input: &Input, start: Start, every_s: f64) -> Result<Vec<Sample>> {
         let Self { damper_n_s_per_m: damper, force_n: force, .. } = self.checked()?;
         input.check_positive()?;
         input.check_pace(every_s, damper / self.springs_at(input.highest())[1])?;
         let y = if start == Start::Settled { force / self.springs_at(input.first())[1] } else { 0.0 };
         let states = follow(input, every_s, y, |piece, t, y, h| {
-            // Short against the fastest time constant of the piece.
+            // Steps much shorter than the smallest time constant within the piece.
             let fastest = self.springs_at(piece.from_v.max(piece.to_v))[1] / damper;
             let parts = (h * fastest / 0.02).ceil().max(1.0);
             let h = h / parts;
@@ -122,9 +122,9 @@ mod tests {
     pub(crate) const PAPER: Zener =
         Zener { k1_n_per_m: 10.0, k2_n_per_m: 1.0, damper_n_s_per_m: 10.0, force_n: 10.0, changes: Changes::K2 };
 
-    /// Held levels have a closed form.
+    /// Held levels have a closed-form response.
     #[test]
-    fn a_step_of_the_damped_spring() {
+    fn a_step_of_the_damped_spring_agrees_with_the_closed_form() {
         let input = Input::held(&[(0.0, 1.0), (30.0, 4.0), (60.0, 4.0)]);
         for sample in PAPER.response(&input, Start::Settled, 0.5).unwrap() {
             let y = if sample.time_s <= 30.0 { 10.0 } else { 2.5 + 7.5 * (-(sample.time_s - 30.0) / 2.5).exp() };
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_of_the_series_spring_comes_at_once() {
+    fn a_step_of_the_series_spring_is_instantaneous() {
         let zener = Zener { changes: Changes::K1, ..PAPER };
         let input = Input::held(&[(0.0, 1.0), (5.0, 2.0), (9.0, 2.0)]);
         for sample in zener.response(&input, Start::Settled, 1.0).unwrap() {
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_model_is_named() {
+    fn an_invalid_model_is_rejected_with_its_field() {
         let input = Input::report().unwrap();
         for (zener, field) in [
             (Zener { k1_n_per_m: 0.0, ..PAPER }, "k1_n_per_m"),
@@ -161,9 +161,9 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
-        /// Force scales elongation, and not stiffness; times scale with the damper.
+        /// Elongation is proportional to the force, stiffness independent of it; times are proportional to the damper.
         #[test]
-        fn scales(force in 0.1..100.0f64, slow in 0.2..5.0f64) {
+        fn elongation_scales_with_force_and_time_with_the_damper(force in 0.1..100.0f64, slow in 0.2..5.0f64) {
             let input = Input::held(&[(0.0, 1.0), (10.0, 3.0), (20.0, 3.0)]);
             let slowly = Input::held(&[(0.0, 1.0), (10.0 * slow, 3.0), (20.0 * slow, 3.0)]);
             let other = Zener { force_n: force, damper_n_s_per_m: slow * PAPER.damper_n_s_per_m, ..PAPER };

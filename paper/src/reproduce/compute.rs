@@ -1,84 +1,22 @@
-//! The computations, by the names that `data/printed.toml` calls them.
+//! The computations, by the names used in `data/printed.toml`.
 
-use std::collections::BTreeMap;
-
-use anyhow::{Context, Result, bail};
-use toml::Value;
+use anyhow::{Result, bail};
 
 use crate::beam::regression::{Fit, straight_line};
+use crate::reproduce::digits::short;
+use crate::reproduce::inputs::Inputs;
+use crate::reproduce::outcome::Outcome;
 use crate::reproduce::{models, readings};
 
-/// What goes into a computation.
-#[derive(Clone, Copy, Debug)]
-pub struct Inputs<'a>(pub &'a BTreeMap<String, Value>);
-
-/// What comes out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
-    /// The number.
-    pub value: f64,
-    /// For a measured number: where other measured numbers say that it lies.
-    pub expected: Option<(f64, f64)>,
-    /// True if the readings after it go on from it: then no digit of it is misread.
-    pub lasts: bool,
-    /// For a fitted number: its standard error.
-    pub standard_error: Option<f64>,
-    /// What else the computation knows, for the explanation.
-    pub evidence: Option<String>,
-}
-
-impl Outcome {
-    /// A number that follows from others.
-    pub fn exact(value: f64) -> Self {
-        Self { value, expected: None, lasts: false, standard_error: None, evidence: None }
-    }
-}
-
-impl Inputs<'_> {
-    /// A number.
-    ///
-    /// # Errors
-    /// If it is missing.
-    pub fn number(&self, name: &str) -> Result<f64> {
-        self.0.get(name).and_then(number).with_context(|| format!("no number `{name}`"))
-    }
-
-    /// Several numbers.
-    ///
-    /// # Errors
-    /// If one is missing.
-    pub fn numbers(&self, name: &str) -> Result<Vec<f64>> {
-        let list = self.0.get(name).and_then(Value::as_array).with_context(|| format!("no list `{name}`"))?;
-        list.iter().map(|value| number(value).with_context(|| format!("`{name}` holds no numbers"))).collect()
-    }
-
-    /// A word.
-    ///
-    /// # Errors
-    /// If it is missing.
-    pub fn word(&self, name: &str) -> Result<&str> {
-        self.0.get(name).and_then(Value::as_str).with_context(|| format!("no word `{name}`"))
-    }
-}
-
-/// A value as a number, if it is one.
-pub(crate) fn number(value: &Value) -> Option<f64> {
-    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
-}
-
-/// Does one computation.
+/// Runs the computation named `of`.
 ///
 /// # Errors
-/// If there is none of that name, or an input is missing.
+/// If no computation has that name, or an input is missing.
 pub fn compute(of: &str, inputs: &Inputs<'_>) -> Result<Outcome> {
     let sum = |terms: Vec<f64>| terms.iter().sum::<f64>();
     Ok(match of {
         "same" => Outcome {
-            evidence: Some(format!(
-                "{} prints {}",
-                inputs.word("place")?,
-                crate::reproduce::short(inputs.number("value")?)
-            )),
+            evidence: Some(format!("{} prints {}", inputs.word("place")?, short(inputs.number("value")?))),
             ..Outcome::exact(inputs.number("value")?)
         },
         "sum" => Outcome::exact(inputs.number("factor").unwrap_or(1.0) * sum(inputs.numbers("terms")?)),

@@ -1,27 +1,27 @@
-//! Why a printed number is not what comes out: general explanations, tried in order of how much they claim.
+//! Explanations of a disagreement between printed and computed number, tried from the most to the least specific.
 //!
-//! A slip of the pen must give the printed digits exactly. Another input must be printed in the report for the same
-//! quantity. Where nothing fits, it is said what one input would have to be, and nothing is claimed.
+//! A misprint must give the printed digits exactly. Another input must be printed in the report for the same quantity.
+//! If nothing fits, the value that one input would need is stated, without claiming it.
 
 use anyhow::Result;
 use toml::Value;
 
-use crate::reproduce::compute::number as as_number;
-use crate::reproduce::inputs::{input_needed, other_reading, terms_left_out};
+use crate::reproduce::comparison::Comparison;
+use crate::reproduce::inputs::number as as_number;
+use crate::reproduce::other_inputs::{input_needed, other_value, terms_left_out};
 use crate::reproduce::printed::Relation;
 use crate::reproduce::slips::{digit_of_a_reading, simple_factor, simulated, slip_of_the_pen};
-use crate::reproduce::{Judged, short};
 
-/// The likeliest explanation of a disagreement, with its evidence.
-pub(crate) fn explain(number: &Judged, all: &[Judged]) -> Result<String> {
+/// The most likely explanation of a disagreement, with its evidence.
+pub(crate) fn explain(number: &Comparison, all: &[Comparison]) -> Result<String> {
     let mut said: Vec<String> =
         [&number.entry.because, &number.outcome.evidence].into_iter().flatten().cloned().collect();
-    said.extend(in_standard_errors(number));
+    said.extend(distance_in_standard_errors(number));
     said.extend(first_explanation(number, all)?);
-    said.extend(with_its_likes(number, all));
+    said.extend(deviations_of_siblings(number, all));
     if number.outcome.standard_error.is_some() {
         let carried = |place| format!("{place} was computed with it: it was so before it was printed");
-        said.extend(used_again(number, all).map(carried));
+        said.extend(used_as_printed(number, all).map(carried));
     }
     Ok(said.iter().map(|sentence| capital(sentence)).collect::<Vec<_>>().join(". "))
 }
@@ -31,8 +31,8 @@ fn capital(sentence: &str) -> String {
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
-/// How far a fitted number is off, in what its readings leave open.
-fn in_standard_errors(number: &Judged) -> Option<String> {
+/// Distance of a fitted number from the printed one, in standard errors of the fit.
+fn distance_in_standard_errors(number: &Comparison) -> Option<String> {
     let off = (number.printed.value - number.outcome.value) / number.outcome.standard_error?;
     let says = if off.abs() > 3.0 {
         "more than their scatter leaves open"
@@ -42,13 +42,13 @@ fn in_standard_errors(number: &Judged) -> Option<String> {
     Some(format!("printed is {off:+.1} standard errors off: {says}"))
 }
 
-/// A number that agrees and was computed with this one as it is printed: then this is no slip of the pen.
-fn used_again<'a>(number: &Judged, all: &'a [Judged]) -> Option<&'a str> {
+/// Place of a number that agrees and was computed with this one as printed, which rules out a misprint.
+fn used_as_printed<'a>(number: &Comparison, all: &'a [Comparison]) -> Option<&'a str> {
     if number.printed.significant_digits() < 4 {
         return None;
     }
     let equal = |value: &Value| as_number(value) == Some(number.printed.value);
-    let uses = |other: &&Judged| {
+    let uses = |other: &&Comparison| {
         other.agrees
             && !other.entry.of_table
             && other.entry.of != "same"
@@ -61,49 +61,36 @@ fn used_again<'a>(number: &Judged, all: &'a [Judged]) -> Option<&'a str> {
 }
 
 /// The first explanation that fits.
-fn first_explanation(number: &Judged, all: &[Judged]) -> Result<Option<String>> {
+fn first_explanation(number: &Comparison, all: &[Comparison]) -> Result<Option<String>> {
     if number.entry.relation != Relation::Equal && number.entry.relation != Relation::About {
-        return Ok(Some(other_reading(number, all)?.unwrap_or_else(|| off(number))));
+        return Ok(Some(other_value(number, all)?.unwrap_or_else(|| number.difference())));
     }
     if number.outcome.expected.is_some() {
-        // What others share is no slip of one digit.
-        let alone = !number.outcome.lasts && !alike(number, &likes(number, all));
+        // A deviation shared with other readings is no misprint of one digit.
+        let alone = !number.outcome.persists && !deviate_alike(number, &siblings(number, all));
         return Ok(alone.then(|| digit_of_a_reading(number)).flatten());
     }
-    if let Some(slip) = simulated(number, all).or_else(|| slip_of_the_pen(number, used_again(number, all).is_some())) {
+    if let Some(slip) =
+        simulated(number, all).or_else(|| slip_of_the_pen(number, used_as_printed(number, all).is_some()))
+    {
         return Ok(Some(slip));
     }
-    if let Some(other) = other_reading(number, all)? {
+    if let Some(other) = other_value(number, all)? {
         return Ok(Some(other));
     }
     if let Some(left_out) = terms_left_out(number)? {
         return Ok(Some(left_out));
     }
-    let what = simple_factor(number).unwrap_or_else(|| off(number));
+    let what = simple_factor(number).unwrap_or_else(|| number.difference());
     Ok(Some(match input_needed(number)? {
         Some(needed) => format!("{what}; {needed}"),
         None => what,
     }))
 }
 
-/// By how much printed and computed differ.
-pub(super) fn off(number: &Judged) -> String {
-    let (printed, computed) = (number.printed.value, number.outcome.value);
-    let ratio = printed / computed;
-    if ratio < 0.0 {
-        return "printed has the opposite sign of what is computed".to_owned();
-    }
-    if !(0.1..10.0).contains(&ratio) {
-        return format!("printed is {} times what is computed", short(ratio));
-    }
-    let percent = 1e2 * (ratio - 1.0);
-    let decimals = if percent.abs() < 1.0 { 3 } else { 1 };
-    format!("printed is {percent:+.decimals$} % off what is computed")
-}
-
-/// Other measured numbers of the table with the same voltage under another force.
-fn likes<'a>(number: &Judged, all: &'a [Judged]) -> Vec<&'a Judged> {
-    let same = |other: &&Judged| {
+/// Other measured numbers of the same table, at the same voltage under another force.
+fn siblings<'a>(number: &Comparison, all: &'a [Comparison]) -> Vec<&'a Comparison> {
+    let same = |other: &&Comparison| {
         number.outcome.expected.is_some()
             && other.entry.group == number.entry.group
             && other.entry.place != number.entry.place
@@ -113,28 +100,32 @@ fn likes<'a>(number: &Judged, all: &'a [Judged]) -> Vec<&'a Judged> {
     all.iter().filter(same).collect()
 }
 
-/// How far a number is off what it should be.
-fn deviation(number: &Judged) -> f64 {
+/// Relative deviation of the printed from the computed number.
+fn deviation(number: &Comparison) -> f64 {
     number.printed.value / number.outcome.value - 1.0
 }
 
-/// True if there are others and they are off by as much, to 5 %.
-fn alike(number: &Judged, likes: &[&Judged]) -> bool {
-    !likes.is_empty() && likes.iter().all(|like| (deviation(like) - deviation(number)).abs() < 0.05)
+/// True if there are other numbers and their deviations agree with this one within 5 percentage points.
+fn deviate_alike(number: &Comparison, siblings: &[&Comparison]) -> bool {
+    !siblings.is_empty() && siblings.iter().all(|like| (deviation(like) - deviation(number)).abs() < 0.05)
 }
 
-/// How far others of the same voltage are off.
-fn with_its_likes(number: &Judged, all: &[Judged]) -> Option<String> {
-    let likes = likes(number, all);
-    if likes.is_empty() {
+/// The deviations of other numbers at the same voltage, in words.
+fn deviations_of_siblings(number: &Comparison, all: &[Comparison]) -> Option<String> {
+    let siblings = siblings(number, all);
+    if siblings.is_empty() {
         return None;
     }
-    let others: Vec<String> = likes.iter().map(|like| format!("{:+.1} %", 1e2 * deviation(like))).collect();
+    let others: Vec<String> = siblings.iter().map(|like| format!("{:+.1} %", 1e2 * deviation(like))).collect();
     Some(format!(
         "it is off by {:+.1} %, at the same voltage the other by {}: {}",
         1e2 * deviation(number),
         others.join(", "),
-        if alike(number, &likes) { "a common cause, such as another sample or mounting" } else { "this one alone" }
+        if deviate_alike(number, &siblings) {
+            "a common cause, such as another sample or mounting"
+        } else {
+            "this one alone"
+        }
     ))
 }
 
@@ -143,13 +134,14 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::reproduce::compute::Outcome;
-    use crate::reproduce::compute::{Inputs, compute};
+    use crate::reproduce::compute::compute;
+    use crate::reproduce::inputs::Inputs;
+    use crate::reproduce::outcome::Outcome;
     use crate::reproduce::printed::Printed;
     use crate::reproduce::printed::Rule;
     use crate::reproduce::source::{BearsOn, Entry};
 
-    fn judged(printed: &str, of: &str, inputs: &str, also: &str) -> Judged {
+    fn comparison(printed: &str, of: &str, inputs: &str, also: &str) -> Comparison {
         let inputs: BTreeMap<String, Value> = toml::from_str(inputs).unwrap();
         let entry = Entry {
             place: "here".to_owned(),
@@ -165,12 +157,12 @@ mod tests {
             of_table: false,
         };
         let outcome: Outcome = compute(of, &Inputs(&entry.inputs)).unwrap();
-        Judged { printed: Printed::new(printed).unwrap(), outcome, rule: Rule::Rounded, agrees: false, entry }
+        Comparison { printed: Printed::new(printed).unwrap(), outcome, rule: Rule::Rounded, agrees: false, entry }
     }
 
-    /// Each kind of slip, made on purpose, is told from the others.
+    /// Each kind of misprint, made deliberately, gets its own explanation.
     #[test]
-    fn each_slip_is_told() {
+    fn each_kind_of_misprint_is_identified() {
         let product = "factors = [3.0, 4.1234]";
         for (printed, of, inputs, also, expected) in [
             ("12.73", "product", product, "", "digits 3 and 7 swapped"),
@@ -190,19 +182,19 @@ mod tests {
             ("8.111", "quotient", "dividend = 31.416\ndivisor = 3.0", "", "it would take dividend = 24.333"),
             ("77.7", "product", product, "", "Printed is +528.1 % off"),
         ] {
-            let number = judged(printed, of, inputs, also);
+            let number = comparison(printed, of, inputs, also);
             let said = explain(&number, &[]).unwrap();
             assert!(said.contains(expected), "{printed}: {said}");
         }
     }
 
     #[test]
-    fn a_reading_that_one_digit_puts_in_line() {
-        let mut number = judged("331", "sum", "terms = [349]", "");
+    fn a_reading_explained_by_one_misread_digit_names_that_digit() {
+        let mut number = comparison("331", "sum", "terms = [349]", "");
         number.outcome.expected = Some((343.0, 355.0));
         let said = digit_of_a_reading(&number).unwrap();
         assert!(said.starts_with("one digit misread would explain it: 351 (by chance one fits in "), "{said}");
-        // Every window of 6 beside numbers that are 10 apart, in six tenths of places; near 331 there are more.
+        // Windows of width 6 around numbers that are 10 apart cover six tenths of all places; near 331 they cover more.
         let percent: f64 = said.split(' ').rev().nth(1).unwrap().parse().unwrap();
         assert!((60.0..75.0).contains(&percent), "{said}");
         number.outcome.expected = Some((445.0, 455.0));

@@ -1,148 +1,42 @@
-//! Other inputs: another value that the report prints or may mean, terms left out, what an input would have to be.
+//! The inputs of a computation, as given in `data/printed.toml`.
 
 use std::collections::BTreeMap;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use toml::Value;
 
-use crate::reproduce::compute::{Inputs, compute, number as as_number};
-use crate::reproduce::explain::off;
-use crate::reproduce::{Judged, short};
+/// The named inputs of a computation.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a>(pub &'a BTreeMap<String, Value>);
 
-/// Another input, printed in the report for the same quantity or meant by the same words.
-pub(super) fn other_reading(number: &Judged, all: &[Judged]) -> Result<Option<String>> {
-    if number.entry.of_table {
-        return Ok(None);
+impl Inputs<'_> {
+    /// The number named `name`.
+    ///
+    /// # Errors
+    /// If it is missing or no number.
+    pub fn number(&self, name: &str) -> Result<f64> {
+        self.0.get(name).and_then(number).with_context(|| format!("no number `{name}`"))
     }
-    let mut nearest: Option<(f64, String)> = None;
-    for (name, values) in alternatives(number, all) {
-        for value in values {
-            let mut inputs = number.entry.inputs.clone();
-            inputs.insert(name.clone(), value.clone());
-            // What cannot be computed is no explanation.
-            let Ok(other) = compute(&number.entry.of, &Inputs(&inputs)) else { continue };
-            let said = format!("{name} = {value} in place of {}", number.entry.inputs[&name]);
-            if number.printed.agrees(other.value, number.entry.relation, number.rule) {
-                return Ok(Some(format!("with {said} it would agree: {}", short(other.value))));
-            }
-            let miss = (other.value / number.printed.value).ln().abs();
-            if miss.is_finite() && nearest.as_ref().is_none_or(|(least, _)| miss < *least) {
-                nearest = Some((miss, format!("{said}: {}", short(other.value))));
-            }
-        }
+
+    /// The list of numbers named `name`.
+    ///
+    /// # Errors
+    /// If it is missing or an element is no number.
+    pub fn numbers(&self, name: &str) -> Result<Vec<f64>> {
+        let list = self.0.get(name).and_then(Value::as_array).with_context(|| format!("no list `{name}`"))?;
+        list.iter().map(|value| number(value).with_context(|| format!("`{name}` holds no numbers"))).collect()
     }
-    let miss = (number.outcome.value / number.printed.value).ln().abs();
-    // Ten times nearer, and near.
-    Ok(nearest
-        .filter(|(least, _)| *least < 0.1 && (miss.is_nan() || 10.0 * least < miss))
-        .map(|(least, said)| format!("{}; nearest is {said}, {:.1} % off", off(number), 1e2 * least.exp_m1())))
+
+    /// The text named `name`.
+    ///
+    /// # Errors
+    /// If it is missing or no text.
+    pub fn word(&self, name: &str) -> Result<&str> {
+        self.0.get(name).and_then(Value::as_str).with_context(|| format!("no word `{name}`"))
+    }
 }
 
-/// What else an input may be: what the text may mean, then what is printed elsewhere under the same name.
-fn alternatives(number: &Judged, all: &[Judged]) -> Vec<(String, Vec<Value>)> {
-    let mut found: BTreeMap<&String, Vec<Value>> = BTreeMap::new();
-    for (name, own) in &number.entry.inputs {
-        let values = found.entry(name).or_default();
-        values.extend(number.entry.also.get(name).into_iter().flatten().cloned());
-        // Only quantities, whose names end in a unit: "part" or "step" of another question are no alternatives.
-        let unit = name.contains('_');
-        let others =
-            all.iter().filter(|other| unit && !other.entry.of_table).filter_map(|other| other.entry.inputs.get(name));
-        values.extend(others.filter(|value| as_number(value).is_some()).cloned());
-        values.retain(|value| as_number(value) != as_number(own));
-        values.dedup();
-    }
-    found.into_iter().map(|(name, values)| (name.clone(), values)).collect()
-}
-
-/// A sum that agrees without some of its terms.
-pub(super) fn terms_left_out(number: &Judged) -> Result<Option<String>> {
-    let Some(terms) = number.entry.inputs.get("terms").and_then(Value::as_array) else { return Ok(None) };
-    if terms.len() > 12 {
-        return Ok(None);
-    }
-    // Fewest left out first.
-    let mut choices: Vec<usize> = (1..1usize << terms.len()).collect();
-    choices.sort_by_key(|kept| std::cmp::Reverse(kept.count_ones()));
-    for kept in choices {
-        let some: Vec<Value> = terms
-            .iter()
-            .enumerate()
-            .filter(|(index, _)| kept >> index & 1 == 1)
-            .map(|(_, term)| term.clone())
-            .collect();
-        let left: Vec<String> = some.iter().filter_map(as_number).map(short).collect();
-        let mut inputs = number.entry.inputs.clone();
-        inputs.insert("terms".to_owned(), Value::Array(some));
-        let value = compute(&number.entry.of, &Inputs(&inputs))?.value;
-        // The terms are printed numbers too: the last digit may differ.
-        if (value - number.printed.value).abs() <= 2.0 * number.printed.last_digit() {
-            return Ok(Some(format!(
-                "{}; to within its last digit it is what {} of the {} terms give: {}",
-                off(number),
-                left.len(),
-                terms.len(),
-                left.join(" + ")
-            )));
-        }
-    }
-    Ok(None)
-}
-
-/// What one input would have to be for the printed number to come out.
-pub(super) fn input_needed(number: &Judged) -> Result<Option<String>> {
-    let mut needed = Vec::new();
-    for (name, own) in &number.entry.inputs {
-        let Some(own) = as_number(own).filter(|own| *own > 0.0) else { continue };
-        let miss = |factor: f64| {
-            let mut inputs = number.entry.inputs.clone();
-            inputs.insert(name.clone(), Value::Float(own * factor));
-            compute(&number.entry.of, &Inputs(&inputs)).map(|outcome| outcome.value - number.printed.value)
-        };
-        if let Some(factor) = root(miss) {
-            needed.push((factor.ln().abs(), format!("{name} = {} in place of {own}", short(own * factor))));
-        }
-    }
-    if needed.is_empty() || number.entry.of == "same" {
-        return Ok(None);
-    }
-    // The two that change least.
-    needed.sort_by(|one, other| one.0.total_cmp(&other.0));
-    let needed: Vec<String> = needed.into_iter().take(2).map(|(_, said)| said).collect();
-    Ok(Some(format!("it would take {}", needed.join(", or "))))
-}
-
-/// A factor between 0.01 and 100 at which `miss` is zero.
-fn root(miss: impl Fn(f64) -> Result<f64>) -> Option<f64> {
-    const PARTS: i32 = 40;
-    let at = |part: i32| 10f64.powf(2.0 * f64::from(part) / f64::from(PARTS));
-    let sign = |factor: f64| miss(factor).ok().map(f64::signum);
-    // From 1 outwards.
-    for part in 0..PARTS {
-        for (near, far) in [(part, part + 1), (-part, -part - 1)] {
-            let (Some(start), Some(end)) = (sign(at(near)), sign(at(far))) else { continue };
-            if start == end {
-                continue;
-            }
-            let (mut one, mut other) = (at(near), at(far));
-            for _ in 0..60 {
-                let middle = (one * other).sqrt();
-                if sign(middle)? == start { one = middle } else { other = middle }
-            }
-            return Some((one * other).sqrt());
-        }
-    }
-    None
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn roots() {
-        let found = root(|factor| Ok(factor - 0.3)).unwrap();
-        assert!((found - 0.3).abs() < 1e-9);
-        assert!(root(|_| Ok(1.0)).is_none());
-    }
+/// A TOML value as a number; `None` if it is neither integer nor float.
+pub(crate) fn number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }

@@ -1,4 +1,4 @@
-//! Numbers that a model of this project gives.
+//! Printed numbers that a model of this project computes.
 
 use anyhow::{Context, Result, bail};
 use model::{Gains, Plant};
@@ -8,16 +8,16 @@ use crate::beam::limits::bonded_n_per_m;
 use crate::beam::regression::Fit;
 use crate::beam::stack::{Layer, Stack};
 use crate::dynamics::plant::PlantGains;
-use crate::reproduce::compute::Inputs;
+use crate::reproduce::inputs::Inputs;
 use crate::table3;
 use simulation::experiment::reference_at;
 use simulation::reference::Loop;
 use simulation::schedule::{Change, Schedule};
 
-/// A beam by its dimensions; what is not given is 1, and without weight.
+/// A beam by its dimensions. A missing length is 1 m, a missing Young's modulus 1 Pa, a missing density 0.
 ///
 /// # Errors
-/// If width or thickness is missing.
+/// If width or thickness is missing, or a value is out of range.
 pub(crate) fn whole_beam(inputs: &Inputs<'_>) -> Result<Beam> {
     let or = |name: &str, otherwise: f64| inputs.number(name).unwrap_or(otherwise);
     let beam = Beam {
@@ -30,14 +30,14 @@ pub(crate) fn whole_beam(inputs: &Inputs<'_>) -> Result<Beam> {
     beam.checked()
 }
 
-/// Tip of a beam under force and weight, upwards, by the linear theory.
+/// Tip displacement of a beam under force and weight, in mm, positive upwards, by the linear theory.
 pub(crate) fn beam_tip_mm(inputs: &Inputs<'_>) -> Result<f64> {
     let beam = whole_beam(inputs)?;
     let load = Load { tip_n: 1e-6 * inputs.number("force_un")?, gravity_m_per_s2: inputs.number("gravity_m_per_s2")? };
     Ok(1e3 * beam.linear_m(&load, beam.length_m))
 }
 
-/// Tip of the report's stack, its layers bonded, with the moduli `<material>_gpa`.
+/// Tip displacement in mm of the report's stack with bonded layers, whose moduli are the inputs `<material>_gpa`.
 pub(crate) fn bonded_tip_mm(inputs: &Inputs<'_>) -> Result<f64> {
     let layer = |layer: &Layer| {
         let gpa = inputs.number(&format!("{}_gpa", layer.material.to_lowercase()))?;
@@ -47,7 +47,7 @@ pub(crate) fn bonded_tip_mm(inputs: &Inputs<'_>) -> Result<f64> {
     Ok(1e3 * inputs.number("force_n")? / bonded_n_per_m(&stack))
 }
 
-/// The report's loop, with its controller or without.
+/// The report's loop, `with` its controller or `without`.
 fn system(controller: &str) -> Result<Loop> {
     let gains = match controller {
         "with" => Some((Gains::PAPER.proportional, Gains::PAPER.integral_per_s)),
@@ -57,20 +57,20 @@ fn system(controller: &str) -> Result<Loop> {
     Ok(free(Plant::PAPER, gains))
 }
 
-/// A loop whose amplifier has no limits.
+/// A loop behind an amplifier without limits.
 pub(super) fn free(plant: Plant, gains: Option<(f64, f64)>) -> Loop {
     let Plant { share, time_constant_s } = plant;
     let everything = (f64::NEG_INFINITY, f64::INFINITY);
     Loop { share, time_constant_s, gains, range_v: everything, slew_v_per_s: f64::INFINITY }
 }
 
-/// The stair experiment at a moment.
+/// Stiffness of the stair experiment, in V, at a time.
 pub(crate) fn stair_at(inputs: &Inputs<'_>) -> Result<f64> {
     let found = reference_at(system(inputs.word("controller")?)?, &Schedule::stair(), [inputs.number("time_s")?]);
     found.first().copied().context("one moment")
 }
 
-/// The voltage of Appendix 8.1.2 at a moment, straight between its samples.
+/// Voltage of Appendix 8.1.2 at a time, in V, interpolated linearly.
 pub(crate) fn stair_voltage(inputs: &Inputs<'_>) -> Result<f64> {
     Ok(Schedule::stair().reader().at(inputs.number("time_s")?))
 }
@@ -82,14 +82,14 @@ fn step(inputs: &Inputs<'_>) -> Result<Change> {
     changes.get(number.wrapping_sub(1)).copied().with_context(|| format!("the stair has no step {number}"))
 }
 
-/// Part of a step made at moments after its start.
+/// Completed part of a step, at times in s after its start.
 fn parts(controller: &str, change: &Change, seconds: impl IntoIterator<Item = f64>) -> Result<Vec<f64>> {
     let times = seconds.into_iter().map(|seconds| change.start_s + seconds);
     let found = reference_at(system(controller)?, &Schedule::stair(), times);
     Ok(found.into_iter().map(|y| (y - change.from_v) / (change.to_v - change.from_v)).collect())
 }
 
-/// Seconds from the start of a step until a part of it is made; infinite if never before the next.
+/// Time in s from the start of a step until a part of it is completed; infinite if the next step comes first.
 pub(crate) fn time_to(controller: &str, inputs: &Inputs<'_>) -> Result<f64> {
     let (change, part) = (step(inputs)?, inputs.number("part")?);
     let ticks = ((change.end_s - change.start_s) * 1e3) as usize;
@@ -100,21 +100,21 @@ pub(crate) fn time_to(controller: &str, inputs: &Inputs<'_>) -> Result<f64> {
     Ok(1e-3 * (after as f64 - missing))
 }
 
-/// Percent of a step that is made after some seconds.
+/// Completed part of a step some seconds after its start, in percent.
 pub(crate) fn part_after_percent(inputs: &Inputs<'_>) -> Result<f64> {
     let made = parts(inputs.word("controller")?, &step(inputs)?, [inputs.number("seconds")?])?;
     Ok(1e2 * made.first().context("one moment")?)
 }
 
-/// Seconds until the report's spring, left alone, has made a part of a single ideal step.
+/// Time in s after which the report's spring without controller has completed a part of an ideal step.
 pub(crate) fn settled_after_s(part: f64) -> f64 {
     let Plant { share, time_constant_s } = Plant::PAPER;
     time_constant_s * ((1.0 - share) / (1.0 - part)).ln().max(0.0)
 }
 
-/// A gain of the proportional-integral plant by least squares on the printed column without controller.
+/// A gain of the proportional-integral plant, fitted by least squares to the printed column without controller.
 ///
-/// Gauss and Newton's method with differences, from a plant that has none of the answer in it.
+/// Gauss-Newton with finite differences, from a start that is independent of the result.
 pub(crate) fn plant_gain(inputs: &Inputs<'_>) -> Result<f64> {
     let rows = table3::rows()?;
     let misses = |[proportional, integral_per_s]: [f64; 2]| -> Vec<f64> {
@@ -133,7 +133,7 @@ pub(crate) fn plant_gain(inputs: &Inputs<'_>) -> Result<f64> {
         });
         let design: Vec<Vec<f64>> = slopes[0].iter().zip(&slopes[1]).map(|(&p, &i)| vec![p, i]).collect();
         let change = Fit::new(&design, &here)?.coefficients;
-        // Gains stay positive.
+        // The gains must remain positive.
         gains = [0, 1].map(|index| (gains[index] - change[index]).max(0.2 * gains[index]));
         if change.iter().zip(&gains).all(|(change, gain)| change.abs() < 1e-9 * gain) {
             break;
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gains_come_out_of_the_table() {
+    fn the_printed_gains_are_recovered_from_the_table() {
         for (which, expected) in [("proportional", 0.1), ("integral", 0.2)] {
             let inputs = [("which".to_owned(), toml::Value::String(which.to_owned()))].into();
             let found = plant_gain(&Inputs(&inputs)).unwrap();
@@ -159,9 +159,9 @@ mod tests {
         }
     }
 
-    /// A single ideal step: 97 % after 5.5 s ln((10/11) / 0.03).
+    /// An ideal step reaches 97 % after 5.5 s ln((10/11) / 0.03).
     #[test]
-    fn settling() {
+    fn settling_time_agrees_with_the_closed_form() {
         assert!((settled_after_s(0.97) - 18.762).abs() < 1e-3);
         assert_eq!(settled_after_s(0.05), 0.0);
     }

@@ -1,4 +1,4 @@
-//! A number as it is printed: its digits say how precisely it is known.
+//! A printed number: its digits define its precision.
 
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
@@ -6,51 +6,51 @@ use serde::Deserialize;
 /// A printed number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Printed {
-    /// As a number.
+    /// Its value.
     pub value: f64,
-    /// Digits behind the point, as printed before the exponent.
+    /// Digits after the decimal point, before the exponent.
     pub decimals: usize,
-    /// Power of ten behind it.
+    /// Power of ten of the exponent, 0 if none is printed.
     pub exponent: i32,
 }
 
-/// How digits that do not fit are dropped.
+/// How excess digits are dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// To the nearest.
+    /// Rounded to nearest.
     Rounded,
-    /// Cut off.
+    /// Truncated.
     Truncated,
 }
 
-/// How a text means a number.
+/// The relation between a printed number and the true one that the text states.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relation {
-    /// To the last digit.
+    /// Equal to the last printed digit.
     #[default]
     Equal,
-    /// Within 20 %.
+    /// Equal within 20 %.
     About,
-    /// The true one is larger.
+    /// The true number is larger.
     #[serde(rename = "more than")]
     MoreThan,
-    /// The true one is smaller.
+    /// The true number is smaller.
     #[serde(rename = "less than")]
     LessThan,
-    /// The true one is not larger.
+    /// The true number is not larger.
     #[serde(rename = "at most")]
     AtMost,
 }
 
-/// Numbers that are an exact decimal must not miss it by a float's last bits.
+/// Relative tolerance for floating-point errors in exact decimals.
 const FLOAT: f64 = 1e-9;
 
 impl Printed {
-    /// Reads the text of a number.
+    /// Parses a printed number.
     ///
     /// # Errors
-    /// If it is none.
+    /// If the text is no finite number.
     pub fn new(text: &str) -> Result<Self> {
         let value: f64 = text.parse().with_context(|| format!("`{text}` is not a number"))?;
         if !value.is_finite() {
@@ -62,12 +62,12 @@ impl Printed {
         Ok(Self { value, decimals, exponent })
     }
 
-    /// What the last digit counts.
+    /// Place value of the last printed digit.
     pub fn last_digit(&self) -> f64 {
         10f64.powi(self.exponent - self.decimals as i32)
     }
 
-    /// Digits, leading zeros not counted.
+    /// Number of significant digits, without leading zeros.
     pub fn significant_digits(&self) -> usize {
         if self.value == 0.0 {
             return 1;
@@ -75,8 +75,8 @@ impl Printed {
         ((self.value.abs() / self.last_digit()).round().log10() + FLOAT).floor() as usize + 1
     }
 
-    /// A number printed in the same way.
-    pub fn alike(&self, value: f64, rule: Rule) -> String {
+    /// Formats `value` with the decimals and exponent of this number.
+    pub fn format_like(&self, value: f64, rule: Rule) -> String {
         let scaled = value / 10f64.powi(self.exponent);
         let shift = 10f64.powi(self.decimals as i32);
         let cut = match rule {
@@ -91,7 +91,7 @@ impl Printed {
         format!("{:.*}", self.decimals, self.value / 10f64.powi(self.exponent))
     }
 
-    /// True if `computed` would be printed so.
+    /// True if `computed` is consistent with the printed number, given the stated relation and rule.
     pub fn agrees(&self, computed: f64, relation: Relation, rule: Rule) -> bool {
         let units = computed / self.last_digit();
         let printed = (self.value / self.last_digit()).round();
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn digits_say_what_agrees() {
+    fn agreement_depends_on_the_printed_digits() {
         for (text, computed, rounded, truncated) in [
             ("28.74", 28.7499, false, true),
             ("28.74", 28.7449, true, true),
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn relations() {
+    fn each_relation_accepts_its_side() {
         let eighty = Printed::new("80").unwrap();
         for (relation, computed, expected) in [
             (Relation::MoreThan, 79.9, false),
@@ -160,13 +160,13 @@ mod tests {
     }
 
     proptest! {
-        /// What is printed in the same way agrees.
+        /// A number formatted like a printed one agrees with it.
         #[test]
-        fn printing_agrees(value in -1e6..1e6f64, decimals in 0usize..5, exponent in -12i32..12) {
+        fn a_number_agrees_with_its_own_print(value in -1e6..1e6f64, decimals in 0usize..5, exponent in -12i32..12) {
             for rule in [Rule::Rounded, Rule::Truncated] {
                 let value = value * 10f64.powi(exponent);
                 let shape = Printed { value: 1.0, decimals, exponent };
-                let text = format!("{}e{exponent}", shape.alike(value, rule));
+                let text = format!("{}e{exponent}", shape.format_like(value, rule));
                 prop_assert!(agrees(&text, value, rule), "{text} {value} {rule:?}");
             }
         }

@@ -1,6 +1,7 @@
-//! Numbers that were measured: they follow from nothing, but other measured numbers say where they should lie.
+//! Printed numbers that were measured, compared with what other measured numbers predict.
 //!
-//! A number is out of line if it would be so even when each number of its table gets its chance (Bonferroni, 5 % a table).
+//! A number is an outlier if it remains one after Bonferroni's correction for the numbers of its table (5 % false
+//! alarms a table).
 
 use anyhow::{Context, Result};
 use model::Plant;
@@ -10,13 +11,14 @@ use crate::beam::experiment::{in_line, lines, voltages};
 use crate::beam::readings::{Reading, table1 as readings};
 use crate::beam::regression::{FALSE_ALARM, Fit};
 use crate::beam::slip::tips;
-use crate::reproduce::compute::{Inputs, Outcome};
+use crate::reproduce::inputs::Inputs;
 use crate::reproduce::models::free;
+use crate::reproduce::outcome::Outcome;
 use crate::table3 as printed;
 use simulation::experiment::reference_at;
 use simulation::schedule::Schedule;
 
-/// The slope through the origin of one voltage of Table 1, from all of its readings.
+/// Slope through the origin of one voltage of Table 1, in uN/mm, from all of its readings.
 pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
     let voltage = inputs.number("voltage_v")?;
     let of_voltage: Vec<Reading> = readings()?.into_iter().filter(|r| r.voltage_v == voltage).collect();
@@ -25,7 +27,7 @@ pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
     let mut evidence = format!("the readings give {:.2} with a standard error of {error:.2}", fit.coefficients[0]);
     let single = of_voltage.iter().map(|r| r.force_un / r.displacement_mm);
     let (least, most) = single.fold((f64::INFINITY, 0.0f64), |(least, most), one| (least.min(one), most.max(one)));
-    // Any line through the origin is a mean of these.
+    // Any line through the origin has a weighted mean of these as its slope.
     evidence += &format!("; one by one, {least:.2} to {most:.2}");
     for (index, reading) in of_voltage.iter().enumerate() {
         let mut others = of_voltage.clone();
@@ -38,7 +40,7 @@ pub(crate) fn slope(inputs: &Inputs<'_>) -> Result<Outcome> {
     Ok(Outcome { standard_error: Some(error), evidence: Some(evidence), ..Outcome::exact(fit.coefficients[0]) })
 }
 
-/// A reading of Table 1, expected from all others: lines through the origin with one scatter.
+/// A reading of Table 1 in uN, predicted from all others by lines through the origin with one scatter.
 pub(crate) fn table1(inputs: &Inputs<'_>) -> Result<Outcome> {
     let (voltage, displacement) = (inputs.number("voltage_v")?, inputs.number("displacement_mm")?);
     let all = readings()?;
@@ -48,29 +50,30 @@ pub(crate) fn table1(inputs: &Inputs<'_>) -> Result<Outcome> {
         .context("Table 1 has no such reading")?;
     let fit = lines(&all, &voltages(&all))?;
     let expected = fit.readings[index].expected;
-    // The interval holds one more reading with 95 %; widened, all readings of the table.
-    let half = (expected.high - expected.value) * widening(&fit, all.len())?;
+    // The prediction interval holds one further reading with 95 %; widened, it holds all readings of the table.
+    let half = (expected.high - expected.value) * bonferroni_factor(&fit, all.len())?;
     let evidence = format!(
         "the line through the other readings, which gives {:.1} +- {half:.1}; by chance a reading falls so far off once in \
          {:.0}",
         expected.value,
         1.0 / fit.readings[index].chance
     );
-    Ok(near(expected.value, half, evidence))
+    Ok(predicted(expected.value, half, evidence))
 }
 
-/// A measured number that should lie within `half` of `value`.
-fn near(value: f64, half: f64, evidence: String) -> Outcome {
+/// A measured number predicted to lie within `half` of `value`.
+fn predicted(value: f64, half: f64, evidence: String) -> Outcome {
     Outcome { expected: Some((value - half, value + half)), evidence: Some(evidence), ..Outcome::exact(value) }
 }
 
-/// How much wider than one number's 95 % interval that of `numbers` numbers is.
-fn widening(fit: &Fit, numbers: usize) -> Result<f64> {
+/// Ratio of the interval that holds `numbers` numbers to that of a single one, both with 95 %.
+fn bonferroni_factor(fit: &Fit, numbers: usize) -> Result<f64> {
     let student = StudentsT::new(0.0, 1.0, (fit.degrees_of_freedom - 1) as f64)?;
     Ok(student.inverse_cdf(1.0 - 0.5 * FALSE_ALARM / numbers as f64) / student.inverse_cdf(0.975))
 }
 
-/// A displacement of section 4.1.4, expected from Table 1: force by slope, with the scatter of a force reading.
+/// A displacement of section 4.1.4 in mm, predicted from Table 1 as force by slope, with the scatter of a force
+/// reading.
 pub(crate) fn tip_by_table1_mm(inputs: &Inputs<'_>) -> Result<Outcome> {
     let (voltage, force) = (inputs.number("voltage_v")?, inputs.number("force_un")?);
     let all = readings()?;
@@ -78,18 +81,18 @@ pub(crate) fn tip_by_table1_mm(inputs: &Inputs<'_>) -> Result<Outcome> {
     let (_, fit, _) = in_line(&all, &voltages)?;
     let index = voltages.iter().position(|&v| v == voltage).context("Table 1 has no such voltage")?;
     let slope = fit.coefficients[index];
-    // As far as the least certain reading of Table 1 scatters.
+    // The widest prediction interval of Table 1.
     let spread = fit.readings.iter().map(|r| r.expected.high - r.expected.value).fold(0.0, f64::max);
-    let half = spread * widening(&fit, tips()?.len())? / slope;
+    let half = spread * bonferroni_factor(&fit, tips()?.len())? / slope;
     let value = force / slope;
     let evidence =
         format!("{force} uN by the slope of Table 1 at {voltage} V, {slope:.2} uN/mm: {value:.3} +- {half:.3} mm");
-    Ok(near(value, half, evidence))
+    Ok(predicted(value, half, evidence))
 }
 
-/// A reading of Table 3, expected from the one before: the simulation without controller, shifted to go through that.
+/// A reading of Table 3 in V, predicted from the one before by the simulation without controller.
 ///
-/// How far apart neighbours may be is what most neighbours are (median absolute deviation).
+/// The scale of the differences between neighbours is their median absolute deviation.
 pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
     let time = inputs.number("time_s")?;
     let rows = printed::rows()?;
@@ -104,7 +107,7 @@ pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
     let value = simulated[index] + off[index - 1];
     let side = |off: f64| if off < 0.0 { "below" } else { "above" };
     let run = off[1..index].iter().rev().take_while(|earlier| side(**earlier) == side(off[index - 1])).count();
-    let lasts = off
+    let persists = off
         .get(index + 1)
         .is_some_and(|next| (next - off[index]).abs() <= half && (next - off[index - 1]).abs() > half);
     let evidence = format!(
@@ -119,9 +122,9 @@ pub(crate) fn table3(inputs: &Inputs<'_>) -> Result<Outcome> {
         off[index - 1].abs(),
         off[index].abs(),
         side(off[index]),
-        if lasts { ", and the next goes on from there: what was measured shifted between the two" } else { "" },
+        if persists { ", and the next goes on from there: what was measured shifted between the two" } else { "" },
     );
-    Ok(Outcome { lasts, ..near(value, half, evidence) })
+    Ok(Outcome { persists, ..predicted(value, half, evidence) })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -130,7 +133,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
-/// The largest error of the finite elements of section 4.1.4 against what was measured.
+/// Largest error of the report's finite elements in section 4.1.4, in percent of the measured displacement.
 pub(crate) fn largest_fem_error_percent() -> Result<Outcome> {
     let errors = tips()?.into_iter().map(|tip| (1e2 * (tip.fem_mm / tip.measured_mm - 1.0).abs(), tip));
     let (worst, tip) = errors.max_by(|one, other| one.0.total_cmp(&other.0)).context("no rows")?;
@@ -143,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn medians() {
+    fn the_median_of_odd_and_even_counts() {
         assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.5);
     }

@@ -1,32 +1,33 @@
-//! Slips of the pen: what the printed digits themselves say.
+//! Misprints: explanations by the printed digits alone.
 
 use crate::misprint::{Pair, single_digit, swapped_digits};
+use crate::reproduce::comparison::Comparison;
+use crate::reproduce::digits::short;
 use crate::reproduce::printed::{Relation, Rule};
-use crate::reproduce::{Judged, short};
 
-/// A number of a simulation that was cut off at two decimals: its own, finer, explanations.
-pub(super) fn simulated(number: &Judged, all: &[Judged]) -> Option<String> {
+/// Explanation of a number from a simulation whose numbers are truncated to two decimals.
+pub(super) fn simulated(number: &Comparison, all: &[Comparison]) -> Option<String> {
     if number.rule != Rule::Truncated || number.printed.decimals != 2 || number.printed.exponent != 0 {
         return None;
     }
-    let pair = |one: &Judged| Pair { printed: one.printed.value, computed: one.outcome.value };
+    let pair = |one: &Comparison| Pair { printed: one.printed.value, computed: one.outcome.value };
     let group: Vec<Pair> = all.iter().filter(|other| other.entry.group == number.entry.group).map(pair).collect();
     Some(pair(number).explain(&group))
 }
 
-/// Swapped or wrong digits, a shifted point, the reciprocal.
-pub(super) fn slip_of_the_pen(number: &Judged, used_again: bool) -> Option<String> {
-    let Judged { printed, outcome, rule, .. } = number;
-    let (found, expected) = (printed.digits(), printed.alike(outcome.value, *rule));
+/// Explanation by swapped or wrong digits, a shifted decimal point, or the reciprocal.
+pub(super) fn slip_of_the_pen(number: &Comparison, used_as_printed: bool) -> Option<String> {
+    let Comparison { printed, outcome, rule, .. } = number;
+    let (found, expected) = (printed.digits(), printed.format_like(outcome.value, *rule));
     let all_digits = printed.significant_digits();
     if number.entry.relation == Relation::About {
         let near = |power: i32| printed.agrees(outcome.value * 10f64.powi(power), Relation::About, *rule);
         let power = [-2, -1, 1, 2].into_iter().find(|&power| near(power))?;
         return Some(format!("10^{power} of the computed {} would be about right", short(outcome.value)));
     }
-    // The fewer digits agree, the less such a match says.
+    // The fewer digits agree, the weaker the evidence of a match.
     if all_digits >= 3
-        && !used_again
+        && !used_as_printed
         && let Some((left, right)) = swapped_digits(&expected, &found)
     {
         return Some(format!("the computed {expected} with its neighbouring digits {left} and {right} swapped"));
@@ -42,10 +43,10 @@ pub(super) fn slip_of_the_pen(number: &Judged, used_again: bool) -> Option<Strin
     if outcome.value != 0.0 && printed.agrees(outcome.value.recip(), Relation::Equal, *rule) {
         return Some(format!("printed is the reciprocal of the computed {}", short(outcome.value)));
     }
-    // The last digit is a matter of precision.
+    // A difference in the last digit is a matter of precision.
     let but_last = |text: &str| text.chars().take(text.len() - 1).collect::<String>();
     if all_digits >= 2
-        && !used_again
+        && !used_as_printed
         && but_last(&expected) != but_last(&found)
         && let Some((wrong, right)) = single_digit(&expected, &found)
     {
@@ -56,10 +57,10 @@ pub(super) fn slip_of_the_pen(number: &Judged, used_again: bool) -> Option<Strin
     None
 }
 
-/// A reading that one digit would put in line, and how much that says.
-pub(super) fn digit_of_a_reading(number: &Judged) -> Option<String> {
+/// Explanation of a reading by one misread digit, with the probability that one fits by chance.
+pub(super) fn digit_of_a_reading(number: &Comparison) -> Option<String> {
     let (low, high) = number.outcome.expected?;
-    // Well within: half of what is tolerated.
+    // Half of the tolerated deviation.
     let half = 0.25 * (high - low);
     let fits = |digits: &(String, f64), expected: f64| (digits.1 - expected).abs() <= half;
     let misread = misread(number)?;
@@ -68,7 +69,7 @@ pub(super) fn digit_of_a_reading(number: &Judged) -> Option<String> {
     if fitting.is_empty() {
         return Some("no single digit changed puts it in line".to_owned());
     }
-    // Had anything else been expected, up to twice as far off: how often would a digit have been found?
+    // Frequency with which some digit would fit if the expected value lay anywhere up to twice as far away.
     let (printed, off) = (number.printed.value, number.printed.value - number.outcome.value);
     let elsewhere = (-1000..=1000).map(|part| printed + 2e-3 * f64::from(part) * off);
     let found = elsewhere.filter(|&expected| misread.iter().any(|one| fits(one, expected))).count();
@@ -79,8 +80,8 @@ pub(super) fn digit_of_a_reading(number: &Judged) -> Option<String> {
     ))
 }
 
-/// All numbers that differ from a printed one in one digit: their digits and value.
-fn misread(number: &Judged) -> Option<Vec<(String, f64)>> {
+/// All numbers that differ from the printed one in a single digit: digits and value.
+fn misread(number: &Comparison) -> Option<Vec<(String, f64)>> {
     let digits: Vec<char> = number.printed.digits().chars().collect();
     let mut others = Vec::new();
     for (place, old) in digits.iter().enumerate().filter(|(_, old)| old.is_ascii_digit()) {
@@ -95,9 +96,9 @@ fn misread(number: &Judged) -> Option<Vec<(String, f64)>> {
     Some(others)
 }
 
-/// A small whole number times what is computed, to all of at least three digits.
-pub(super) fn simple_factor(number: &Judged) -> Option<String> {
-    let Judged { printed, outcome, rule, .. } = number;
+/// Explanation by a factor of 2 to 12 or its reciprocal, for numbers of at least three digits.
+pub(super) fn simple_factor(number: &Comparison) -> Option<String> {
+    let Comparison { printed, outcome, rule, .. } = number;
     if printed.significant_digits() < 3 {
         return None;
     }

@@ -1,4 +1,4 @@
-//! The printed numbers: `data/printed.toml`, and the tables it names.
+//! The printed numbers of `data/printed.toml` and of the tables it names.
 
 use std::collections::BTreeMap;
 
@@ -10,52 +10,52 @@ use crate::reproduce::printed::Relation;
 
 const PRINTED: &str = include_str!("../../../data/printed.toml");
 
-/// Tables by the name of their file.
+/// Tables by file name.
 const TABLES: [(&str, &str); 3] = [
     ("table1_bending.csv", include_str!("../../../data/table1_bending.csv")),
     ("section414_tip_displacement.csv", include_str!("../../../data/section414_tip_displacement.csv")),
     ("table3_stair.csv", include_str!("../../../data/table3_stair.csv")),
 ];
 
-/// What rests on a number, most important first.
+/// What depends on a number, most important first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BearsOn {
     /// A claim of the report.
     Conclusion,
-    /// The input of a model, or whether it is one.
+    /// An input of a model, or the validity of a model.
     Model,
-    /// A result that nothing is built on.
+    /// A result that nothing else depends on.
     #[default]
     Result,
     /// A side remark.
     Detail,
 }
 
-/// A printed number and how to compute it.
+/// A printed number and its computation.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// Where it is printed.
+    /// Place in the report.
     pub place: String,
-    /// As printed.
+    /// The number as printed.
     pub printed: String,
-    /// Unit.
+    /// Unit of the number.
     pub unit: String,
-    /// How the text means it.
+    /// Relation between the printed and the true number.
     pub relation: Relation,
     /// Name of the computation.
     pub of: String,
-    /// What goes into it.
+    /// Inputs of the computation.
     pub inputs: BTreeMap<String, Value>,
-    /// Other inputs that the text may mean.
+    /// Other values of the inputs that the text may mean.
     pub also: BTreeMap<String, Vec<Value>>,
-    /// Why the computation applies, where that is not plain.
+    /// Why the computation applies, where that is not obvious.
     pub because: Option<String>,
-    /// What rests on it.
+    /// What depends on the number.
     pub bears_on: BearsOn,
-    /// Numbers printed in the same way.
+    /// Name of the numbers printed with the same rounding rule.
     pub group: String,
-    /// True if it is a row of a table: then its inputs are its place in the table.
+    /// True for a number of a table, whose inputs are the other columns of its row.
     pub of_table: bool,
 }
 
@@ -85,7 +85,7 @@ struct Number {
     group: Option<String>,
 }
 
-/// A column of a table: one number a row, the other columns being inputs.
+/// A column of a table: one number per row, with the other columns as inputs.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Column {
@@ -100,15 +100,15 @@ struct Column {
     #[serde(default)]
     bears_on: BearsOn,
     group: Option<String>,
-    /// Rows that cannot be computed, at the top.
+    /// Number of rows at the top that cannot be computed.
     #[serde(default)]
     skip: usize,
 }
 
-/// Every number: tables first, then as in the file.
+/// All printed numbers, those of tables first.
 ///
 /// # Errors
-/// If a file that was built in is damaged.
+/// If a built-in data file is damaged.
 pub fn entries() -> Result<Vec<Entry>> {
     let file: File = toml::from_str(PRINTED).context("data/printed.toml")?;
     let mut entries = Vec::new();

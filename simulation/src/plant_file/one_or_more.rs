@@ -1,4 +1,4 @@
-//! A list that is written as a number where it has only one.
+//! (De)serialises a list of numbers; a list of length one is written as a plain number.
 
 use serde::{Deserializer, Serialize, Serializer};
 

@@ -1,9 +1,9 @@
-//! Where in a TOML text a value stands.
+//! The position of a value in a TOML text.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// File, line and column of a byte of `text`.
+/// File name, line and column of the byte at index `at` of `text`.
 pub(super) fn line_and_column(name: &str, text: &str, at: usize) -> String {
     let before = text.get(..at).unwrap_or(text);
     let line = before.matches('\n').count() + 1;
@@ -11,8 +11,8 @@ pub(super) fn line_and_column(name: &str, text: &str, at: usize) -> String {
     format!("{name}, line {line}, column {column}")
 }
 
-/// The byte at which the `value` of a field `table.key` starts: the value itself in a list that has it, else the list;
-/// where the field was left out, its table.
+/// Byte index of the `value` of a field `table.key`: of the element with that value in a list, else of the field's
+/// value; of its table if the field is missing.
 pub(super) fn of_field(text: &str, field: &str, value: f64) -> usize {
     let Ok(root) = DeTable::parse(text) else { return 0 };
     let mut start = 0;

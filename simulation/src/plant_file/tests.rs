@@ -1,10 +1,10 @@
 use crate::plant_file::*;
 
-/// Every table and field.
+/// A file with every table and field.
 const WHOLE: &str = include_str!("../../../docs/plant.toml");
 
 #[test]
-fn a_file_gives_its_numbers() {
+fn values_of_a_file_are_read() {
     let file = parse("p", "schema = 1\n[relaxation]\nshare = 0.2\ntau_s = 3\n").unwrap();
     assert_eq!(file.extended().plain(), Some(Plant { share: 0.2, time_constant_s: 3.0 }));
     assert_eq!(file, Plant { share: 0.2, time_constant_s: 3.0 }.into());
@@ -18,7 +18,7 @@ fn a_file_gives_its_numbers() {
 }
 
 #[test]
-fn the_plain_spring_can_be_asked_for() {
+fn load_plain_accepts_the_plain_spring_only() {
     assert_eq!(load_plain("paper").unwrap(), Plant::PAPER);
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/plant.toml");
     assert!(load_plain(example).unwrap_err().to_string().contains("expected [relaxation] with one share and tau_s"));
@@ -26,7 +26,7 @@ fn the_plain_spring_can_be_asked_for() {
 }
 
 #[test]
-fn what_is_written_is_read_again() {
+fn a_written_file_reads_back_unchanged() {
     let whole = parse("p", WHOLE).unwrap();
     let mut slim = whole.clone();
     (slim.memory, slim.law, slim.leakage, slim.unmodelled) = (None, None, None, None);
@@ -42,7 +42,7 @@ fn what_is_written_is_read_again() {
 }
 
 #[test]
-fn faults_are_one_line_with_their_place() {
+fn errors_are_one_line_with_their_place() {
     let plain = "schema = 1\n[relaxation]\nshare = 0.2\ntau_s = 3.0\n";
     let changed = |from: &str, to: &str| WHOLE.replace(from, to);
     for (text, expected) in [
@@ -78,7 +78,7 @@ fn faults_are_one_line_with_their_place() {
 }
 
 #[test]
-fn what_is_left_out_is_named_in_one_line() {
+fn effects_not_simulated_are_named_without_control_characters() {
     let text = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 5.5\n[unmodelled]\ndrift = 1\n\"a\\nb\\u0000\" = 1\n";
     assert_eq!(parse("t", text).unwrap().left_out(), [r"a\nb\0", "drift"]);
 }

@@ -1,33 +1,34 @@
-//! What determines the voltage for a while, and what becomes of the loop until then.
+//! The modes of the loop: what determines the voltage, and the solution within a mode.
 
 use crate::reference::Solution;
 
-/// What determines the voltage for a while.
+/// What determines the voltage for some time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Mode {
-    /// The control law.
+    /// The control law; no limit acts.
     Free,
-    /// Straight: at an end of the range (slope 0) or at the slew, until the law comes back to it.
+    /// The voltage is linear in time: constant at an end of the range, or at the slew limit, until the control law
+    /// takes over.
     Straight { slope: f64 },
 }
 
-/// How far beyond a limit still counts as at it, in V.
+/// Tolerance within which a voltage counts as being at a limit, in V.
 const TOLERANCE_V: f64 = 1e-9;
 
 impl Solution {
-    /// How fast the law moves, in V/s, while it is followed.
+    /// Slope of the control law's voltage, in V/s, while it is followed.
     fn law_slope(&self, slope: f64) -> f64 {
         let (dw, dz) = ((self.u - self.w) / self.system.time_constant_s, (self.u - self.z) * self.reset_per_s);
         self.law[0] * dw + self.law[1] * dz + self.law[2] * slope
     }
 
-    /// What determines the voltage from now on; moves `u` where it can follow at once.
+    /// Mode from now on; moves `u` where it can follow immediately.
     pub(super) fn mode(&mut self, target: f64, slope: f64) -> Mode {
         self.jump(target);
         let (lowest, highest) = self.system.range_v;
         let ahead = self.law_at(self.w, self.z, target) - self.u;
         let slew = self.system.slew_v_per_s;
-        // Where the law would have the voltage go: where it is already, or else where it is heading.
+        // Direction in which the control law would move the voltage, by its value or, if that is reached, by its slope.
         let pull = if ahead.abs() > TOLERANCE_V { ahead } else { self.law_slope(slope) };
         let at_end = if pull > 0.0 { self.u >= highest - TOLERANCE_V } else { self.u <= lowest + TOLERANCE_V };
         if at_end && pull != 0.0 {
@@ -39,7 +40,7 @@ impl Solution {
         }
     }
 
-    /// The solution after `duration_s` in one mode.
+    /// The solution after `duration_s` seconds in one mode.
     pub(super) fn after(&self, mode: Mode, target: f64, slope: f64, duration_s: f64) -> Self {
         let mut next = self.clone();
         match mode {
@@ -63,7 +64,7 @@ impl Solution {
         next
     }
 
-    /// True if `mode` cannot have led here.
+    /// True if this solution violates the conditions of `mode`.
     pub(super) fn broken(&self, mode: Mode, target: f64, slope: f64) -> bool {
         let (lowest, highest) = self.system.range_v;
         let ahead = self.law_at(self.w, self.z, target) - self.u;
@@ -71,7 +72,7 @@ impl Solution {
         match mode {
             Mode::Free => outside || self.law_slope(slope).abs() > self.system.slew_v_per_s * (1.0 + 1e-9),
             Mode::Straight { slope } if slope != 0.0 => outside || ahead * slope < 0.0,
-            // At an end of the range: until the law wants to go back inside.
+            // At an end of the range, until the control law points back inside.
             Mode::Straight { .. } => {
                 let end = if self.u > 0.5 * (lowest + highest) { 1.0 } else { -1.0 };
                 ahead * end < -TOLERANCE_V
@@ -80,7 +81,7 @@ impl Solution {
     }
 }
 
-/// A first-order lag of `rate` per second that follows a voltage starting at `u` with a `slope`.
+/// First-order lag with `rate` (1/s) whose input starts at `u` (V) with a `slope` (V/s), after `duration_s` seconds.
 fn follow(state: f64, u: f64, slope: f64, rate: f64, duration_s: f64) -> f64 {
     if rate == 0.0 {
         return state;

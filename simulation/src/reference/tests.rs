@@ -8,7 +8,7 @@ const PAPER: Loop = Loop {
     slew_v_per_s: f64::INFINITY,
 };
 
-/// Classical Runge-Kutta with very small steps, limits by clamping: other mathematics, the same answer.
+/// Classical Runge-Kutta method with small steps and clamped limits, an independent solution.
 fn runge_kutta(system: &Loop, target: impl Fn(f64) -> f64, end_s: f64) -> f64 {
     let (kp, ki) = system.gains.unwrap();
     let voltage = |t: f64, x: [f64; 2]| {
@@ -44,7 +44,7 @@ fn solve(system: Loop, target: impl Fn(f64) -> f64, sample_s: f64, end_s: f64) -
 }
 
 #[test]
-fn agrees_with_runge_kutta_free_and_limited() {
+fn solution_agrees_with_runge_kutta_with_and_without_limits() {
     let ramp = |t: f64| 100.0 * (t / 0.5).clamp(0.0, 1.0);
     for limit in [1e9, 250.0, 120.0] {
         let system = Loop { range_v: (0.0, limit), ..PAPER };
@@ -55,9 +55,9 @@ fn agrees_with_runge_kutta_free_and_limited() {
     }
 }
 
-/// Slow, quick or oscillating: many samples at once are as exact as one long stretch.
+/// For slow, fast and oscillating loops the kernel is as exact as one long stretch.
 #[test]
-fn many_samples_are_one_long_stretch() {
+fn many_samples_equal_one_long_stretch() {
     let ramp = |t: f64| 100.0 * (t / 0.5).clamp(0.0, 1.0);
     for gains in [Some((4.0, 1.35)), Some((4.0, 0.0)), Some((1.0, 0.4)), Some((4.0, 40.0)), None] {
         let system = Loop { gains, ..PAPER };
@@ -69,7 +69,7 @@ fn many_samples_are_one_long_stretch() {
 }
 
 #[test]
-fn the_sample_time_does_not_matter() {
+fn the_solution_is_independent_of_the_sample_time() {
     let target = |t: f64| if t < 3.0 { 100.0 * t.min(1.0) } else { 40.0_f64.max(100.0 - 400.0 * (t - 3.0)) };
     for (limit, slew) in [(1e9, f64::INFINITY), (130.0, f64::INFINITY), (1e9, 150.0), (130.0, 90.0)] {
         let system = Loop { range_v: (0.0, limit), slew_v_per_s: slew, ..PAPER };
@@ -79,7 +79,7 @@ fn the_sample_time_does_not_matter() {
     }
 }
 
-/// A loop that swings in and out of its limits: long stretches see as many limits as single samples.
+/// A loop that oscillates into its limits: a long stretch sees the same limits as single samples.
 #[test]
 fn limits_within_a_long_stretch_are_seen() {
     for (range_v, slew_v_per_s) in
@@ -98,9 +98,9 @@ fn limits_within_a_long_stretch_are_seen() {
     }
 }
 
-/// Ten decades of slew take no time to solve, and a fast one is no limit.
+/// A very high slew limit is cheap to solve and has no effect.
 #[test]
-fn a_very_fast_slew_is_like_none() {
+fn a_very_high_slew_limit_has_no_effect() {
     let at = |slew_v_per_s| {
         let mut solution = Loop { slew_v_per_s, range_v: (50.0, 700.0), ..PAPER }.at_rest(1e-3);
         solution.advance(100.0, 0.0, 3.0);
@@ -112,7 +112,7 @@ fn a_very_fast_slew_is_like_none() {
 }
 
 #[test]
-fn a_slew_limits_the_voltage_and_is_left_again() {
+fn the_slew_limit_acts_and_is_left_again() {
     let system = Loop { slew_v_per_s: 100.0, ..PAPER };
     let mut solution = system.at_rest(0.01);
     solution.advance(100.0, 0.0, 1.0);
@@ -122,7 +122,7 @@ fn a_slew_limits_the_voltage_and_is_left_again() {
 }
 
 #[test]
-fn without_a_controller_it_is_the_plain_exponential() {
+fn without_a_controller_the_response_is_exponential() {
     let mut solution = Loop { gains: None, ..PAPER }.at_rest(0.1);
     solution.jump(100.0);
     assert!((solution.moment().stiffness - 100.0 / 11.0).abs() < 1e-12);

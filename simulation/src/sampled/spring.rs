@@ -1,4 +1,4 @@
-//! The extended spring in double precision, for a voltage held as long as one likes: exact, not a tick.
+//! The extended spring in double precision, solved exactly for a voltage held for any time.
 //!
 //! ```text
 //! p = direct v + sum weight_j play_j(v)     play: z' = clamp(z, v - r, v + r)
@@ -7,28 +7,28 @@
 //! y = share q + sum weight_k w_k            w_k' = (q - w_k) / tau_k
 //! ```
 //!
-//! While the voltage holds, `f` does too, `l` is one exponential, and each `w_k`, driven by it, two.
+//! While the voltage is constant, so is `f`; `l` is then one exponential and each `w_k` a sum of two.
 
 use model::ExtendedPlant;
 
-/// A spring, in SI units.
+/// An extended spring, in SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spring {
     direct: f64,
-    /// Threshold in V, and weight.
+    /// Threshold in V and weight of each play operator.
     plays: Vec<(f64, f64)>,
-    /// Input and output in V; empty: the output is the input.
+    /// Input and output of each point, in V; empty for the identity.
     law: Vec<(f64, f64)>,
     /// Share, and time constant in s.
     leakage: (f64, f64),
     share: f64,
-    /// Time constant in s, and weight.
+    /// Time constant in s and weight of each lag.
     lags: Vec<(f64, f64)>,
-    /// The first time constant at 500 V, in s.
+    /// The first time constant at 500 V, in s; `None` if it is constant.
     high_s: Option<f64>,
 }
 
-/// Where a spring is, in V.
+/// State of an extended spring, in V.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     voltage: f64,
@@ -37,14 +37,14 @@ pub struct State {
     lags: Vec<f64>,
 }
 
-/// What a change of the voltage does, in V/V.
+/// Effect of a change of the voltage by 1 V, dimensionless.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turning {
-    /// At the end of the first tick.
+pub struct Reversal {
+    /// Change of the stiffness at the end of the first tick.
     pub within_a_tick: f64,
-    /// More, in each later tick.
+    /// Further change in each later tick.
     pub in_each_later: f64,
-    /// What part of its distance the slowest lag makes in a tick.
+    /// Part of its remaining distance that the slowest lag covers in a tick.
     pub relaxed: f64,
 }
 
@@ -85,12 +85,12 @@ impl From<model::Plant> for Spring {
 }
 
 impl Spring {
-    /// Without voltage, settled.
+    /// The state at rest at 0 V.
     pub fn at_rest(&self) -> State {
         State { voltage: 0.0, plays: vec![0.0; self.plays.len()], leaked: 0.0, lags: vec![0.0; self.lags.len()] }
     }
 
-    /// `volts` are put across the spring.
+    /// Applies `volts` (V) across the spring.
     pub fn apply(&self, state: &mut State, volts: f64) {
         state.voltage = volts;
         for (place, (threshold, _)) in state.plays.iter_mut().zip(&self.plays) {
@@ -98,16 +98,16 @@ impl Spring {
         }
     }
 
-    /// The stiffness now, in V.
+    /// Stiffness as the equivalent static voltage, in V.
     pub fn stiffness(&self, state: &State) -> f64 {
-        let charge = self.answer(state) - self.leakage.0 * state.leaked;
+        let charge = self.law_output(state) - self.leakage.0 * state.leaked;
         let later: f64 = self.lags.iter().zip(&state.lags).map(|((_, weight), lag)| weight * lag).sum();
         self.share * charge + later
     }
 
-    /// The voltage holds for `seconds`.
+    /// Holds the voltage for `seconds`.
     pub fn hold(&self, state: &mut State, seconds: f64) {
-        let answer = self.answer(state);
+        let answer = self.law_output(state);
         let (leak_share, leak_tau) = self.leakage;
         let still_to_leak = leak_share * (answer - state.leaked);
         let settled = (1.0 - leak_share) * answer;
@@ -123,16 +123,17 @@ impl Spring {
         state.leaked = answer + (state.leaked - answer) * (-seconds / leak_tau).exp();
     }
 
-    /// What one volt more gives at once, where it gives most: every play moves, on the steepest line of the law.
-    pub fn steepest(&self) -> f64 {
+    /// Largest instantaneous change of the stiffness per volt: all play operators move, on the steepest segment of the
+    /// law.
+    pub fn steepest_slope(&self) -> f64 {
         let plays: f64 = self.plays.iter().map(|(_, weight)| weight.max(0.0)).sum();
         let slopes = self.law.windows(2).map(|pair| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0));
         let law = if self.law.is_empty() { 1.0 } else { slopes.fold(0.0, f64::max) };
         self.share * law * (self.direct.max(0.0) + plays)
     }
 
-    /// What one volt less does at the least when the voltage turns back, in ticks of `seconds`.
-    pub fn turning(&self, seconds: f64) -> Turning {
+    /// Smallest effect of 1 V when the voltage turns back, for ticks of `seconds`.
+    pub fn reversal(&self, seconds: f64) -> Reversal {
         let slopes = self.law.windows(2).map(|pair| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0));
         let law = slopes.reduce(f64::min).unwrap_or(1.0);
         let all: f64 = self.plays.iter().map(|(_, weight)| weight).sum::<f64>() + self.direct;
@@ -148,18 +149,18 @@ impl Spring {
             self.lags.iter().enumerate().map(|(index, &(tau, weight))| (made(slowest(index, tau)), weight)).collect();
         let later: f64 = lags.iter().map(|(made, weight)| made * weight).sum();
         let in_each_later = slope * (1.0 - mean_loss) * later;
-        Turning {
+        Reversal {
             within_a_tick: slope * self.share * (1.0 - loss * made(leak_tau)) + in_each_later,
             in_each_later,
             relaxed: lags.iter().map(|lag| lag.0).fold(1.0, f64::min),
         }
     }
 
-    /// The law's answer to the memory of the voltage.
-    fn answer(&self, state: &State) -> f64 {
+    /// Output of the static law after the play operators, in V.
+    fn law_output(&self, state: &State) -> f64 {
         let plays: f64 = self.plays.iter().zip(&state.plays).map(|((_, weight), place)| weight * place).sum();
         let input = self.direct * state.voltage + plays;
-        // The pair of points around the input, or the nearest pair.
+        // The segment around the input, or the nearest one.
         let after = self.law.partition_point(|point| point.0 <= input);
         match self.law.len() {
             0 => input,
@@ -172,18 +173,33 @@ impl Spring {
     }
 }
 
-/// A time constant that goes straight from `low_s` at 0 V through `high_s` at 500 V, never below half of the shorter.
+/// Simulates the spring without a controller, from rest at 0 V: returns its stiffness in V at the increasing times `time_s`
+/// (s), each just after `voltage_v` (V) of the same index was applied; every voltage is held until the next time.
+pub fn simulate(spring: &Spring, time_s: &[f64], voltage_v: &[f64]) -> Vec<f64> {
+    let mut state = spring.at_rest();
+    let lasts = time_s.windows(2).map(|pair| pair[1] - pair[0]).chain([0.0]);
+    let points = voltage_v.iter().zip(lasts);
+    let at = |(&voltage, lasts): (&f64, f64)| {
+        spring.apply(&mut state, voltage);
+        let stiffness = spring.stiffness(&state);
+        spring.hold(&mut state, lasts);
+        stiffness
+    };
+    points.map(at).collect()
+}
+
+/// Time constant that is linear in the voltage, `low_s` at 0 V and `high_s` at 500 V, at least half of the shorter one.
 fn varied(low_s: f64, high_s: f64, volts: f64) -> f64 {
     let straight = low_s * (1.0 - volts.max(0.0) / 500.0) + high_s * volts.max(0.0) / 500.0;
     straight.max(low_s.min(high_s) / 2.0)
 }
 
-/// What a lag of `tau` makes of an input `exp(-t / fading)` in `seconds`.
+/// Response after `seconds` of a lag with time constant `tau` to the input `exp(-t / fading)`.
 fn decaying_input(seconds: f64, tau: f64, fading: f64) -> f64 {
     let difference = 1.0 / tau - 1.0 / fading;
     let x = difference * seconds;
     if x.abs() < 1e-4 {
-        // The difference of two almost equal exponentials, as a series.
+        // Series of the difference of two almost equal exponentials.
         return seconds / tau * (-seconds / tau).exp() * (1.0 + x / 2.0 + x * x / 6.0);
     }
     ((-seconds / fading).exp() - (-seconds / tau).exp()) / (difference * tau)
@@ -193,17 +209,16 @@ fn decaying_input(seconds: f64, tau: f64, fading: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::plant_file::parse;
-    use crate::sampled::simulate;
 
-    /// The example, its leakage and its second lag just as fast.
+    /// The example file, with equal time constants of leakage and second lag.
     fn example() -> Spring {
         let text = include_str!("../../../docs/plant.toml").replace("40.0", "7.0");
         Spring::from(parse("docs/plant.toml", &text).unwrap().extended())
     }
 
-    /// One hold of seconds is the same as very many small steps by Euler's method, and as two shorter holds.
+    /// One hold equals many small Euler steps, and two shorter holds.
     #[test]
-    fn a_hold_is_exact() {
+    fn a_hold_agrees_with_small_steps_and_shorter_holds() {
         let spring = example();
         let mut state = spring.at_rest();
         spring.apply(&mut state, 400.0);
@@ -215,7 +230,7 @@ mod tests {
         spring.hold(&mut short, 1.75);
         assert!((spring.stiffness(&long) - spring.stiffness(&short)).abs() < 1e-9);
 
-        let (f, steps) = (spring.answer(&state), 3_000_000);
+        let (f, steps) = (spring.law_output(&state), 3_000_000);
         let h = 3.0 / f64::from(steps);
         for _ in 0..steps {
             let q = f - 0.1 * state.leaked;
@@ -227,29 +242,29 @@ mod tests {
         assert!((exact - euler).abs() < 1e-4, "{exact} {euler}");
     }
 
-    /// Numbers by hand: up to 300 V, back to 290 V, and the law between and beyond its points.
+    /// Computed by hand: up to 300 V, back to 290 V, and between and beyond the points of the law.
     #[test]
-    fn memory_and_law_by_hand() {
+    fn play_operators_and_law_agree_with_hand_computation() {
         let spring = example();
         let mut state = spring.at_rest();
         spring.apply(&mut state, 300.0);
         // 0.8 * 300 + 0.15 * 290 + 0.05 * 275 = 297.25, on the line from (200, 190) to (300, 300)
-        assert!((spring.answer(&state) - (190.0 + 1.1 * 97.25)).abs() < 1e-9);
+        assert!((spring.law_output(&state) - (190.0 + 1.1 * 97.25)).abs() < 1e-9);
         spring.apply(&mut state, 290.0);
-        // Both plays stay.
-        assert!((spring.answer(&state) - (190.0 + 1.1 * 89.25)).abs() < 1e-9);
+        // Both play operators stay.
+        assert!((spring.law_output(&state) - (190.0 + 1.1 * 89.25)).abs() < 1e-9);
         spring.apply(&mut state, 700.0);
         // 560 + 103.5 + 33.75 = 697.25, beyond the last point on its line
-        assert!((spring.answer(&state) - (500.0 + 0.9 * 197.25)).abs() < 1e-9);
+        assert!((spring.law_output(&state) - (500.0 + 0.9 * 197.25)).abs() < 1e-9);
         spring.apply(&mut state, -100.0);
         // -80 - 13.5 - 3.75
-        assert!((spring.answer(&state) + 0.9 * 97.25).abs() < 1e-9);
-        assert!((spring.steepest() - 0.0909 * 1.1).abs() < 1e-12);
+        assert!((spring.law_output(&state) + 0.9 * 97.25).abs() < 1e-9);
+        assert!((spring.steepest_slope() - 0.0909 * 1.1).abs() < 1e-12);
     }
 
-    /// Rows any time apart, the last of a long rest.
+    /// Rows at uneven times, the last after a long rest.
     #[test]
-    fn simulate_gives_one_stiffness_a_row() {
+    fn simulate_returns_the_stiffness_at_each_row() {
         let spring = Spring::from(model::Plant { share: 0.2, time_constant_s: 2.0 });
         let got = simulate(&spring, &[0.0, 1.0, 3.0, 1003.0], &[0.0, 100.0, 50.0, 50.0]);
         let relaxed = 100.0 * (1.0 - (-1f64).exp());

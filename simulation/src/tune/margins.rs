@@ -1,15 +1,15 @@
-//! Stability margins of the proportional-integral loop, linearised, at the controller's own rate.
+//! Stability margins of the linearised proportional-integral loop at the controller's rate.
 //!
 //! ```text
 //! L(z) = (Kp + Ki T / (z - 1)) steepness (share + sum_k weight_k r_k / (z - 1 + r_k)),    r = 1 - exp(-T / tau)
 //! ```
 //!
-//! The loop solves for the share that comes at once, so it has no delay. `steepness` is the steepest that law and memory
-//! are. Leakage is left out: it is slow, and lowers the gain.
+//! The controller solves for the instantaneous share, so the loop has no delay. `steepness` is the largest slope of law
+//! and play operators. Leakage is neglected: it is slow and reduces the gain.
 //!
-//! Gain margin: what `L` may be multiplied by. Phase margin: how far `L` is from -1 where its magnitude is 1. Greatest
-//! sensitivity: the largest of `1 / |1 + L|`; 2 or less is the usual advice (K. J. Astrom, R. M. Murray: Feedback Systems,
-//! 2008, chapter 11).
+//! Gain margin: the factor on `L` at the stability limit. Phase margin: the phase distance of `L` from -180 degrees
+//! where `|L| = 1`. Largest sensitivity: the maximum of `1 / |1 + L|`, for which 2 or less is recommended (K. J.
+//! Astrom, R. M. Murray: Feedback Systems, 2008, chapter 11).
 
 use model::Gains;
 use nalgebra::Complex;
@@ -17,26 +17,26 @@ use serde::Serialize;
 
 use crate::plant_file::PlantFile;
 
-/// Margins; `None` where nothing ends them.
+/// Stability margins; a margin is `None` if it is unlimited.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Margins {
-    /// A factor.
+    /// Gain margin, a factor.
     pub gain: Option<f64>,
-    /// In degrees.
+    /// Phase margin, in degrees.
     pub phase_deg: Option<f64>,
-    /// The largest of `1 / |1 + L|`.
+    /// Maximum of `1 / |1 + L|`.
     pub greatest_sensitivity: f64,
 }
 
 impl Margins {
-    /// What tuned gains keep.
+    /// The margins required of tuned gains.
     pub const LEAST: Self = Self { gain: Some(2.0), phase_deg: Some(45.0), greatest_sensitivity: 2.0 };
 
-    /// Of these gains on a spring.
+    /// Margins of a controller with these gains on a spring, at `rate_hz` ticks per second.
     pub fn of(file: &PlantFile, gains: &Gains, rate_hz: f64) -> Self {
         const POINTS: u32 = 2000;
         let highest = std::f64::consts::PI;
-        // From a full turn in a day of ticks up to half of one in a tick.
+        // Frequencies from 1e-7 of half a turn per tick up to half a turn per tick.
         let angles =
             (0..=POINTS).map(|point| highest * 10f64.powf(-7.0 * (1.0 - f64::from(point) / f64::from(POINTS))));
         let open = |angle: f64| open_loop(file, gains, rate_hz, Complex::from_polar(1.0, angle));
@@ -58,8 +58,8 @@ impl Margins {
         margins
     }
 
-    /// Whether they keep [`Margins::LEAST`].
-    pub fn enough(&self) -> bool {
+    /// True if all margins are at least as good as [`Margins::LEAST`].
+    pub fn sufficient(&self) -> bool {
         let at_least =
             |own: Option<f64>, least: Option<f64>| own.is_none_or(|own| least.is_none_or(|least| own >= least));
         at_least(self.gain, Self::LEAST.gain)
@@ -88,9 +88,9 @@ mod tests {
     use super::*;
     use model::Plant;
 
-    /// Slow gains on a spring with little share: in continuous time `L = (Kp + Ki / s) / (1 + tau s)` by hand.
+    /// Low gains on a spring without instantaneous share: in continuous time `L = (Kp + Ki / s) / (1 + tau s)`.
     #[test]
-    fn as_by_hand_in_continuous_time() {
+    fn margins_agree_with_the_closed_form_in_continuous_time() {
         let file = PlantFile::from(Plant { share: 0.0, time_constant_s: 5.5 });
         let margins = Margins::of(&file, &Gains { proportional: 2.0, integral_per_s: 4.0 }, 1000.0);
         // |L| = 1: (Kp^2 w^2 + Ki^2) = w^2 (1 + tau^2 w^2)
@@ -100,6 +100,6 @@ mod tests {
         let got = margins.phase_deg.unwrap();
         assert!((got - phase).abs() < 0.5, "{got} {phase}");
         assert_eq!(margins.gain, None, "two lags never turn it to -180 degrees: {margins:?}");
-        assert!(!Margins::of(&file, &Gains { proportional: 0.01, integral_per_s: 50.0 }, 1000.0).enough());
+        assert!(!Margins::of(&file, &Gains { proportional: 0.01, integral_per_s: 50.0 }, 1000.0).sufficient());
     }
 }

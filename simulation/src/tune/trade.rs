@@ -1,8 +1,7 @@
-//! What an error of the model costs: the voltages that a controller puts out, having the spring as it is said to be for
-//! its estimate, on springs that are not.
+//! The effect of model errors: a controller computed with the nominal spring drives springs that differ from it.
 //!
-//! Without a sensor nothing tells the controller of the difference, so its voltages are those of the nominal run, and each
-//! other spring just answers them. A step counts from the stiffness that it started at.
+//! Without a sensor the controller cannot detect the difference, so its voltages are those of the nominal run, and only
+//! the response of the spring changes. A step is measured from the stiffness at its start.
 
 use model::ScaledStiffness;
 use serde::Serialize;
@@ -12,25 +11,25 @@ use crate::plant_file::PlantFile;
 use crate::response::measure;
 use crate::sampled::{self, Spring};
 use crate::schedule::{Change, Schedule};
-use crate::tune::Worst;
+use crate::tune::worst::Worst;
 
-/// What is wrong.
+/// A parameter of the spring that differs from the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parameter {
-    /// The instantaneous share; the settled value stays.
+    /// The instantaneous share, at constant settled value.
     Share,
     /// All time constants.
     TimeConstant,
-    /// The whole response.
+    /// The gain of the whole response.
     Gain,
 }
 
 impl Parameter {
-    /// All of them.
+    /// All parameters.
     pub const ALL: [Self; 3] = [Self::Share, Self::TimeConstant, Self::Gain];
 
-    /// For people.
+    /// Name for texts and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Share => "share",
@@ -40,35 +39,35 @@ impl Parameter {
     }
 }
 
-/// Both controllers on one spring that is not what they take it for.
+/// Both controllers on a spring that differs from their model.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Trade {
-    /// What is off.
+    /// The parameter that differs.
     pub parameter: Parameter,
-    /// By what part of itself, -0.5 to 0.5: the spring's less the model's.
+    /// Relative difference of the spring's parameter from the model's, -0.5 to 0.5.
     pub error: f64,
-    /// The tuned proportional-integral controller.
+    /// Worst response with the tuned proportional-integral controller; `None` if there are no gains.
     pub proportional_integral: Option<Worst>,
-    /// The fast one.
+    /// Worst response with the time-optimal controller.
     pub fast: Option<Worst>,
 }
 
-/// Over +-50 % in steps of 5 %.
-pub(super) fn over_errors(file: &PlantFile, with_gains: Option<&Run>, fast: Option<&Run>) -> Vec<Trade> {
+/// Evaluates errors of -50 % to +50 % in steps of 5 %.
+pub(super) fn over_model_errors(file: &PlantFile, with_gains: Option<&Run>, fast: Option<&Run>) -> Vec<Trade> {
     let mut trade = Vec::new();
     for parameter in Parameter::ALL {
         for part in -10..=10 {
             let error = f64::from(part) / 20.0;
-            let on = |run: Option<&Run>| run.map(|run| on_another(file, parameter, error, run));
+            let on = |run: Option<&Run>| run.map(|run| with_model_error(file, parameter, error, run));
             trade.push(Trade { parameter, error, proportional_integral: on(with_gains), fast: on(fast) });
         }
     }
     trade
 }
 
-/// The voltages of `run` on a spring that differs from the file's.
-fn on_another(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> Worst {
-    let (spring, gain) = another(file, parameter, 1.0 + error);
+/// Worst response when the voltages of `run` drive a spring that differs from the file's.
+fn with_model_error(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> Worst {
+    let (spring, gain) = differing_spring(file, parameter, 1.0 + error);
     let times: Vec<f64> = (0..run.with.len()).map(|tick| run.time_s(tick)).collect();
     let volts: Vec<f64> = run.with.iter().map(|sample| sample.applied.to_f64()).collect();
     let stiffness = sampled::simulate(&spring, &times, &volts);
@@ -87,8 +86,8 @@ fn on_another(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> 
     Worst::of(each)
 }
 
-/// A spring whose parameter is `factor` times the file's, and the gain behind it.
-fn another(file: &PlantFile, parameter: Parameter, factor: f64) -> (Spring, f64) {
+/// A spring whose `parameter` is `factor` times the file's, and the gain of its response.
+fn differing_spring(file: &PlantFile, parameter: Parameter, factor: f64) -> (Spring, f64) {
     let mut file = file.clone();
     let relaxation = &mut file.relaxation;
     match parameter {
@@ -114,15 +113,15 @@ mod tests {
     use super::*;
     use model::Plant;
 
-    /// The settled value does not depend on how it is reached.
+    /// The settled value is independent of share and time constants.
     #[test]
-    fn another_share_or_time_constant_keeps_the_settled_value() {
+    fn share_and_time_constant_do_not_change_the_settled_value() {
         let text = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = [2.0, 9.0]\nweights = [0.5, 0.3]\n";
         for file in [PlantFile::from(Plant::PAPER), crate::plant_file::parse("two lags", text).unwrap()] {
             let settled = |spring: &Spring| sampled::simulate(spring, &[0.0, 1e4], &[100.0, 100.0])[1];
             let nominal = settled(&Spring::from(file.extended()));
             for parameter in Parameter::ALL {
-                let (spring, gain) = another(&file, parameter, 1.4);
+                let (spring, gain) = differing_spring(&file, parameter, 1.4);
                 let expected = if parameter == Parameter::Gain { 1.4 * nominal } else { nominal };
                 assert!((gain * settled(&spring) - expected).abs() < 1e-6, "{parameter:?}");
             }

@@ -1,10 +1,10 @@
-//! Random springs such as identification finds: each block alone and all together.
+//! Random springs in the range of identified ones: each block alone and all together.
 
 use model::Plant;
 use proptest::prelude::*;
 use simulation::plant_file::{Law, Leakage, Memory, PlantFile, Relaxation};
 
-/// Which blocks are there.
+/// The blocks that a spring has.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Blocks {
     pub(crate) memory: bool,

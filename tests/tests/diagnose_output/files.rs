@@ -143,7 +143,7 @@ fn all_files_or_none() {
 
     let (code, error) = rejected(folder.path(), &["diagnose", "record.csv", "--out", "record.csv"]);
     assert_eq!(code, Some(2), "{error}");
-    assert!(error.contains("record.csv: cannot be made") && error.contains("expected a folder"), "{error}");
+    assert!(error.contains("record.csv: cannot be created") && error.contains("expected a writable folder"), "{error}");
 
     // A bad record leaves no folder behind.
     fs::write(folder.path().join("bad.csv"), "time_s,voltage_v\n").expect("a file");

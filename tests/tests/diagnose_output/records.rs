@@ -110,7 +110,7 @@ fn an_offset_within_one_held_out_segment_gives_no_held_out_improvement() {
     assert!(number("/extended/rmse") < 0.4, "{found}");
     assert!(number("/extended/held_out_rmse") > 0.9 * number("/baseline/held_out_rmse"), "{found}");
     let printed = text(&run(folder.path(), &["diagnose", "record.csv"]).stdout);
-    assert!(printed.contains("no other part of the record foretells it"), "{printed}");
+    assert!(printed.contains("the other parts of the record do not predict it"), "{printed}");
 }
 
 /// Errors that no cause explains are neither consistent nor outliers, although autocorrelated noise may resemble them

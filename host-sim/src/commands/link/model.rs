@@ -3,62 +3,59 @@
 use anyhow::{Context, Result};
 use clap::Args;
 use host_sim::link::Failure;
+use host_sim::output::terminal::{json, print, remark};
 use link::{Reason, WireModel};
 use simulation::{BadInput, bad_input, plant_file};
 
-use super::Talk;
+use super::session::Session;
 
-/// A spring nearer to rest than this, in V, counts as settled.
+/// A spring whose stiffness is below this, in V, counts as settled at 0 V.
 const SETTLED_V: f64 = 1.0;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// A plant file, as `vsj diagnose --out` writes it, or `paper`
+    /// A plant file, such as `vsj diagnose --out` writes, or `paper`
     #[arg(value_name = "FILE.toml|paper")]
     plant: Option<String>,
 }
 
 impl Arguments {
-    /// What is to be sent.
+    /// Reads the model to be sent; `None` without a plant file.
     pub(super) fn read(&self) -> Result<Option<WireModel>> {
         let Some(plant) = &self.plant else { return Ok(None) };
         let file = plant_file::load(plant)?;
         let left_out = file.left_out();
         if !left_out.is_empty() {
-            eprintln!("vsj: {plant}: not run by the MCU: {}", left_out.join(", "));
+            remark(&format!("{plant}: not run by the MCU: {}", left_out.join(", ")));
         }
         Ok(Some(file.wire().map_err(|error| BadInput(format!("{plant}: {error}")))?))
     }
 }
 
-pub(super) fn run(talk: &mut Talk, arguments: &Arguments, model: Option<&WireModel>) -> Result<()> {
+pub(super) fn run(session: &mut Session, arguments: &Arguments, model: Option<&WireModel>) -> Result<()> {
     let answer = match model {
-        None => talk.client.models(),
-        Some(model) => talk.client.install(model),
+        None => session.client.models(),
+        Some(model) => session.client.install(model),
     };
-    let name = talk.client.name();
+    let name = session.client.name();
     let models = match answer {
         Err(Failure::Refused(reason @ Reason::BadModel { .. })) => {
             bad_input!("{}: {reason}", arguments.plant.as_deref().unwrap_or_default())
         }
         answer => answer.with_context(|| name.to_owned())?,
     };
-    let estimate_v = talk.status.sample.estimate.to_f64();
+    let estimate_v = session.status.sample.estimate.to_f64();
     if let Some(wait_s) = model.and_then(|model| unsettled_s(estimate_v, model)) {
-        eprintln!(
-            "vsj: {name}: the spring is still {estimate_v:.0} V stiff, and the MCU that has restarted takes it to be at rest; \
+        remark(&format!(
+            "{name}: the estimated stiffness is still {estimate_v:.0} V, but the MCU has restarted and takes it to be at rest; \
              leave it disarmed for {wait_s:.0} s"
-        );
+        ));
     }
-    if talk.json {
-        println!("{}", serde_json::to_string(&models)?);
-    } else {
-        println!("runs    {}\nstored  {}", models.active, models.stored);
-    }
-    Ok(())
+    let text = format!("runs    {}\nstored  {}\n", models.active, models.stored);
+    print(&if session.json { json(&models)? } else { text })
 }
 
-/// How long the slowest of a spring's relaxations takes to settle without voltage, in s, if it has not.
+/// Time in s that the slowest relaxation needs to settle at 0 V; `None` if it has settled.
 fn unsettled_s(estimate_v: f64, model: &WireModel) -> Option<f64> {
     let leak_s = model.leakage.map(|(_, time_constant_s)| time_constant_s);
     let all_s = model.time_constants_s.iter().copied().chain(model.time_constant_high_s).chain(leak_s);

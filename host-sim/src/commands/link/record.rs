@@ -1,42 +1,43 @@
-//! `vsj link PORT record`: telemetry to a file, and a schedule to the MCU meanwhile if one is asked for.
+//! `vsj link PORT record`: writes telemetry to a file, and optionally commands a schedule.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::link::Recording;
+use host_sim::output::recording::Recording;
+use host_sim::output::terminal::{print, remark};
 use indicatif::{ProgressBar, ProgressStyle};
-use link::{Desired, Request, State};
+use link::{Desired, Request};
 use serde_json::json;
 use simulation::bad_input;
 use simulation::record::{MEASURED, Record};
-use simulation::schedule::Schedule;
+use simulation::schedule::{Between, Schedule};
 
-use super::{Talk, seconds, stop_on_interrupt, stopped};
-use crate::commands::voltage::Between;
+use super::session::{Session, seconds, stop_on_interrupt, stopped};
+use crate::commands::choice::{BETWEEN, one_of};
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
     /// The file to write
     #[arg(value_name = "FILE.csv")]
     file: PathBuf,
-    /// Stop after so many seconds; without it, with Ctrl-C or at the end of --input
+    /// Stop after this many seconds; default: at the end of --input, or with Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Samples per second; 115 200 bit/s carry about 250
+    /// Samples per second; 115 200 bit/s suffice for about 250
     #[arg(long, default_value_t = 100.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// Lead an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v
+    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v
     #[arg(long, value_name = "stair|step|FILE.csv")]
     input: Option<String>,
-    /// What the voltage does between two rows of an input file
-    #[arg(long, value_enum, default_value_t)]
+    /// Interpolation of the voltage between two rows of an input file
+    #[arg(long, default_value = "hold", value_parser = one_of(BETWEEN))]
     between: Between,
-    /// Arm first
+    /// Arm the MCU first
     #[arg(long)]
     arm: bool,
-    /// Overwrite a file that exists
+    /// Overwrite an existing file
     #[arg(long)]
     force: bool,
 }
@@ -59,56 +60,55 @@ impl Arguments {
             None => None,
             Some("stair") => Some(Schedule::stair()),
             Some("step") => Some(Schedule::ideal_stair()),
-            Some(file) => Some(Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between.into())),
+            Some(file) => Some(Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between)),
         })
     }
 }
 
-pub(super) fn run(talk: &mut Talk, arguments: &Arguments) -> Result<()> {
+pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let schedule = arguments.schedule()?;
-    if schedule.is_some() && !arguments.arm && talk.status.sample.state != State::Armed {
-        bail!("{}: not armed ({}); expected --arm with --input", talk.client.name(), talk.status.sample.state);
+    if schedule.is_some() && !arguments.arm && session.status.sample.state != link::State::Armed {
+        bail!("{}: not armed ({}); expected --arm with --input", session.client.name(), session.status.sample.state);
     }
     if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {
-        // Before anything is armed or written, not in the middle of an experiment.
-        schedule.check_range(name, talk.status.lowest.to_f64(), talk.status.highest.to_f64())?;
+        // Checked before anything is armed or written.
+        schedule.check_range(name, session.status.lowest.to_f64(), session.status.highest.to_f64())?;
     }
     let length = schedule.as_ref().map(|schedule| Duration::from_secs_f64(schedule.end_s() - schedule.start_s()));
     let whole = arguments.time()?.or(length);
-    let ticks = f64::from(talk.status.rate_hz) / arguments.rate_hz;
+    let ticks = f64::from(session.status.rate_hz) / arguments.rate_hz;
     let every_ticks = ticks.round().clamp(1.0, f64::from(u16::MAX)) as u16;
     stop_on_interrupt()?;
-    let mut recording = Recording::new(&arguments.file, arguments.force, &talk.status, every_ticks)?;
+    let mut recording = Recording::new(&arguments.file, arguments.force, &session.status, every_ticks)?;
     if arguments.arm {
-        talk.order(Request::Arm)?;
+        session.order(Request::Arm)?;
     }
-    talk.order(Request::Stream { every_ticks })?;
-    let done = follow(talk, schedule.as_ref(), whole, &mut recording);
-    // Out of courtesy: it also stops by itself when it no longer hears us.
-    let stopped = talk.order(Request::Stream { every_ticks: 0 });
+    session.order(Request::Stream { every_ticks })?;
+    let done = follow(session, schedule.as_ref(), whole, &mut recording);
+    // The MCU would also stop by itself once the host is silent.
+    let stopped = session.order(Request::Stream { every_ticks: 0 });
     let (summary, file) = (recording.summary(), arguments.file.display());
-    done.with_context(|| format!("{file} keeps {} rows", summary.rows))?;
+    done.with_context(|| format!("{file} contains {} rows", summary.rows))?;
     stopped?;
     if summary.stiffness == "estimate" {
-        eprintln!("vsj: no sensor: the column stiffness is the controller's own estimate, not a measurement");
+        remark("no sensor: the column stiffness is the controller's own estimate, not a measurement");
     }
-    if talk.json {
+    if session.json {
         let mut report = serde_json::to_value(summary)?;
         report["file"] = json!(arguments.file);
-        println!("{report}");
+        print(&format!("{report}\n"))
     } else {
-        println!("wrote {file}: {} rows, {} s, {} lost", summary.rows, summary.seconds, summary.lost);
+        print(&format!("wrote {file}: {} rows, {} s, {} lost\n", summary.rows, summary.seconds, summary.lost))
     }
-    Ok(())
 }
 
 fn follow(
-    talk: &mut Talk,
+    session: &mut Session,
     schedule: Option<&Schedule>,
     whole: Option<Duration>,
     recording: &mut Recording,
 ) -> Result<()> {
-    let name = talk.client.name().to_owned();
+    let name = session.client.name().to_owned();
     let bar = match whole {
         Some(time) if time < Duration::from_secs(1 << 30) => ProgressBar::new(time.as_secs()),
         _ => ProgressBar::no_length(),
@@ -116,26 +116,26 @@ fn follow(
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos} of {len} s, {msg}")?);
     let whole = whole.unwrap_or(Duration::MAX);
     let mut reader = schedule.map(|schedule| (schedule.start_s(), schedule.reader()));
-    let (start, heartbeat) = (Instant::now(), talk.heartbeat());
+    let (start, heartbeat) = (Instant::now(), session.heartbeat());
     let (mut commanded, mut heard) = (None, start);
     while start.elapsed() < whole && !stopped() {
         let elapsed = start.elapsed();
         if let Some((from, reader)) = &mut reader {
             let volts = reader.at(*from + elapsed.as_secs_f64());
             if commanded != Some(volts) {
-                talk.order(Request::Set(Desired::ScaledVolts(volts)))?;
+                session.order(Request::Set(Desired::ScaledVolts(volts)))?;
                 (commanded, heard) = (Some(volts), Instant::now());
             }
         }
         if heard.elapsed() >= heartbeat {
-            let (state, _) = talk.order(Request::Heartbeat)?;
+            let (state, _) = session.order(Request::Heartbeat)?;
             if reader.is_some() {
-                talk.still_armed(state)?;
+                session.still_armed(state)?;
             }
             heard = Instant::now();
         }
         let wait = Duration::from_millis(5).min(whole.saturating_sub(start.elapsed()));
-        for sample in talk.client.samples(wait).with_context(|| name.clone())? {
+        for sample in session.client.samples(wait).with_context(|| name.clone())? {
             recording.add(&sample)?;
         }
         bar.set_position(elapsed.as_secs());

@@ -2,22 +2,24 @@
 //!
 //! On a terminal one screenful is written over and over; anywhere else each sample is a line.
 
-use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::link::{Row, StatusReport};
+use host_sim::link::StatusReport;
+use host_sim::output::screen::Screen;
+use host_sim::output::terminal::{json, print};
 use serde::Serialize;
 
-use super::{Talk, seconds, stop_on_interrupt, stopped};
+use super::session::{Session, seconds, stop_on_interrupt, stopped};
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
     /// Time between two samples, in s
     #[arg(long, default_value_t = 0.2, value_name = "S", allow_negative_numbers = true)]
     every: f64,
-    /// Stop after so many seconds; without it, with Ctrl-C
+    /// Stop after this many seconds; default: with Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
 }
@@ -33,7 +35,7 @@ impl Arguments {
     }
 }
 
-/// What `--json` prints at the end.
+/// The answer of `watch` with `--json`.
 #[derive(Serialize)]
 struct Watched {
     samples: u64,
@@ -41,74 +43,31 @@ struct Watched {
     status: StatusReport,
 }
 
-pub(super) fn run(talk: &mut Talk, arguments: &Arguments) -> Result<()> {
+pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let (every, whole) = arguments.times()?;
     stop_on_interrupt()?;
-    let mut screen = Screen::new(talk.json);
-    let (start, heartbeat) = (Instant::now(), talk.heartbeat());
+    let mut screen = Screen::new(session.json);
+    let (start, heartbeat) = (Instant::now(), session.heartbeat());
     let (mut samples, mut next) = (0, start);
-    let mut report = StatusReport::new(&talk.status);
+    let mut report = StatusReport::new(&session.status);
     while start.elapsed() < whole && !stopped() {
-        report = StatusReport::new(&talk.refresh()?);
+        report = StatusReport::new(&session.refresh()?);
         if Instant::now() >= next {
             samples += 1;
             match screen.show(&report) {
-                // Who closes the pipe has seen enough.
+                // A closed pipe ends the command without an error.
                 Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
                 shown => shown?,
             }
-            // From now on, should we have been late: no burst.
+            // After a delay, continue from now instead of catching up.
             next = (next + every).max(Instant::now());
         }
         let pause = next.saturating_duration_since(Instant::now());
         std::thread::sleep(pause.min(heartbeat).min(whole.saturating_sub(start.elapsed())));
     }
-    if talk.json {
+    if session.json {
         let watched = Watched { samples, seconds: start.elapsed().as_secs_f64(), status: report };
-        println!("{}", serde_json::to_string(&watched)?);
+        print(&json(&watched)?)?;
     }
     Ok(())
-}
-
-/// Where samples go.
-struct Screen {
-    out: Box<dyn Write>,
-    /// Written over, instead of line by line.
-    live: bool,
-    lines: usize,
-}
-
-impl Screen {
-    fn new(json: bool) -> Self {
-        // With --json, stdout is for the one object.
-        let (out, live): (Box<dyn Write>, _) = if json {
-            (Box::new(io::stderr()), io::stderr().is_terminal())
-        } else {
-            (Box::new(io::stdout()), io::stdout().is_terminal())
-        };
-        Self { out, live, lines: 0 }
-    }
-
-    fn show(&mut self, report: &StatusReport) -> io::Result<()> {
-        let mut text = String::new();
-        if self.live {
-            if self.lines > 0 {
-                // Up to where the last one started.
-                text += &format!("\x1b[{}A", self.lines);
-            }
-            for line in report.text().lines() {
-                // Each line clears what stood to its right.
-                text += &format!("{line}\x1b[K\n");
-            }
-            self.lines = report.text().lines().count();
-        } else {
-            if self.lines == 0 {
-                text += &format!("{}\n", Row::HEADER);
-            }
-            text += &format!("{}\n", report.sample.line());
-            self.lines += 1;
-        }
-        self.out.write_all(text.as_bytes())?;
-        self.out.flush()
-    }
 }

@@ -1,15 +1,17 @@
-//! The page that a person reads: one HTML file that needs nothing else.
+//! The report page: one self-contained HTML file.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use crate::output::diagnosis::extension::is_extended;
+use crate::output::diagnosis::figures::Figure;
+use crate::output::diagnosis::origin::Origin;
 use crate::output::diagnosis::style;
 use crate::output::diagnosis::tables;
 use crate::output::diagnosis::text;
-use crate::output::diagnosis::{Figure, Origin, is_extended};
 use identify::answer::Verdict;
 use identify::{Diagnosis, Input};
 
-/// The whole page. What comes from files is escaped.
+/// The whole page; texts from files are escaped.
 pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -> String {
     let report = &diagnosis.report;
     let [readings, residual, residual_voltage, correlations @ ..] = figures else { unreachable!("see `figures`") };
@@ -28,30 +30,30 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 div.sentences {
                     @for sentence in text::sentences(&origin.record, report) { p { (sentence) } }
                 }
-                h2 { "What is wrong" }
+                h2 { "Causes" }
                 (tables::findings(&report.findings))
                 h2 { "Readings and simulations" }
                 @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
-                h2 { "Is anything left?" }
+                h2 { "Residual tests" }
                 div.pair { @for figure in correlations { (drawn(figure)) } }
                 @if let Some(leftover) = &report.leftover { p { (leftover) "." } }
-                h2 { "Evidence for the causes and their rivals" }
+                h2 { "Ranking of the causes and their rivals" }
                 (tables::standings(diagnosis))
                 @if is_extended(diagnosis) {
-                    h2 { "What the cure is worth" }
+                    h2 { "Held-out improvement" }
                     (tables::quality(diagnosis))
                     @if let Some(sentence) = text::in_fixed_point(&report.extended) { p { (sentence) } }
-                    h2 { "Gain on stretches that no fit has seen" }
+                    h2 { "Improvement on each held-out segment" }
                     (tables::folds(diagnosis))
                 } @else {
-                    h2 { "How well it fits" }
+                    h2 { "Accuracy" }
                     (tables::quality(diagnosis))
                 }
                 h2 { "Next experiment" }
                 p {
                     @match &report.next_experiment {
                         Some(next) => { (capital(next)) "." }
-                        None => { "None needed: nothing is left to decide." }
+                        None => { "None needed: no decision is open." }
                     }
                 }
                 h2 { "Noise" }
@@ -65,15 +67,15 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
 
 fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
-        Verdict::Consistent => "consistent: nothing is wrong beyond noise",
-        Verdict::Explained => "explained: the causes below explain what is wrong",
-        Verdict::Ambiguous => "ambiguous: rival causes explain it as well",
-        Verdict::Unexplained => "unexplained: something is left that no known cause explains",
-        Verdict::Insufficient => "insufficient: the record cannot tell",
+        Verdict::Consistent => "consistent: the simulation agrees within the noise",
+        Verdict::Explained => "explained: the causes below explain the difference",
+        Verdict::Ambiguous => "ambiguous: other causes explain the difference as well",
+        Verdict::Unexplained => "unexplained: a part of the difference has no known cause",
+        Verdict::Insufficient => "insufficient: the record has too little excitation to decide",
     }
 }
 
-/// An SVG within a page: it fits the column, and needs no namespace there.
+/// An SVG inside the page: scaled to the column, without its namespace.
 fn drawn(Figure { caption, svg, .. }: &Figure) -> Markup {
     let inline = svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
     let side = |name: &str| {
@@ -96,7 +98,7 @@ fn drawn(Figure { caption, svg, .. }: &Figure) -> Markup {
 fn footer(diagnosis: &Diagnosis, Origin { record, column, input, command }: &Origin) -> Markup {
     let between = match input {
         Input::Hold => "held between rows (hold)",
-        Input::Linear => "straight from row to row (linear)",
+        Input::Linear => "linear between rows (linear)",
         Input::Stair => "the report's stair with its 0.1 s ramps (stair)",
     };
     html! {

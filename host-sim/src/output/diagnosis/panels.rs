@@ -1,4 +1,4 @@
-//! A record beside a simulation, and below it what the simulation leaves: how a cause looks.
+//! A record compared with a simulation, and their difference in a panel below.
 
 use kuva::prelude::*;
 
@@ -7,10 +7,10 @@ use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned_to};
 use identify::record::data::Data;
 
-/// Stretches of time that a line is drawn by: the panels are small.
+/// Number of stretches that a line is drawn by, since the panels are small.
 const STRETCHES: usize = 200;
 
-/// Two panels over the same time as SVG; `simulation` is its value at each row, in V.
+/// Two panels over the same time as SVG; `simulation` is its stiffness at each row, in V.
 pub fn panels(data: &Data, simulation: &[f64]) -> String {
     let each = |value: &dyn Fn(usize) -> f64| {
         thinned_to(STRETCHES, (0..data.rows()).map(|row| (data.time_s[row], value(row))).collect())
@@ -25,7 +25,7 @@ pub fn panels(data: &Data, simulation: &[f64]) -> String {
     let (first, last) = (data.time_s[0], data.time_s[data.rows() - 1]);
     let layout = |plots: &[Plot], x: &str, y: &str| {
         let layout = draw::layout(plots, Axes { title: "", x, y });
-        // Both panels as wide and as high: one stands below the other.
+        // Both panels have the same width and height.
         let layout = layout.with_force_margins(70.0, 10.0).with_force_margins_y(20.0, 50.0 * f64::from(!x.is_empty()));
         layout.with_x_axis_min(first).with_x_axis_max(last)
     };

@@ -2,22 +2,22 @@
 
 use kuva::prelude::*;
 
-use crate::output::diagnosis::is_extended;
+use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned};
-use identify::answer::Report;
+use identify::answer;
 use identify::record::data::Data;
 use identify::verdict::diagnosis::Diagnosis;
 
-/// A record with no more rows than this is drawn as points: a line would tell what is between them.
+/// Records with at most this number of rows are drawn as points, since a line would suggest values in between.
 const POINTS: usize = 120;
-/// Radius of a reading's point, and of a simulation's on it.
+/// Radii of the points of readings and of simulations.
 const READ: f64 = 4.5;
 const SIMULATED: f64 = 3.0;
-/// Part of an axis by which it goes on beyond the points at its ends.
+/// Extension of an axis beyond the outermost points, as a part of its length.
 const BEYOND: f64 = 0.015;
 
-/// Readings beside both simulations.
+/// Readings compared with both simulations.
 pub fn readings(diagnosis: &Diagnosis) -> String {
     let Diagnosis { data, baseline, extended, .. } = diagnosis;
     let mut plots: Vec<Plot> = vec![
@@ -31,7 +31,7 @@ pub fn readings(diagnosis: &Diagnosis) -> String {
     over_time(data, plots, "Readings and simulations", "voltage, scaled stiffness [V]")
 }
 
-/// A value of each row over time: a line, or points of that radius.
+/// A value of each row over time, as a line or as points of the given radius.
 fn by_row(data: &Data, value: impl Fn(usize) -> f64, radius: f64, colour: &str, name: &str) -> Plot {
     let values = (0..data.rows()).map(|row| (data.time_s[row], value(row))).collect();
     if data.rows() > POINTS {
@@ -41,7 +41,7 @@ fn by_row(data: &Data, value: impl Fn(usize) -> f64, radius: f64, colour: &str, 
     }
 }
 
-/// The commanded voltage, between the rows too; of a plateau, its ends.
+/// The commanded voltage, also between the rows; plateaus are reduced to their ends.
 pub(super) fn command(data: &Data) -> Vec<(f64, f64)> {
     let mut time = data.time_s[0];
     let mut corners: Vec<(f64, f64)> = Vec::new();
@@ -64,7 +64,7 @@ pub(super) fn command(data: &Data) -> Vec<(f64, f64)> {
     thinned(corners)
 }
 
-/// What both simulations leave, over time.
+/// Residuals of both simulations over time.
 pub fn residual(diagnosis: &Diagnosis) -> String {
     let data = &diagnosis.data;
     let of =
@@ -77,7 +77,7 @@ pub fn residual(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// What both simulations leave, against the commanded voltage.
+/// Residuals of both simulations over the commanded voltage.
 pub fn residual_by_voltage(diagnosis: &Diagnosis) -> String {
     let data = &diagnosis.data;
     let mut plots: Vec<Plot> = Vec::new();
@@ -94,12 +94,12 @@ pub fn residual_by_voltage(diagnosis: &Diagnosis) -> String {
 }
 
 /// Autocorrelation of the whitened residual.
-pub fn autocorrelation(report: &Report) -> String {
+pub fn autocorrelation(report: &answer::Report) -> String {
     correlation(report, &report.residual.autocorrelation, 1, "Residual with itself")
 }
 
 /// Correlation of the whitened residual with the voltage's changes.
-pub fn input_correlation(report: &Report) -> String {
+pub fn input_correlation(report: &answer::Report) -> String {
     correlation(report, &report.residual.input_correlation, 0, "Residual with the voltage's changes")
 }
 
@@ -115,14 +115,14 @@ fn over_time(data: &Data, plots: Vec<Plot>, title: &str, y: &str) -> String {
     render_to_svg(plots, layout)
 }
 
-/// An axis from `low` to `high`, and a little more: a point at an end is drawn whole.
+/// An axis from `low` to `high`, slightly extended so that points at the ends are drawn whole.
 fn beyond(layout: Layout, low: f64, high: f64) -> Layout {
     let more = BEYOND * (high - low);
     layout.with_x_axis_min(low - more).with_x_axis_max(high + more)
 }
 
-fn correlation(report: &Report, values: &[f64], first_lag: usize, title: &str) -> String {
-    // No two rows are farther apart than the record is long.
+fn correlation(report: &answer::Report, values: &[f64], first_lag: usize, title: &str) -> String {
+    // Two rows are not farther apart than the record is long.
     let values = &values[..values.len().min(report.rows - first_lag)];
     let band = report.residual.band;
     let stems = values.iter().enumerate().map(|(index, &value)| ((index + first_lag) as f64, value));

@@ -1,13 +1,13 @@
-//! Residuals as CSV, one row a reading.
+//! Residuals as CSV, one row per reading.
 
 use std::io::Write;
 
 use identify::verdict::diagnosis::Diagnosis;
 
-/// Writes the table; voltages, readings and residuals in V.
+/// Writes the table; voltages, readings and residuals are in V.
 ///
 /// # Errors
-/// As the sink's.
+/// If `out` cannot be written.
 pub(super) fn write(out: &mut dyn Write, diagnosis: &Diagnosis) -> std::io::Result<()> {
     let Diagnosis { data, baseline, extended, .. } = diagnosis;
     writeln!(

@@ -1,17 +1,17 @@
-//! Colours of plots and page. A page on a dark screen shows the plots in lighter ones.
+//! Colours of the plots and the page, with lighter plot colours for dark screens.
 
 use std::fmt::Write;
 
-/// Readings.
+/// Colour of the readings.
 pub(super) const READING: &str = "#000000";
-/// The simulation as it was.
+/// Colour of the original simulation.
 pub(super) const BEFORE: &str = "#d55e00";
-/// The extended simulation.
+/// Colour of the extended simulation.
 pub(super) const AFTER: &str = "#0072b2";
-/// The commanded voltage.
+/// Colour of the commanded voltage.
 pub(super) const COMMAND: &str = "#888888";
 
-/// Colours of the plots, and what they are on a dark screen.
+/// Colours of the plots, and their replacements on a dark screen.
 const ON_DARK: [(&str, &str); 5] =
     [(READING, "#e8e8e8"), (BEFORE, "#ff9a4d"), (AFTER, "#5cb8f2"), (COMMAND, "#909090"), ("#cccccc", "#3d4248")];
 

@@ -1,8 +1,8 @@
-//! The page's tables.
+//! The tables of the report page.
 
 use maud::{Markup, html};
 
-use crate::output::diagnosis::is_extended;
+use crate::output::diagnosis::extension::is_extended;
 use identify::answer::{Finding, Parameter};
 use identify::stats::scale::root_mean_square;
 use identify::verdict::diagnosis::Diagnosis;
@@ -11,7 +11,7 @@ use identify::verdict::ranking::RankedCauses as Standing;
 /// Each cause with its parameters.
 pub(super) fn findings(findings: &[Finding]) -> Markup {
     if findings.is_empty() {
-        return html! { p { "No cause is named." } };
+        return html! { p { "No cause was found." } };
     }
     html! {
         div.scroll { table {
@@ -37,19 +37,19 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
     }
 }
 
-/// The best sets of causes, how far each is behind, and which cause it does without.
+/// The best sets of causes, each with its distance from the best and the cause that it lacks.
 pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
     let standings = &diagnosis.ranking;
     let Some(best) = standings.first() else {
-        return html! { p { "Nothing was compared: the record cannot tell." } };
+        return html! { p { "No causes were compared: the record has too little excitation." } };
     };
     let behind = |standing: &Standing| best.score - standing.score;
     let furthest = standings.iter().map(behind).fold(1.0, f64::max);
-    // Rivals are a few nats behind, wrong causes thousands: only a logarithm shows both.
+    // Rivals are a few nats behind, wrong causes thousands, so the bars are logarithmic.
     let width = |nats: f64| format!("width:{:.1}%", 100.0 * nats.ln_1p() / furthest.ln_1p());
     html! {
         p.small {
-            "Nats behind the best on stretches that no fit has seen, the price of each cause paid; bars are logarithmic. "
+            "Distance from the best set in held-out log-likelihood, in nats, after a penalty for each cause; bars are logarithmic. "
             "3 nats are odds of 20 to 1."
         }
         div.scroll { table {
@@ -74,10 +74,10 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
 }
 
 fn set(causes: &[&str]) -> String {
-    if causes.is_empty() { "none: the simulation as it was".to_owned() } else { causes.join(" + ") }
+    if causes.is_empty() { "none: the original simulation".to_owned() } else { causes.join(" + ") }
 }
 
-/// Values that are not broken within.
+/// A list of values, none of which is broken across lines.
 fn values(list: &str) -> Markup {
     html! {
         @for (place, value) in list.split(", ").enumerate() {
@@ -89,23 +89,23 @@ fn values(list: &str) -> Markup {
 
 fn note(standings: &[Standing], place: usize) -> String {
     if place == 0 {
-        return "the best".to_owned();
+        return "best".to_owned();
     }
     let lacks = |place: usize, cause: &&&str| !standings[place].causes.contains(cause);
     let first_without = |cause: &&&str| lacks(place, cause) && !(1..place).any(|earlier| lacks(earlier, cause));
     let without: Vec<&str> = standings[0].causes.iter().filter(first_without).copied().collect();
-    if without.is_empty() { String::new() } else { format!("the best without {}", without.join(", ")) }
+    if without.is_empty() { String::new() } else { format!("best without {}", without.join(", ")) }
 }
 
-/// Both simulations beside each other, if there are two.
+/// Accuracy of the simulation, and of the extended one if there is one.
 pub(super) fn quality(diagnosis: &Diagnosis) -> Markup {
     let (report, extended) = (&diagnosis.report, is_extended(diagnosis));
     let (before, after) = (&report.baseline, &report.extended.quality);
-    // Readings that are all the same have no spread to compare errors with.
+    // Readings that are all equal have no spread to compare errors with.
     let spread = diagnosis.data.reading.windows(2).any(|pair| pair[0] != pair[1]);
     let of_spread = |percent| if spread { number(percent) } else { "-".to_owned() };
     let rows = [
-        ("free run RMSE [V]", number(before.rmse), number(after.rmse)),
+        ("free-run RMSE [V]", number(before.rmse), number(after.rmse)),
         ("held-out RMSE [V]", number(before.held_out_rmse), number(after.held_out_rmse)),
         ("one-step RMSE [V]", number(before.one_step_rmse), number(after.one_step_rmse)),
         ("fit [%]", of_spread(before.fit_percent), of_spread(after.fit_percent)),
@@ -118,14 +118,14 @@ pub(super) fn quality(diagnosis: &Diagnosis) -> Markup {
                     tr { td { (what) } td.number { (before) } @if extended { td.number { (after) } } }
                 }
                 @if extended {
-                    tr { td { "gain on held-out stretches [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) } }
+                    tr { td { "held-out improvement [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) } }
                 }
             }
         } }
     }
 }
 
-/// The error of both simulations on each fold.
+/// Error of both simulations on each fold.
 pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
     let Diagnosis { data, held_out: [before, after], .. } = diagnosis;
     let of = |fold: usize, residual: &[f64]| -> Vec<f64> {
@@ -143,7 +143,7 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
         div.scroll { table {
             thead { tr {
                 th.number { "fold" } th.number { "rows" } th.number.before { "simulation [V]" } th.number.after { "extended [V]" } th { "" }
-                th.number { "gain [%]" }
+                th.number { "improvement [%]" }
             } }
             tbody {
                 @for (fold, rows, before, after) in rows {
@@ -159,34 +159,34 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// In percent; of a fold without any error there is none.
+/// Improvement in percent; `-` for a fold without error.
 fn gain(before: f64, after: f64) -> String {
     if before > 0.0 { format!("{:.1}", 100.0 * (1.0 - after / before)) } else { "-".to_owned() }
 }
 
-/// The noise's law.
+/// The noise model.
 pub(super) fn noise(diagnosis: &Diagnosis) -> Markup {
     let noise = &diagnosis.report.noise;
     let tail = match noise.tail {
-        Some(freedom) => format!("a heavy tail (Student's t with {} degrees of freedom)", number(freedom)),
-        None => "a normal tail".to_owned(),
+        Some(freedom) => format!("Student's t distribution with {} degrees of freedom", number(freedom)),
+        None => "normal distribution".to_owned(),
     };
-    let memory = match noise.memory_rows {
-        0 => "no memory".to_owned(),
-        1 => "a memory of one row".to_owned(),
-        rows => format!("a memory of {rows} rows"),
+    let autocorrelation = match noise.memory_rows {
+        0 => "no autocorrelation".to_owned(),
+        1 => "autocorrelated over one row".to_owned(),
+        rows => format!("autocorrelated over {rows} rows"),
     };
     let wide = diagnosis.extended.noise.outliers.map(|(fraction, wide)| {
-        format!(" {} % of the readings are off by {} V.", number(100.0 * fraction), number(wide))
+        format!(" {} % of the readings are outliers with a scale of {} V.", number(100.0 * fraction), number(wide))
     });
-    html! { p { "Scale " (number(noise.sigma)) " V, " (tail) ", " (memory) "." (wide.unwrap_or_default()) } }
+    html! { p { "Scale " (number(noise.sigma)) " V, " (tail) ", " (autocorrelation) "." (wide.unwrap_or_default()) } }
 }
 
 fn interval(Parameter { value, low, high, unit }: &Parameter) -> String {
     format!("{} [{}, {}] {unit}", number(*value), number(*low), number(*high)).trim_end().to_owned()
 }
 
-/// Four significant digits.
+/// Formats a number with four significant digits.
 fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !value.is_finite() {
@@ -220,12 +220,12 @@ mod tests {
     }
 
     #[test]
-    fn a_fold_without_error_has_nothing_to_gain() {
+    fn a_fold_without_error_has_no_improvement() {
         assert_eq!([gain(0.0, 0.0), gain(4.0, 1.0), gain(1.0, 2.0)], ["-", "75.0", "-100.0"]);
     }
 
     #[test]
-    fn a_rival_is_noted_for_the_first_cause_it_lacks_and_no_later_one_is() {
+    fn a_rival_is_noted_only_for_the_first_time_a_cause_is_missing() {
         let standing = |causes: &[&'static str]| Standing {
             causes: causes.to_vec(),
             values: String::new(),
@@ -235,6 +235,6 @@ mod tests {
         };
         let standings = [standing(&["hum", "drift"]), standing(&["drift"]), standing(&["hum"]), standing(&[])];
         let notes: Vec<String> = (0..4).map(|place| note(&standings, place)).collect();
-        assert_eq!(notes, ["the best", "the best without hum", "the best without drift", ""]);
+        assert_eq!(notes, ["best", "best without hum", "best without drift", ""]);
     }
 }

@@ -1,18 +1,17 @@
-//! A diagnosis as text: three sentences a person can act on, then the table.
+//! A diagnosis as text: a few sentences, then tables.
 
 use std::fmt::Write;
 
-use identify::answer::Margins;
-use identify::answer::{Extended, Finding, Quality, Report, Verdict};
+use identify::answer::{self, Extended, Finding, Margins, Quality, Verdict};
 use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
 use identify::verdict::export::SMALL_ERROR_V;
 
-/// A gain below this is none.
-const FORETOLD: f64 = 0.005;
+/// Smallest held-out improvement that is reported as one.
+const SMALLEST_IMPROVEMENT: f64 = 0.005;
 
-/// What goes to the terminal.
-pub fn text(name: &str, report: &Report) -> String {
+/// The text for the terminal.
+pub fn text(name: &str, report: &answer::Report) -> String {
     let mut text = String::new();
     for sentence in sentences(name, report) {
         let _ = writeln!(text, "{sentence}");
@@ -27,7 +26,7 @@ pub fn text(name: &str, report: &Report) -> String {
     let extends = !report.findings.is_empty() || !report.take_out.is_empty();
     let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
     for (what, before, after) in [
-        ("free run RMSE [V]", before.rmse, after.rmse),
+        ("free-run RMSE [V]", before.rmse, after.rmse),
         ("held-out RMSE [V]", before.held_out_rmse, after.held_out_rmse),
         ("one-step RMSE [V]", before.one_step_rmse, after.one_step_rmse),
         ("fit [%]", before.fit_percent, after.fit_percent),
@@ -42,30 +41,30 @@ pub fn text(name: &str, report: &Report) -> String {
     text
 }
 
-/// Whether the tick runs the extended spring.
+/// States whether the fixed-point tick simulates the extended spring; `None` if that was not tested.
 pub fn in_fixed_point(extended: &Extended) -> Option<String> {
     if let Some(why) = &extended.tick_refuses {
-        return Some(format!("The fixed-point tick does NOT run the extended spring: {why}."));
+        return Some(format!("The fixed-point tick can NOT simulate the extended spring: {why}."));
     }
     let error_v = extended.fixed_point_error_v?;
     Some(if error_v <= SMALL_ERROR_V {
-        format!("The fixed-point tick runs the extended spring within {error_v:.3} V of the fit.")
+        format!("The fixed-point tick simulates the extended spring within {error_v:.3} V of the fit.")
     } else {
         format!(
-            "The extended spring as written is NOT the fitted one: in the fixed-point tick it departs by up to \
+            "The written extended spring is NOT the fitted one: in the fixed-point tick it differs by up to \
              {error_v:.3} V, more than {SMALL_ERROR_V} V."
         )
     })
 }
 
-/// Which parts of the plant file are not in this spring.
-fn lacking(report: &Report) -> Option<String> {
+/// States which parts of the plant file this spring does not have; `None` if it has all of them.
+fn parts_to_take_out(report: &answer::Report) -> Option<String> {
     let parts = &report.take_out;
     let (are, them) = if parts.len() == 1 { ("is", "it") } else { ("are", "them") };
     let (before, after) = (&report.baseline, &report.extended.quality);
     (!parts.is_empty()).then(|| {
         format!(
-            "The plant file's {} {are} not in this spring: take {them} out. The error on stretches that no fit has seen falls \
+            "The plant file's {} {are} not in this spring: take {them} out. The held-out error decreases \
              from {:.3} to {:.3} V without {them}{}.",
             parts.join(" and "),
             before.held_out_rmse,
@@ -75,7 +74,7 @@ fn lacking(report: &Report) -> Option<String> {
     })
 }
 
-/// How far off something is, as a part of it, to two digits.
+/// A relative error in words, with two digits.
 fn off_by(part: f64) -> String {
     let percent = 100.0 * part;
     match part {
@@ -86,8 +85,8 @@ fn off_by(part: f64) -> String {
     }
 }
 
-/// What is wrong; what the cure is worth; what to do next.
-pub fn sentences(name: &str, report: &Report) -> Vec<String> {
+/// The findings, the held-out improvement, and the next experiment, one sentence each.
+pub fn sentences(name: &str, report: &answer::Report) -> Vec<String> {
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
     let in_readings = effects.clone().all(|effect| effect.location() == Location::Reading);
     let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.description())).collect();
@@ -95,28 +94,32 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
         format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
     });
     let (one, rows) = (causes.len() == 1, report.rows);
-    let mut sentences: Vec<String> = lacking(report).into_iter().collect();
+    let mut sentences: Vec<String> = parts_to_take_out(report).into_iter().collect();
     sentences.push(match report.verdict {
         Verdict::Explained if causes.is_empty() => {
-            format!("Without that, the simulation agrees with {name}: nothing beyond noise in {rows} readings.")
+            format!("Without that, the simulation agrees with {name} within the noise of {rows} readings.")
         }
         Verdict::Consistent => {
-            let what = if report.leftover.is_none() { "beyond noise" } else { "worth a cause" };
+            let what = if report.leftover.is_none() {
+                "no difference beyond noise"
+            } else {
+                "no difference that needs a cause"
+            };
             format!(
-                "The simulation agrees with {name}: nothing {what} in {rows} readings{}.",
-                margins.map_or_else(String::new, |off| format!(", where {off} would have shown"))
+                "The simulation agrees with {name}: {what} in {rows} readings{}.",
+                margins.map_or_else(String::new, |off| format!(", in which {off} would have been detected"))
             )
         }
         Verdict::Insufficient => format!(
-            "{name} cannot tell what is wrong: its {rows} readings hold too little excitation{}.",
-            margins.map_or_else(String::new, |off| format!("; {off} need not show"))
+            "{name} cannot decide whether the simulation is wrong: its {rows} readings have too little excitation{}.",
+            margins.map_or_else(String::new, |off| format!("; {off} could remain undetected"))
         ),
         Verdict::Unexplained if causes.is_empty() => {
             format!("The simulation is wrong on {name}, and no known cause explains it.")
         }
         Verdict::Unexplained => {
             let explain = if one { "explains" } else { "explain" };
-            format!("The simulation is wrong on {name}; {} {explain} only a part.", causes.join(", "))
+            format!("The simulation is wrong on {name}; {} {explain} only a part of the error.", causes.join(", "))
         }
         Verdict::Ambiguous | Verdict::Explained => {
             let what = match (in_readings, report.alternatives.iter().any(Vec::is_empty)) {
@@ -131,38 +134,38 @@ pub fn sentences(name: &str, report: &Report) -> Vec<String> {
     if !report.findings.is_empty() && report.take_out.is_empty() {
         let it = if one { "it" } else { "them" };
         let (before, after) = (&report.baseline, &report.extended.quality);
-        sentences.push(if report.extended.gain > FORETOLD {
+        sentences.push(if report.extended.gain > SMALLEST_IMPROVEMENT {
             format!(
-                "With {it} in the model, the error on stretches that no fit has seen falls from {:.3} to {:.3} V, by {:.1} %.",
+                "With {it} in the model, the held-out error decreases from {:.3} to {:.3} V, by {:.1} %.",
                 before.held_out_rmse,
                 after.held_out_rmse,
                 100.0 * report.extended.gain
             )
-        } else if after.rmse > (1.0 - FORETOLD) * before.rmse {
-            let whose = if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is the readings' own" };
+        } else if after.rmse > (1.0 - SMALLEST_IMPROVEMENT) * before.rmse {
+            let whose = if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is noise of the readings" };
             format!("With {it} in the model, the error stays at {:.3} V{whose}.", after.rmse)
         } else {
             format!(
-                "With {it} in the model, the error falls from {:.3} to {:.3} V, but not on stretches that no fit has seen: no \
-                 other part of the record foretells it.",
+                "With {it} in the model, the error decreases from {:.3} to {:.3} V, but the held-out error does not: the \
+                 other parts of the record do not predict it.",
                 before.rmse, after.rmse
             )
         });
     }
     if !report.alternatives.is_empty() {
-        let nothing = || "that nothing is wrong".to_owned();
+        let nothing = || "no error at all".to_owned();
         let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
-        sentences.push(format!("The data cannot reject instead: {}.", rivals.collect::<Vec<_>>().join("; ")));
+        sentences.push(format!("Alternatives that the data cannot reject: {}.", rivals.collect::<Vec<_>>().join("; ")));
     }
     if report.verdict == Verdict::Consistent && report.next_experiment.is_some() {
         let Quality { rmse, one_step_rmse, .. } = report.extended.quality;
         sentences.push(format!(
-            "That noise wanders, by {rmse:.3} V where {one_step_rmse:.3} V is new at each reading: what is slow in the spring \
-             would pass for it."
+            "The noise is autocorrelated: {rmse:.3} V in free run, {one_step_rmse:.3} V in one step. A slow effect of the spring \
+             could be mistaken for it."
         ));
     }
     if let Some(leftover) = &report.leftover {
-        let small = if report.verdict == Verdict::Unexplained { "" } else { "Too little to change this verdict: " };
+        let small = if report.verdict == Verdict::Unexplained { "" } else { "Too small to change this verdict: " };
         sentences.push(format!("{small}{leftover}."));
     }
     if let Some(next) = &report.next_experiment {
@@ -188,7 +191,7 @@ mod tests {
     use super::*;
     use identify::answer::{NoiseReport, ResidualReport, SCHEMA};
 
-    /// The first two sentences about causes that leave the error as it is.
+    /// The first two sentences about causes that do not reduce the error.
     fn said(verdict: Verdict, causes: &[&'static str], alternatives: &[Vec<&'static str>]) -> String {
         let quality = Quality { rmse: 7.86, fit_percent: 90.0, held_out_rmse: 7.86, one_step_rmse: 7.86 };
         let finding = |&cause: &&'static str| Finding {
@@ -199,7 +202,7 @@ mod tests {
             rmse_after: 7.86,
             evidence: String::new(),
         };
-        let report = Report {
+        let report = answer::Report {
             schema: SCHEMA,
             rows: 600,
             verdict,
@@ -232,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_at_fault_is_said_of_readings_and_of_the_simulation() {
+    fn readings_and_simulation_are_distinguished_as_the_source_of_the_error() {
         use Verdict::{Ambiguous, Explained, Unexplained};
         let nothing = [Vec::new()];
         for (verdict, causes, alternatives, expected) in [
@@ -244,12 +247,13 @@ mod tests {
         ] {
             let said = said(verdict, causes, alternatives);
             assert!(said.starts_with(expected), "{said}");
-            let whose = "stays at 7.860 V: nearly all of it is the readings' own.";
+            let whose = "stays at 7.860 V: nearly all of it is noise of the readings.";
             assert_eq!(said.ends_with(whose), verdict != Unexplained, "{said}");
         }
-        for (causes, part) in
-            [(&["drift"][..], ") explains only a part."), (&["drift", "hum"], ") explain only a part.")]
-        {
+        for (causes, part) in [
+            (&["drift"][..], ") explains only a part of the error."),
+            (&["drift", "hum"], ") explain only a part of the error."),
+        ] {
             let said = said(Unexplained, causes, &[]);
             assert!(said.contains(part), "{said}");
         }

@@ -1,15 +1,15 @@
-//! A tuning as text, table and plots.
+//! The answer of `vsj tune` as text, CSV and plots.
 
 use anyhow::Result;
 
+use crate::output::cells::{line, optional};
 use crate::output::figure;
 use crate::output::files::Files;
-use crate::output::terminal::{line, optional};
 use paper::figure::Figure;
 use simulation::tune::trade::Parameter;
 use simulation::tune::{Margins, Trade, Tuning, Worst};
 
-/// Settings, what they are worth, and the trade in a few rows.
+/// Settings, their performance, and the responses under some model errors.
 pub fn text(tuning: &Tuning, plant: &str) -> String {
     let mut text = String::new();
     let Tuning { limit_v, proportional_integral, fast, trade } = tuning;
@@ -17,18 +17,19 @@ pub fn text(tuning: &Tuning, plant: &str) -> String {
     let worst =
         |worst: &Worst| format!("t97 {} s, overshoot {:.2} %", optional(worst.t97_s, 3), worst.overshoot_percent);
     match proportional_integral {
-        None => {
-            line(&mut text, "proportional-integral: no gains make every step with this overshoot and these margins")
-        }
+        None => line(
+            &mut text,
+            "proportional-integral: no gains meet the overshoot limit and the stability margins on every step",
+        ),
         Some(gains) => {
             let Margins { gain, phase_deg, greatest_sensitivity } = gains.margins;
             let or_none =
-                |margin: Option<f64>, unit: &str| margin.map_or("no end".to_owned(), |it| format!("{it:.1}{unit}"));
+                |margin: Option<f64>, unit: &str| margin.map_or("unlimited".to_owned(), |it| format!("{it:.1}{unit}"));
             line(&mut text, &format!("proportional-integral: {}", worst(&gains.worst)));
             line(
                 &mut text,
                 &format!(
-                    "  margins: gain {}, phase {}, greatest sensitivity {greatest_sensitivity:.2}",
+                    "  margins: gain {}, phase {}, largest sensitivity {greatest_sensitivity:.2}",
                     or_none(gain, ""),
                     or_none(phase_deg, " degrees")
                 ),
@@ -48,7 +49,7 @@ pub fn text(tuning: &Tuning, plant: &str) -> String {
             "  vsj stair --plant {plant} --limit-v {limit_v} --input step --controller fast --approach-s {approach_s}"
         ),
     );
-    line(&mut text, "\nOn a spring that is not as its model; each step from where it started:");
+    line(&mut text, "\nOn a spring that differs from its model; each step is measured from its own start:");
     line(&mut text, "                       | proportional-integral |         fast");
     line(&mut text, "spring's         error |     t97   overshoot   |     t97   overshoot");
     line(&mut text, "                   [%] |     [s]         [%]   |     [s]         [%]");
@@ -74,7 +75,7 @@ pub fn text(tuning: &Tuning, plant: &str) -> String {
 /// Adds trade.csv, t97.svg and overshoot.svg.
 ///
 /// # Errors
-/// As [`Files::add`].
+/// Returns the errors of [`Files::add`].
 pub fn write(files: &mut Files, tuning: &Tuning) -> Result<()> {
     files.add("trade.csv", |out| {
         writeln!(
@@ -95,15 +96,15 @@ pub fn write(files: &mut Files, tuning: &Tuning) -> Result<()> {
     })?;
     type Value = fn(&Worst) -> Option<f64>;
     let figures: [(&str, &str, &str, Value); 2] = [
-        ("t97.svg", "Time to 97 % on a spring that is not as its model", "t97 of the slowest step [s]", |worst| {
+        ("t97.svg", "Time to 97 % on a spring that differs from its model", "t97 of the slowest step [s]", |worst| {
             worst.t97_s
         }),
-        ("overshoot.svg", "Overshoot on a spring that is not as its model", "largest overshoot [%]", |worst| {
+        ("overshoot.svg", "Overshoot on a spring that differs from its model", "largest overshoot [%]", |worst| {
             Some(worst.overshoot_percent)
         }),
     ];
     for (name, title, y, value) in figures {
-        let mut figure = Figure::new(title, "error of the model: the spring's less the model's [%]", y);
+        let mut figure = Figure::new(title, "model error: parameter of the spring relative to the model [%]", y);
         for parameter in Parameter::ALL {
             let rows = || tuning.trade.iter().filter(move |row| row.parameter == parameter);
             let fast = rows().filter_map(|row| Some((100.0 * row.error, value(&row.fast?)?)));

@@ -1,38 +1,38 @@
-//! What the fixed-point run of a spring is laid beside: a reference in double precision.
+//! The double-precision reference that the fixed-point run of a spring is compared with.
 //!
-//! The plain spring's is the exact solution in continuous time, [`crate::reference`]; the extended spring's, and that of the
-//! time-optimal pre-compensator, which thinks in ticks, is the loop at the controller's own rate, [`crate::sampled`].
+//! The plain spring's is the exact solution in continuous time, [`crate::reference`]. The extended spring and the
+//! time-optimal pre-compensator, which is defined in ticks, have the loop at the controller's rate, [`crate::sampled`].
 
 use model::estimator::Model;
 use model::{Compensation, ExtendedPlant, Plant, Settings};
 
 use serde::Serialize;
 
-use crate::bound::{from_where_it_is, shortest_time};
+use crate::bound::{shortest_time, shortest_times_from_state};
 use crate::reference::{Loop, Moment};
 use crate::run::{Run, Sample};
 use crate::sampled::{Controller, SampledLoop, Spring};
 use crate::schedule::{Change, Schedule};
 
-/// Where the fastest drive starts that a step is compared with.
+/// Initial state of the spring for the lower bound on a step's time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StartsFrom {
-    /// At the old value, settled.
+    /// Settled at the old target.
     Settled,
-    /// Where the loop has brought the spring.
+    /// As the loop has left it.
     Reached,
 }
 
-/// A spring whose fixed-point run is laid beside a reference.
-pub trait Judged: Model {
-    /// The highest voltage that may be asked for: what the reference treats as the tick does.
+/// A spring whose fixed-point run can be compared with a reference.
+pub trait HasReference: Model {
+    /// Highest target, in V, that the reference handles like the tick does.
     fn highest_target(settings: &Settings<Self>) -> f64;
 
-    /// The reference's stiffness at every tick, in V, for one target a tick.
+    /// Stiffness of the reference at every tick, in V, for one target per tick.
     fn reference_at_ticks(settings: &Settings<Self>, schedule: &Schedule, targets: &[f64]) -> Vec<f64>;
 
-    /// The same at increasing moments; `samples` are those of the loop.
+    /// Stiffness of the reference at increasing times in s, in V; `samples` are those of the compared loop.
     fn reference_at(
         settings: &Settings<Self>,
         schedule: &Schedule,
@@ -41,14 +41,14 @@ pub trait Judged: Model {
         times_s: &[f64],
     ) -> Vec<f64>;
 
-    /// The shortest time, in s, in which any controller could make 97 % of each change, from the state that is meant.
+    /// Shortest time, in s, in which any controller completes 97 % of each change; `None` if out of reach.
     fn bounds(settings: &Settings<Self>, run: &Run, samples: &[Sample], changes: &[Change]) -> Vec<Option<f64>>;
 
-    /// The state that is meant.
+    /// Initial state of the spring for [`HasReference::bounds`].
     fn bounds_from(settings: &Settings<Self>) -> StartsFrom;
 }
 
-impl Judged for Plant {
+impl HasReference for Plant {
     fn highest_target(settings: &Settings) -> f64 {
         settings.amplifier.max_v
     }
@@ -83,9 +83,9 @@ impl Judged for Plant {
     }
 }
 
-/// In steps of the tick: between ticks the last one counts.
-impl Judged for ExtendedPlant<'_> {
-    /// Where the amplifier ends below its full scale, both take a higher target at that end.
+/// The reference advances in ticks; between two ticks the earlier one counts.
+impl HasReference for ExtendedPlant<'_> {
+    /// Where the amplifier ends below its full scale, tick and reference both clamp a higher target to that end.
     fn highest_target(settings: &Settings<Self>) -> f64 {
         settings.amplifier.full_scale_v
     }
@@ -101,7 +101,7 @@ impl Judged for ExtendedPlant<'_> {
     fn bounds(settings: &Settings<Self>, run: &Run, samples: &[Sample], changes: &[Change]) -> Vec<Option<f64>> {
         match settings.plant.plain() {
             Some(plant) => Plant::bounds(&with_plant(settings, plant), run, samples, changes),
-            None => from_where_it_is(&SampledLoop::from(settings), run, samples, changes, 0.97),
+            None => shortest_times_from_state(&SampledLoop::from(settings), run, samples, changes, 0.97),
         }
     }
 
@@ -116,7 +116,7 @@ pub fn with_plant<P, Q>(settings: &Settings<P>, plant: Q) -> Settings<Q> {
     Settings { rate_hz, plant, compensation, amplifier, feedback }
 }
 
-/// The settings as the reference takes them; the target is put out as it is where it cannot be led by gains.
+/// The settings as a loop in continuous time. Without gains the target is the voltage.
 pub fn continuous(settings: &Settings) -> Loop {
     Loop {
         share: settings.plant.share,
@@ -130,7 +130,7 @@ pub fn continuous(settings: &Settings) -> Loop {
     }
 }
 
-/// The sampled loop's stiffness, in V, for one target a tick.
+/// Stiffness of the sampled loop, in V, for one target per tick.
 fn sampled_at_ticks<P: Copy + Into<Spring>>(settings: &Settings<P>, targets: &[f64]) -> Vec<f64> {
     let sampled = SampledLoop::from(settings);
     let mut state = sampled.at_rest();
@@ -141,12 +141,12 @@ fn sampled_at_ticks<P: Copy + Into<Spring>>(settings: &Settings<P>, targets: &[f
     targets.iter().map(at).collect()
 }
 
-/// Between ticks the last one counts.
+/// Reference of the last tick at or before each time.
 fn at_last_ticks(run: &Run, samples: &[Sample], times_s: &[f64]) -> Vec<f64> {
     times_s.iter().map(|&time| samples[run.tick_at(time)].reference).collect()
 }
 
-/// The amplifier's slew, in V/s; what it makes within a tick is no limit to it.
+/// The amplifier's slew, in V/s; infinite if it covers the full scale within a tick.
 fn slew<P>(settings: &Settings<P>) -> f64 {
     let amplifier = &settings.amplifier;
     let acts = |slew: &f64| slew / settings.rate_hz < amplifier.full_scale_v;
@@ -171,12 +171,12 @@ impl<P: Copy + Into<Spring>> From<&Settings<P>> for SampledLoop {
     }
 }
 
-/// The stiffness of the exact solution at every tick, in V.
+/// Stiffness of the exact solution at every tick, in V.
 fn exact_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f64]) -> Vec<f64> {
     let mut stiffness = vec![0.0; targets.len()];
     let mut solution = system.at_rest(1.0 / rate_hz);
     let time = |tick: usize| schedule.start_s() + tick as f64 / rate_hz;
-    // Where the target goes straight from tick to tick, and does not jump at the next, whole runs of ticks are one call.
+    // A run of ticks whose targets are linear, without a jump at the next tick, is one call of the solution.
     let mut reader = schedule.reader();
     let mut straight = |tick: usize| {
         reader.at(time(tick));
@@ -185,7 +185,7 @@ fn exact_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f6
         stretches.next().is_none() && first.is_some_and(|first| (first.to_v() - targets[tick + 1]).abs() < 1e-9)
     };
     let mut moments = vec![Moment::default(); targets.len()];
-    // Goes along, like the other: found from the start each time, a long file would take the square of its rows.
+    // This reader advances with the loop; searching from the start each time would take quadratic time.
     let mut behind = schedule.reader();
     let mut tick = 0;
     while tick < targets.len() {
@@ -205,7 +205,7 @@ fn exact_at_ticks(system: Loop, schedule: &Schedule, rate_hz: f64, targets: &[f6
     stiffness
 }
 
-/// The stiffness of the exact solution at increasing moments of a schedule, in V.
+/// Stiffness of the exact solution at increasing times (s) of a schedule, in V.
 pub fn reference_at(system: Loop, schedule: &Schedule, times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut solution = system.at_rest(1e-3);
     let mut now = schedule.start_s();

@@ -1,10 +1,10 @@
-//! A comparison of controllers as text.
+//! The answer of `vsj compare` as text.
 
+use crate::output::cells::{line, tidy};
 use crate::output::step_response;
-use crate::output::terminal::{line, tidy};
 use simulation::comparison::{AtLimit, Comparison};
 
-/// One table an amplifier.
+/// One table per amplifier.
 pub fn text(comparison: &Comparison) -> String {
     let mut text = String::new();
     for AtLimit { limit_v, steps } in &comparison.limits {

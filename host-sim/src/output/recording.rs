@@ -1,7 +1,7 @@
-//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness` that a [`simulation::record::Record`] is read from.
+//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness`, which a [`simulation::record::Record`] is read from.
 //!
-//! Each row leaves the program in one piece, the moment it is known: whenever the recording stops, by Ctrl-C, by a lost
-//! cable, by the end of the disk, the file ends with a complete row.
+//! Each row is written in one piece as soon as it arrives: however the recording ends, by Ctrl-C, a lost connection or
+//! a full disk, the file ends with a complete row.
 
 use std::fs::File;
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
@@ -13,11 +13,11 @@ use serde::Serialize;
 
 use simulation::bad_input;
 
-/// A recording on its way.
+/// A recording in progress.
 pub struct Recording {
     path: PathBuf,
     file: File,
-    /// Bytes up to the end of the last complete row.
+    /// Number of bytes up to the end of the last complete row.
     complete: u64,
     rate_hz: f64,
     every_ticks: u64,
@@ -27,33 +27,33 @@ pub struct Recording {
     summary: Summary,
 }
 
-/// What was recorded.
+/// Totals of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// Rows of data.
+    /// Number of rows.
     pub rows: u64,
-    /// From the first row to the last one, in s.
+    /// Time from the first row to the last, in s.
     pub seconds: f64,
-    /// Samples that did not arrive: damaged on the way, or never sent because the line was full.
+    /// Number of samples that did not arrive: damaged, or not sent because the line was busy.
     pub lost: u64,
-    /// Rows without a reading of the sensor, which had some before: `-`.
+    /// Number of rows with `-`, for which the sensor gave no reading.
     pub without_reading: u64,
-    /// `measured` by the sensor, or the controller's `estimate` where there is none.
+    /// `measured` if the MCU has a sensor, otherwise the controller's `estimate`.
     pub stiffness: &'static str,
 }
 
 impl Recording {
-    /// Starts a file. One that exists is kept unless `replace`: a measurement cannot be made again.
+    /// Creates the file. An existing one is kept unless `replace`, since a measurement cannot be repeated.
     ///
     /// # Errors
-    /// [`simulation::bad_input::BadInput`] if it cannot be made.
+    /// [`simulation::bad_input::BadInput`] if the file exists or cannot be created.
     pub fn new(path: &Path, replace: bool, status: &Status, every_ticks: u16) -> Result<Self> {
         let file = match File::options().write(true).create_new(!replace).create(replace).truncate(replace).open(path) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                bad_input!("{}: exists; expected a new file, or --force", path.display())
+                bad_input!("{}: already exists; expected a new file, or --force", path.display())
             }
-            Err(error) => bad_input!("{}: cannot be made: {error}; expected a file to write to", path.display()),
+            Err(error) => bad_input!("{}: cannot be created: {error}; expected a writable path", path.display()),
         };
         let measured = status.sample.measured.is_some();
         let stiffness = if measured { "measured" } else { "estimate" };
@@ -69,9 +69,9 @@ impl Recording {
             summary: Summary { stiffness, ..Summary::default() },
         };
         let source = if measured {
-            "as the sensor measured it"
+            "as measured by the sensor"
         } else {
-            "as the controller estimates it, for want of a sensor: no measurement"
+            "as estimated by the controller, without a sensor: no measurement"
         };
         let rate = status.rate_hz;
         recording.put(&format!(
@@ -81,10 +81,10 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Adds a sample; one that came before is left out.
+    /// Adds a sample; one that is not newer than the last is ignored.
     ///
     /// # Errors
-    /// If the disk is full, or the MCU has restarted.
+    /// If the file cannot be written, or the MCU has restarted.
     pub fn add(&mut self, sample: &Telemetry) -> Result<()> {
         let first = *self.first_tick.get_or_insert(sample.tick);
         if sample.tick < first {
@@ -94,7 +94,7 @@ impl Recording {
             if sample.tick <= self.last_tick {
                 return Ok(());
             }
-            // Half a period is jitter, not a loss.
+            // Up to half a period is jitter, not a loss.
             let periods = (sample.tick - self.last_tick + self.every_ticks / 2) / self.every_ticks;
             self.summary.lost += periods.saturating_sub(1);
         }
@@ -102,7 +102,7 @@ impl Recording {
         self.summary.without_reading += u64::from(stiffness.is_none());
         let stiffness = stiffness.map_or("-".into(), |stiffness| format!("{:.6}", stiffness.to_f64()));
         let time_s = (sample.tick - first) as f64 / self.rate_hz;
-        // Nine decimals hide what floats make of decimal times.
+        // Nine decimals hide floating-point errors of decimal times.
         let time = (time_s * 1e9).round() / 1e9;
         self.put(&format!("{time},{:.6},{stiffness}\n", sample.applied.to_f64()))?;
         self.last_tick = sample.tick;
@@ -111,7 +111,7 @@ impl Recording {
         Ok(())
     }
 
-    /// What has been recorded.
+    /// Totals so far.
     pub fn summary(&self) -> &Summary {
         &self.summary
     }
@@ -119,7 +119,7 @@ impl Recording {
     fn put(&mut self, text: &str) -> Result<()> {
         let written = self.file.write_all(text.as_bytes());
         if written.is_err() {
-            // What of the row got through must go. Should that fail too, the first error is the one to tell.
+            // Remove an incomplete row; if that fails too, the first error is reported.
             let _ = self.file.set_len(self.complete);
             let _ = self.file.seek(SeekFrom::Start(self.complete));
         }
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_readable_before_the_recording_ends_repeats_left_out_and_losses_counted() {
+    fn rows_are_readable_at_once_without_repeats_and_losses_are_counted() {
         let folder = tempfile::tempdir().unwrap();
         let (path, mut recording) = start(folder.path(), true);
         for tick in [5000, 5010, 5010, 5000, 5050, 5061] {
@@ -163,14 +163,14 @@ mod tests {
         let times: Vec<f64> = read.rows.iter().map(|row| row.time_s).collect();
         assert_eq!(times, [0.0, 0.01, 0.05, 0.061, 0.07]);
         assert_eq!((read.rows[1].voltage_v, read.rows[1].measured), (100.0, Some(8.0)));
-        // The spring feels the voltage, whether its sensor reads or not.
+        // The voltage acts on the spring whether or not the sensor reads.
         assert_eq!((read.rows[4].voltage_v, read.rows[4].measured), (100.0, None));
         let Summary { rows, lost, without_reading, .. } = recording.summary();
         assert_eq!((*rows, *lost, *without_reading), (5, 3, 1));
     }
 
     #[test]
-    fn without_a_sensor_the_file_says_so() {
+    fn without_a_sensor_the_file_states_that_it_holds_estimates() {
         let folder = tempfile::tempdir().unwrap();
         let (path, mut recording) = start(folder.path(), false);
         recording.add(&sample(1)).unwrap();
@@ -198,10 +198,10 @@ mod tests {
         Recording::new(&path, true, &status(true), 10).unwrap();
     }
 
-    /// A device that is always full stands for a disk that is.
+    /// A device that is always full stands for a full disk.
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_full_disk_is_told() {
+    fn a_full_disk_is_reported() {
         let error = Recording::new(Path::new("/dev/full"), true, &status(true), 10).err().unwrap();
         assert!(error.to_string().contains("/dev/full cannot be written"), "{error}");
     }

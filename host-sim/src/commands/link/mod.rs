@@ -1,0 +1,183 @@
+//! `vsj link`: the MCU over its serial link.
+
+mod model;
+mod record;
+mod session;
+mod watch;
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand, ValueEnum};
+use host_sim::link::{Client, Patience, Port};
+use link::{Desired, Fault, Request};
+use session::{Session, seconds};
+use simulation::bad_input;
+
+/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, model
+#[derive(Args, Debug)]
+#[command(
+    arg_required_else_help = false,
+    after_help = "\
+Examples:
+  vsj link /dev/ttyACM0 status
+  vsj link /dev/ttyACM0 set 300 --arm --keep 60         arm, 300 V for a minute
+  vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
+  vsj link unix:/tmp/mcu.sock watch                     the emulator
+  vsj link /dev/ttyACM0 record out.csv --input stair --arm
+  vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
+
+The MCU ramps the voltage down when the host is silent for longer than its limit (see `status`): a target is kept only while \
+a command stays connected: --keep, watch or record. A request is repeated every 0.1 s until it is answered, for --timeout \
+seconds; the MCU applies it once.
+
+Exit codes: 0 success, 1 request rejected, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a \
+stiffness out of reach."
+)]
+pub(crate) struct Arguments {
+    /// A serial device, unix:PATH or tcp:HOST:PORT
+    #[arg(value_name = "PORT")]
+    port: String,
+    #[command(subcommand)]
+    command: Command,
+    /// Baud rate of a serial device, in bit/s
+    #[arg(long, global = true, default_value_t = 115_200, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
+    baud: u32,
+    /// How long to wait for an answer, in s
+    #[arg(long, global = true, default_value_t = 1.0, value_name = "S", allow_negative_numbers = true)]
+    timeout: f64,
+    /// One JSON object on stdout
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Show the status of the MCU
+    Status,
+    /// Set the desired stiffness of an armed MCU
+    Set(Set),
+    /// Enable the output; the target starts at 0 V
+    Arm {
+        /// Stay connected for this many seconds, `inf` until Ctrl-C
+        #[arg(long, value_name = "S", allow_negative_numbers = true)]
+        keep: Option<f64>,
+    },
+    /// Disable the output immediately
+    Disarm,
+    /// Acknowledge a fault by the name or number that `status` shows; the MCU is then disarmed
+    Acknowledge {
+        /// Name or number of the fault
+        fault: String,
+    },
+    /// Show the running loop, and keep the MCU from detecting a silent host
+    Watch(watch::Arguments),
+    /// Record time, voltage and stiffness as CSV for `vsj diagnose`
+    Record(record::Arguments),
+    /// Show the MCU's model of the spring; with a plant file, send it to be checked and stored, and restart
+    Model(model::Arguments),
+}
+
+#[derive(Args, Debug)]
+struct Set {
+    /// The desired stiffness
+    #[arg(allow_negative_numbers = true)]
+    value: f64,
+    /// Unit of the value: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip
+    #[arg(long, value_enum, default_value_t)]
+    unit: Unit,
+    /// Arm the MCU first
+    #[arg(long)]
+    arm: bool,
+    /// Stay connected for this many seconds, `inf` until Ctrl-C
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    keep: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Unit {
+    #[default]
+    V,
+    Pa,
+    NPerM,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let json = arguments.json;
+    let patience = Patience::of(seconds("--timeout", arguments.timeout, 3600.0)?);
+    // The arguments are checked before anything is sent.
+    let fault = match &arguments.command {
+        Command::Acknowledge { fault } => parse_fault(fault)?,
+        _ => Fault::NONE,
+    };
+    if let Command::Set(Set { value, .. }) = &arguments.command
+        && !value.is_finite()
+    {
+        bad_input!("{value} is not a stiffness; expected a finite number");
+    }
+    let keep = match &arguments.command {
+        Command::Set(Set { keep, .. }) | Command::Arm { keep } => keep.map(|s| seconds("--keep", s, f64::INFINITY)),
+        _ => None,
+    };
+    let keep = keep.transpose()?;
+    if let Command::Record(arguments) = &arguments.command {
+        arguments.check()?;
+    }
+    if let Command::Watch(arguments) = &arguments.command {
+        arguments.check()?;
+    }
+
+    let model = match &arguments.command {
+        Command::Model(arguments) => arguments.read()?,
+        _ => None,
+    };
+
+    let port = Port::open(&arguments.port, arguments.baud)?;
+    let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
+    let mut session = Session { client, status, json };
+    match &arguments.command {
+        Command::Status => session.show_status(),
+        Command::Set(set) => {
+            let desired = match set.unit {
+                Unit::V => Desired::ScaledVolts(set.value),
+                Unit::Pa => Desired::Pascal(set.value),
+                Unit::NPerM => Desired::NewtonPerMetre(set.value),
+            };
+            if set.arm {
+                session.order(Request::Arm)?;
+            }
+            let done = session.order(Request::Set(desired))?;
+            session.show(done)?;
+            session.keep(keep)
+        }
+        Command::Arm { .. } => {
+            let done = session.order(Request::Arm)?;
+            session.show(done)?;
+            session.keep(keep)
+        }
+        Command::Disarm => {
+            let done = session.order(Request::Disarm)?;
+            session.show(done)
+        }
+        Command::Acknowledge { .. } => {
+            let done = session.order(Request::Acknowledge(fault))?;
+            session.show(done)
+        }
+        Command::Watch(arguments) => watch::run(&mut session, arguments),
+        Command::Record(arguments) => record::run(&mut session, arguments),
+        Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
+    }
+}
+
+fn parse_fault(text: &str) -> Result<Fault> {
+    let known = (1..=u8::MAX).map(Fault).filter(|fault| fault.name() != "unknown");
+    if let Some(fault) = known.clone().find(|fault| fault.name() == text) {
+        return Ok(fault);
+    }
+    match text.parse() {
+        Ok(code) if code > 0 => Ok(Fault(code)),
+        _ => {
+            let names: Vec<_> = known.map(Fault::name).collect();
+            bad_input!("{text} is not a fault; expected {} or a number of 1 to 255", names.join(", "))
+        }
+    }
+}

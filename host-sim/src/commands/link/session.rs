@@ -1,0 +1,111 @@
+//! An open connection to the MCU, and what the subcommands of `vsj link` share.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use host_sim::link::{Client, Failure, StatusReport};
+use host_sim::output::terminal::{json, print};
+use link::{Desired, Reason, Request, Status, WireVolts};
+use serde::Serialize;
+use simulation::bad_input;
+use simulation::bad_input::number;
+
+/// The answer of `set`, `arm`, `disarm` and `acknowledge` with `--json`.
+#[derive(Serialize)]
+struct Done {
+    state: &'static str,
+    target_v: f64,
+}
+
+/// A connection to an MCU with its latest status.
+pub(super) struct Session {
+    pub(super) client: Client,
+    pub(super) status: Status,
+    pub(super) json: bool,
+}
+
+impl Session {
+    /// Sends a request. A stiffness out of reach is bad input; any other error is a failure.
+    pub(super) fn order(&mut self, request: Request) -> Result<(link::State, WireVolts)> {
+        match self.client.order(request) {
+            Ok(done) => Ok(done),
+            Err(Failure::Refused(reason @ Reason::OutOfRange { .. })) => {
+                let unit = match request {
+                    Request::Set(Desired::Pascal(_)) => "Pa",
+                    Request::Set(Desired::NewtonPerMetre(_)) => "N/m",
+                    _ => "V",
+                };
+                bad_input!("{}: {reason} {unit}", self.client.name())
+            }
+            Err(failure) => Err(failure).with_context(|| self.client.name().to_owned()),
+        }
+    }
+
+    pub(super) fn refresh(&mut self) -> Result<Status> {
+        self.status = self.client.status().with_context(|| self.client.name().to_owned())?;
+        Ok(self.status)
+    }
+
+    pub(super) fn show_status(&self) -> Result<()> {
+        let report = StatusReport::new(&self.status);
+        print(&if self.json { json(&report)? } else { report.text() })
+    }
+
+    pub(super) fn show(&self, (state, target): (link::State, WireVolts)) -> Result<()> {
+        let done = Done { state: state.name(), target_v: target.to_f64() };
+        let text = format!("{}, target {:.3} V\n", done.state, done.target_v);
+        print(&if self.json { json(&done)? } else { text })
+    }
+
+    /// Interval of heartbeats: five within the longest silence that the MCU allows, 0.01 s to 1 s.
+    pub(super) fn heartbeat(&self) -> Duration {
+        let limit_s = f64::from(self.status.silence_limit_ticks) / f64::from(self.status.rate_hz.max(1));
+        Duration::from_secs_f64((limit_s / 5.0).clamp(0.01, 1.0))
+    }
+
+    /// Returns an error unless the MCU is armed. Ramping is accepted: the frame that reported it has ended it.
+    pub(super) fn still_armed(&mut self, state: link::State) -> Result<()> {
+        if !matches!(state, link::State::Armed | link::State::Ramping) {
+            self.refresh()?;
+            bail!("{}: no longer armed: {state}, fault {}", self.client.name(), self.status.fault);
+        }
+        Ok(())
+    }
+
+    /// Stays connected for `time`; returns an error if the MCU is no longer armed.
+    pub(super) fn keep(&mut self, time: Option<Duration>) -> Result<()> {
+        let Some(time) = time else { return Ok(()) };
+        stop_on_interrupt()?;
+        let (start, pause) = (Instant::now(), self.heartbeat());
+        while start.elapsed() < time && !stopped() {
+            let (state, _) = self.order(Request::Heartbeat)?;
+            self.still_armed(state)?;
+            std::thread::sleep(pause.min(time.saturating_sub(start.elapsed())));
+        }
+        Ok(())
+    }
+}
+
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Makes Ctrl-C set the flag read by [`stopped`]; a second Ctrl-C ends the program.
+pub(super) fn stop_on_interrupt() -> Result<()> {
+    Ok(ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })?)
+}
+
+pub(super) fn stopped() -> bool {
+    STOP.load(Ordering::Relaxed)
+}
+
+/// Checks a time in s that must be positive and at most `most`; an infinite one becomes the longest `Duration`.
+pub(super) fn seconds(option: &str, value: f64, most: f64) -> Result<Duration> {
+    if !(value > 0.0 && value <= most) {
+        bad_input!("{option} {}: expected a positive number of seconds", number(value));
+    }
+    Ok(Duration::try_from_secs_f64(value).unwrap_or(Duration::MAX))
+}

@@ -1,0 +1,29 @@
+//! Errors of the libraries name a field; users know the option that sets it.
+
+use simulation::bad_input::BadInput;
+
+/// Puts the option in front of an error that begins with a field's name. `options` holds pairs of field and option; a field
+/// that ends in `.` stands for a whole table.
+pub(crate) fn named(error: anyhow::Error, options: &[(&str, &str)]) -> anyhow::Error {
+    let text = error.to_string();
+    let field = text.split(' ').next().unwrap_or_default();
+    let table = field.split_inclusive('.').next().unwrap_or_default();
+    match options.iter().find(|(name, _)| *name == field || *name == table) {
+        Some((_, option)) => BadInput(format!("{option}: {text}")).into(),
+        None => error,
+    }
+}
+
+/// The fields of [`model::Settings`] whose options `stair`, `compare` and `tune` have in common.
+pub(crate) const SETTINGS: &[(&str, &str)] = &[
+    ("rate_hz", "--rate-hz"),
+    ("full_scale_v", "--limit-v"),
+    ("max_v", "--limit-v"),
+    ("slew_v_per_s", "--slew-v-per-s"),
+    ("share", "--plant"),
+    ("time_constant_s", "--plant"),
+    ("relaxation.", "--plant"),
+    ("memory.", "--plant"),
+    ("law.", "--plant"),
+    ("leakage.", "--plant"),
+];
