@@ -20,7 +20,7 @@ impl Effect for AmplifierLimit {
     }
 
     fn isolating_experiment(&self) -> &'static str {
-        "a stair in small steps up to the full voltage: above the limit nothing moves any more, not even at once"
+        "a stair in small steps up to the full voltage: above the limit nothing changes any more, not even the instantaneous part"
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {

@@ -28,7 +28,7 @@ impl Effect for Drift {
     }
 
     fn description(&self) -> &'static str {
-        "the response changes with the clock, not with the voltage"
+        "the response changes with time, not with the voltage"
     }
 
     fn isolating_experiment(&self) -> &'static str {

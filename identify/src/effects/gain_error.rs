@@ -20,7 +20,7 @@ impl Effect for GainError {
     }
 
     fn isolating_experiment(&self) -> &'static str {
-        "one step, held for ten time constants: the settled value tells the gain"
+        "one step, held for ten time constants: the settled value gives the gain"
     }
 
     fn special_case_of(&self) -> &'static [&'static str] {

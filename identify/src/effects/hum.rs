@@ -25,7 +25,7 @@ impl Effect for Hum {
     }
 
     fn description(&self) -> &'static str {
-        "a periodic disturbance rides on the readings"
+        "a periodic disturbance is added to the readings"
     }
 
     fn isolating_experiment(&self) -> &'static str {

@@ -59,11 +59,11 @@ impl Effect for Hysteresis {
     }
 
     fn description(&self) -> &'static str {
-        "the branches up and down differ, however slowly they are run"
+        "the rising and falling branches differ, however slowly the voltage changes"
     }
 
     fn isolating_experiment(&self) -> &'static str {
-        "a slow stair up and down again: only under hysteresis the branches stay apart, however long each step is held"
+        "a slow stair up and down again: only with hysteresis do the branches stay apart, however long each step is held"
     }
 
     fn forms(&self) -> usize {

@@ -16,7 +16,7 @@ impl Effect for InstantaneousShare {
     }
 
     fn description(&self) -> &'static str {
-        "the part of a step that comes at once is another"
+        "the instantaneous part of a step (feedthrough) differs"
     }
 
     fn isolating_experiment(&self) -> &'static str {

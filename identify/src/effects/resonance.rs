@@ -47,7 +47,7 @@ impl Effect for Resonance {
     }
 
     fn description(&self) -> &'static str {
-        "it swings after a change"
+        "underdamped oscillation after a change"
     }
 
     fn isolating_experiment(&self) -> &'static str {

@@ -16,7 +16,7 @@ impl Effect for TimeConstant {
     }
 
     fn description(&self) -> &'static str {
-        "the relaxation takes another time"
+        "the time constant of the relaxation differs"
     }
 
     fn isolating_experiment(&self) -> &'static str {
