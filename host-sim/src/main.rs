@@ -4,9 +4,10 @@ mod commands;
 
 use std::process::ExitCode;
 
+use anyhow::Result;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
-use host_sim::output::terminal::remark;
+use host_sim::output::terminal::{has_reader, remark};
 use simulation::bad_input::BadInput;
 
 /// Simulates the variable-stiffness spring and its controller, with the code that runs in the amplifier's MCU.
@@ -16,7 +17,7 @@ use simulation::bad_input::BadInput;
 #[command(
     name = "vsj",
     version,
-    after_help = "Exit codes: 0 success, 1 the command failed, 2 bad arguments or bad input."
+    after_help = "Exit codes: 0 success, 1 the command failed or stdout cannot be written, 2 bad arguments or bad input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -55,6 +56,11 @@ fn main() -> ExitCode {
         Some(Command::Tune(arguments)) => commands::tune::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),
     };
+    exit_code(done)
+}
+
+/// Prints an error as one line; returns the exit code.
+fn exit_code(done: Result<()>) -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -67,9 +73,7 @@ fn main() -> ExitCode {
 /// Prints help and version in full, and a wrong argument as one line; returns the exit code.
 fn usage(error: &clap::Error) -> ExitCode {
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
-        // A closed pipe is no failure.
-        let _ = error.print();
-        return ExitCode::SUCCESS;
+        return exit_code(has_reader(error.print()).map(drop));
     }
     remark(&one_line(error));
     ExitCode::from(2)

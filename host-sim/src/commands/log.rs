@@ -46,11 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Err(error) => bad_input!("{}: {error:#}", arguments.elf.display()),
     };
     let source = open(&arguments.file)?;
-    match decode(source, formats, arguments) {
-        // A closed pipe ends the command without an error.
-        Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
-        done => done,
-    }
+    decode(source, formats, arguments)
 }
 
 fn open(path: &Path) -> Result<Box<dyn Read>> {
@@ -84,12 +80,16 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) ->
     let mut summary = Summary::default();
     let mut buffer = [0; 1 << 13];
     let mut broken = None;
-    let mut printer = Printer::start(match (arguments.json, arguments.csv) {
+    let mut printer = Printer::new(match (arguments.json, arguments.csv) {
         (true, _) => Format::Json,
         (_, true) => Format::Csv,
         _ => Format::Table,
-    })?;
+    });
     loop {
+        // Without a reader, the rest of a live log would be awaited in vain.
+        if !printer.flush()? {
+            return Ok(());
+        }
         let read = match source.read(&mut buffer) {
             Ok(0) => break,
             Ok(read) => read,
@@ -101,13 +101,12 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) ->
         };
         for item in decoder.feed(&buffer[..read]) {
             summary.add(&item);
-            printer.item(item)?;
+            printer.item(item);
         }
-        printer.flush()?;
     }
     if let Some(item) = decoder.finish() {
         summary.add(&item);
-        printer.item(item)?;
+        printer.item(item);
     }
     let verdict = verdict(arguments, &summary);
     printer.end(encoding, summary)?;

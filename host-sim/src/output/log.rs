@@ -1,10 +1,9 @@
 //! The decoded firmware log on stdout: as a table, as CSV, or as one JSON object.
 
-use std::io::{self, StdoutLock, Write};
-
 use anyhow::Result;
 use serde::Serialize;
 
+use super::terminal::{json, print, print_to_reader};
 use crate::log::{
     CSV_HEADER, Encoding, Item, Line, Summary, TABLE_HEADER, csv_row, more_damage_csv_row, more_damage_table_row,
     summary_text, table_row,
@@ -41,7 +40,8 @@ struct Damage {
 /// Prints the items of a log while they are decoded.
 pub struct Printer {
     format: Format,
-    out: StdoutLock<'static>,
+    /// Text that is not printed yet.
+    text: String,
     /// Kept for JSON, which is one object.
     lines: Vec<Line>,
     damaged: Vec<Damage>,
@@ -51,26 +51,18 @@ pub struct Printer {
 }
 
 impl Printer {
-    /// Prints the header of a table or CSV file to stdout.
-    ///
-    /// # Errors
-    /// If stdout cannot be written.
-    pub fn start(format: Format) -> io::Result<Self> {
-        let mut out = io::stdout().lock();
-        match format {
-            Format::Table => writeln!(out, "{TABLE_HEADER}")?,
-            Format::Csv => writeln!(out, "{CSV_HEADER}")?,
-            Format::Json => {}
-        }
-        out.flush()?;
-        Ok(Self { format, out, lines: Vec::new(), damaged: Vec::new(), run: None })
+    /// Starts with the header of a table or CSV file.
+    pub fn new(format: Format) -> Self {
+        let text = match format {
+            Format::Table => format!("{TABLE_HEADER}\n"),
+            Format::Csv => format!("{CSV_HEADER}\n"),
+            Format::Json => String::new(),
+        };
+        Self { format, text, lines: Vec::new(), damaged: Vec::new(), run: None }
     }
 
-    /// Prints an item; of a run of damaged frames only the first, then their number.
-    ///
-    /// # Errors
-    /// If stdout cannot be written.
-    pub fn item(&mut self, item: Item) -> io::Result<()> {
+    /// Adds an item; of a run of damaged frames only the first, then their number.
+    pub fn item(&mut self, item: Item) {
         if self.format == Format::Json {
             match item {
                 Item::Line(line) => self.lines.push(line),
@@ -78,53 +70,55 @@ impl Printer {
                 Item::Lost { offset } => self.damaged.push(Damage { offset, bytes: None }),
                 Item::Unread { .. } | Item::CutOff { .. } => {}
             }
-            return Ok(());
+            return;
         }
         match (&item, &mut self.run) {
             (Item::Damaged { bytes: more, .. }, Some((frames, bytes))) => {
                 *frames += 1;
                 *bytes += more;
-                return Ok(());
+                return;
             }
             (Item::Damaged { .. }, None) => self.run = Some((0, 0)),
-            _ => self.end_run()?,
+            _ => self.end_run(),
         }
         let row = if self.format == Format::Csv { csv_row(&item) } else { table_row(&item) };
-        writeln!(self.out, "{row}")
+        self.text += &row;
+        self.text.push('\n');
     }
 
-    /// Shows what has been printed so far: a log may be followed live.
+    /// Prints what has been added, since a log may be followed live; returns false if the reader of stdout has closed the pipe.
     ///
     /// # Errors
-    /// If stdout cannot be written.
-    pub fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
+    /// If stdout cannot be written for another reason.
+    pub fn flush(&mut self) -> Result<bool> {
+        print_to_reader(&std::mem::take(&mut self.text))
     }
 
-    fn end_run(&mut self) -> io::Result<()> {
-        let Some((frames @ 1.., bytes)) = self.run.take() else { return Ok(()) };
+    fn end_run(&mut self) {
+        let Some((frames @ 1.., bytes)) = self.run.take() else { return };
         let row = if self.format == Format::Csv { more_damage_csv_row } else { more_damage_table_row };
-        writeln!(self.out, "{}", row(frames, bytes))
+        self.text += &row(frames, bytes);
+        self.text.push('\n');
     }
 
-    /// Prints the summary.
+    /// Prints the rest and the summary.
     ///
     /// # Errors
-    /// If stdout cannot be written.
+    /// If stdout cannot be written, except to a pipe closed by its reader.
     pub fn end(mut self, encoding: Encoding, summary: Summary) -> Result<()> {
-        self.end_run()?;
+        self.end_run();
         match self.format {
             Format::Json => {
                 let report = Report { encoding, lines: self.lines, damaged: self.damaged, summary };
-                writeln!(self.out, "{}", serde_json::to_string(&report)?)?;
+                self.text = json(&report)?;
             }
             Format::Csv => {
                 for line in summary_text(&summary).lines() {
-                    writeln!(self.out, "# {line}")?;
+                    self.text += &format!("# {line}\n");
                 }
             }
-            Format::Table => write!(self.out, "\n{}", summary_text(&summary))?,
+            Format::Table => self.text += &format!("\n{}", summary_text(&summary)),
         }
-        Ok(self.out.flush()?)
+        print(&self.text)
     }
 }

@@ -1,12 +1,16 @@
 //! The status of a running loop: refreshed in place on a terminal, one line a sample anywhere else.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 
+use anyhow::Result;
+
+use super::terminal::{print_error, print_to_reader};
 use crate::link::{Row, StatusReport};
 
 /// Where the samples of `vsj link watch` go.
 pub struct Screen {
-    out: Box<dyn Write>,
+    /// True if the samples go to stderr.
+    on_stderr: bool,
     /// True on a terminal: each status overwrites the one before.
     live: bool,
     /// Lines of the last status on a terminal; otherwise rows written so far.
@@ -16,19 +20,15 @@ pub struct Screen {
 impl Screen {
     /// Writes to stdout, or with `json` to stderr, since stdout then takes one JSON object only.
     pub fn new(json: bool) -> Self {
-        let (out, live): (Box<dyn Write>, _) = if json {
-            (Box::new(io::stderr()), io::stderr().is_terminal())
-        } else {
-            (Box::new(io::stdout()), io::stdout().is_terminal())
-        };
-        Self { out, live, lines: 0 }
+        let live = if json { io::stderr().is_terminal() } else { io::stdout().is_terminal() };
+        Self { on_stderr: json, live, lines: 0 }
     }
 
-    /// Shows a status.
+    /// Shows a status; returns false if the reader of stdout has closed the pipe.
     ///
     /// # Errors
-    /// If it cannot be written, for example to a pipe that its reader has closed.
-    pub fn show(&mut self, report: &StatusReport) -> io::Result<()> {
+    /// If stdout cannot be written for another reason.
+    pub fn show(&mut self, report: &StatusReport) -> Result<bool> {
         let mut text = String::new();
         if self.live {
             if self.lines > 0 {
@@ -47,7 +47,10 @@ impl Screen {
             text += &format!("{}\n", report.sample.line());
             self.lines += 1;
         }
-        self.out.write_all(text.as_bytes())?;
-        self.out.flush()
+        if self.on_stderr {
+            print_error(&text);
+            return Ok(true);
+        }
+        print_to_reader(&text)
     }
 }

@@ -5,4 +5,6 @@ mod command;
 mod damage;
 mod mcu;
 mod model;
+#[cfg(target_os = "linux")]
+mod output;
 mod vsj;

@@ -146,13 +146,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
                 session.order(Request::Arm)?;
             }
             let done = session.order(Request::Set(desired))?;
-            session.show(done)?;
-            session.keep(keep)
+            session.show_and_keep(done, keep)
         }
         Command::Arm { .. } => {
             let done = session.order(Request::Arm)?;
-            session.show(done)?;
-            session.keep(keep)
+            session.show_and_keep(done, keep)
         }
         Command::Disarm => {
             let done = session.order(Request::Disarm)?;

@@ -11,11 +11,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 use link::{Desired, Request};
 use serde_json::json;
 use simulation::bad_input;
+use simulation::bad_input::number;
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::{Between, Schedule};
 
 use super::session::{Session, seconds, stop_on_interrupt, stopped};
 use crate::commands::choice::{BETWEEN, one_of};
+
+/// Longest accepted input, in s; much more cannot be expressed as a [`Duration`].
+const LONGEST_S: f64 = 1e9;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -28,7 +32,8 @@ pub(super) struct Arguments {
     /// Samples per second; 115 200 bit/s suffice for about 250
     #[arg(long, default_value_t = 100.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v
+    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v that
+    /// lasts at most 1e9 s
     #[arg(long, value_name = "stair|step|FILE.csv")]
     input: Option<String>,
     /// Interpolation of the voltage between two rows of an input file
@@ -60,7 +65,14 @@ impl Arguments {
             None => None,
             Some("stair") => Some(Schedule::stair()),
             Some("step") => Some(Schedule::ideal_stair()),
-            Some(file) => Some(Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between)),
+            Some(file) => {
+                let schedule = Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between);
+                let length_s = schedule.end_s() - schedule.start_s();
+                if length_s > LONGEST_S {
+                    bad_input!("{file} lasts {} s; expected at most {LONGEST_S} s", number(length_s));
+                }
+                Some(schedule)
+            }
         })
     }
 }

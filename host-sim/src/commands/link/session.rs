@@ -52,6 +52,14 @@ impl Session {
         print(&if self.json { json(&report)? } else { report.text() })
     }
 
+    /// Prints the answer, and stays connected for `time` even if it cannot be printed: lost output decides nothing about an
+    /// armed MCU.
+    pub(super) fn show_and_keep(&mut self, done: (link::State, WireVolts), time: Option<Duration>) -> Result<()> {
+        let shown = self.show(done);
+        self.keep(time)?;
+        shown
+    }
+
     pub(super) fn show(&self, (state, target): (link::State, WireVolts)) -> Result<()> {
         let done = Done { state: state.name(), target_v: target.to_f64() };
         let text = format!("{}, target {:.3} V\n", done.state, done.target_v);
@@ -74,7 +82,7 @@ impl Session {
     }
 
     /// Stays connected for `time`; returns an error if the MCU is no longer armed.
-    pub(super) fn keep(&mut self, time: Option<Duration>) -> Result<()> {
+    fn keep(&mut self, time: Option<Duration>) -> Result<()> {
         let Some(time) = time else { return Ok(()) };
         stop_on_interrupt()?;
         let (start, pause) = (Instant::now(), self.heartbeat());

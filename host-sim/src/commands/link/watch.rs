@@ -2,7 +2,6 @@
 //!
 //! On a terminal one screenful is written over and over; anywhere else each sample is a line.
 
-use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -54,10 +53,8 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         report = StatusReport::new(&session.refresh()?);
         if Instant::now() >= next {
             samples += 1;
-            match screen.show(&report) {
-                // A closed pipe ends the command without an error.
-                Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
-                shown => shown?,
+            if !screen.show(&report)? {
+                return Ok(());
             }
             // After a delay, continue from now instead of catching up.
             next = (next + every).max(Instant::now());
