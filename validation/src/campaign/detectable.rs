@@ -7,13 +7,12 @@
 //!
 //! Where an effect does not shift the expected readings, an equivalent test is used:
 //! - Quantisation: a test of the residual's variance, which rounding increases by step^2/12. The quantisation grid
-//! itself
-//!   could be found at any step size, but is not visible below this one in the noise.
+//!   itself could be found at any step size, but is not visible below this one in the noise.
 //! - Outliers: the likelihood ratio of the true [`mixture`](super::mixture).
 //! - Saturation: the shift by which the limit clips the expected readings; that clipped readings are identical is not
-//! used.
+//!   used.
 //! - Delay and slew: compared with the smallest one (see [`Effect::least`](crate::ground_truth::Effect::least)), not
-//! with none.
+//!   with none.
 
 use super::mixture::Mixture;
 use super::statistics::NORMAL_95;
