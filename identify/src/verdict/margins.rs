@@ -1,7 +1,7 @@
 //! Smallest errors of gain and time constant that a record without findings would have shown.
 //!
 //! ```text
-//! margin = (sqrt(2 N) + 1.64) / sqrt(J' W J)        J, W: sensitivities and weights of the rows
+//! margin = (sqrt(2 N) + 1.645) / sqrt(J' W J)        J, W: sensitivities and weights of the rows
 //! ```
 //!
 //! An error of the gain, or of the time constant's logarithm, of this size gains the `N` nats that the price of its cause and
