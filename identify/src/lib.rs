@@ -41,7 +41,7 @@
 //!
 //! | folder | what comes in | what goes out |
 //! | --- | --- | --- |
-//! | [`stats`] | numbers | medians, sums, scales, a periodogram |
+//! | [`stats`] | numbers | medians, sums, scales, a periodogram; the thresholds of all decisions |
 //! | [`answer`] | | the data types of a report |
 //! | [`record`] | a record's rows | the command as a signal, the readings, the grid that they lie on |
 //! | [`plant`] | a plant file | the chain from command to stiffness that effects change |

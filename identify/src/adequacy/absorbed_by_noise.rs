@@ -21,21 +21,12 @@ use crate::noise::autocorrelation::Autocorrelation;
 use crate::record::data::Data;
 use crate::record::spectrum;
 use crate::stats::scale::{robust_scale, root_mean_square};
+use crate::stats::thresholds::empirical::{
+    CHANGE_NATS, CHANGE_NATS_PER_ROW, CLIP_FOR_AUTOCORRELATION, LINE_TO_NEIGHBOURS, ROWS_PER_SWING, SLOW_SHARE,
+};
 
 /// Parts of the record whose means are compared with the error's scale.
 const SWING_PARTS: usize = 8;
-/// Fewest rows that are tested: ten for each part.
-const ROWS_TO_TEST_ABSORPTION: usize = 10 * SWING_PARTS;
-/// Fraction of the mean square in the parts' means above which the error is not stationary noise.
-const SLOW_SHARE: f64 = 0.75;
-/// Change of the autocorrelation between the halves, in nats, above which the error is not stationary noise.
-const CHANGE_NATS: f64 = 60.0;
-/// The same threshold for each row of the record, in nats; the larger of the two applies.
-const CHANGE_NATS_PER_ROW: f64 = 0.02;
-/// Power of a spectral line over the mean power of its neighbours above which the line is not noise.
-const LINE_TO_NEIGHBOURS: f64 = 30.0;
-/// Errors are clipped at this many robust scales when the halves are compared.
-const HALVES_CLIP_SCALES: f64 = 4.0;
 
 /// The check of a fit whose noise is autocorrelated.
 pub(super) struct AbsorbedByNoise;
@@ -53,7 +44,7 @@ impl Check for AbsorbedByNoise {
 
 /// Tests errors in V that the noise model predicts by `memory`, its autoregression.
 fn absorbed(data: &Data, errors: &[f64], memory: &Autocorrelation) -> Option<UnmodelledDynamics> {
-    if errors.len() < ROWS_TO_TEST_ABSORPTION || memory.is_white() {
+    if errors.len() < ROWS_PER_SWING.count() * SWING_PARTS || memory.is_white() {
         return None;
     }
     let found = |place: &str, share: f64| {
@@ -61,15 +52,15 @@ fn absorbed(data: &Data, errors: &[f64], memory: &Autocorrelation) -> Option<Unm
         UnmodelledDynamics::certain(place, share, share.sqrt() * root_mean_square(errors))
     };
     let slow = slow(errors);
-    if slow > SLOW_SHARE {
+    if slow > SLOW_SHARE.get() {
         return Some(found("as a slow swing over the whole record", slow));
     }
     let changed = changed(errors);
-    if changed > CHANGE_NATS.max(CHANGE_NATS_PER_ROW * errors.len() as f64) {
+    if changed > CHANGE_NATS.get().max(CHANGE_NATS_PER_ROW.get() * errors.len() as f64) {
         let new = root_mean_square(&memory.whitened(errors)) / root_mean_square(errors);
         return Some(found("as a rhythm that changes along the record", (1.0 - new * new).max(0.0)));
     }
-    let line = spectrum::most_prominent_line(errors, data).filter(|line| line.prominence > LINE_TO_NEIGHBOURS)?;
+    let line = spectrum::most_prominent_line(errors, data).filter(|line| line.prominence > LINE_TO_NEIGHBOURS.get())?;
     Some(found(&format!("at a frequency of {:.3} Hz", line.frequency_hz), line.share))
 }
 
@@ -86,7 +77,7 @@ fn changed(errors: &[f64]) -> f64 {
     let [of_early, of_late] = [early, late].map(|half| Autocorrelation::fitted(half, robust_scale(half)));
     let loss = |half: &[f64], own: &Autocorrelation, other: &Autocorrelation| {
         let own = own.whitened(half);
-        let bound = HALVES_CLIP_SCALES * robust_scale(&own);
+        let bound = CLIP_FOR_AUTOCORRELATION.get() * robust_scale(&own);
         let size =
             |white: Vec<f64>| root_mean_square(&white.iter().map(|e| e.clamp(-bound, bound)).collect::<Vec<_>>());
         half.len() as f64 * (size(other.whitened(half)) / size(own)).ln()

@@ -3,9 +3,6 @@
 use crate::adequacy::unidentifiable::Unidentifiable;
 use crate::fit::engine::{Engine, Fit};
 
-/// Standard normal quantile of one in ten thousand, above which the statistic of a residual's check is significant.
-pub(crate) const Z_RARE: f64 = 3.72;
-
 /// A test of whether a fit leaves nothing but noise, on a record that can identify a spring.
 pub trait Check: Sync {
     /// Name of the check in [`CHECKS`](crate::adequacy::CHECKS): that of its file.

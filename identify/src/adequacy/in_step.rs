@@ -16,16 +16,11 @@ use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 use crate::fit::engine::Engine;
 use crate::stats::scale::root_mean_square;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::{ERROR_PER_SCATTER, ROWS_PER_MEAN};
+use crate::stats::thresholds::probability::Z_IN_STEP;
 
 /// Numbers of parts that the record is divided into: more parts resolve quick changes, fewer average louder noise.
 const STEP_PARTS: [usize; 2] = [100, 200];
-/// Fewest rows in a part.
-const ROWS_PER_PART: usize = 5;
-/// Value of z that noise exceeds in one of ten thousand records: exponential scores have a skewed sum, so that the quantile is
-/// above the normal distribution's 3.72.
-const Z_IN_STEP: f64 = 4.6;
-/// Smallest ratio of the error's root mean square to its scatter within the parts.
-const ERROR_PER_SCATTER: f64 = 2.0;
 
 /// The check of a fit's free-running error.
 pub(super) struct InStep;
@@ -54,14 +49,14 @@ fn in_step(errors: &[f64], stiffness: &[f64]) -> Option<UnmodelledDynamics> {
 
 fn in_parts(parts: usize, errors: &[f64], stiffness: &[f64]) -> Option<UnmodelledDynamics> {
     let length = errors.len() / parts;
-    if length < ROWS_PER_PART {
+    if length < ROWS_PER_MEAN.count() {
         return None;
     }
     let error = root_mean_square(errors);
     let share = 1.0 - (scatter(errors, length) / error.max(f64::MIN_POSITIVE)).powi(2);
     let [of_error, of_stiffness] = [errors, stiffness].map(|values| scores(&changes(values, length)));
     let z = correlation(&of_error, &of_stiffness) * (of_error.len() as f64 - 1.0).sqrt();
-    (z > Z_IN_STEP && share > 1.0 - ERROR_PER_SCATTER.powi(-2)).then(|| {
+    (z > Z_IN_STEP && share > 1.0 - ERROR_PER_SCATTER.get().powi(-2)).then(|| {
         let place = "in step with the spring, as an error that changes when the stiffness does";
         UnmodelledDynamics::certain(place.into(), share, share.sqrt() * error)
     })

@@ -10,19 +10,10 @@ use crate::adequacy::unidentifiable::Unidentifiable;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::covariance;
 use crate::noise::Noise;
-
-/// Range of the simulation, in V, beyond which constant readings are a fault of the sensor and not a lack of excitation.
-const RANGE_OF_A_DEAD_SENSOR_V: f64 = 5.0;
-/// Absolute correlation with the simulation above which readings beyond any gain are readings in another unit.
-const CORRELATION_OF_OTHER_UNIT: f64 = 0.98;
-/// Absolute correlation with the simulation below which the readings may not depend on the voltage.
-const CORRELATION_OF_NO_SPRING: f64 = 0.2;
-/// Gain in log-likelihood by gain and time constant, in nats, above which their covariance at the fit may be used.
-const NATS_TO_TRUST_FIT: f64 = 20.0;
-/// Largest useful standard deviation of the gain: half of the nominal gain.
-const GAIN_DEVIATION: f64 = 0.5;
-/// Largest useful standard deviation of the time constant's natural logarithm: a factor of e.
-const LOG_TIME_CONSTANT_DEVIATION: f64 = 1.0;
+use crate::stats::thresholds::empirical::{
+    CORRELATION_OF_NO_SPRING, CORRELATION_OF_OTHER_UNIT, GAIN_DEVIATION, LOG_TIME_CONSTANT_DEVIATION,
+    NATS_TO_TRUST_FIT, RANGE_OF_A_DEAD_SENSOR_V,
+};
 
 /// The check of a record, with the fit of the simulation as it is given.
 pub(super) struct Informative;
@@ -47,7 +38,7 @@ fn unidentifiable(engine: &mut Engine, baseline: &Fit) -> Option<Unidentifiable>
     }
     let comparison = Comparison::new(engine);
     if !changes(&data.reading) {
-        let excited = comparison.simulated_range_v() > RANGE_OF_A_DEAD_SENSOR_V;
+        let excited = comparison.simulated_range_v() > RANGE_OF_A_DEAD_SENSOR_V.get();
         return Some(if excited {
             Unidentifiable::Sensor(comparison.constant_readings())
         } else {
@@ -66,24 +57,25 @@ fn unidentifiable(engine: &mut Engine, baseline: &Fit) -> Option<Unidentifiable>
     let bounds = &gain.coordinates(data)[0];
     let found = best.model.point(gain.effect).map_or(1.0, |point| point[0]);
     if !(1.01 * bounds.lowest..0.99 * bounds.highest).contains(&found)
-        && comparison.correlation.abs() > CORRELATION_OF_OTHER_UNIT
+        && comparison.correlation.abs() > CORRELATION_OF_OTHER_UNIT.get()
     {
         return Some(Unidentifiable::Sensor(comparison.other_unit()));
     }
     let identified = |fit: &Fit, engine: &mut Engine| {
-        covariance(engine, fit)
-            .is_some_and(|of| of[(0, 0)].sqrt() < GAIN_DEVIATION && of[(1, 1)].sqrt() < LOG_TIME_CONSTANT_DEVIATION)
+        covariance(engine, fit).is_some_and(|of| {
+            of[(0, 0)].sqrt() < GAIN_DEVIATION.get() && of[(1, 1)].sqrt() < LOG_TIME_CONSTANT_DEVIATION.get()
+        })
     };
     // Noise of the best fit with the sensitivities at the start of the search; where the start is far off, these vanish.
     let residual = engine.residual(&start);
     let start = Fit { model: start, residual, noise: best.noise.clone(), ..best.clone() };
-    let is_clear = best.log_likelihood > baseline.log_likelihood + NATS_TO_TRUST_FIT;
+    let is_clear = best.log_likelihood > baseline.log_likelihood + NATS_TO_TRUST_FIT.get();
     let informative = identified(&start, engine) || is_clear && identified(&best, engine);
     if !informative {
         return Some(Unidentifiable::Excitation);
     }
     // Checked before the search, which takes long on noise alone.
-    let constant = comparison.correlation.abs() < CORRELATION_OF_NO_SPRING
+    let constant = comparison.correlation.abs() < CORRELATION_OF_NO_SPRING.get()
         && constant_is_as_likely(engine, &best.model, best.log_likelihood);
     constant.then(|| Unidentifiable::Sensor(comparison.constant_readings()))
 }

@@ -8,10 +8,7 @@ use std::ops::Range;
 
 use crate::record::data::Data;
 use crate::stats::sums::dot;
-
-/// Fraction of the error's power above which a range of voltages is named in addition to the stretch of time, if it is also the denser
-/// of the two.
-const POWER_TO_NAME_VOLTAGES: f64 = 0.5;
+use crate::stats::thresholds::empirical::POWER_TO_NAME_VOLTAGES;
 
 /// A stretch of time and a range of voltages where an error is largest.
 pub(crate) struct Localisation {
@@ -56,7 +53,7 @@ impl Localisation {
             levels.iter().map(|level| (level.iter().map(|row| row.1).sum(), level.len())).collect();
         let (run, share, rows) = densest(&each_level);
         let there = density(share, rows);
-        let denser = there.power > POWER_TO_NAME_VOLTAGES && there.power_per_row() > in_time.power_per_row();
+        let denser = there.power > POWER_TO_NAME_VOLTAGES.get() && there.power_per_row() > in_time.power_per_row();
         let voltages_v = [run.start, run.end - 1].map(|level| levels[level][0].0);
         Self {
             time_s,

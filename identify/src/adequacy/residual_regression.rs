@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics, Z_RARE};
+use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 use crate::adequacy::localisation::Localisation;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::Jacobian;
@@ -16,20 +16,11 @@ use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece};
 use crate::record::spectrum;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::{ROWS_PER_FEATURE, SPECTRUM_CLIP_SCALES};
+use crate::stats::thresholds::probability::{LINE_NATS, Z_DOUBTFUL, Z_RARE, Z_SHORT_RECORD};
 
-/// Standard normal quantile above which the search goes on: one of fifteen records of noise exceeds it.
-const Z_DOUBTFUL: f64 = 1.5;
-/// Standard normal quantile of one in a hundred: the significance of serial correlation in a record too short for regression.
-const Z_SHORT_RECORD: f64 = 2.33;
 /// Parts that time and voltage are each divided into.
 const FEATURE_PARTS: usize = 6;
-/// Fewest rows for each feature of the regression.
-const ROWS_PER_FEATURE: usize = 10;
-/// Whitened residuals are clipped at this many scales of the noise before the spectrum is taken.
-const SPECTRUM_CLIP_SCALES: f64 = 6.0;
-/// Gain in log-likelihood of a spectral line, less the logarithm of the number of lines that are searched, in nats, above which
-/// the line is structure.
-const LINE_NATS: f64 = 12.0;
 
 /// The check of any fit.
 pub(super) struct ResidualRegression;
@@ -56,7 +47,7 @@ fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
     let data = engine.data;
     let mut groups = features(data);
     let count: usize = groups.iter().map(|group| group.columns.len()).sum();
-    if data.rows() < ROWS_PER_FEATURE * count {
+    if data.rows() < ROWS_PER_FEATURE.count() * count {
         return Some(serial_correlation(data, fit));
     }
     let terms = engine.terms(&fit.noise, &fit.residual);
@@ -120,7 +111,7 @@ fn serial_correlation(data: &Data, fit: &Fit) -> UnmodelledDynamics {
 /// more than `found` does; else `found`.
 fn spectral_line(data: &Data, fit: &Fit, target: &[f64], found: UnmodelledDynamics) -> UnmodelledDynamics {
     let clipped: Vec<f64> =
-        target.iter().map(|value| value.clamp(-SPECTRUM_CLIP_SCALES, SPECTRUM_CLIP_SCALES)).collect();
+        target.iter().map(|value| value.clamp(-SPECTRUM_CLIP_SCALES.get(), SPECTRUM_CLIP_SCALES.get())).collect();
     let Some(peak) = spectrum::peaks(&clipped, data, 1).into_iter().next() else { return found };
     let share = (0.5 * (peak.cosine.powi(2) + peak.sine.powi(2))).min(1.0);
     let power = 0.5 * data.rows() as f64 * share;

@@ -9,23 +9,16 @@
 //! z = (count - n p) / sqrt(n p (1 - p)),      z = (alike - unlike) / sqrt(alike + unlike)
 //! ```
 
-use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics, Z_RARE};
+use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 use crate::adequacy::localisation::Localisation;
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
 use crate::record::data::Data;
 use crate::stats::sums::dot;
-
-/// Innovation beyond which a reading is far off, in scales of the noise.
-const FAR_OFF_SCALES: f64 = 4.0;
-/// Smallest change of the voltage that counts, as a fraction of the full scale.
-const CHANGE_OF_FULL_SCALE: f64 = 0.01;
-/// Rows from a change, as it leaves the amplifier, that are just after it.
-const ROWS_AFTER_CHANGE: f64 = 4.0;
-/// Fraction of the far readings above which those just after a change count.
-const SHARE_AFTER_CHANGES: f64 = 0.5;
-/// Fraction of the far readings above which those next to another of equal sign count.
-const SHARE_IN_RUNS: f64 = 0.2;
+use crate::stats::thresholds::empirical::{
+    CHANGE_OF_FULL_SCALE, FAR_OFF_SCALES, ROWS_AFTER_CHANGE, SHARE_AFTER_CHANGES, SHARE_IN_RUNS,
+};
+use crate::stats::thresholds::probability::Z_RARE;
 
 /// The check of a fit whose noise is a mixture of two scales.
 pub(super) struct Spikes;
@@ -65,7 +58,7 @@ fn count_after_changes(far: &[bool], after: &[bool]) -> Option<usize> {
     let count = far.iter().zip(after).filter(|(far, after)| **far && **after).count();
     let (all, part) = (of_rows(far) as f64, of_rows(after) as f64 / after.len() as f64);
     let z = (count as f64 - all * part) / (all * part * (1.0 - part)).sqrt();
-    (count as f64 > SHARE_AFTER_CHANGES * all && z > Z_RARE).then_some(count)
+    (count as f64 > SHARE_AFTER_CHANGES.get() * all && z > Z_RARE).then_some(count)
 }
 
 /// Number of all far rows, if significantly many follow another of equal sign.
@@ -75,12 +68,12 @@ fn count_in_runs(far: &[bool], white: &[f64]) -> Option<usize> {
     let (alike, unlike): (Vec<usize>, Vec<usize>) = neighbours.partition(|&row| white[row] * white[row - 1] > 0.0);
     let (alike, unlike) = (alike.len() as f64, unlike.len() as f64);
     let z = (alike - unlike) / (alike + unlike).sqrt();
-    (alike > SHARE_IN_RUNS * count as f64 && z > Z_RARE).then_some(count)
+    (alike > SHARE_IN_RUNS.get() * count as f64 && z > Z_RARE).then_some(count)
 }
 
 /// For each row, true if the reading is far off by its innovation.
 pub(crate) fn far_off(noise: &Noise, innovations: &[f64]) -> Vec<bool> {
-    innovations.iter().map(|innovation| innovation.abs() > FAR_OFF_SCALES * noise.sigma).collect()
+    innovations.iter().map(|innovation| innovation.abs() > FAR_OFF_SCALES.get() * noise.sigma).collect()
 }
 
 /// For each row, true if it is just after a change of the voltage, which leaves the amplifier `delay_s` seconds late.
@@ -88,12 +81,12 @@ fn after_changes(data: &Data, delay_s: f64) -> Vec<bool> {
     let mut after = vec![false; data.rows()];
     let first_from = |time: f64| data.time_s.partition_point(|&at| at < time);
     for row in 1..data.rows() {
-        if (data.voltage_v[row] - data.voltage_v[row - 1]).abs() <= CHANGE_OF_FULL_SCALE * data.full_scale_v {
+        if (data.voltage_v[row] - data.voltage_v[row - 1]).abs() <= CHANGE_OF_FULL_SCALE.get() * data.full_scale_v {
             continue;
         }
         // From the command on: the simulated delay may not be the spring's.
         let leaves = data.time_s[row] + delay_s;
-        after[row..first_from(leaves + ROWS_AFTER_CHANGE * data.sample_s)].fill(true);
+        after[row..first_from(leaves + ROWS_AFTER_CHANGE.get() * data.sample_s)].fill(true);
     }
     after
 }

@@ -17,12 +17,10 @@ use crate::fit::engine::Engine;
 use crate::noise::Noise;
 use crate::stats::median::median;
 use crate::stats::scale::robust_scale;
+use crate::stats::thresholds::empirical::SPRING_ERROR_PER_SCATTER;
 
 /// Effects that act on readings whatever the sensor reads; they are added to the constant.
 const ON_ANY_READING: [&str; 2] = ["hum", "reading-offset"];
-/// A spring whose robust error is below this fraction of the readings' robust scatter around the constant follows the voltage,
-/// however likely autocorrelated noise makes the constant.
-const SPRING_ERROR_PER_SCATTER: f64 = 0.9;
 
 /// The check of a model with at least one effect.
 pub(super) struct Standstill;
@@ -56,5 +54,5 @@ pub(crate) fn constant_is_as_likely(engine: &mut Engine, model: &Model, score: f
     let noise = Noise::fitted(&around, engine.observed);
     let likelihood = noise.log_likelihood(&around, engine.observed) - noise.cost(around.len());
     let [error, scatter] = [&left, &around].map(|residual| robust_scale(&engine.observed.errors(residual)));
-    likelihood >= score && error > SPRING_ERROR_PER_SCATTER * scatter
+    likelihood >= score && error > SPRING_ERROR_PER_SCATTER.get() * scatter
 }

@@ -12,6 +12,7 @@
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
+use crate::stats::thresholds::empirical::SLOWEST_OUTPUT_S;
 
 pub(super) struct AmplifierSlew;
 
@@ -20,8 +21,6 @@ const TWO_RATES: usize = 1;
 const RESISTANCE: usize = 2;
 /// Number of rates of a form.
 const RATES: [usize; 2] = [1, 2];
-/// Largest time constant of the output, in s; a larger one could not be distinguished from the spring's.
-const SLOWEST_OUTPUT_S: f64 = 1.0;
 /// Ratio of the two rates at initial points.
 const INITIAL_RATIO: f64 = 3.0;
 /// Distance of the initial voltage from the command at initial points, as a fraction of the full scale.
@@ -38,7 +37,7 @@ fn range(data: &Data) -> (f64, f64) {
 
 /// Returns the bounds of the output's time constant, in s; a shorter one looks like a delay.
 fn taus(data: &Data) -> (f64, f64) {
-    (data.sample_s, SLOWEST_OUTPUT_S.max(2.0 * data.sample_s))
+    (data.sample_s, SLOWEST_OUTPUT_S.get().max(2.0 * data.sample_s))
 }
 
 impl Effect for AmplifierSlew {

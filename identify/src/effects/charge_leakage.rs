@@ -12,11 +12,9 @@ use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity,
 use crate::plant::chain::Chain;
 use crate::plant::leakage::Loss;
 use crate::record::data::Data;
+use crate::stats::thresholds::empirical::FASTEST_LEAKAGE_S;
 
 pub(super) struct ChargeLeakage;
-
-/// Smallest time constant, in s; a faster loss hardly lets the stiffness fall and looks like a gain.
-const FASTEST_S: f64 = 3.5;
 
 const WITH_INSTANTANEOUS_PART: usize = 1;
 
@@ -46,8 +44,8 @@ impl Effect for ChargeLeakage {
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
-        let longest = 10.0 * data.duration_s().max(FASTEST_S);
-        let mut coordinates = vec![Coordinate::new(0.0, 1.0), Coordinate::log(FASTEST_S, longest)];
+        let longest = 10.0 * data.duration_s().max(FASTEST_LEAKAGE_S.get());
+        let mut coordinates = vec![Coordinate::new(0.0, 1.0), Coordinate::log(FASTEST_LEAKAGE_S.get(), longest)];
         coordinates.extend((form == WITH_INSTANTANEOUS_PART).then_some(Coordinate::new(0.0, 1.0)));
         coordinates
     }

@@ -3,13 +3,12 @@
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 use crate::record::spectrum;
+use crate::stats::thresholds::empirical::FEWEST_PERIODS;
 
 pub(super) struct Hum;
 
 /// Number of spectral peaks that are tried.
 const PEAKS: usize = 3;
-/// Smallest number of periods in the record.
-const FEWEST: f64 = spectrum::FEWEST_PERIODS as f64;
 
 impl Effect for Hum {
     fn cause(&self) -> &'static str {
@@ -34,14 +33,14 @@ impl Effect for Hum {
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
         let most = 2.0 * data.full_scale_v.max(1.0);
-        let frequency = Coordinate::new(0.9 * FEWEST / data.duration_s().max(1e-9), 0.5 / data.sample_s);
+        let frequency = Coordinate::new(0.9 * FEWEST_PERIODS.get() / data.duration_s().max(1e-9), 0.5 / data.sample_s);
         vec![frequency, Coordinate::new(-most, most), Coordinate::new(-most, most)]
     }
 
     fn initial_points(&self, _: usize, FitContext { data, residual, .. }: &FitContext) -> Vec<Vec<f64>> {
         spectrum::peaks(residual, data, PEAKS)
             .into_iter()
-            .filter(|peak| peak.frequency_hz > FEWEST / data.duration_s())
+            .filter(|peak| peak.frequency_hz > FEWEST_PERIODS.get() / data.duration_s())
             .map(|peak| vec![peak.frequency_hz, peak.cosine, peak.sine])
             .collect()
     }

@@ -9,20 +9,13 @@ use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, 
 use crate::record::data::Data;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::second_differences;
+use crate::stats::thresholds::empirical::{CLIP_FOR_RUN, PRICE_OF_RUN, ROWS_FOR_ZERO, SHORTEST_RUN};
+use crate::stats::thresholds::probability::{NATS_WITHIN_INTERVAL, Z_ZERO};
 
 pub(super) struct ReadingOffset;
 
 const RUN: usize = 0;
 const WHOLE: usize = 1;
-
-/// Shortest run, in rows; for a run longer than half of the record, the other rows count as shifted.
-const SHORTEST_RUN: usize = 5;
-/// Readings are clipped at this many scales of the noise in the search.
-const CLIP: f64 = 6.0;
-/// Number of first rows from which the sensor's zero is estimated.
-const ROWS_AT_REST: usize = 10;
-/// The sensor's zero is wrong if it is this many standard errors away from 0.
-const SIGNIFICANT_ZERO: f64 = 3.0;
 
 /// Returns the rows that are shifted and the shift, in V: rows from `point[0]` up to but not including `point[1]` by
 /// `point[2]`, or all by `point[0]`.
@@ -36,20 +29,20 @@ fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, 
 
 /// Returns false if the readings before the first voltage show that the sensor's zero is right.
 fn shows_at_rest(data: &Data) -> bool {
-    let rest = data.voltage_v.iter().take(ROWS_AT_REST).take_while(|voltage| **voltage == 0.0).count();
+    let rest = data.voltage_v.iter().take(ROWS_FOR_ZERO.count()).take_while(|voltage| **voltage == 0.0).count();
     if data.initial_state_unknown || rest == 0 {
         return true;
     }
     let zero = median(&mut data.reading[..rest].to_vec()).unwrap_or(0.0);
     let error = robust_deviation(second_differences(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
-    zero.abs() > SIGNIFICANT_ZERO * error
+    zero.abs() > Z_ZERO * error
 }
 
 /// Returns the run whose shift reduces the squared error most, among runs of growing length; NaN rows count neither for
 /// nor against it.
 fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>> {
     let rows = residual.len();
-    let bound = CLIP * sigma;
+    let bound = CLIP_FOR_RUN.get() * sigma;
     let (mut sums, mut counts) = (vec![0.0], vec![0]);
     for (row, value) in residual.iter().enumerate() {
         let clipped = if value.is_nan() { 0.0 } else { value.clamp(-bound, bound) };
@@ -57,12 +50,12 @@ fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>>
         counts.push(counts[row] + usize::from(!value.is_nan()));
     }
     let gain = |from: usize, to: usize| match counts[to] - counts[from] {
-        seen if seen < SHORTEST_RUN => 0.0,
+        seen if seen < SHORTEST_RUN.count() => 0.0,
         seen => (sums[to] - sums[from]).powi(2) / seen as f64,
     };
     let longest = rows / 2;
     let mut best = (0.0, 0, 0);
-    let mut length = SHORTEST_RUN;
+    let mut length = SHORTEST_RUN.count();
     while length <= longest {
         for from in 0..=rows - length {
             let found = gain(from, from + length);
@@ -88,13 +81,15 @@ fn refined(from: usize, to: usize, rows: usize, gain: &impl Fn(usize, usize) -> 
     let mut best = (gain(from, to), from, to);
     for _ in 0..3 {
         let before = best;
-        for edge in best.1.saturating_sub(reach)..=(best.1 + reach).min(best.2 - SHORTEST_RUN.min(best.2 - best.1)) {
+        for edge in
+            best.1.saturating_sub(reach)..=(best.1 + reach).min(best.2 - SHORTEST_RUN.count().min(best.2 - best.1))
+        {
             let found = gain(edge, best.2);
-            if found > best.0 && best.2 - edge >= SHORTEST_RUN {
+            if found > best.0 && best.2 - edge >= SHORTEST_RUN.count() {
                 best = (found, edge, best.2);
             }
         }
-        for edge in (best.1 + SHORTEST_RUN).max(best.2.saturating_sub(reach))..=(best.2 + reach).min(rows) {
+        for edge in (best.1 + SHORTEST_RUN.count()).max(best.2.saturating_sub(reach))..=(best.2 + reach).min(rows) {
             let found = gain(best.1, edge);
             if found > best.0 {
                 best = (found, best.1, edge);
@@ -162,7 +157,7 @@ impl Effect for ReadingOffset {
 
     fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
         // Both edges are searched; neighbouring runs are nearly equivalent.
-        if form == RUN { 1.25 * (data.rows() as f64).max(1.0).ln() } else { 0.0 }
+        if form == RUN { PRICE_OF_RUN.get() * (data.rows() as f64).max(1.0).ln() } else { 0.0 }
     }
 
     fn searched(&self, form: usize) -> bool {
@@ -175,7 +170,7 @@ impl Effect for ReadingOffset {
         }
     }
 
-    /// An edge may move as long as that costs less than 2 nats (95 %), and lies between two rows.
+    /// An edge may move as long as that costs less than [`NATS_WITHIN_INTERVAL`] (95 %), and lies between two rows.
     fn searched_range(&self, form: usize, point: &[f64], context: &FitContext) -> Vec<(String, f64, f64)> {
         if form != RUN {
             return Vec::new();
@@ -189,7 +184,7 @@ impl Effect for ReadingOffset {
             let (mut sum, mut last) = (0.0, None);
             for row in outwards.take(200) {
                 sum += sign * cost(row);
-                if sum < 2.0 {
+                if sum < NATS_WITHIN_INTERVAL {
                     last = Some(row);
                 }
                 if sum > 8.0 {

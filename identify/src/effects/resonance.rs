@@ -16,13 +16,10 @@ use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, 
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece, Signal};
+use crate::stats::thresholds::empirical::{LEAST_DAMPED, MOST_DAMPED};
 
 pub(super) struct Resonance;
 
-/// Smallest damping ratio; an oscillation that a polymer damps less is a periodicity of the schedule.
-const LEAST_DAMPED: f64 = 5e-3;
-/// Largest damping ratio; with an overshoot below a sixth, an oscillation cannot be distinguished from a lag.
-const MOST_DAMPED: f64 = 0.5;
 const WHOLE: usize = 0;
 const QUICK: usize = 2;
 /// Time constant `T` of the high-pass filter at initial points, in s.
@@ -60,8 +57,10 @@ impl Effect for Resonance {
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (lowest, highest) = range(data);
-        let mut coordinates =
-            vec![Coordinate::log(lowest, highest.max(2.0 * lowest)), Coordinate::log(LEAST_DAMPED, MOST_DAMPED)];
+        let mut coordinates = vec![
+            Coordinate::log(lowest, highest.max(2.0 * lowest)),
+            Coordinate::log(LEAST_DAMPED.get(), MOST_DAMPED.get()),
+        ];
         if form != WHOLE {
             coordinates.push(Coordinate::new(0.0, 1.5));
         }

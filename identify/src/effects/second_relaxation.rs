@@ -11,14 +11,13 @@ use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity}
 use crate::plant::chain::Chain;
 use crate::plant::relaxation::Part;
 use crate::record::data::Data;
+use crate::stats::thresholds::empirical::FASTEST_CREEP_S;
 
 pub(super) struct SecondRelaxation;
 
 const OF_THE_REST: usize = 0;
 const OF_EVERYTHING: usize = 1;
 const BY_DECADES: usize = 2;
-/// Smallest time constant of the creep, in s: the paper's time constant.
-const FASTEST_S: f64 = 5.5;
 
 impl Effect for SecondRelaxation {
     fn cause(&self) -> &'static str {
@@ -42,7 +41,10 @@ impl Effect for SecondRelaxation {
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        vec![Coordinate::new(0.0, 0.9), Coordinate::log(FASTEST_S, 10.0 * data.duration_s().max(FASTEST_S))]
+        vec![
+            Coordinate::new(0.0, 0.9),
+            Coordinate::log(FASTEST_CREEP_S.get(), 10.0 * data.duration_s().max(FASTEST_CREEP_S.get())),
+        ]
     }
 
     fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {

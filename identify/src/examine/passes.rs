@@ -24,17 +24,9 @@ use crate::plant::base::Base;
 use crate::record::data::{Data, Input};
 use crate::record::observed::Observed;
 use crate::search::{Scored, Search, WarmStart};
+use crate::stats::thresholds::empirical::{LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
+use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::diagnosis::{self, Diagnosis};
-
-/// Fewest readings that are diagnosed.
-const ROWS_TO_DIAGNOSE: usize = 8;
-/// Difference of two scores, in nats, from which the less usual explanation is kept: readings that were cut off instead of
-/// rounded, a spring that lacks a part of the plant file.
-const CLEARLY_LIKELIER: f64 = 3.0;
-/// Number of rows above which a part of them is searched first.
-const LONG_RECORD_ROWS: usize = 5_000;
-/// Number of rows, about, in that part.
-const ROWS_TO_SEARCH: usize = 2_500;
 
 /// Finds out what the simulation gets wrong on a record.
 ///
@@ -51,11 +43,12 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
     let data = Data::new(record, options.input);
-    if data.rows() < ROWS_TO_DIAGNOSE {
+    if data.rows() < ROWS_TO_DIAGNOSE.count() {
         bad_input!(
-            "{}: {} row(s) with a reading; expected at least {ROWS_TO_DIAGNOSE} to tell causes apart",
+            "{}: {} row(s) with a reading; expected at least {} to tell causes apart",
             record.name,
-            data.rows()
+            data.rows(),
+            ROWS_TO_DIAGNOSE.count()
         );
     }
     let progress = &mut |scored: &Scored| {
@@ -191,10 +184,10 @@ fn search(
 /// Searches a part of the rows of a long record, evenly spaced; `None` if the record is not long.
 fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, progress: Progress) -> Option<WarmStart> {
     let rows = record.data.rows();
-    if rows <= LONG_RECORD_ROWS {
+    if rows <= LONG_RECORD_ROWS.count() {
         return None;
     }
-    let part = Data::thinned(record.record, record.input, rows.div_ceil(ROWS_TO_SEARCH));
+    let part = Data::thinned(record.record, record.input, rows.div_ceil(ROWS_TO_SEARCH.count()));
     let observed = Observed::new(&part).with_conclusions_of(observed);
     let mut engine = Engine::new(&part, &observed, base);
     let mut search = Search::new(&mut engine);

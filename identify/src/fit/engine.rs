@@ -13,6 +13,7 @@ use crate::plant::initial_state;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::stats::scale::robust_scale;
+use crate::stats::thresholds::empirical::STRONG_AUTOCORRELATION;
 
 /// A model with fitted points.
 #[derive(Clone, Debug)]
@@ -31,14 +32,11 @@ pub struct Fit {
     pub initial_state_cost: f64,
 }
 
-/// Ratio of the scales of residual and innovations from which on the autocorrelation is strong.
-const STRONG_AUTOCORRELATION: f64 = 4.0;
-
 impl Fit {
     /// Returns true if the autocorrelation of the noise predicts nearly all of the residual, so that slow structure may
     /// be hidden in it.
     pub fn strongly_autocorrelated(&self) -> bool {
-        self.noise.marginal > STRONG_AUTOCORRELATION * self.noise.sigma
+        self.noise.marginal > STRONG_AUTOCORRELATION.get() * self.noise.sigma
     }
 
     /// Returns the cost of the law of the noise and of the initial state, in nats.

@@ -16,9 +16,7 @@ use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations};
 use crate::noise::Term;
-
-/// A coordinate is unknown if the rows outside the fold hold less than this fraction of its information.
-const LEAST_INFORMATION: f64 = 0.01;
+use crate::stats::thresholds::empirical::LEAST_INFORMATION;
 
 impl Engine<'_> {
     /// Returns the log-likelihood of all rows, each predicted by a fit without its fold, minus the cost of the fit, in
@@ -78,7 +76,7 @@ impl<'f> FullFit<'f> {
             .map(|(term, &of)| Term { weight: if unseen(of) { 0.0 } else { term.weight }, ..*term })
             .collect();
         let (normal, gradient) = normal_equations(&self.jacobian, &seen);
-        let knows = |column: &usize| normal[(*column, *column)] > LEAST_INFORMATION * self.known[*column];
+        let knows = |column: &usize| normal[(*column, *column)] > LEAST_INFORMATION.get() * self.known[*column];
         let columns: Vec<usize> = (0..self.known.len()).filter(knows).collect();
         let (normal, gradient) =
             (normal.select_columns(&columns).select_rows(&columns), gradient.select_rows(&columns));

@@ -18,7 +18,7 @@ use crate::effects::model::Block;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::normal_equations;
 use crate::record::data::Data;
-use crate::stats::scale::Z;
+use crate::stats::thresholds::probability::Z;
 
 /// Returns the information matrix of the fitted coordinates.
 pub(crate) fn information(engine: &mut Engine, fit: &Fit) -> DMatrix<f64> {

@@ -14,6 +14,10 @@ use crate::noise::band_spectrum::BandSpectrum;
 use crate::stats::median::running_median;
 use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::{
+    CLIP_FOR_AUTOCORRELATION, COST_OF_DIFFERENCE, FEWEST_ROWS_FOR_AUTOCORRELATION, FEWEST_ROWS_FOR_DIFFERENCE,
+    ROWS_PER_LAG,
+};
 
 /// A filter from autocorrelated noise to independent innovations; the default passes every value unchanged.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,51 +32,42 @@ pub struct Autocorrelation {
 
 /// Largest order of the autoregression, in rows.
 const LARGEST_ORDER: usize = 50;
-/// Smallest number of rows for each lag of the autoregression.
-const ROWS_PER_LAG: usize = 12;
 /// Largest order of the autoregression behind a fractional difference.
 const LARGEST_ORDER_WITH_DIFFERENCE: usize = 12;
-/// In records with fewer rows autocorrelation cannot be distinguished from structure.
-const FEWEST_ROWS: usize = 24;
-/// In records with fewer rows a fractional difference is not tried.
-const FEWEST_ROWS_FOR_DIFFERENCE: usize = 150;
 /// Ratio of the frequencies that one section spans.
 const SECTION_RATIO: f64 = 4.0;
 /// Number of rows that are whitened at a time.
 const BLOCK: usize = 1024;
-/// Residuals are clipped at this many robust scales before the filter is fitted.
-const CLIP: f64 = 4.0;
-/// Gain in nats by which a fractional difference must exceed an autoregression alone; unexplained structure has a
-/// similar spectrum.
-const COST_OF_DIFFERENCE: f64 = 8.0;
 /// Error of a likelihood that is computed from the spectrum, in nats.
 const SPECTRUM_ERROR: f64 = 10.0;
 
 impl Autocorrelation {
     /// Fits the filter to a residual with the given robust scale, in V.
     pub fn fitted(residual: &[f64], scale: f64) -> Self {
-        if residual.len() < FEWEST_ROWS {
+        if residual.len() < FEWEST_ROWS_FOR_AUTOCORRELATION.count() {
             return Self::default();
         }
-        let clipped: Vec<f64> =
-            without_outliers(residual).into_iter().map(|r| r.clamp(-CLIP * scale, CLIP * scale)).collect();
+        let clipped: Vec<f64> = without_outliers(residual)
+            .into_iter()
+            .map(|r| r.clamp(-CLIP_FOR_AUTOCORRELATION.get() * scale, CLIP_FOR_AUTOCORRELATION.get() * scale))
+            .collect();
         let rows = residual.len();
-        let (ar, cost) = autoregression(&correlation(&clipped, LARGEST_ORDER.min(rows / ROWS_PER_LAG)), rows);
+        let (ar, cost) = autoregression(&correlation(&clipped, LARGEST_ORDER.min(rows / ROWS_PER_LAG.count())), rows);
         let alone = Self { ar, ..Self::default() };
-        if alone.is_white() || rows < FEWEST_ROWS_FOR_DIFFERENCE {
+        if alone.is_white() || rows < FEWEST_ROWS_FOR_DIFFERENCE.count() {
             return alone;
         }
         // The order is estimated from the spectrum, which is fast; whether it pays is decided with the whitened
         // residual.
         let (by_spectrum, power) = likeliest_power(&BandSpectrum::of(&clipped, 0.0), rows);
-        if by_spectrum + COST_OF_DIFFERENCE > cost + SPECTRUM_ERROR {
+        if by_spectrum + COST_OF_DIFFERENCE.get() > cost + SPECTRUM_ERROR {
             return alone;
         }
         let mut filter = Self { power, ar: Vec::new(), sections: sections(power, rows) };
         let (ar, with_power) =
             autoregression(&correlation(&filter.whitened(&clipped), LARGEST_ORDER_WITH_DIFFERENCE), rows);
         filter.ar = ar;
-        if with_power + COST_OF_DIFFERENCE < cost { filter } else { alone }
+        if with_power + COST_OF_DIFFERENCE.get() < cost { filter } else { alone }
     }
 
     /// Returns true if the noise is not autocorrelated.
@@ -137,7 +132,7 @@ impl Autocorrelation {
 fn without_outliers(values: &[f64]) -> Vec<f64> {
     let medians = running_median(values);
     let off: Vec<f64> = values.iter().zip(&medians).map(|(value, median)| value - median).collect();
-    let wild = CLIP * robust_scale(&off);
+    let wild = CLIP_FOR_AUTOCORRELATION.get() * robust_scale(&off);
     let tame = |((value, median), off): ((&f64, f64), &f64)| if off.abs() > wild { median } else { *value };
     values.iter().zip(medians).zip(&off).map(tame).collect()
 }
@@ -166,9 +161,12 @@ fn correlation(values: &[f64], longest: usize) -> Vec<f64> {
 pub fn coding_cost(signal: &[f64], scale: f64) -> f64 {
     let (rows, noise) = (signal.len(), scale * scale);
     let spectrum = BandSpectrum::of(signal, noise);
-    let alone = autoregression(&spectrum.correlation(0.0, LARGEST_ORDER.min(rows / ROWS_PER_LAG)), rows).1;
-    let with_power =
-        if rows < FEWEST_ROWS_FOR_DIFFERENCE { alone } else { likeliest_power(&spectrum, rows).0 + COST_OF_DIFFERENCE };
+    let alone = autoregression(&spectrum.correlation(0.0, LARGEST_ORDER.min(rows / ROWS_PER_LAG.count())), rows).1;
+    let with_power = if rows < FEWEST_ROWS_FOR_DIFFERENCE.count() {
+        alone
+    } else {
+        likeliest_power(&spectrum, rows).0 + COST_OF_DIFFERENCE.get()
+    };
     (alone.min(with_power) - 0.5 * rows as f64 * noise.ln()).max(0.0)
 }
 

@@ -2,9 +2,10 @@
 
 use crate::noise::autocorrelation::Autocorrelation;
 use crate::noise::law::Noise;
-use crate::record::observed::{COARSE, Observed};
+use crate::record::observed::Observed;
 use crate::record::quantisation_grid::QuantisationGrid;
-use crate::stats::scale::{FINEST_V, negligible, robust_scale, root_mean_square};
+use crate::stats::scale::{negligible, robust_scale, root_mean_square};
+use crate::stats::thresholds::empirical::{COARSE, FINEST_V};
 
 impl Noise {
     /// Returns the law of the noise that fits a residual, in V.
@@ -12,18 +13,18 @@ impl Noise {
         let residual = &*observed.errors(residual);
         let mut noise = Self::robust(&observed.uncensored(residual));
         if let Some(QuantisationGrid { step, .. }) = observed.grid
-            && (observed.step_beyond(COARSE).is_some()
-                || step >= COARSE * without_rounding(root_mean_square(residual), step).max(FINEST_V))
+            && (observed.step_beyond(COARSE.get()).is_some()
+                || step >= COARSE.get() * without_rounding(root_mean_square(residual), step).max(FINEST_V.get()))
         {
             noise.half_step = step / 2.0;
             noise.nu = f64::INFINITY;
-            noise.sigma = without_rounding(root_mean_square(residual), step).max(0.05 * step).max(FINEST_V);
+            noise.sigma = without_rounding(root_mean_square(residual), step).max(0.05 * step).max(FINEST_V.get());
             noise.rescale_cells(residual, observed);
             noise.marginal = noise.sigma;
             return noise;
         }
         if negligible(residual) {
-            return noise.with_tail(f64::INFINITY, FINEST_V);
+            return noise.with_tail(f64::INFINITY, FINEST_V.get());
         }
         noise.weights.clone_from(&observed.weights);
         let even = noise.weighted(residual);

@@ -11,8 +11,9 @@ use std::sync::Arc;
 use crate::noise::autocorrelation::Autocorrelation;
 use crate::noise::term::{HALF_LN_TAU, Term, in_cell, stopped};
 use crate::record::observed::{Kind, Observed};
-use crate::stats::scale::{FINEST_V, robust_scale};
+use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::FINEST_V;
 
 /// The law of the noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +60,7 @@ impl Noise {
 
     /// Returns the same law with another tail and scale, at least [`FINEST_V`].
     pub(super) fn with_tail(&self, nu: f64, sigma: f64) -> Self {
-        let sigma = sigma.max(FINEST_V);
+        let sigma = sigma.max(FINEST_V.get());
         let shape = if nu.is_finite() { tail_constant(nu) } else { -HALF_LN_TAU };
         Self { nu, sigma, constant: shape - sigma.ln(), ..self.clone() }
     }

@@ -4,8 +4,9 @@ use crate::noise::law::Noise;
 use crate::noise::tail::sizes;
 use crate::noise::term::in_cell;
 use crate::record::observed::{Kind, Observed};
-use crate::stats::scale::{FINEST_V, root_mean_square};
+use crate::stats::scale::root_mean_square;
 use crate::stats::sums::total;
+use crate::stats::thresholds::empirical::FINEST_V;
 
 impl Noise {
     /// Sets the scale under which rounded readings are most likely, by golden-section search on its logarithm.
@@ -20,7 +21,7 @@ impl Noise {
             at_bound + total(&in_cells, |&(r, times)| times * in_cell(r, noise.sigma, noise.half_step).log)
         };
         let (mut low, mut high) =
-            ((0.02 * self.half_step).max(FINEST_V).ln(), (root_mean_square(residual) + self.half_step).ln());
+            ((0.02 * self.half_step).max(FINEST_V.get()).ln(), (root_mean_square(residual) + self.half_step).ln());
         const GOLDEN: f64 = 0.618_033_988_75;
         for _ in 0..12 {
             let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));

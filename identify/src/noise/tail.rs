@@ -1,21 +1,18 @@
 //! The tail of the innovations: normal, Student's t, or a mixture of two normals, chosen by likelihood.
 
 use crate::noise::law::Noise;
-use crate::stats::scale::{FINEST_V, robust_scale, root_mean_square};
+use crate::stats::scale::{robust_scale, root_mean_square};
 use crate::stats::sums::total;
+use crate::stats::thresholds::empirical::{
+    COST_OF_HEAVY_TAIL, COST_OF_OUTLIERS, FEWEST_ROWS_FOR_OUTLIERS, FINEST_V, LEAST_OUTLIER_SCALE, MOST_OUTLIERS,
+};
 
 /// Degrees of freedom that are tried.
 const TAILS: [f64; 6] = [2.3, 3.0, 4.0, 6.0, 10.0, 25.0];
-/// Gain in nats by which a mixture must exceed one heavy tail to count as outliers.
-const COST_OF_OUTLIERS: f64 = 7.0;
-/// A mixture with a larger fraction of the wider normal is not taken for outliers.
-const MOST_OUTLIERS: f64 = 0.25;
 /// Up to this many errors are used one by one; more are grouped into cells by size.
 const MOST_SINGLE_ERRORS: usize = 1_000;
 /// Number of cells in one scale of the errors.
 const CELLS_PER_SCALE: f64 = 100.0;
-/// Smallest scale of outliers relative to that of the noise.
-const LEAST_OUTLIER_SCALE: f64 = 4.0;
 
 impl Noise {
     fn is_normal(&self) -> bool {
@@ -68,12 +65,14 @@ impl Noise {
         for nu in TAILS {
             let mut heavy = normal.with_tail(nu, start);
             heavy.fit_scale(start, sizes, |&size| size, 8);
-            consider(self, heavy, 2.0);
+            consider(self, heavy, COST_OF_HEAVY_TAIL.get());
         }
-        if innovations.len() >= 30 && innovations.iter().any(|e| e.abs() > LEAST_OUTLIER_SCALE * start) {
+        if innovations.len() >= FEWEST_ROWS_FOR_OUTLIERS.count()
+            && innovations.iter().any(|e| e.abs() > LEAST_OUTLIER_SCALE.get() * start)
+        {
             let mixture = Self::mixture(sizes, start, &normal);
-            if mixture.outliers.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS) {
-                consider(self, mixture, COST_OF_OUTLIERS);
+            if mixture.outliers.is_some_and(|(fraction, _)| fraction < MOST_OUTLIERS.get()) {
+                consider(self, mixture, COST_OF_OUTLIERS.get());
             }
         }
     }
@@ -82,8 +81,10 @@ impl Noise {
     fn mixture(sizes: &[(f64, f64)], start: f64, normal: &Self) -> Self {
         let sums = |sum: (f64, f64), &(e, times): &(f64, f64)| (sum.0 + times, sum.1 + times * (e * e));
         let (count, _) = sizes.iter().fold((0.0, 0.0), sums);
-        let (far, squares) = sizes.iter().filter(|(e, _)| e.abs() > LEAST_OUTLIER_SCALE * start).fold((0.0, 0.0), sums);
-        let (mut sigma, mut wide) = (start, (squares / f64::max(far, 1.0)).sqrt().max(LEAST_OUTLIER_SCALE * start));
+        let (far, squares) =
+            sizes.iter().filter(|(e, _)| e.abs() > LEAST_OUTLIER_SCALE.get() * start).fold((0.0, 0.0), sums);
+        let (mut sigma, mut wide) =
+            (start, (squares / f64::max(far, 1.0)).sqrt().max(LEAST_OUTLIER_SCALE.get() * start));
         let mut fraction = far / count;
         for _ in 0..25 {
             let (mut weight, mut narrow_sum, mut wide_sum) = (0.0, 0.0, 0.0);
@@ -96,8 +97,8 @@ impl Noise {
                 wide_sum += times * outlier * e * e;
             }
             fraction = (weight / count).clamp(1e-6, 0.5);
-            sigma = (narrow_sum / (count - weight)).sqrt().max(FINEST_V);
-            wide = (wide_sum / weight.max(1e-9)).sqrt().max(LEAST_OUTLIER_SCALE * sigma);
+            sigma = (narrow_sum / (count - weight)).sqrt().max(FINEST_V.get());
+            wide = (wide_sum / weight.max(1e-9)).sqrt().max(LEAST_OUTLIER_SCALE.get() * sigma);
         }
         Self { outliers: Some((fraction, wide)), ..normal.with_tail(f64::INFINITY, sigma) }
     }
@@ -108,7 +109,7 @@ pub(super) fn sizes(errors: &[f64], scale: f64) -> Vec<(f64, f64)> {
     if errors.len() <= MOST_SINGLE_ERRORS {
         return errors.iter().map(|&e| (e, 1.0)).collect();
     }
-    let mut cells = vec![(0.0, 0.0); (2.0 * LEAST_OUTLIER_SCALE * CELLS_PER_SCALE) as usize];
+    let mut cells = vec![(0.0, 0.0); (2.0 * LEAST_OUTLIER_SCALE.get() * CELLS_PER_SCALE) as usize];
     let mut sizes = Vec::new();
     for &e in errors {
         match cells.get_mut((e.abs() / scale * CELLS_PER_SCALE) as usize) {

@@ -11,9 +11,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::HUBER_THRESHOLD;
 
-/// Errors beyond this many scales are weighted down (Huber's threshold).
-const HUBER_THRESHOLD: f64 = 3.0;
 /// Number of reweighting rounds.
 const ROUNDS: usize = 4;
 /// Rows in which all kernels are below this fraction of their maximum do not contribute to the estimate.
@@ -82,7 +81,7 @@ pub(crate) fn subtract_estimate(
             left.clone_from(&read);
             subtract(&start, &used, &mut left);
             usual = robust_scale(&left);
-            far = HUBER_THRESHOLD * usual;
+            far = HUBER_THRESHOLD.get() * usual;
         }
     }
     subtract(&start, kernels, residual);

@@ -3,17 +3,10 @@
 use model::Plant;
 
 use crate::stats::scale::{robust_scale, second_differences};
+use crate::stats::thresholds::empirical::{FEWEST_ROWS_AT_REST, LARGEST_CORRELATION, SHORT_REST, SIGNIFICANT_DECAY};
 
-/// Smallest number of readings before the first voltage that can show a decay.
-const FEWEST_AT_REST: usize = 4;
-/// A rest shorter than this fraction of the time constant is too short to show a decay.
-const SHORT_REST: f64 = 0.3;
-/// A decay is significant if its amplitude is this many standard deviations.
-const SIGNIFICANT_DECAY: f64 = 5.0;
 /// Time constants of the decays that are tried, relative to the paper's.
 const DECAY_TIMES: [f64; 3] = [0.5, 1.0, 2.0];
-/// Largest lag-1 correlation of the noise that is assumed.
-const LARGEST_CORRELATION: f64 = 0.98;
 
 /// Returns true if the readings before the first voltage contain an exponential decay from an earlier stiffness; where
 /// the rest is too short to show a decay, if the readings differ from zero.
@@ -24,7 +17,7 @@ pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], read
     }
     let (time_s, at_rest) = (&time_s[..rest], &reading[..rest]);
     let tau_s = Plant::PAPER.time_constant_s;
-    let short = rest < FEWEST_AT_REST || time_s[rest - 1] - time_s[0] < SHORT_REST * tau_s;
+    let short = rest < FEWEST_ROWS_AT_REST.count() || time_s[rest - 1] - time_s[0] < SHORT_REST.get() * tau_s;
     let new_v = robust_scale(&second_differences(reading).collect::<Vec<_>>());
     let falls = |tau_s: f64| {
         let decay: Vec<f64> = time_s.iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
@@ -35,7 +28,7 @@ pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], read
         let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
         let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
         let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
-        height.abs() * power.sqrt() > SIGNIFICANT_DECAY * new_v.max(scaled_deviation_of_sum(&left))
+        height.abs() * power.sqrt() > SIGNIFICANT_DECAY.get() * new_v.max(scaled_deviation_of_sum(&left))
     };
     DECAY_TIMES.iter().any(|times| falls(times * tau_s))
 }
@@ -45,7 +38,7 @@ pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], read
 fn scaled_deviation_of_sum(noise: &[f64]) -> f64 {
     let power: f64 = noise.iter().map(|value| value * value).sum();
     let memory = noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / power.max(f64::MIN_POSITIVE);
-    let memory = memory.clamp(0.0, LARGEST_CORRELATION);
+    let memory = memory.clamp(0.0, LARGEST_CORRELATION.get());
     (power / noise.len() as f64 * (1.0 + memory) / (1.0 - memory)).sqrt()
 }
 

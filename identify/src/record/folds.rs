@@ -1,5 +1,6 @@
 //! The folds of cross-validation: which rows are held out together.
 
+use crate::stats::thresholds::empirical::{FEW_ROWS, FEWEST_STAIRS, SHORTEST_SEGMENT};
 use std::iter;
 
 /// Number of folds; each holds out every [`FOLDS`]-th segment of the record.
@@ -7,28 +8,22 @@ const FOLDS: usize = 5;
 /// Number of segments of a long record: short compared with the extent of most effects, long compared with the noise's
 /// autocorrelation.
 const SEGMENTS: usize = 40;
-/// Length of the shortest segment, in rows.
-const SHORTEST_SEGMENT: usize = 3;
-/// Records with fewer rows than this are held out stair by stair, if they have at least [`FEWEST_STAIRS`] stairs.
-const FEW_ROWS: usize = 200;
-/// Smallest number of stairs of a short record that is held out stair by stair.
-const FEWEST_STAIRS: usize = 4;
 
 /// Returns the fold of each row: whole stairs of a short record with enough stairs, else segments of equal length in
 /// turn.
 pub(super) fn folds(voltage_v: &[f64]) -> Vec<u8> {
     let rows = voltage_v.len();
-    if rows < FEW_ROWS {
+    if rows < FEW_ROWS.count() {
         let stairs: Vec<usize> = voltage_v.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
         let longest = stairs.iter().copied().max().unwrap_or(0);
         // A stair with half of the rows leaves too little to fit, and the rows of a sweep are no stairs.
-        if stairs.len() >= FEWEST_STAIRS && 2 * stairs.len() <= rows && 2 * longest <= rows {
+        if stairs.len() >= FEWEST_STAIRS.count() && 2 * stairs.len() <= rows && 2 * longest <= rows {
             let most = 2 * FOLDS;
             let of_stair = |(stair, &length): (usize, &usize)| iter::repeat_n((stair % most) as u8, length);
             return stairs.iter().enumerate().flat_map(of_stair).collect();
         }
     }
-    let length = rows.div_ceil(SEGMENTS).max(SHORTEST_SEGMENT);
+    let length = rows.div_ceil(SEGMENTS).max(SHORTEST_SEGMENT.count());
     // Each round begins with another fold; otherwise one fold would hold out all steps of a stair whose period is one
     // round.
     let fold_of = |stretch: usize| (stretch + 2 * (stretch / FOLDS)) % FOLDS;
@@ -47,7 +42,7 @@ mod tests {
         // A sweep and a single step are divided into segments of equal length.
         for record in [(0..60).map(f64::from).collect::<Vec<_>>(), [[0.0; 10], [1.0; 10], [1.0; 10]].concat()] {
             let fold = folds(&record);
-            assert!(fold.chunk_by(|a, b| a == b).all(|stretch| stretch.len() == SHORTEST_SEGMENT), "{fold:?}");
+            assert!(fold.chunk_by(|a, b| a == b).all(|stretch| stretch.len() == SHORTEST_SEGMENT.count()), "{fold:?}");
             assert_eq!(fold.iter().max(), Some(&(FOLDS as u8 - 1)));
         }
     }

@@ -14,24 +14,19 @@ use crate::record::data::Data;
 use crate::stats::median::running_median;
 use crate::stats::scale::robust_scale;
 use crate::stats::scale::second_differences;
+use crate::stats::thresholds::empirical::{FEWEST_ROWS_OF_LEVEL, RELEVANT_RATIO, SIGNIFICANT_SLOPE};
 
 /// Number of groups of similar level.
 const GROUPS: usize = 10;
-/// Smallest number of rows in a group.
-const FEWEST_ROWS: usize = 20;
 /// Relative standard error of a scale estimated from one second difference; neighbouring differences are correlated.
 const RELATIVE_ERROR: f64 = 1.5;
-/// Growth is significant if the slope is this many standard errors,
-const SIGNIFICANT_SLOPE: f64 = 6.0;
-/// and relevant if the scale at the highest level is this many times the scale at the lowest.
-const RELEVANT_RATIO: f64 = 1.3;
 
 /// Returns the reciprocal scale of each row, normalised to a geometric mean of 1; `None` if the scale does not grow
 /// significantly. Rows for which `counts` is false are not used for the estimate.
 pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc<[f64]>> {
     let mut rows: Vec<usize> =
         (1..data.rows().saturating_sub(1)).filter(|row| (row - 1..=row + 1).all(&counts)).collect();
-    if rows.len() < GROUPS * FEWEST_ROWS {
+    if rows.len() < GROUPS * FEWEST_ROWS_OF_LEVEL.count() {
         return None;
     }
     let reading = &data.reading;
@@ -54,7 +49,7 @@ pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
     let least = groups.iter().map(|group| group.1).fold(f64::INFINITY, f64::min);
     let of_level = |level: f64| (mean_scale + slope * (level - mean_level)).max(least / 2.0);
     let (lowest, highest) = (of_level(groups.first()?.0), of_level(groups.last()?.0));
-    if slope * spread.sqrt() < SIGNIFICANT_SLOPE || highest < RELEVANT_RATIO * lowest {
+    if slope * spread.sqrt() < SIGNIFICANT_SLOPE.get() || highest < RELEVANT_RATIO.get() * lowest {
         return None;
     }
     let scales: Vec<f64> = level.into_iter().map(of_level).collect();

@@ -10,7 +10,10 @@ use crate::record::data::Data;
 use crate::record::heteroscedasticity;
 use crate::record::quantisation_grid::QuantisationGrid;
 use crate::stats::median::robust_deviation;
-use crate::stats::scale::{FINEST_V, second_differences};
+use crate::stats::scale::second_differences;
+use crate::stats::thresholds::empirical::{
+    BOUND_TO_NEXT_STEP, CLOSE_TO_BOUND, COARSE, FEWEST_TIES, FINEST_V, LEAST_TRUNCATION,
+};
 
 /// What one reading says about the true value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,17 +45,6 @@ pub struct Observed {
     pub weights: Option<Arc<[f64]>>,
 }
 
-/// Smallest number of equal readings at an extreme that is taken for a bound, if readings are continuous.
-const FEWEST_TIES: usize = 3;
-/// Steps larger than this many scales of the noise are treated as quantisation cells, smaller ones as noise.
-pub const COARSE: f64 = 2.0;
-/// Truncation is considered if half a step is at least this fraction of the noise's scale.
-const LEAST_TRUNCATION: f64 = 0.5;
-/// A reading further from the bound than this many scales of the noise is not close to it.
-const CLOSE_TO_BOUND: f64 = 30.0;
-/// Factor by which readings at a bound must outnumber those at the next step of a quantisation grid.
-const BOUND_TO_NEXT_STEP: usize = 6;
-
 impl Observed {
     /// Examines the readings of a record.
     pub fn new(data: &Data) -> Self {
@@ -72,12 +64,12 @@ impl Observed {
         };
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
-        let scatter_v = scatter(&data.reading).max(FINEST_V);
-        let far = CLOSE_TO_BOUND * scatter_v;
+        let scatter_v = scatter(&data.reading).max(FINEST_V.get());
+        let far = CLOSE_TO_BOUND.get() * scatter_v;
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
             let (value, count) = *extreme?;
-            let piled =
-                count >= FEWEST_TIES && (continuous || count >= BOUND_TO_NEXT_STEP * next.map_or(1, |next| next.1));
+            let piled = count >= FEWEST_TIES.count()
+                && (continuous || count >= BOUND_TO_NEXT_STEP.count() * next.map_or(1, |next| next.1));
             // A spring at rest reads exactly zero many times.
             (piled && count < data.rows() && value != 0.0 && stays(&data.reading, value, far)).then_some(value)
         };
@@ -99,7 +91,7 @@ impl Observed {
             .collect();
         let mut observed = Self { kinds, grid, upper, lower, scatter_v, truncation_v: 0.0, weights: None };
         // Rounding makes the scale constant.
-        if observed.step_beyond(COARSE).is_none() {
+        if observed.step_beyond(COARSE.get()).is_none() {
             observed.weights = heteroscedasticity::weights(data, |row| observed.kinds[row] == Kind::Exact);
         }
         observed
@@ -123,7 +115,7 @@ impl Observed {
 
     /// Returns the same for a converter that truncates instead of rounding; `None` if the step is too small to matter.
     pub fn truncated(&self) -> Option<Self> {
-        let step = self.step_beyond(LEAST_TRUNCATION)?;
+        let step = self.step_beyond(LEAST_TRUNCATION.get())?;
         Some(Self { truncation_v: step / 2.0, ..self.clone() })
     }
 

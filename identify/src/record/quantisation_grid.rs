@@ -7,6 +7,9 @@
 //! d - p <= k step <= d + p
 //! ```
 
+use crate::stats::thresholds::empirical::FEWEST_UNITS;
+use crate::stats::thresholds::probability::CHANCE_NATS;
+
 /// A step to which readings were rounded, with its bounds, in V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuantisationGrid {
@@ -20,12 +23,8 @@ pub struct QuantisationGrid {
 
 /// Relative uncertainty of a step that is not limited by printed digits.
 const RELATIVE_ERROR: f64 = 1e-6;
-/// A step finer than this many units of the last digit is attributed to the digits.
-const FEWEST_UNITS: f64 = 4.0;
 /// Largest number of decimals that is taken for deliberate rounding.
 const MOST_DECIMALS: i32 = 9;
-/// The differences agree with a common step by chance with a probability below `exp` of minus this.
-const CHANCE_NATS: f64 = 12.0;
 
 impl QuantisationGrid {
     /// Returns the coarsest grid that contains all values, which must be distinct and in ascending order; `None` if
@@ -69,7 +68,7 @@ fn printed(values: &[f64]) -> Option<QuantisationGrid> {
     differences.sort_by(f64::total_cmp);
     let least = *differences.first()?;
     let chance = (2.0 * unit / least).ln() * (differences.len() as f64 - 1.0);
-    if least < FEWEST_UNITS * unit || chance > -CHANCE_NATS {
+    if least < FEWEST_UNITS.get() * unit || chance > -CHANCE_NATS {
         return None;
     }
     let (mut low, mut high) = (least - unit, least + unit);

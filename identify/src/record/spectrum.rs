@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use crate::record::data::Data;
 use crate::stats::periodogram;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::{FEWEST_PERIODS, FEWEST_ROWS_FOR_LINES};
 
 /// A sinusoid `cosine cos(2 pi f t) + sine sin(2 pi f t)`, with `t` counted from the first reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,13 +18,9 @@ pub struct Peak {
     pub sine: f64,
 }
 
-/// A line with fewer periods in the record may be a harmonic of the schedule that a nonlinear spring makes.
-pub const FEWEST_PERIODS: usize = 10;
 /// Number of rows after which the recursive oscillation is computed afresh.
 const ROTATIONS: usize = 64;
 
-/// Records with fewer rows have no lines.
-const FEWEST_ROWS: usize = 16;
 /// Number of line widths on each side that count as neighbours of a line.
 const NEIGHBOURS: usize = 16;
 
@@ -49,7 +46,7 @@ pub struct Line {
 
 /// Returns the most prominent line with at least [`FEWEST_PERIODS`] periods in the record; `None` for short records.
 pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
-    if residual.len() < FEWEST_ROWS {
+    if residual.len() < FEWEST_ROWS_FOR_LINES.count() {
         return None;
     }
     let (power, width) = powers(residual, data);
@@ -65,8 +62,9 @@ pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
         let (left, right) = (sum(from, own_from), sum(own_to, to));
         power[bin] * (left.1 + right.1) / (left.0 + right.0).max(f64::MIN_POSITIVE)
     };
-    let (bin, prominence) =
-        (FEWEST_PERIODS * width..power.len()).map(|bin| (bin, prominence(bin))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (bin, prominence) = (FEWEST_PERIODS.count() * width..power.len())
+        .map(|bin| (bin, prominence(bin)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
     let share = 2.0 * power[bin] / (residual.len() as f64 * dot(residual, residual)).max(f64::MIN_POSITIVE);
     Some(Line { frequency_hz: bin as f64 / (2.0 * power.len() as f64 * data.sample_s), prominence, share })
 }
@@ -74,7 +72,7 @@ pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
 /// Returns the `count` strongest lines in descending order; bins around a line found are left out of the search for the
 /// next.
 pub fn peaks(residual: &[f64], data: &Data, count: usize) -> Vec<Peak> {
-    if residual.len() < FEWEST_ROWS {
+    if residual.len() < FEWEST_ROWS_FOR_LINES.count() {
         return Vec::new();
     }
     let (mut power, width) = powers(residual, data);

@@ -8,12 +8,7 @@ use crate::effects::model::{Block, Model};
 use crate::fit::engine::Fit;
 use crate::search::evaluator::Evaluator;
 use crate::search::scored::{Scored, effects};
-
-/// Factor on the misfit of form that is charged for a second block in the same stage of the chain, in addition to that of any
-/// further block: it may correct the form of the first rather than be another cause.
-const SAME_STAGE: f64 = 15.0;
-/// Gain in log-likelihood of a new first fit over an evaluated one, in nats, from which the structure is evaluated again.
-const NATS_TO_EVALUATE_AGAIN: f64 = 1.0;
+use crate::stats::thresholds::empirical::{NATS_TO_EVALUATE_AGAIN, SAME_STAGE};
 
 /// Structures with their scores, under one penalty factor.
 #[derive(Debug)]
@@ -37,7 +32,7 @@ impl Evaluated {
         let blocks = &fit.model.blocks;
         let further = blocks.len().saturating_sub(1) as f64;
         let stages: HashSet<Location> = blocks.iter().map(|(block, _)| block.effect().location()).collect();
-        let times = further + SAME_STAGE * (blocks.len() - stages.len()) as f64;
+        let times = further + SAME_STAGE.get() * (blocks.len() - stages.len()) as f64;
         let misfit = if times > 0.0 { evaluator.misfit(fit, times, self.floor_v) } else { 0.0 };
         misfit + self.penalty_factor * blocks.iter().map(|(block, _)| evaluator.price(block)).sum::<f64>()
     }
@@ -72,7 +67,7 @@ impl Evaluated {
     /// Returns a structure with its score; fits it again from `first` if that is likelier than the evaluated fit.
     pub(super) fn evaluate_again(&mut self, evaluator: &mut impl Evaluator, first: Fit) -> Scored {
         match self.scored.get(&first.model.structure()).cloned() {
-            Some(known) if known.fit.log_likelihood + NATS_TO_EVALUATE_AGAIN < first.log_likelihood => {
+            Some(known) if known.fit.log_likelihood + NATS_TO_EVALUATE_AGAIN.get() < first.log_likelihood => {
                 let fit = evaluator.refit(first);
                 let again = self.scored(evaluator, fit);
                 if known.score > again.score {

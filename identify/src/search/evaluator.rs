@@ -9,20 +9,9 @@ use crate::noise::{Noise, autocorrelation};
 use crate::search::penalty_factor::penalty_factor;
 use crate::search::predicted_gain::GainPredictor;
 use crate::stats::scale::{negligible, robust_scale, root_mean_square};
-
-/// Price of a block, in nats, without its places and forms: roughly the gain of the best of all blocks on noise.
-const PRICE_OF_BLOCK: f64 = 4.3;
-/// Price of each fitted coordinate of a block, in nats, beyond what held-out rows charge, so that a block with more coordinates
-/// does not replace one with fewer.
-const PRICE_OF_COORDINATE: f64 = 1.8;
-/// Assumed difference in form between the spring and a block, as a fraction of what the block changes.
-const MISFIT_OF_FORM: f64 = 0.005;
-/// Largest misfit of form, as a fraction of the noise floor: a larger one would show as autocorrelation.
-const MISFIT_PER_FLOOR: f64 = 0.3;
-/// Predicted gain, in nats, that one form of an effect must exceed for the effect to be fitted.
-const NATS_TO_FIT: f64 = 2.5;
-/// Fraction of its price that the predicted gain of a block must exceed when the search is not exhaustive.
-const GAIN_PER_PRICE: f64 = 0.5;
+use crate::stats::thresholds::empirical::{
+    GAIN_PER_PRICE, MISFIT_OF_FORM, MISFIT_PER_FLOOR, NATS_TO_FIT, PRICE_OF_BLOCK, PRICE_OF_COORDINATE,
+};
 
 /// Fits structures and evaluates them.
 pub trait Evaluator {
@@ -79,7 +68,8 @@ impl Evaluator for Engine<'_> {
         let law = if exhaustive { Noise::default_robust() } else { fit.noise.clone() };
         if !exhaustive {
             let misfit = if fit.model.blocks.is_empty() { 0.0 } else { self.misfit(fit, 1.0, fit.noise.floor_v()) };
-            extensions.retain(|it| it.predicted_gain > GAIN_PER_PRICE * (Evaluator::price(self, &it.block) + misfit));
+            extensions
+                .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
         let extensions = extensions.into_iter();
         extensions.map(|Extension { block, point, .. }| self.fit(fit.model.with(block, point), &law)).collect()
@@ -88,8 +78,8 @@ impl Evaluator for Engine<'_> {
     fn price(&self, block: &Block) -> f64 {
         let effect = block.effect();
         let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
-        PRICE_OF_BLOCK
-            + PRICE_OF_COORDINATE * fitted as f64
+        PRICE_OF_BLOCK.get()
+            + PRICE_OF_COORDINATE.get() * fitted as f64
             + effect.ln_candidates(block.form, self.data)
             + (effect.forms() as f64).ln()
     }
@@ -97,7 +87,9 @@ impl Evaluator for Engine<'_> {
     fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {
         let explained: Vec<f64> =
             self.baseline_residual.iter().zip(&fit.residual).map(|(before, after)| before - after).collect();
-        let part = MISFIT_OF_FORM.min(MISFIT_PER_FLOOR * floor_v / root_mean_square(&explained).max(f64::MIN_POSITIVE));
+        let part = MISFIT_OF_FORM
+            .get()
+            .min(MISFIT_PER_FLOOR.get() * floor_v / root_mean_square(&explained).max(f64::MIN_POSITIVE));
         autocorrelation::coding_cost(&explained, floor_v / (part * times.sqrt()))
     }
 
@@ -152,7 +144,7 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
             of_effect.extend(starts);
         }
         // Predicted gains rank the forms of an effect poorly: if one form is worth fitting, all are fitted.
-        if of_effect.iter().any(|extension| extension.predicted_gain > NATS_TO_FIT) {
+        if of_effect.iter().any(|extension| extension.predicted_gain > NATS_TO_FIT.get()) {
             found.extend(of_effect);
         }
     }

@@ -8,10 +8,8 @@ use crate::fit::engine::Fit;
 use crate::search::evaluator::Evaluator;
 use crate::search::scored::{Scored, effects};
 use crate::search::structure_search::{FirstFits, Search};
+use crate::stats::thresholds::empirical::NATS_TO_LOSE_AT_FIRST;
 
-/// Largest loss of score of a first fit against the structure that it extends, in nats, at which it is still evaluated; no
-/// limit while the search is exhaustive.
-const NATS_TO_LOSE_AT_FIRST: f64 = 10.0;
 /// Extensions that are evaluated on held-out rows.
 const EVALUATED: usize = 5;
 /// Further extensions that are evaluated, by their likelihood under independent noise, where the noise is autocorrelated.
@@ -60,7 +58,7 @@ impl<E: Evaluator> Search<'_, E> {
         };
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
         if !self.exhaustive {
-            let lost = first_score(node) - NATS_TO_LOSE_AT_FIRST;
+            let lost = first_score(node) - NATS_TO_LOSE_AT_FIRST.get();
             fits.retain(|(score, _)| *score > lost);
         }
         fits.sort_by(|a, b| b.0.total_cmp(&a.0));

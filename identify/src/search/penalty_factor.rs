@@ -5,13 +5,11 @@
 
 use crate::noise::Term;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::ROWS_PER_MEAN;
+use crate::stats::thresholds::probability::Z_LONG_MEMORY;
 
-/// Standard normal quantile of one in a thousand, above which a variance is not that of independent noise.
-const Z_LONG_MEMORY: f64 = 3.09;
 /// Numbers of stretches that the record is divided into.
 const STRETCHES: [usize; 5] = [5, 10, 20, 40, 80];
-/// Fewest rows in a stretch.
-const ROWS_PER_STRETCH: usize = 5;
 
 /// Returns the ratio of the variance of stretch means of the rows' scores (weight times residual) to that of independent
 /// rows, the largest over all numbers of stretches; 1 unless it is significant.
@@ -21,7 +19,7 @@ pub(super) fn penalty_factor(terms: &[Term]) -> f64 {
     let mut largest = 1.0f64;
     for parts in STRETCHES {
         let length = scores.len() / parts;
-        if length < ROWS_PER_STRETCH || variance <= 0.0 {
+        if length < ROWS_PER_MEAN.count() || variance <= 0.0 {
             continue;
         }
         let squares = scores.chunks_exact(length).map(|chunk| chunk.iter().sum::<f64>().powi(2) / length as f64);

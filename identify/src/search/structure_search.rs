@@ -9,6 +9,7 @@ use crate::search::evaluated::Evaluated;
 use crate::search::evaluator::Evaluator;
 use crate::search::scored::{Scored, effects};
 use crate::search::warm_start::WarmStart;
+use crate::stats::thresholds::empirical::NATS_TO_LOSE_IN_BEAM;
 
 /// Models in a warm start.
 const MODELS_IN_WARM_START: usize = 3;
@@ -18,8 +19,6 @@ const BEAM: usize = 3;
 const MOST_BLOCKS: usize = 6;
 /// Rounds in which each block is exchanged for every other.
 const EXCHANGES: usize = 3;
-/// Loss of score, in nats, at which a structure may stay in the beam while the noise is autocorrelated.
-const NATS_TO_LOSE_IN_BEAM: f64 = 30.0;
 
 /// A search, with all that it has evaluated.
 pub struct Search<'e, E> {
@@ -207,8 +206,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
             // Two blocks may gain only together, so that the first may lose score while the noise is autocorrelated.
             let may_lose = |child: &Scored| {
                 let gain = child.score - node.score;
-                gain > -NATS_TO_LOSE_IN_BEAM
-                    || child.fit.white_noise_log_likelihood > node.fit.white_noise_log_likelihood + NATS_TO_LOSE_IN_BEAM
+                gain > -NATS_TO_LOSE_IN_BEAM.get()
+                    || child.fit.white_noise_log_likelihood
+                        > node.fit.white_noise_log_likelihood + NATS_TO_LOSE_IN_BEAM.get()
             };
             let independent = node.fit.noise.autocorrelation.is_white();
             let children = self.children(node).into_iter();

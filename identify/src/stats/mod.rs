@@ -4,9 +4,11 @@
 //! - *Root mean square* (RMS): the scale that every value changes.
 //! - *Second difference*: `(x(n-1) - 2 x(n) + x(n+1)) / sqrt(6)`; it removes a slow signal and keeps the variance of
 //!   independent noise.
+//! - [`thresholds`]: the number that each decision of the diagnosis is compared with.
 //! - *Periodogram*: the squared magnitude of the discrete Fourier transform.
 
 pub mod median;
 pub mod periodogram;
 pub mod scale;
 pub mod sums;
+pub mod thresholds;

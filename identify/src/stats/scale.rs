@@ -2,22 +2,18 @@
 
 use crate::stats::median::robust_deviation;
 use crate::stats::sums::dot;
-
-/// The 97.5 % quantile of the standard normal distribution: half the width of a 95 % interval, in standard deviations.
-pub const Z: f64 = 1.96;
-/// Smallest scale of noise that is assumed, in V. It is the resolution of the fixed-point tick; a noise-free record of
-/// another simulation differs from this one by the time steps of both.
-pub const FINEST_V: f64 = 0.01;
+use crate::stats::thresholds::empirical::FINEST_V;
 
 /// Returns the robust scale of a residual around zero, in V, at least [`FINEST_V`]. Zeros are left out: noise is never
 /// exactly zero, but the rows of a spring at rest in a noise-free record are.
 pub fn robust_scale(residual: &[f64]) -> f64 {
-    robust_deviation(residual.iter().copied().filter(|r| *r != 0.0)).map_or(FINEST_V, |scale| scale.max(FINEST_V))
+    robust_deviation(residual.iter().copied().filter(|r| *r != 0.0))
+        .map_or(FINEST_V.get(), |scale| scale.max(FINEST_V.get()))
 }
 
 /// Returns true if the root mean square of a residual, in V, is no more than the arithmetic's resolution [`FINEST_V`].
 pub fn negligible(residual: &[f64]) -> bool {
-    root_mean_square(residual) <= FINEST_V
+    root_mean_square(residual) <= FINEST_V.get()
 }
 
 /// Returns the root mean square of the values, in their unit; 0 if there are none.

@@ -5,11 +5,9 @@ use crate::answer::{Finding, Verdict};
 use crate::effects::{EFFECTS, contains, index_of};
 use crate::record::data::Data;
 use crate::search::{Evaluator, Scored, Search, effects};
+use crate::stats::thresholds::empirical::REVERSAL_OF_FULL_SCALE;
+use crate::stats::thresholds::probability::RIVAL_ODDS;
 
-/// Odds against a rival set, in nats, below which the record cannot reject it.
-pub(crate) const RIVAL_ODDS: f64 = 3.0;
-/// Change of the voltage, as a fraction of the full scale, that counts as a reversal.
-const REVERSAL_OF_FULL_SCALE: f64 = 0.02;
 /// Largest number of rivals that are listed.
 const MOST_RIVALS: usize = 3;
 
@@ -47,7 +45,7 @@ pub(crate) fn twin(findings: &[Finding]) -> Option<Vec<&'static str>> {
 pub(crate) fn never_reverses(data: &Data) -> bool {
     let mut extremes = (f64::MAX, f64::MIN);
     let (mut falls, mut rises) = (false, false);
-    let slack = REVERSAL_OF_FULL_SCALE * data.full_scale_v;
+    let slack = REVERSAL_OF_FULL_SCALE.get() * data.full_scale_v;
     for &voltage in &data.voltage_v {
         falls |= voltage < extremes.1 - slack;
         rises |= voltage > extremes.0 + slack;

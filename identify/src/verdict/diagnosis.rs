@@ -7,7 +7,8 @@ use crate::fit::engine::{Engine, Fit};
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::search::{Scored, WarmStart};
-use crate::stats::scale::FINEST_V;
+
+use crate::stats::thresholds::empirical::{FINEST_V, SHARE_UNEXPLAINED, STEPS_BEYOND_BOUND};
 use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
 use crate::verdict::export::export;
 use crate::verdict::finding::{explained, finding};
@@ -17,11 +18,6 @@ use crate::verdict::quality::{noise_report, quality, residual_report};
 use crate::verdict::ranking::{RankedCauses, ranking};
 use crate::verdict::reading_findings::reading_findings;
 use simulation::plant_file::PlantFile;
-
-/// Fraction of the residual's mean square that unmodelled dynamics must exceed for the verdict `unexplained`.
-const SHARE_UNEXPLAINED: f64 = 0.1;
-/// Mean distance beyond a bound, in steps of the readings, from which readings at the bound have saturated.
-const STEPS_BEYOND_BOUND: f64 = 0.5;
 
 /// A finished diagnosis: the report and what is needed to draw it.
 #[derive(Clone, Debug)]
@@ -52,11 +48,11 @@ impl Diagnosis {
     /// True if the extended simulation goes beyond the bounds at which readings stopped; on a quantisation grid, a plateau may
     /// only look like a bound.
     pub(crate) fn confirms_bounds(&self) -> bool {
-        let step = self.observed.grid.map_or(FINEST_V, |lattice| lattice.step);
+        let step = self.observed.grid.map_or(FINEST_V.get(), |lattice| lattice.step);
         let beyond = |kind: Kind, sign: f64| {
             let rows = self.observed.kinds.iter().zip(&self.extended.residual).filter(|(of, _)| **of == kind);
             let beyond: Vec<f64> = rows.map(|(_, left)| -sign * left).collect();
-            beyond.is_empty() || beyond.iter().sum::<f64>() > STEPS_BEYOND_BOUND * step * beyond.len() as f64
+            beyond.is_empty() || beyond.iter().sum::<f64>() > STEPS_BEYOND_BOUND.get() * step * beyond.len() as f64
         };
         beyond(Kind::AtLeast, 1.0) && beyond(Kind::AtMost, -1.0)
     }
@@ -88,14 +84,14 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
     for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
         *left -= observed.truncation_v;
     }
-    let unmodelled = adequacy::first_significant(engine, extended).filter(|found| found.rms > FINEST_V);
+    let unmodelled = adequacy::first_significant(engine, extended).filter(|found| found.rms > FINEST_V.get());
     let before = quality(engine, &baseline, &held_out[0], false);
     let after = quality(engine, extended, &held_out[1], true);
 
     let findings = findings(engine, &found);
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
     let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).collect();
-    let unexplained = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED);
+    let unexplained = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let would_show = (findings.is_empty() && !unexplained)
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let verdict = verdict(unexplained, &alternatives, would_show.as_ref(), &findings);

@@ -5,12 +5,9 @@ use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::search::{Scored, Search, WarmStart, effects};
 use crate::stats::scale::root_mean_square;
+use crate::stats::thresholds::empirical::LARGEST_ERROR_RATIO;
 use crate::verdict::alternatives::rivals;
 use crate::verdict::ranking;
-
-/// Root mean square error of the best structure over that of the simulation as it is given, above which the structure is
-/// rejected: likelier readings with a larger error are no improvement.
-const LARGEST_ERROR_RATIO: f64 = 1.005;
 
 /// A finished search.
 pub(crate) struct Found {
@@ -57,7 +54,7 @@ pub(crate) fn search(
         Some(warm_start) => search.run_from(warm_start, progress),
     };
     let [before, after] = [baseline, &best.fit].map(|fit| root_mean_square(&observed.errors(&fit.residual)));
-    if after > LARGEST_ERROR_RATIO * before {
+    if after > LARGEST_ERROR_RATIO.get() * before {
         best = search.root();
     }
     let candidate = Candidate { fit: &best.fit, score: best.score };

@@ -1,7 +1,7 @@
 //! Smallest errors of gain and time constant that a record without findings would have shown.
 //!
 //! ```text
-//! margin = (sqrt(2 N) + 1.64) / sqrt(J' W J)        J, W: sensitivities and weights of the rows
+//! margin = (sqrt(2 N) + 1.645) / sqrt(J' W J)        J, W: sensitivities and weights of the rows
 //! ```
 //!
 //! An error of the gain, or of the time constant's logarithm, of this size gains the `N` nats that the price of its cause and
@@ -13,12 +13,8 @@ use crate::answer::Margins;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::information;
 use crate::search::Evaluator;
-use crate::verdict::alternatives::RIVAL_ODDS;
-
-/// 95 % quantile of the standard normal distribution.
-const Z_POWER: f64 = 1.64;
-/// Margins from which the record is insufficient: half of the gain, or a factor of 2 in the time constant.
-const WIDEST: Margins = Margins { gain: 0.5, time_constant: 1.0 };
+use crate::stats::thresholds::empirical::{WIDEST_GAIN_MARGIN, WIDEST_TIME_CONSTANT_MARGIN};
+use crate::stats::thresholds::probability::{RIVAL_ODDS, Z_POWER};
 
 /// Smallest errors of gain and time constant that would have been found in a record without findings, as fractions of the
 /// simulation's values; prices are multiplied by `penalty_factor`.
@@ -32,5 +28,5 @@ pub(crate) fn margins(engine: &mut Engine, nothing: &Fit, penalty_factor: f64) -
 
 /// True if both margins are narrow enough for the verdict that nothing is wrong.
 pub(crate) fn informative(margins: &Margins) -> bool {
-    margins.gain < WIDEST.gain && margins.time_constant < WIDEST.time_constant
+    margins.gain < WIDEST_GAIN_MARGIN.get() && margins.time_constant < WIDEST_TIME_CONSTANT_MARGIN.get()
 }

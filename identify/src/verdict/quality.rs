@@ -6,8 +6,10 @@ use crate::answer::{NoiseReport, Quality, ResidualReport};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
 use crate::record::data::Data;
-use crate::stats::scale::{FINEST_V, Z, root_mean_square};
+use crate::stats::scale::root_mean_square;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::FINEST_V;
+use crate::stats::thresholds::probability::Z;
 
 /// Largest lag of the residual's correlations, in rows.
 const LAGS: usize = 20;
@@ -24,7 +26,7 @@ pub(crate) fn quality(engine: &Engine, fit: &Fit, held_out: &[f64], stops: bool)
     Quality {
         rmse,
         // Undefined for readings that never change.
-        fit_percent: if spread > FINEST_V { 100.0 * (1.0 - rmse / spread) } else { f64::NAN },
+        fit_percent: if spread > FINEST_V.get() { 100.0 * (1.0 - rmse / spread) } else { f64::NAN },
         held_out_rmse: error(held_out),
         one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
     }

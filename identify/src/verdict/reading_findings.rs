@@ -6,10 +6,9 @@ use crate::fit::engine::Fit;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
 use crate::record::quantisation_grid::QuantisationGrid;
-use crate::stats::scale::{FINEST_V, Z, root_mean_square};
-
-/// Smallest step of the readings that is reported, in root mean square errors.
-const STEP_TO_REPORT: f64 = 0.5;
+use crate::stats::scale::root_mean_square;
+use crate::stats::thresholds::empirical::{FINEST_V, STEP_TO_REPORT};
+use crate::stats::thresholds::probability::Z;
 
 /// Findings in the readings; far readings are outliers only if `isolated`, which says that they neither come in runs nor follow
 /// changes of the command.
@@ -22,7 +21,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
         vec![(name.to_owned(), Parameter { value, low, high, unit })]
     };
     if let Some(QuantisationGrid { step, low, high }) = observed.grid
-        && (step > (STEP_TO_REPORT * stopped_raw).max(2.0 * FINEST_V) || observed.truncation_v > 0.0)
+        && (step > (STEP_TO_REPORT.get() * stopped_raw).max(2.0 * FINEST_V.get()) || observed.truncation_v > 0.0)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data

@@ -37,6 +37,7 @@ Examples:
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
   cargo campaign rivals                      comparison with PySINDy and SysIdentPy
   RAYON_NUM_THREADS=1 cargo campaign speed   CPU time by rows and noise, one record at a time
+  cargo thresholds                           every threshold at half and twice its value
 
 Exit codes: 0 success, 1 a criterion is not met or the work failed, 2 bad arguments."
 )]
@@ -45,7 +46,7 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
-    /// long), or in total (nulls, triples)
+    /// long), in total (nulls, triples), or times 62 (thresholds)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -130,6 +131,8 @@ enum Part {
     OutOfModel,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
     Rivals,
+    /// Every empirical threshold at half and twice its value: 62 records at each value. Run it as `cargo thresholds`
+    Thresholds,
 }
 
 impl Part {
@@ -273,6 +276,20 @@ impl Cli {
                 let markdown = rivals::table(&rows);
                 Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows) })
             }
+            #[cfg(not(feature = "sensitivity"))]
+            Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),
+            #[cfg(feature = "sensitivity")]
+            Part::Thresholds => {
+                use validation::campaign::{diagnosis, thresholds};
+
+                let cases = thresholds::cases(first, self.count(1));
+                let bar = bar("thresholds", thresholds::diagnoses(&cases))?;
+                let (as_set, rows) = thresholds::run(&cases, diagnosis::vary, &diagnose, &bar)?;
+                bar.finish_and_clear();
+                let markdown = thresholds::page(&cases, &as_set, &rows);
+                let json = json!({"as_set": as_set, "thresholds": rows});
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json })
+            }
         }
     }
 
@@ -329,7 +346,9 @@ impl Done {
         let path = folder.join(format!("{}.md", self.part.name()));
         let arguments: Vec<String> = std::env::args().skip(1).collect();
         let (title, command) = (self.part.title(), arguments.join(" "));
-        let mut text = format!("# {title}\n\nPrinted by `cargo campaign {command}`.\n\n{}", self.markdown);
+        // `cargo thresholds` runs this program with the feature that the part needs.
+        let alias = if self.part == Part::Thresholds { "cargo" } else { "cargo campaign" };
+        let mut text = format!("# {title}\n\nPrinted by `{alias} {command}`.\n\n{}", self.markdown);
         if !self.criteria.is_empty() {
             text.push('\n');
             self.criteria.iter().try_for_each(|criterion| writeln!(text, "- {criterion}"))?;

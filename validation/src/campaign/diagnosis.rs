@@ -3,6 +3,9 @@
 use anyhow::Result;
 use identify::fit::simulator::Simulator;
 use identify::record::data::Data;
+#[cfg(feature = "sensitivity")]
+pub use identify::stats::thresholds::vary;
+pub use identify::stats::thresholds::{Threshold, empirical::ALL as THRESHOLDS};
 use identify::{Options, examine};
 use serde_json::Value;
 use simulation::record::Record;

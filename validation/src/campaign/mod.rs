@@ -12,6 +12,7 @@
 //! | [`score`] | the diagnosis of one record compared with the truth |
 //! | [`part`], [`summary`] | the parts of the campaign, and the counts over their records |
 //! | [`sensitivity`] | the smallest effect that is named |
+//! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
@@ -30,3 +31,4 @@ pub mod sensitivity;
 pub mod statistics;
 pub mod summary;
 pub mod tables;
+pub mod thresholds;

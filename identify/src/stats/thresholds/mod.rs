@@ -1,0 +1,13 @@
+//! Every number that a decision of the diagnosis is compared with; algorithm sizes and numerical tolerances stay with their code.
+//!
+//! - [`probability`]: limits that follow from the probability of a false alarm.
+//! - [`empirical`]: limits that were set by counting right and wrong diagnoses. `cargo thresholds` counts again at half and twice
+//!   each value; with the feature `sensitivity` a process can change one of them.
+
+pub mod empirical;
+pub mod probability;
+mod threshold;
+
+pub use threshold::Threshold;
+#[cfg(feature = "sensitivity")]
+pub use threshold::vary;
