@@ -48,7 +48,7 @@ impl Diagnosis {
     /// True if the extended simulation goes beyond the bounds at which readings stopped; on a quantisation grid, a plateau may
     /// only look like a bound.
     pub(crate) fn confirms_bounds(&self) -> bool {
-        let step = self.observed.grid.map_or(FINEST_V.get(), |lattice| lattice.step);
+        let step = self.observed.grid.map_or(FINEST_V.get(), |grid| grid.step);
         let beyond = |kind: Kind, sign: f64| {
             let rows = self.observed.kinds.iter().zip(&self.extended.residual).filter(|(of, _)| **of == kind);
             let beyond: Vec<f64> = rows.map(|(_, left)| -sign * left).collect();

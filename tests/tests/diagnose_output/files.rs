@@ -11,7 +11,7 @@ use validation::ground_truth::record::Recipe;
 
 use super::{FILES, folder, names, papers, rejected};
 
-/// A file name that is HTML, XML and shell at once.
+/// A file name that is HTML, XML and shell syntax.
 const NASTY: &str = "<script>alert('a & \"b\"')<script>$x$.csv";
 
 /// The record of a hidden cause.
@@ -44,7 +44,7 @@ fn every_file_is_written_and_named() {
     ] {
         assert!(page.contains(part), "no {part:?} on the page");
     }
-    // The plots are on the page and beside it.
+    // The plots are on the page and in files.
     assert_eq!(page.matches("<svg ").count(), 5);
     // The file says the same as `--json`.
     let answer = json(folder.path(), &["diagnose", "record.csv", "--json", "--out", "made/here"]);
@@ -65,8 +65,8 @@ fn residuals_add_up_and_are_a_record_again() {
     assert_eq!(rows.len(), 600);
     let rmse = |column: usize| (rows.iter().map(|row| row[column].powi(2)).sum::<f64>() / 600.0).sqrt();
     for (column, quality) in [(5, "baseline"), (6, "extended")] {
-        let told = answer[quality]["rmse"].as_f64().expect("a number");
-        assert!((rmse(column) - told).abs() < 1e-4, "{quality}: {} in the table, {told} told", rmse(column));
+        let stated = answer[quality]["rmse"].as_f64().expect("a number");
+        assert!((rmse(column) - stated).abs() < 1e-4, "{quality}: {} in the table, {stated} stated", rmse(column));
     }
     for row in &rows {
         assert!((row[2] - row[3] - row[5]).abs() < 2e-6 && (row[2] - row[4] - row[6]).abs() < 2e-6, "{row:?}");
