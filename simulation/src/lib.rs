@@ -4,6 +4,7 @@
 //! | module | what it is |
 //! | --- | --- |
 //! | [`schedule`], [`record`] | the commanded voltage over time: the report's stair, or a file |
+//! | [`units`] | units in which a user reads times, voltages and readings |
 //! | [`csv_table`], [`mod@bad_input`] | CSV tables, and errors that name what was expected |
 //! | [`plant_file`] | the spring as a file |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
@@ -28,5 +29,6 @@ pub mod run;
 pub mod sampled;
 pub mod schedule;
 pub mod tune;
+pub mod units;
 
 pub use bad_input::BadInput;

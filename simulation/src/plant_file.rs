@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
+use crate::units::UnitNames;
 
 /// A plant file, in SI units. Each optional table adds an effect to the plain spring.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +24,15 @@ use crate::bad_input::BadInput;
 pub struct PlantFile {
     /// Version of the format: 1.
     pub schema: u32,
+    /// True if the spring responds to the magnitude of the voltage, whatever its sign.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub even: bool,
+    /// Names of the units in which the spring's quantities are shown to a user; every number of the file is in s and V.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub units: Option<UnitNames>,
+    /// The reading for a stiffness; identical numbers without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reading: Option<Reading>,
     /// Hysteresis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory: Option<Memory>,
@@ -40,6 +50,29 @@ pub struct PlantFile {
     /// Effects that the tick does not simulate, kept unchanged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unmodelled: Option<toml::Table>,
+}
+
+/// The map from stiffness to reading: `reading = zero + gain stiffness`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reading {
+    /// Change of the reading per V of equivalent static voltage, in the reading's unit per V; not 0.
+    pub gain: f64,
+    /// Reading at 0 V, in the reading's unit.
+    #[serde(default)]
+    pub zero: f64,
+}
+
+impl Default for Reading {
+    /// A reading that is the stiffness, as the equivalent static voltage in V.
+    fn default() -> Self {
+        Self { gain: 1.0, zero: 0.0 }
+    }
+}
+
+/// Returns true for false; serde omits such a field.
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// A bank of play operators.
@@ -86,9 +119,12 @@ pub struct Relaxation {
     /// Share of each time constant; empty for a single one with the share `1 - share`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weights: Vec<f64>,
-    /// Value of the first time constant at 500 V, in s; the time constant in `tau_s` is then its value at 0 V.
+    /// Value of the first time constant at `tau_high_at_v`, in s; the time constant in `tau_s` is then its value at 0 V.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tau_high_s: Option<f64>,
+    /// Voltage at which the time constant is `tau_high_s`, in V; 500 if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tau_high_at_v: Option<f64>,
 }
 
 /// The amplifier with which a record was made.
@@ -106,6 +142,18 @@ pub struct Amplifier {
     pub delay_s: Option<f64>,
 }
 
+impl Relaxation {
+    /// Voltage at which the time constant is `tau_high_s` unless the file names another, in V.
+    pub const HIGH_V: f64 = 500.0;
+
+    /// Value of the first time constant at [`Relaxation::HIGH_V`], in s; `None` if it is constant.
+    pub fn tau_at_500_v(&self) -> Option<f64> {
+        let low_s = self.tau_s.first().copied().unwrap_or_default();
+        let part = Self::HIGH_V / self.tau_high_at_v.unwrap_or(Self::HIGH_V);
+        self.tau_high_s.map(|high_s| if part == 1.0 { high_s } else { low_s + (high_s - low_s) * part })
+    }
+}
+
 impl From<Plant> for PlantFile {
     fn from(plant: Plant) -> Self {
         let relaxation = Relaxation {
@@ -113,8 +161,21 @@ impl From<Plant> for PlantFile {
             tau_s: vec![plant.time_constant_s],
             weights: Vec::new(),
             tau_high_s: None,
+            tau_high_at_v: None,
         };
-        Self { schema: 1, memory: None, law: None, leakage: None, relaxation, amplifier: None, unmodelled: None }
+        let (units, reading) = (None, None);
+        Self {
+            schema: 1,
+            even: false,
+            units,
+            reading,
+            memory: None,
+            law: None,
+            leakage: None,
+            relaxation,
+            amplifier: None,
+            unmodelled: None,
+        }
     }
 }
 
@@ -136,7 +197,7 @@ impl PlantFile {
                 share: self.relaxation.share,
                 time_constants_s: &self.relaxation.tau_s,
                 weights: &self.relaxation.weights,
-                time_constant_high_s: self.relaxation.tau_high_s,
+                time_constant_high_s: self.relaxation.tau_at_500_v(),
             },
         }
     }
@@ -183,6 +244,83 @@ impl PlantFile {
         Ok(())
     }
 
+    /// Checks whether the spring can be simulated in double precision, which has no ranges of its own: signs, list lengths and
+    /// orders only.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with table and field as named in the file, and the allowed range.
+    pub fn check_for_host(&self) -> Result<(), OutOfRange> {
+        const ANY: f64 = f64::MAX;
+        const POSITIVE: f64 = f64::MIN_POSITIVE;
+        let refused = |field, value, lowest, highest, unit| Err(OutOfRange { field, value, lowest, highest, unit });
+        if self.schema != 1 {
+            return refused("schema", f64::from(self.schema), 1.0, 1.0, "as version of the format");
+        }
+        let Relaxation { share, tau_s, weights, tau_high_s, tau_high_at_v } = &self.relaxation;
+        let some = |value: &Option<f64>| value.iter().copied().collect::<Vec<_>>();
+        let reading = self.reading.unwrap_or_default();
+        let (memory, law, leakage) = (self.memory.as_ref(), self.law.as_ref(), self.leakage.as_ref());
+        let amplifier = self.amplifier.clone().unwrap_or_default();
+        let of_memory = |of: fn(&Memory) -> &Vec<f64>| memory.map(of).cloned().unwrap_or_default();
+        let of_law = |of: fn(&Law) -> &Vec<f64>| law.map(of).cloned().unwrap_or_default();
+        let of_leakage = |of: fn(&Leakage) -> f64| leakage.map(of).into_iter().collect::<Vec<f64>>();
+        for (field, values, lowest, highest, unit) in [
+            ("relaxation.share", vec![*share], 0.0, 1.0, ""),
+            ("relaxation.tau_s", tau_s.clone(), POSITIVE, ANY, "s"),
+            ("relaxation.weights", weights.clone(), -ANY, ANY, ""),
+            ("relaxation.tau_high_s", some(tau_high_s), POSITIVE, ANY, "s"),
+            ("relaxation.tau_high_at_v", some(tau_high_at_v), POSITIVE, ANY, "V"),
+            ("reading.gain", vec![reading.gain], -ANY, ANY, "per V"),
+            ("reading.zero", vec![reading.zero], -ANY, ANY, ""),
+            ("memory.thresholds_v", of_memory(|memory| &memory.thresholds_v), 0.0, ANY, "V"),
+            ("memory.weights", of_memory(|memory| &memory.weights), -ANY, ANY, ""),
+            ("law.voltage_v", of_law(|law| &law.voltage_v), 0.0, ANY, "V"),
+            ("law.stiffness", of_law(|law| &law.stiffness), -ANY, ANY, "V"),
+            ("leakage.share", of_leakage(|leakage| leakage.share), 0.0, 1.0, ""),
+            ("leakage.tau_s", of_leakage(|leakage| leakage.tau_s), POSITIVE, ANY, "s"),
+            ("amplifier.limit_v", some(&amplifier.limit_v), POSITIVE, ANY, "V"),
+            ("amplifier.slew_v_per_s", some(&amplifier.slew_v_per_s), POSITIVE, ANY, "V/s"),
+            ("amplifier.delay_s", some(&amplifier.delay_s), 0.0, ANY, "s"),
+        ] {
+            if let Some(&value) = values.iter().find(|value| !(lowest..=highest).contains(*value)) {
+                return refused(field, value, lowest, highest, unit);
+            }
+        }
+        if reading.gain == 0.0 {
+            return refused("reading.gain", 0.0, POSITIVE, ANY, "per V, or its negative");
+        }
+        let lengths = |field, found: usize, expected: usize, unit| match found == expected {
+            true => Ok(()),
+            false => refused(field, found as f64, expected as f64, expected as f64, unit),
+        };
+        let most = model::extended::lags::MAX_LAGS;
+        if tau_s.is_empty() || tau_s.len() > most {
+            return refused("relaxation.tau_s", tau_s.len() as f64, 1.0, most as f64, "time constants");
+        }
+        if tau_s.len() > 1 || !weights.is_empty() {
+            lengths("relaxation.weights", weights.len(), tau_s.len(), "weights")?;
+        }
+        if let Some(Memory { thresholds_v, weights, .. }) = memory {
+            lengths("memory.weights", weights.len(), thresholds_v.len(), "weights")?;
+        }
+        if let Some(Law { voltage_v, stiffness }) = law {
+            if voltage_v.first() != Some(&0.0) || voltage_v.len() < 2 {
+                return refused(
+                    "law.voltage_v",
+                    voltage_v.first().copied().unwrap_or(f64::NAN),
+                    0.0,
+                    0.0,
+                    "V, where the law starts",
+                );
+            }
+            if let Some(pair) = voltage_v.windows(2).find(|pair| pair[1] <= pair[0]) {
+                return refused("law.voltage_v", pair[1], pair[0], ANY, "V");
+            }
+            lengths("law.stiffness", stiffness.len(), voltage_v.len(), "points")?;
+        }
+        Ok(())
+    }
+
     /// The amplifier with the file's limit and slew where they are stricter.
     pub fn behind(&self, amplifier: model::Amplifier) -> model::Amplifier {
         let Some(Amplifier { limit_v, slew_v_per_s, .. }) = self.amplifier else { return amplifier };
@@ -194,7 +332,8 @@ impl PlantFile {
         let delayed = self.amplifier.as_ref().is_some_and(|amplifier| amplifier.delay_s.is_some());
         let unmodelled =
             self.unmodelled.iter().flat_map(|table| table.keys().map(|key| key.escape_debug().to_string()));
-        delayed.then(|| "amplifier.delay_s".to_owned()).into_iter().chain(unmodelled).collect()
+        let even = self.even.then(|| "even".to_owned());
+        delayed.then(|| "amplifier.delay_s".to_owned()).into_iter().chain(even).chain(unmodelled).collect()
     }
 
     /// Formats the file as TOML.
@@ -206,11 +345,28 @@ impl PlantFile {
     }
 }
 
-/// Loads the report's spring for `paper`, or the plant file of that path.
+/// Loads the report's spring for `paper`, or the plant file of that path, for the tick.
+///
+/// # Errors
+/// [`crate::bad_input::BadInput`] with file, line, column and what was expected, also for values that [`PlantFile::check`]
+/// rejects.
+pub fn load(plant: &str) -> Result<PlantFile> {
+    load_checked(plant, PlantFile::check)
+}
+
+/// Loads like [`load`], for a simulation in double precision, which accepts every spring that passes
+/// [`PlantFile::check_for_host`].
 ///
 /// # Errors
 /// [`crate::bad_input::BadInput`] with file, line, column and what was expected.
-pub fn load(plant: &str) -> Result<PlantFile> {
+pub fn load_for_host(plant: &str) -> Result<PlantFile> {
+    load_checked(plant, PlantFile::check_for_host)
+}
+
+/// A check of a plant file's values.
+type Check = fn(&PlantFile) -> Result<(), OutOfRange>;
+
+fn load_checked(plant: &str, check: Check) -> Result<PlantFile> {
     if plant == "paper" {
         return Ok(Plant::PAPER.into());
     }
@@ -220,7 +376,7 @@ pub fn load(plant: &str) -> Result<PlantFile> {
         let before = String::from_utf8_lossy(&error.as_bytes()[..end]);
         BadInput(format!("{}: not UTF-8; expected a text in UTF-8", place::line_and_column(plant, &before, end)))
     })?;
-    parse(plant, &text)
+    parse_checked(plant, &text, check)
 }
 
 /// Loads like [`load`], but accepts the plain spring only.
@@ -239,12 +395,19 @@ pub fn load_plain(plant: &str) -> Result<Plant> {
 /// # Errors
 /// The errors of [`load`].
 pub fn parse(name: &str, text: &str) -> Result<PlantFile> {
+    parse_checked(name, text, PlantFile::check)
+}
+
+fn parse_checked(name: &str, text: &str, check: Check) -> Result<PlantFile> {
     let file: PlantFile = toml::from_str(text).map_err(|error| {
         let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
         let expected = "expected schema, [relaxation] share and tau_s, and the tables of a plant file";
         BadInput(format!("{}: {what}; {expected}", place::line_and_column(name, text, at)))
     })?;
-    if let Err(error) = file.check() {
+    if let Some(names) = &file.units {
+        names.units().map_err(|error| BadInput(format!("{name}, [units]: {error}")))?;
+    }
+    if let Err(error) = check(&file) {
         let at = place::of_field(text, error.field, error.value);
         // The position already tells the table.
         let field = error.field.rsplit('.').next().unwrap_or(error.field);

@@ -86,7 +86,8 @@ impl Relaxation {
             _ => std::iter::once(self.first_weight()).chain(self.parts().map(|part| part.part)).collect(),
         };
         let tau_high_s = self.varies().then_some(self.tau_high_s);
-        file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s };
+        let tau_high_at_v = file.relaxation.tau_high_at_v.filter(|_| tau_high_s.is_some());
+        file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s, tau_high_at_v };
     }
 
     /// Returns the relaxation of a plant file, which must be valid.

@@ -55,26 +55,59 @@ fn errors_are_one_line_with_their_place() {
         (plain.replace("3.0", "nan"), "p, line 4, column 9: tau_s = NaN"),
         (plain.replace("3.0", "\"slow\""), "p, line 4, column 9: invalid type: string \"slow\", expected a number or"),
         ("schema = ".into(), "p, line 1"),
-        (changed("[10.0, 25.0]", "[10.0, 2500]"), "p, line 5, column 23: thresholds_v = 2500 is not allowed"),
-        (changed("[10.0, 25.0]", "[10.0]"), "p, line 6, column 11: weights = 2 is not allowed: expected 1 weights"),
-        (changed("[0, 100, 200", "[0, 300, 200"), "p, line 9, column 22: voltage_v = 200 is not allowed"),
+        (changed("[10.0, 25.0]", "[10.0, 2500]"), "p, line 15, column 23: thresholds_v = 2500 is not allowed"),
+        (changed("[10.0, 25.0]", "[10.0]"), "p, line 16, column 11: weights = 2 is not allowed: expected 1 weights"),
+        (changed("[0, 100, 200", "[0, 300, 200"), "p, line 19, column 22: voltage_v = 200 is not allowed"),
         (
             changed("[0, 100, 200", "[5, 100, 200"),
-            "p, line 9, column 14: voltage_v = 5 is not allowed: expected 0 V, where the law starts",
+            "p, line 19, column 14: voltage_v = 5 is not allowed: expected 0 V, where the law starts",
         ),
         (
             changed("[0, 90", "[0, 9000"),
-            "p, line 10, column 17: stiffness = 9000 is not allowed: expected -1000 to 1000",
+            "p, line 20, column 17: stiffness = 9000 is not allowed: expected -1000 to 1000",
         ),
-        (changed("share = 0.1\n", "share = 1.5\n"), "p, line 13, column 9: share = 1.5 is not allowed"),
+        (changed("share = 0.1\n", "share = 1.5\n"), "p, line 23, column 9: share = 1.5 is not allowed"),
         (changed("weights = [0.8, 0.109]\n", ""), "weights = 0 is not allowed: expected 2 weights"),
-        (changed("tau_high_s = 8.0", "tau_high_s = 80"), "p, line 20, column 14: tau_high_s = 80 is not allowed"),
-        (changed("650.0", "4"), "p, line 23, column 11: limit_v = 4 is not allowed: expected 10 to 1000 V"),
-        (changed("limit_v = 650.0", "limit = 650.0"), "p, line 23, column 1: unknown field `limit`"),
+        (changed("tau_high_s = 8.0", "tau_high_s = 80"), "p, line 30, column 14: tau_high_s = 80 is not allowed"),
+        (changed("650.0", "4"), "p, line 34, column 11: limit_v = 4 is not allowed: expected 10 to 1000 V"),
+        (changed("limit_v = 650.0", "limit = 650.0"), "p, line 34, column 1: unknown field `limit`"),
     ] {
         let got = parse("p", &text).unwrap_err().to_string();
         assert!(got.contains(expected) && !got.contains('\n'), "{text:?}: {got}");
     }
+}
+
+#[test]
+fn a_host_accepts_springs_beyond_the_ranges_of_the_tick() {
+    let path = std::env::temp_dir().join(format!("plant-for-host-{}.toml", std::process::id()));
+    let load = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        let name = path.display().to_string();
+        (super::load(&name).map_err(|error| error.to_string()), load_for_host(&name).map_err(|error| error.to_string()))
+    };
+    let quick =
+        "schema = 1\neven = true\n[reading]\ngain = -0.05\nzero = 20.5\n[relaxation]\nshare = 1\ntau_s = 1e-6\n";
+    let (tick, host) = load(quick);
+    assert!(tick.unwrap_err().contains("share = 1 is not allowed"));
+    assert_eq!(host.unwrap().reading, Some(Reading { gain: -0.05, zero: 20.5 }));
+    for (from, to, expected) in [
+        ("1e-6", "-1", "line 8, column 9: tau_s = -1 is not allowed"),
+        ("share = 1", "share = 1.1", "share = 1.1 is not allowed: expected 0 to 1"),
+        ("-0.05", "0", "line 4, column 8: gain = 0 is not allowed"),
+        ("zero = 20.5", "zero = nan", "zero = NaN"),
+        ("[reading]", "[units]\ntime = \"fortnight\"\n[reading]", "`fortnight` is not a unit of time"),
+        ("[relaxation]", "[law]\nvoltage_v = [0, 2, 1]\nstiffness = [0, 1, 2]\n[relaxation]", "voltage_v = 1 is not"),
+    ] {
+        let error = load(&quick.replace(from, to)).1.unwrap_err();
+        assert!(error.contains(expected) && !error.contains('\n'), "{error}");
+    }
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_time_constant_at_another_voltage_is_converted_for_the_tick() {
+    let changed = WHOLE.replace("tau_high_at_v = 500.0", "tau_high_at_v = 250.0").replace("= 8.0", "= 6.5");
+    assert_eq!(parse("p", &changed).unwrap().extended().relaxation.time_constant_high_s, Some(7.5));
 }
 
 #[test]

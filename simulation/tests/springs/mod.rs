@@ -57,7 +57,7 @@ prop_compose! {
         let tau_s: Vec<f64> = lags.iter().map(|lag| 10f64.powf(lag.0)).collect();
         let weights = if several { lags.iter().map(|lag| lag.1 / all).collect() } else { Vec::new() };
         let tau_high_s = varying.then_some(tau_s[0] * 10f64.powf(ratio));
-        Relaxation { share, tau_s, weights, tau_high_s }
+        Relaxation { share, tau_s, weights, tau_high_s, tau_high_at_v: None }
     }
 }
 

@@ -1,0 +1,116 @@
+//! Units in which a user reads times, voltages and readings. Inside the libraries a time is in s and a voltage in V; a reading
+//! keeps its own unit, which is only a name.
+
+use serde::{Deserialize, Serialize};
+
+use crate::bad_input::BadInput;
+
+/// A unit of time or voltage: its name, and its size in s or V.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    /// Name, e.g. `ms`.
+    pub name: String,
+    /// Size in the SI unit, e.g. 1e-3 for `ms`; positive.
+    pub si: f64,
+}
+
+/// Units of the three quantities of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Units {
+    /// Unit of times.
+    pub time: Unit,
+    /// Unit of the commanded voltage.
+    pub voltage: Unit,
+    /// Name of the reading's unit; `V` for stiffness as the equivalent static voltage.
+    pub reading: String,
+}
+
+impl Default for Units {
+    /// Seconds, volts, and stiffness as the equivalent static voltage in V.
+    fn default() -> Self {
+        Self { time: Unit::of("s", 1.0), voltage: Unit::of("V", 1.0), reading: "V".into() }
+    }
+}
+
+/// Names and sizes of the units of time, in s.
+const TIMES: &[(&str, f64)] =
+    &[("s", 1.0), ("ns", 1e-9), ("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0), ("d", 86400.0)];
+
+/// Decimal prefixes of the volt.
+const PREFIXES: &[(&str, f64)] =
+    &[("", 1.0), ("n", 1e-9), ("u", 1e-6), ("µ", 1e-6), ("m", 1e-3), ("k", 1e3), ("M", 1e6)];
+
+impl Unit {
+    fn of(name: &str, si: f64) -> Self {
+        Self { name: name.into(), si }
+    }
+
+    /// Returns the unit of time with a name.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the names that are known.
+    pub fn of_time(name: &str) -> Result<Self, BadInput> {
+        let known = TIMES.iter().find(|(known, _)| *known == name).map(|&(_, si)| Self::of(name, si));
+        known.ok_or_else(|| BadInput(format!("`{name}` is not a unit of time; expected ns, us, ms, s, min, h or d")))
+    }
+
+    /// Returns the unit of voltage with a name. A command in any other unit (a heater's percent, an ampere, a code) is
+    /// accepted as it is: its unit takes the place of the volt.
+    pub fn of_voltage(name: &str) -> Self {
+        let known = PREFIXES.iter().find(|(prefix, _)| name.strip_suffix('V') == Some(prefix));
+        Self::of(name, known.map_or(1.0, |&(_, si)| si))
+    }
+}
+
+/// The names of [`Units`] as the table `[units]` of a plant file; an absent name is that of the default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnitNames {
+    /// Name of the unit of time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<String>,
+    /// Name of the unit of the commanded voltage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub voltage: Option<String>,
+    /// Name of the unit of the reading.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reading: Option<String>,
+}
+
+impl UnitNames {
+    /// Returns the units with these names.
+    ///
+    /// # Errors
+    /// [`BadInput`] for an unknown unit of time.
+    pub fn units(&self) -> Result<Units, BadInput> {
+        let default = Units::default();
+        Ok(Units {
+            time: self.time.as_deref().map_or(Ok(default.time), Unit::of_time)?,
+            voltage: self.voltage.as_deref().map_or(default.voltage, Unit::of_voltage),
+            reading: self.reading.clone().unwrap_or(default.reading),
+        })
+    }
+}
+
+impl From<&Units> for UnitNames {
+    fn from(units: &Units) -> Self {
+        let [time, voltage] = [&units.time, &units.voltage].map(|unit| Some(unit.name.clone()));
+        Self { time, voltage, reading: Some(units.reading.clone()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_give_sizes_and_read_back() {
+        let names = UnitNames { time: Some("ms".into()), voltage: Some("kV".into()), reading: Some("mm".into()) };
+        let units = names.units().unwrap();
+        assert_eq!((units.time.si, units.voltage.si, &*units.reading), (1e-3, 1e3, "mm"));
+        assert_eq!(UnitNames::from(&units), names);
+        assert_eq!(UnitNames::default().units().unwrap(), Units::default());
+        assert_eq!(Unit::of_voltage("%").si, 1.0);
+        assert!(Unit::of_time("parsec").unwrap_err().to_string().contains("expected ns, us, ms, s, min, h or d"));
+    }
+}
