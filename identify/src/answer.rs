@@ -36,6 +36,30 @@ pub struct Report {
     pub noise: NoiseReport,
     /// Correlations of the residual of the extended simulation.
     pub residual: ResidualReport,
+    /// What each of several records shows beyond the causes that they share; empty for a single record.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub records: Vec<RecordReport>,
+}
+
+/// What one of several records shows beyond the causes that they share.
+#[derive(Clone, Debug, Serialize)]
+pub struct RecordReport {
+    /// Name of the record.
+    pub name: String,
+    /// Number of rows with a reading.
+    pub rows: usize,
+    /// Zero offset of the record, in V.
+    pub offset: f64,
+    /// Scale of the innovations of its noise, in V.
+    pub sigma: f64,
+    /// Root mean square error with the shared causes and its own findings, in V.
+    pub rmse: f64,
+    /// The conclusion on this record, against the spring with the shared causes.
+    pub verdict: Verdict,
+    /// Causes that are in this record and not in all: faults of this record.
+    pub findings: Vec<Finding>,
+    /// Structure in the residual of this record that no cause explains, in one sentence.
+    pub leftover: Option<String>,
 }
 
 /// The conclusion on a record.

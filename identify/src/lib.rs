@@ -66,6 +66,6 @@ pub mod stats;
 pub mod verdict;
 
 pub use answer::{Margins, Report, Verdict};
-pub use examine::{Options, diagnose, examine};
+pub use examine::{Options, Several, diagnose, examine, examine_several};
 pub use record::data::Input;
 pub use verdict::diagnosis::Diagnosis;

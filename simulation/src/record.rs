@@ -21,6 +21,13 @@ pub struct Row {
     pub measured: Option<f64>,
 }
 
+impl Row {
+    /// Returns the row with `offset` subtracted from its reading.
+    pub fn less(&self, offset: f64) -> Self {
+        Self { measured: self.measured.map(|reading| reading - offset), ..*self }
+    }
+}
+
 /// A validated record: at least two rows, all numbers finite, times increasing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {

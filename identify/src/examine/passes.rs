@@ -42,27 +42,38 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
-    let data = Data::new(record, options.input);
-    if data.rows() < ROWS_TO_DIAGNOSE.count() {
-        bad_input!(
-            "{}: {} row(s) with a reading; expected at least {} to tell causes apart",
-            record.name,
-            data.rows(),
-            ROWS_TO_DIAGNOSE.count()
-        );
+    joint(std::slice::from_ref(record), options, &mut progress)
+}
+
+/// Finds out what the simulation gets wrong on all of several records of one spring.
+///
+/// # Errors
+/// The errors of [`examine`], for the first record that has one.
+pub(super) fn joint(records: &[Record], options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
+    let prepared: Vec<Data> = records.iter().map(|record| Data::new(record, options.input)).collect();
+    for (record, data) in records.iter().zip(&prepared) {
+        if data.rows() < ROWS_TO_DIAGNOSE.count() {
+            bad_input!(
+                "{}: {} row(s) with a reading; expected at least {} to tell causes apart",
+                record.name,
+                data.rows(),
+                ROWS_TO_DIAGNOSE.count()
+            );
+        }
     }
+    let data = Data::joined(prepared);
     let progress = &mut |scored: &Scored| {
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
-    let record = ExaminedRecord { record, input: options.input, data: &data };
+    let record = ExaminedRecord { records, input: options.input, data: &data };
     let found = of_readings(&record, &options.base, progress);
     Ok(without_unsupported_terms(&record, &options.base, found, progress))
 }
 
-/// A record as all passes take it.
+/// One record, or several of one spring, as all passes take them.
 struct ExaminedRecord<'r> {
-    record: &'r Record,
+    records: &'r [Record],
     input: Input,
     data: &'r Data,
 }
@@ -187,7 +198,8 @@ fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, pr
     if rows <= LONG_RECORD_ROWS.count() {
         return None;
     }
-    let part = Data::thinned(record.record, record.input, rows.div_ceil(ROWS_TO_SEARCH.count()));
+    let every = rows.div_ceil(ROWS_TO_SEARCH.count());
+    let part = Data::joined(record.records.iter().map(|of| Data::thinned(of, record.input, every)).collect());
     let observed = Observed::new(&part).with_conclusions_of(observed);
     let mut engine = Engine::new(&part, &observed, base);
     let mut search = Search::new(&mut engine);

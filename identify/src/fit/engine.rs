@@ -123,7 +123,8 @@ impl<'a> Engine<'a> {
 
     /// Returns the same, and the cost of that initial state in nats.
     fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
-        if self.data.initial_state_unknown {
+        let estimated = self.data.initial_state_unknown || self.data.is_joined();
+        if estimated {
             self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
         } else {
             self.simulator.run(model, &mut self.predicted);
@@ -132,7 +133,7 @@ impl<'a> Engine<'a> {
         let left = |(reading, predicted): (&f64, &f64)| reading + truncation_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
         let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
-        let initial_state_cost = match self.data.initial_state_unknown {
+        let initial_state_cost = match estimated {
             true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
         };
@@ -210,6 +211,16 @@ impl<'a> Engine<'a> {
     pub fn refit(&mut self, first: Fit) -> Fit {
         let second = self.fit(first.model.clone(), &first.noise);
         if second.log_likelihood >= first.log_likelihood { second } else { first }
+    }
+
+    /// Returns the zero offset of each of several records at a fit, in V: what the estimated nuisance parameters add to the
+    /// prediction at the record's end, where its initial state has decayed.
+    pub fn zero_offsets(&mut self, fit: &Fit) -> Vec<f64> {
+        let mut predicted = Vec::new();
+        self.simulator.run(&fit.model, &mut predicted);
+        let ends = self.data.parts.iter().map(|part| part.rows.end - 1);
+        ends.map(|row| self.data.reading[row] + self.observed.truncation_v - predicted[row] - fit.residual[row])
+            .collect()
     }
 
     fn log(&self, noise: &Noise, residual: &[f64]) -> f64 {

@@ -25,6 +25,8 @@ pub struct Simulator<'a> {
     response: Cached<Vec<f64>>,
     /// Response of the stiffness to each initial state.
     kernels: Cached<Vec<Vec<f64>>>,
+    /// Simulators of several records, in their order; empty for a single one.
+    parts: Vec<Simulator<'a>>,
 }
 
 /// A result, and the blocks that it was computed from.
@@ -60,11 +62,15 @@ impl<'a> Simulator<'a> {
             chained: Cached::default(),
             response: Cached::default(),
             kernels: Cached::default(),
+            parts: data.parts.iter().map(|part| Self::new(&part.data, base)).collect(),
         }
     }
 
     /// Computes the prediction of a model for each row, in V.
     pub fn run(&mut self, model: &Model, readings: &mut Vec<f64>) {
+        if !self.parts.is_empty() {
+            return self.run_parts(model, readings, None);
+        }
         if !self.response.update_key(model, Affects::Response) {
             let mut value = std::mem::take(&mut self.response.value);
             value.clear();
@@ -73,6 +79,32 @@ impl<'a> Simulator<'a> {
         }
         readings.clone_from(&self.response.value);
         self.modify_readings(model, readings);
+    }
+
+    /// Computes the prediction of several records one after the other and, if asked for, the kernels of each: those of its initial
+    /// state, if that is unknown, and its zero offset.
+    fn run_parts(&mut self, model: &Model, readings: &mut Vec<f64>, mut kernels: Option<&mut Vec<Vec<f64>>>) {
+        readings.clear();
+        let rows = self.data.rows();
+        let (mut of_part, mut own) = (Vec::new(), Vec::new());
+        for (part, simulator) in self.data.parts.iter().zip(&mut self.parts) {
+            own.clear();
+            match kernels {
+                Some(_) if part.data.initial_state_unknown => {
+                    simulator.run_with_initial_states(model, &mut of_part, &mut own);
+                }
+                _ => simulator.run(model, &mut of_part),
+            }
+            readings.extend(&of_part);
+            if let Some(kernels) = &mut kernels {
+                own.push(vec![1.0; part.rows.len()]);
+                kernels.extend(own.drain(..).map(|kernel| {
+                    let mut whole = vec![0.0; rows];
+                    whole[part.rows.clone()].copy_from_slice(&kernel);
+                    whole
+                }));
+            }
+        }
     }
 
     fn modify_readings(&self, model: &Model, readings: &mut [f64]) {
@@ -84,6 +116,10 @@ impl<'a> Simulator<'a> {
     /// Computes the same, and the change of the prediction for each initial state that is 1 V away from rest at the
     /// first row.
     pub fn run_with_initial_states(&mut self, model: &Model, readings: &mut Vec<f64>, kernels: &mut Vec<Vec<f64>>) {
+        if !self.parts.is_empty() {
+            kernels.clear();
+            return self.run_parts(model, readings, Some(kernels));
+        }
         self.run(model, readings);
         if !self.kernels.update_key(model, Affects::Response) {
             let chain = model.chain(self.base, self.data);

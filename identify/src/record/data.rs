@@ -1,5 +1,8 @@
 //! The record prepared for fits: the commanded voltage as a signal, the readings, and the folds of cross-validation.
 
+use std::iter;
+use std::ops::Range;
+
 use model::Plant;
 
 use simulation::record::Record;
@@ -52,6 +55,17 @@ pub struct Data {
     pub fold: Vec<u8>,
     /// Number of folds.
     pub folds: usize,
+    /// The records that were joined; empty for a single record.
+    pub parts: Vec<Part>,
+}
+
+/// One of several joined records.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Its rows among those of all records.
+    pub rows: Range<usize>,
+    /// The record on its own, with the scales that all records share.
+    pub data: Data,
 }
 
 impl Data {
@@ -108,7 +122,54 @@ impl Data {
             initial_state_unknown,
             fold,
             folds,
+            parts: Vec::new(),
         }
+    }
+
+    /// Joins several records of one spring; each is simulated from its own initial state and has its own zero offset. Each record
+    /// is held out as a whole. Times of a record follow those of the record before it, after a pause of one row; effects
+    /// that depend on time begin anew with each record.
+    pub fn joined(records: Vec<Data>) -> Self {
+        let mut records = records;
+        if records.len() == 1 {
+            return records.remove(0);
+        }
+        let longest = records.iter().max_by_key(|data| data.rows()).expect("at least one record");
+        let (sample_s, record_sample_s) = (longest.sample_s, longest.record_sample_s);
+        let alike = |data: &Data| data.uniform && (data.sample_s - sample_s).abs() < 0.01 * sample_s;
+        let uniform = records.iter().all(alike);
+        let full_scale_v = records.iter().fold(0.0, |most: f64, data| most.max(data.full_scale_v));
+        let mut all = Data {
+            time_s: Vec::new(),
+            voltage_v: Vec::new(),
+            reading: Vec::new(),
+            command: records[0].command.clone(),
+            full_scale_v,
+            sample_s,
+            record_sample_s,
+            uniform,
+            initial_state_unknown: records.iter().any(|data| data.initial_state_unknown),
+            fold: Vec::new(),
+            folds: records.len(),
+            parts: Vec::new(),
+        };
+        for (fold, mut data) in records.into_iter().enumerate() {
+            let first = all.rows();
+            let shift_s = all.time_s.last().map_or(0.0, |last| last + sample_s - data.time_s[0]);
+            data.time_s.iter_mut().for_each(|time_s| *time_s += shift_s);
+            all.time_s.extend(&data.time_s);
+            all.voltage_v.extend(&data.voltage_v);
+            all.reading.extend(&data.reading);
+            all.fold.extend(iter::repeat_n(fold as u8, data.rows()));
+            data = Data { full_scale_v, sample_s, record_sample_s, uniform, ..data };
+            all.parts.push(Part { rows: first..first + data.rows(), data });
+        }
+        all
+    }
+
+    /// Returns true if the records are several.
+    pub fn is_joined(&self) -> bool {
+        !self.parts.is_empty()
     }
 
     /// Returns the number of readings.
@@ -116,8 +177,11 @@ impl Data {
         self.reading.len()
     }
 
-    /// Returns the time from the first to the last reading, in s.
+    /// Returns the time from the first to the last reading, in s; that of the longest of several records.
     pub fn duration_s(&self) -> f64 {
+        if self.is_joined() {
+            return self.parts.iter().map(|part| part.data.duration_s()).fold(0.0, f64::max);
+        }
         self.time_s.last().unwrap_or(&0.0) - self.time_s.first().unwrap_or(&0.0)
     }
 }

@@ -46,8 +46,11 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// Examines the readings of a record.
+    /// Examines the readings of a record, or of several, each on its own.
     pub fn new(data: &Data) -> Self {
+        if data.is_joined() {
+            return Self::joined(&data.parts.iter().map(|part| Self::new(&part.data)).collect::<Vec<_>>());
+        }
         let mut sorted = data.reading.clone();
         sorted.sort_by(f64::total_cmp);
         let mut counts: Vec<(f64, usize)> = Vec::new();
@@ -97,6 +100,34 @@ impl Observed {
         observed
     }
 
+    /// Joins the properties of several records. A grid or a bound is one of the sensor if all records have it; the weights follow
+    /// from the noise of each record.
+    fn joined(records: &[Self]) -> Self {
+        let scales: Vec<f64> = records.iter().map(|record| record.scatter_v).collect();
+        let rows: usize = records.iter().map(|record| record.kinds.len()).sum();
+        let of_rows = |record: &Self| record.kinds.len() as f64 * record.scatter_v.ln();
+        let scatter_v = (records.iter().map(of_rows).sum::<f64>() / rows as f64).exp();
+        let weights = records.iter().zip(&scales).flat_map(|(record, scale)| {
+            let own = record.weights.clone();
+            let weight = move |row: usize| own.as_ref().map_or(1.0, |own| own[row]) * scatter_v / scale;
+            (0..record.kinds.len()).map(weight)
+        });
+        let weights: Arc<[f64]> = weights.collect();
+        let common = |of: fn(&Self) -> Option<f64>| {
+            of(&records[0]).filter(|_| records.iter().all(|record| of(record) == of(&records[0])))
+        };
+        let step = common(|record| record.grid.map(|grid| grid.step));
+        Self {
+            kinds: records.iter().flat_map(|record| record.kinds.iter().copied()).collect(),
+            grid: records[0].grid.filter(|_| step.is_some()),
+            upper: common(|record| record.upper),
+            lower: common(|record| record.lower),
+            scatter_v,
+            truncation_v: 0.0,
+            weights: weights.iter().any(|weight| (weight - 1.0).abs() > 1e-9).then_some(weights),
+        }
+    }
+
     /// Returns the same without bounds; a spring that settles at its highest voltage also repeats one reading.
     pub fn without_bounds(&self) -> Self {
         Self { kinds: vec![Kind::Exact; self.kinds.len()], upper: None, lower: None, ..self.clone() }
@@ -143,7 +174,7 @@ impl Observed {
 
     /// Returns true if no reading stopped at a bound.
     pub fn all_exact(&self) -> bool {
-        self.upper.is_none() && self.lower.is_none()
+        self.kinds.iter().all(|kind| *kind == Kind::Exact)
     }
 }
 

@@ -36,6 +36,8 @@ pub struct Diagnosis {
     pub held_out: [Vec<f64>; 2],
     /// The best sets of causes with their scores and errors, the best first.
     pub ranking: Vec<RankedCauses>,
+    /// Zero offset of each of several records, in V; empty for a single record.
+    pub(crate) zero_offsets: Vec<f64>,
     /// How each reading was taken: exact or at a bound, on a quantisation grid, cut off.
     pub(crate) observed: Observed,
     /// Held-out log-likelihood of the extended simulation less the price of its causes, in nats.
@@ -118,6 +120,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         leftover: unmodelled.as_ref().map(sentence),
         noise: noise_report(&extended.noise),
         residual: residual_report(data, extended),
+        records: Vec::new(),
     };
     Diagnosis {
         report,
@@ -126,6 +129,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         plant: export.file,
         held_out,
         ranking,
+        zero_offsets: engine.zero_offsets(extended),
         observed: observed.clone(),
         score: found.best.score,
         warm_start: Some(found.warm_start),
@@ -183,6 +187,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         leftover: reason.leftover(),
         noise: noise_report(&baseline.noise),
         residual: residual_report(data, &baseline),
+        records: Vec::new(),
     };
     Diagnosis {
         report,
@@ -193,6 +198,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         plant: engine.base().file().clone(),
         held_out: [held_out.clone(), held_out],
         ranking: Vec::new(),
+        zero_offsets: vec![0.0; data.parts.len()],
         observed: engine.observed.clone(),
         warm_start: None,
     }

@@ -42,6 +42,8 @@ pub(crate) fn export(engine: &Engine, model: &Model, held: bool) -> Export {
 
 /// Largest absolute difference between the tick and the fitted spring, in V; `None` if the tick fails.
 fn tick_error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Option<f64> {
+    // The command of several records is that of the first.
+    let data = data.parts.first().map_or(data, |part| &part.data);
     let mut applied = data.command.clone();
     model.chain(base, data).amplify(&mut applied);
     let row = |(&time_s, voltage_v)| Row { line: 0, time_s, voltage_v, measured: None };

@@ -1,0 +1,83 @@
+//! The diagnosis of several records of one spring.
+//!
+//! Each record has its own initial state, zero offset and noise. Causes that all records share are found first, each record
+//! held out as a whole. Then each record is diagnosed on its own against the spring with the shared causes; what is found there
+//! is in that record only: a fault, not a property of the spring.
+
+use anyhow::Result;
+
+use simulation::record::Record;
+
+use crate::answer::{RecordReport, Verdict};
+use crate::examine::options::Options;
+use crate::examine::passes::{examine, joint};
+use crate::plant::base::Base;
+use crate::verdict::diagnosis::Diagnosis;
+
+/// The diagnosis of several records.
+#[derive(Clone, Debug)]
+pub struct Several {
+    /// The diagnosis of all records together; its report lists what is in single records.
+    pub joint: Diagnosis,
+    /// The diagnosis of each record against the spring with the shared causes; empty for a single record.
+    pub each: Vec<Diagnosis>,
+}
+
+/// Finds out what the simulation gets wrong on several records of one spring; `progress` receives the names of the best causes
+/// so far, separated by commas. A single record is diagnosed as by [`examine`].
+///
+/// # Errors
+/// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
+pub fn examine_several(records: &[Record], options: &Options, mut progress: impl FnMut(&str)) -> Result<Several> {
+    let mut joint = joint(records, options, &mut progress)?;
+    let mut each = Vec::new();
+    if records.len() < 2 {
+        return Ok(Several { joint, each });
+    }
+    // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
+    let mut spring = joint.plant.clone();
+    spring.unmodelled = None;
+    let options = Options { base: Base::new(spring)?, ..options.clone() };
+    for (record, offset) in records.iter().zip(joint.zero_offsets.clone()) {
+        let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
+        let alone = examine(&from_zero, &options, |causes| progress(&format!("{}: {causes}", record.name)))?;
+        joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
+        each.push(alone);
+    }
+    joint.report.verdict = verdict(&joint);
+    joint.report.leftover =
+        joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
+    Ok(Several { joint, each })
+}
+
+/// What is found in one record beyond the causes that all records share.
+fn of_record(joint: &Diagnosis, alone: &Diagnosis, name: &str, offset: f64) -> RecordReport {
+    let shared = |cause: &str| joint.report.findings.iter().any(|finding| finding.cause == cause);
+    let report = &alone.report;
+    RecordReport {
+        name: name.to_owned(),
+        rows: report.rows,
+        offset,
+        sigma: report.noise.sigma,
+        rmse: report.extended.quality.rmse,
+        verdict: report.verdict,
+        findings: report.findings.iter().filter(|finding| !shared(finding.cause)).cloned().collect(),
+        leftover: report.leftover.clone(),
+    }
+}
+
+/// The verdict on all records: a structure that a fault of one record left in the joint fit counts only if that record's own
+/// diagnosis leaves it as well.
+fn verdict(joint: &Diagnosis) -> Verdict {
+    let report = &joint.report;
+    let any = |verdict| report.records.iter().any(|of| of.verdict == verdict);
+    let faults = report.records.iter().any(|of| !of.findings.is_empty());
+    match report.verdict {
+        _ if any(Verdict::Unexplained) => Verdict::Unexplained,
+        Verdict::Ambiguous => Verdict::Ambiguous,
+        Verdict::Insufficient if !faults => Verdict::Insufficient,
+        _ if any(Verdict::Ambiguous) => Verdict::Ambiguous,
+        _ if report.findings.is_empty() && !faults => Verdict::Consistent,
+        _ => Verdict::Explained,
+    }
+}

@@ -1,0 +1,92 @@
+//! Several records of one spring are diagnosed together.
+
+use identify::{Options, Several, Verdict, examine_several};
+use simulation::record::{Record, Row};
+
+/// Time between rows, in s.
+const SAMPLE_S: f64 = 0.2;
+
+/// What differs between the records of one spring.
+struct Test {
+    /// Voltages, each held for 20 s.
+    volts: [f64; 5],
+    /// Offset of the sensor, in V.
+    zero_v: f64,
+    /// RMS of the noise, in V.
+    noise_v: f64,
+    /// Output of the lag at the first row, in V.
+    start_v: f64,
+    /// Largest reading of the sensor, in V.
+    largest_v: f64,
+}
+
+const PLAIN: Test =
+    Test { volts: [0.0, 200.0, 400.0, 100.0, 300.0], zero_v: 0.0, noise_v: 0.5, start_v: 0.0, largest_v: f64::MAX };
+
+/// A record of a spring with a static gain and a time constant, in s.
+fn record(name: &str, gain: f64, tau_s: f64, test: &Test) -> Record {
+    let share = 1.0 / 11.0;
+    let (mut lag_v, mut state) = (test.start_v, name.len() as u32);
+    let mut row = |index: usize| {
+        let voltage_v = test.volts[index / 100];
+        let mut uniform = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+        };
+        let noise_v = test.noise_v * (uniform() + uniform() + uniform());
+        let stiffness_v = gain * (share * voltage_v + (1.0 - share) * lag_v) + test.zero_v + 2.0 * noise_v;
+        lag_v = voltage_v + (lag_v - voltage_v) * f64::exp(-SAMPLE_S / tau_s);
+        let measured = Some(stiffness_v.min(test.largest_v));
+        Row { line: index + 2, time_s: SAMPLE_S * index as f64, voltage_v, measured }
+    };
+    Record { name: name.into(), rows: (0..500).map(&mut row).collect() }
+}
+
+fn causes(several: &Several) -> Vec<&'static str> {
+    let mut causes: Vec<_> = several.joint.report.findings.iter().map(|finding| finding.cause).collect();
+    causes.sort_unstable();
+    causes
+}
+
+#[test]
+fn shared_causes_are_found_under_different_offsets_starts_and_noise() {
+    let volts = [300.0, 0.0, 500.0, 250.0, 100.0];
+    let records = [
+        record("first", 1.1, 7.0, &Test { zero_v: 3.0, ..PLAIN }),
+        record("second", 1.1, 7.0, &Test { volts, zero_v: -8.0, noise_v: 2.0, start_v: 150.0, ..PLAIN }),
+        record("third one", 1.1, 7.0, &Test { volts, ..PLAIN }),
+    ];
+    let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
+    let report = &several.joint.report;
+    assert_eq!(causes(&several), ["gain-error", "time-constant"], "{report:#?}");
+    assert_eq!((report.verdict, report.rows), (Verdict::Explained, 1500));
+    for (cause, truth) in [("gain-error", 1.1), ("time-constant", 7.0)] {
+        let finding = report.findings.iter().find(|finding| finding.cause == cause).unwrap();
+        let found = &finding.parameters[0].1;
+        assert!((found.value - truth).abs() < 0.01 * truth && found.low < truth && truth < found.high, "{found:?}");
+    }
+    for (of, zero_v) in report.records.iter().zip([3.0, -8.0, 0.0]) {
+        assert!((of.offset - zero_v).abs() < 1.0, "{of:?}");
+        assert!(of.findings.is_empty() && of.verdict == Verdict::Consistent, "{of:?}");
+    }
+    assert!(report.records[1].sigma > 3.0 * report.records[0].sigma, "{:?}", report.records);
+}
+
+#[test]
+fn a_cause_in_one_record_only_is_a_fault_of_that_record() {
+    let records = [
+        record("first", 1.1, 5.5, &PLAIN),
+        record("second", 1.1, 5.5, &Test { largest_v: 380.0, ..PLAIN }),
+        record("third one", 1.1, 5.5, &Test { volts: [0.0, 500.0, 300.0, 100.0, 400.0], ..PLAIN }),
+    ];
+    let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
+    let report = &several.joint.report;
+    assert_eq!(causes(&several), ["gain-error"], "{report:#?}");
+    let faults: Vec<(&str, &str)> = report
+        .records
+        .iter()
+        .flat_map(|of| of.findings.iter().map(|finding| (of.name.as_str(), finding.cause)))
+        .collect();
+    assert_eq!(faults, [("second", "sensor-saturation")], "{report:#?}");
+    assert_eq!(report.verdict, Verdict::Explained);
+}
