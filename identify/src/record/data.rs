@@ -64,6 +64,8 @@ pub struct Data {
 pub struct Part {
     /// Its rows among those of all records.
     pub rows: Range<usize>,
+    /// Time by which it was moved to follow the record before it, in s.
+    pub shift_s: f64,
     /// The record on its own, with the scales that all records share.
     pub data: Data,
 }
@@ -162,9 +164,15 @@ impl Data {
             all.reading.extend(&data.reading);
             all.fold.extend(iter::repeat_n(fold as u8, data.rows()));
             data = Data { full_scale_v, sample_s, record_sample_s, uniform, ..data };
-            all.parts.push(Part { rows: first..first + data.rows(), data });
+            all.parts.push(Part { rows: first..first + data.rows(), shift_s, data });
         }
         all
+    }
+
+    /// Returns, for a row, the index of its record and its time in that record, in s.
+    pub fn place(&self, row: usize) -> (usize, f64) {
+        let index = self.parts.partition_point(|part| part.rows.end <= row);
+        (index, self.time_s[row] - self.parts.get(index).map_or(0.0, |part| part.shift_s))
     }
 
     /// Returns true if the records are several.

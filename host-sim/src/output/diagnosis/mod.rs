@@ -14,6 +14,7 @@ mod origin;
 mod page;
 pub mod panels;
 pub mod plots;
+mod records;
 mod residuals;
 mod style;
 mod tables;

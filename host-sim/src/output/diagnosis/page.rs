@@ -5,6 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::origin::Origin;
+use crate::output::diagnosis::records;
 use crate::output::diagnosis::style;
 use crate::output::diagnosis::tables;
 use crate::output::diagnosis::text;
@@ -32,6 +33,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 }
                 h2 { "Causes" }
                 (tables::findings(&report.findings))
+                (records::section(&report.records))
                 h2 { "Readings and simulations" }
                 @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
                 h2 { "Residual tests" }

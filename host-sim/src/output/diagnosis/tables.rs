@@ -182,12 +182,13 @@ pub(super) fn noise(diagnosis: &Diagnosis) -> Markup {
     html! { p { "Scale " (number(noise.sigma)) " V, " (tail) ", " (autocorrelation) "." (wide.unwrap_or_default()) } }
 }
 
-fn interval(Parameter { value, low, high, unit }: &Parameter) -> String {
+/// Formats a parameter with its interval and unit.
+pub(super) fn interval(Parameter { value, low, high, unit }: &Parameter) -> String {
     format!("{} [{}, {}] {unit}", number(*value), number(*low), number(*high)).trim_end().to_owned()
 }
 
 /// Formats a number with four significant digits.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::output::diagnosis::records;
 use identify::answer::{self, Extended, Finding, Margins, Quality, Verdict};
 use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
@@ -22,6 +23,7 @@ pub fn text(name: &str, report: &answer::Report) -> String {
             row(&mut text, finding);
         }
     }
+    text += &records::text(&report.records);
     let (before, after) = (&report.baseline, &report.extended.quality);
     let extends = !report.findings.is_empty() || !report.take_out.is_empty();
     let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
@@ -216,6 +218,7 @@ mod tests {
             leftover: None,
             noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
             residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
+            records: Vec::new(),
         };
         sentences("r.csv", &report)[..2].join(" ")
     }

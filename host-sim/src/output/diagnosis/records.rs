@@ -1,0 +1,104 @@
+//! What each of several records shows beyond the causes that they share.
+
+use std::fmt::Write;
+
+use identify::answer::{Finding, RecordReport};
+use maud::{Markup, html};
+
+use crate::output::diagnosis::tables::{interval, number};
+
+/// The table for the terminal; empty for a single record.
+pub(super) fn text(records: &[RecordReport]) -> String {
+    let mut text = String::new();
+    if records.is_empty() {
+        return text;
+    }
+    let width = records.iter().map(|of| of.name.chars().count()).max().unwrap_or(0).max(6);
+    let _ = writeln!(
+        text,
+        "\n{:width$} {:>7} {:>12} {:>10} {:>10}   in this record only",
+        "record", "rows", "zero offset", "noise", "RMSE"
+    );
+    for of in records {
+        let numbers = [of.offset, of.sigma, of.rmse].map(number);
+        let [offset, sigma, rmse] = &numbers;
+        let only = only(of).join("; ");
+        let _ = writeln!(text, "{:width$} {:>7} {offset:>12} {sigma:>10} {rmse:>10}   {only}", of.name, of.rows);
+    }
+    text
+}
+
+/// The section of the page; empty for a single record.
+pub(super) fn section(records: &[RecordReport]) -> Markup {
+    html! {
+        @if !records.is_empty() {
+            h2 { "Each record" }
+            p.small {
+                "Every record has its own initial state, zero offset and noise. What is in one record only is a fault of that record, \
+                not a property of the spring."
+            }
+            div.scroll { table {
+                thead { tr {
+                    th { "record" } th.number { "rows" } th.number { "zero offset" } th.number { "noise" } th.number { "RMSE" }
+                    th { "in this record only" }
+                } }
+                tbody {
+                    @for of in records {
+                        tr {
+                            td { (of.name) } td.number { (of.rows) }
+                            @for value in [of.offset, of.sigma, of.rmse] { td.number { (number(value)) } }
+                            td { ul.parameters { @for fault in only(of) { li { (fault) } } } }
+                        }
+                    }
+                }
+            } }
+        }
+    }
+}
+
+/// The findings of one record, each as `cause (parameters)`, and structure that no cause explains; `none` without any.
+fn only(of: &RecordReport) -> Vec<String> {
+    let parameters = |finding: &Finding| {
+        let each = finding.parameters.iter().map(|(name, parameter)| format!("{name} = {}", interval(parameter)));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let faults = of.findings.iter().map(|finding| format!("{} ({})", finding.cause, parameters(finding)));
+    let all: Vec<String> = faults.chain(of.leftover.iter().map(|left| format!("unexplained: {left}"))).collect();
+    if all.is_empty() { vec!["none".to_owned()] } else { all }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use identify::Verdict;
+    use identify::answer::Parameter;
+
+    #[test]
+    fn a_fault_is_listed_with_its_record() {
+        let limit = Parameter { value: 380.0, low: 379.9, high: 380.1, unit: "V" };
+        let finding = Finding {
+            cause: "sensor-saturation",
+            probability: 1.0,
+            parameters: vec![("limit".to_owned(), limit)],
+            rmse_before: 2.0,
+            rmse_after: 1.0,
+            evidence: String::new(),
+        };
+        let of = |name: &str, findings: Vec<Finding>| RecordReport {
+            name: name.to_owned(),
+            rows: 500,
+            offset: -8.0,
+            sigma: 0.5,
+            rmse: 0.5,
+            verdict: Verdict::Explained,
+            findings,
+            leftover: None,
+        };
+        let text = text(&[of("a.csv", Vec::new()), of("second.csv", vec![finding])]);
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(lines[0], "record        rows  zero offset      noise       RMSE   in this record only");
+        assert_eq!(lines[1], "a.csv          500       -8.000     0.5000     0.5000   none");
+        assert!(lines[2].ends_with("   sensor-saturation (limit = 380.0 [379.9, 380.1] V)"), "{text}");
+        assert!(section(&[]).into_string().is_empty());
+    }
+}
