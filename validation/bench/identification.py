@@ -1,6 +1,6 @@
 """Identification of the spring with PySINDy and SysIdentPy, for comparison with `vsj diagnose` in `cargo campaign rivals`.
 
-    identification.py FOLDER
+    identification.py FOLDER [--any-unit]
 
 Each CSV of the folder (time_s, voltage_v, stiffness; even rows) is split: the first 60 % for identification, the last 40 % for
 a free run from the state at the split and the voltages alone. Prints one JSON object: for each file and tool the root mean
@@ -8,6 +8,9 @@ square error of the free run, the CPU time, and the best settings.
 
 Both tools get what a competent user would provide: several libraries and lags are tried on the first three quarters of the
 identification part; the settings with the smallest free-run error on its last quarter are identified again on all of it.
+
+With `--any-unit` (`cargo campaign real`) nothing is known of the plant: voltages and readings are scaled to mean 0 and deviation
+1 over the identification part, and no part of the response is taken as immediate.
 
 PySINDy identifies dw/dt = f(w, u), polynomials up to degree 3, by thresholded least squares. It is given the paper's split of
 the response, w = (y - u/11) 11/10, because y itself jumps with the voltage and has no derivative. Derivatives tried: the
@@ -35,11 +38,11 @@ from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
-SHARE = 1 / 11
+PAPER_SHARE = 1 / 11
 FULL_V = 500.0
 LEARN = 0.6
 TRY = 0.75  # of the identification part
-LARGEST = 1e3  # in units of 500 V: a free run beyond has diverged
+LARGEST = 1e3  # in scaled units: a free run beyond has diverged
 
 
 def read(path):
@@ -63,12 +66,14 @@ class Sindy:
         for window in (0, 11, 41)
     ]
 
+    share = PAPER_SHARE
+
     def __init__(self, degree, threshold, window):
         self.degree, self.threshold, self.window = degree, threshold, window
 
     def fit(self, t, u, y):
         self.step = float(np.mean(np.diff(t)))
-        w = (y - SHARE * u) / (1 - SHARE)
+        w = (y - self.share * u) / (1 - self.share)
         optimizer = ps.STLSQ(threshold=self.threshold, alpha=1e-6, normalize_columns=True)
         library = ps.PolynomialLibrary(degree=self.degree)
         if self.window == 0:
@@ -96,7 +101,7 @@ class Sindy:
         for k, volts in enumerate(u):
             if not abs(w) < LARGEST:
                 break
-            y[k] = SHARE * volts + (1 - SHARE) * w
+            y[k] = self.share * volts + (1 - self.share) * w
             k1 = rate(w, volts)
             if self.window == 0:
                 w += h * k1
@@ -146,7 +151,7 @@ class Narx:
 
 
 def learn(tool, t, u, y):
-    """Free-run error, in units of 500 V, of the best settings, and these settings."""
+    """Free-run error, in scaled units, of the best settings, and these settings."""
     split = int(LEARN * len(y))
     tried = int(TRY * split)
     errors = []
@@ -160,19 +165,29 @@ def learn(tool, t, u, y):
     return rmse(tool(**best).fit(t[:split], u[:split], y[:split]).run(u[split:]) - y[split:]), best
 
 
+def scales(values):
+    """Mean and deviation over the identification part; 0 and 1 for a constant."""
+    learnt = values[: int(LEARN * len(values))]
+    return float(np.mean(learnt)), float(np.std(learnt)) or 1.0
+
+
 def main():
+    any_unit = "--any-unit" in sys.argv
+    if any_unit:
+        Sindy.share = 0.0
     warnings.simplefilter("ignore")
     np.seterr(all="ignore")
     answers = {}
     for path in sorted(Path(sys.argv[1]).glob("*.csv")):
         t, u, y = read(path)
+        (u0, us), (y0, ys) = (scales(u), scales(y)) if any_unit else ((0.0, FULL_V), (0.0, FULL_V))
         answers[path.stem] = {}
         for name, tool in (("pysindy", Sindy), ("sysidentpy", Narx)):
             start = time.process_time()
             # Both tools print progress to stdout.
             with contextlib.redirect_stdout(io.StringIO()):
-                error, settings = learn(tool, t, u / FULL_V, y / FULL_V)
-            answer = {"rmse": FULL_V * error if math.isfinite(error) else None, "settings": settings}
+                error, settings = learn(tool, t, (u - u0) / us, (y - y0) / ys)
+            answer = {"rmse": ys * error if math.isfinite(error) else None, "settings": settings}
             answers[path.stem][name] = answer | {"seconds": time.process_time() - start}
         print(path.stem, answers[path.stem], file=sys.stderr)
     print(json.dumps(answers))
