@@ -20,6 +20,7 @@
 //! | [`record`], [`truth`] | the finished record and the true values of its parameters |
 //! | [`export`] | the record as CSV, as JSON and as the host tools' record type |
 //! | [`out_of_model`] | other laws for the same causes, by a simulator of their own |
+//! | [`other_plants`] | records of other instruments, in their own units |
 
 pub mod cause;
 pub mod effect;
@@ -29,6 +30,7 @@ pub mod hysteresis;
 pub mod integrator;
 pub mod live;
 pub mod noise;
+pub mod other_plants;
 pub mod out_of_model;
 pub mod physics;
 pub mod record;
