@@ -1,56 +1,37 @@
 //! CSV tables with one header row, columns by name in any order, and comment lines that start with `#`.
 //!
+//! Columns may be separated by commas, semicolons, tabs or blanks; where it is not a comma, the decimal mark may be one.
+//!
 //! Errors are one line that names file, line, column and what was expected.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Read};
+pub mod dialect;
+pub mod text;
+
 use std::path::Path;
-use std::str::FromStr;
 
 use anyhow::Result;
 use csv::StringRecord;
 
 use crate::bad_input;
-use crate::bad_input::{BadInput, excerpt};
-
-/// Largest number of rows: a row of a record takes 40 bytes, its diagnosis 500.
-const MOST_ROWS: usize = 1_000_000;
-/// Largest size of a text, in bytes, since a single line may be very long.
-const MOST_BYTES: u64 = 1 << 29;
+use crate::bad_input::{BadInput, excerpt, number};
+use dialect::{Dialect, Numbers, Preamble, Separator, has_thousands_separators};
+use text::Source;
 
 /// Reads the text of a file.
 ///
 /// # Errors
 /// [`BadInput`] if the file cannot be read, is not UTF-8, is too large, or has more than a million rows.
 pub fn read(path: &Path) -> Result<String> {
-    let name = path.display();
-    let unreadable = |error| BadInput(format!("{name}: cannot be read: {error}"));
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?).take(MOST_BYTES);
-    let mut text = String::new();
-    // The file is read once, since it may be a pipe, and no further than the limit.
-    for line in 1..=MOST_ROWS + 2 {
-        match file.read_line(&mut text) {
-            Ok(1..) => (),
-            _ if file.limit() == 0 => bad_input!(
-                "{name}: more than {} MiB; expected at most that: keep every tenth row, or a part of the record",
-                MOST_BYTES >> 20
-            ),
-            Ok(0) => return Ok(text),
-            Err(error) if error.kind() == ErrorKind::InvalidData => {
-                bad_input!("{name}, line {line}: not UTF-8; expected a text in UTF-8")
-            }
-            Err(error) => return Err(unreadable(error).into()),
-        }
-    }
-    bad_input!(
-        "{name}: more than {MOST_ROWS} lines; expected at most that: keep every tenth row, or a part of the record"
-    )
+    Source::open(path)?.utf_8()
 }
 
 /// A table, read row by row.
 pub struct Table<'a> {
     name: &'a str,
     header: StringRecord,
+    header_line: usize,
+    separator: Separator,
+    numbers: Numbers,
     reader: csv::Reader<&'a [u8]>,
     record: StringRecord,
     lines: Lines<'a>,
@@ -60,28 +41,46 @@ pub struct Table<'a> {
 pub struct Row<'t> {
     name: &'t str,
     header: &'t StringRecord,
+    numbers: &'t Numbers,
     record: &'t StringRecord,
     /// Line of the file, from 1.
     pub line: usize,
 }
 
 impl<'a> Table<'a> {
-    /// Reads the header; `name` is what messages call the table.
+    /// Reads the header; `name` is what messages call the table. Separator and decimal mark are found in the text.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the line of an invalid header.
     pub fn new(name: &'a str, text: &'a str) -> Result<Self> {
+        Self::with_dialect(name, text, Dialect::default())
+    }
+
+    /// Reads the header of a table whose dialect may be known.
+    ///
+    /// # Errors
+    /// The errors of [`Table::new`].
+    pub fn with_dialect(name: &'a str, text: &'a str, dialect: Dialect) -> Result<Self> {
+        let preamble = Preamble::of(text);
+        let text = &text[preamble.bytes..];
+        let separator = dialect.separator.or(preamble.separator).unwrap_or_else(|| Separator::of(text));
         // Rows of another length are reported by [`Table::next_row`], which knows their line.
         let mut builder = csv::ReaderBuilder::new();
-        builder.comment(Some(b'#')).trim(csv::Trim::All).flexible(true);
+        builder.delimiter(separator.0).comment(Some(b'#')).trim(csv::Trim::All).flexible(true);
         let mut reader = builder.from_reader(text.as_bytes());
-        let mut lines = Lines { text, byte: 0, line: 1 };
-        let header = reader.headers().map_err(|error| unreadable(name, &mut lines, &error))?.clone();
+        let mut lines = Lines { text, byte: 0, line: 1 + preamble.lines };
+        let mut header = reader.headers().map_err(|error| unreadable(name, &mut lines, &error))?.clone();
+        let line = lines.at(header.position());
+        let empty_at_end = header.iter().rev().take_while(|column| column.is_empty()).count();
+        keep_columns(&mut header, separator, |index, count| index < (count - empty_at_end).max(1));
         let twice =
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
         if let Some((_, column)) = header.iter().enumerate().find(twice) {
-            let line = lines.at(header.position());
             let column = excerpt(column);
             bad_input!("{name}, line {line}: column `{column}` appears twice; expected every column once");
         }
-        Ok(Self { name, header, reader, record: StringRecord::new(), lines })
+        let numbers = Numbers::new(dialect, separator);
+        Ok(Self { name, header, header_line: line, separator, numbers, reader, record: StringRecord::new(), lines })
     }
 
     /// Name of the table in messages.
@@ -94,23 +93,33 @@ impl<'a> Table<'a> {
         self.header.iter()
     }
 
-    /// Index of a column, `None` if the table does not have it.
+    /// Index of a column, `None` if the table does not have it. Without a column of exactly this name, the only one that has
+    /// it apart from case, blanks and quotes.
     pub fn find(&self, column: &str) -> Option<usize> {
-        self.columns().position(|name| name == column)
+        let alike = || {
+            let mut alike = self.columns().enumerate().filter(|(_, name)| plain(name) == plain(column));
+            alike.next().filter(|_| alike.next().is_none()).map(|(index, _)| index)
+        };
+        self.columns().position(|name| name == column).or_else(alike)
+    }
+
+    /// Line of the header, from 1.
+    pub fn header_line(&self) -> usize {
+        self.header_line
     }
 
     /// Index of a column that must exist; `expected` lists the columns for the error.
-    pub fn require(&mut self, column: &str, expected: &str) -> Result<usize> {
+    pub fn require(&self, column: &str, expected: &str) -> Result<usize> {
         self.find(column).ok_or_else(|| self.lacks(column, expected).into())
     }
 
     /// The error for a missing column.
-    pub fn lacks(&mut self, column: &str, expected: &str) -> BadInput {
+    pub fn lacks(&self, column: &str, expected: &str) -> BadInput {
         let name = self.name;
         if self.columns().all(str::is_empty) {
             return BadInput(format!("{name}: no header; expected one with {expected}"));
         }
-        let line = self.lines.at(self.header.position());
+        let line = self.header_line;
         if self.columns().any(unclosed) {
             return BadInput(format!("{name}, line {line}: {UNCLOSED}; expected a header with {expected}"));
         }
@@ -121,22 +130,56 @@ impl<'a> Table<'a> {
     }
 
     /// Reads the next row; `None` after the last.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the line of a row that has not as many fields as the header; empty ones at its end do not count.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>> {
-        match self.reader.read_record(&mut self.record) {
-            Ok(false) => Ok(None),
-            Ok(true) => {
-                let (name, line) = (self.name, self.lines.at(self.record.position()));
-                let (found, expected) = (self.record.len(), self.header.len());
-                if found != expected {
-                    let why =
-                        if self.record.iter().any(unclosed) { format!(" with {UNCLOSED}") } else { String::new() };
-                    bad_input!("{name}, line {line}: {found} field(s){why}; expected {expected} as in the header");
-                }
-                Ok(Some(Row { name, header: &self.header, record: &self.record, line }))
+        let (name, expected) = (self.name, self.header.len());
+        loop {
+            match self.reader.read_record(&mut self.record) {
+                Ok(false) => return Ok(None),
+                Ok(true) => (),
+                Err(error) => return Err(unreadable(name, &mut self.lines, &error).into()),
             }
-            Err(error) => Err(unreadable(self.name, &mut self.lines, &error).into()),
+            let line = self.lines.at(self.record.position());
+            let is_trailing = |index: usize, cell: &str| index >= expected && cell.is_empty();
+            if self.separator == Separator::BLANKS || self.record.len() > expected {
+                let trailing =
+                    self.record.iter().enumerate().skip(expected).all(|(index, cell)| is_trailing(index, cell));
+                keep_columns(&mut self.record, self.separator, |index, _| index < expected || !trailing);
+            }
+            let found = self.record.len();
+            if found == 0 {
+                continue;
+            }
+            if found != expected {
+                let why = if self.record.iter().any(unclosed) { format!(" with {UNCLOSED}") } else { String::new() };
+                let has_decimal_commas =
+                    self.separator == Separator::COMMA && (expected + 1..=2 * expected).contains(&found);
+                let hint =
+                    if has_decimal_commas { " (decimal commas need another separator, `;` or a tab)" } else { "" };
+                bad_input!("{name}, line {line}: {found} field(s){why}; expected {expected} as in the header{hint}");
+            }
+            return Ok(Some(Row { name, header: &self.header, numbers: &self.numbers, record: &self.record, line }));
         }
     }
+}
+
+/// Keeps the cells for whose index and number of cells `keep` holds; of cells between blanks, those that are not empty.
+fn keep_columns(record: &mut StringRecord, separator: Separator, keep: impl Fn(usize, usize) -> bool) {
+    let position = record.position().cloned();
+    let cells = record.iter().filter(|cell| separator != Separator::BLANKS || !cell.is_empty());
+    let cells: Vec<&str> = cells.collect();
+    let kept = (0..).zip(&cells).filter(|(index, _)| keep(*index, cells.len())).map(|(_, cell)| *cell);
+    let mut kept: StringRecord = kept.collect();
+    kept.set_position(position);
+    *record = kept;
+}
+
+/// A column's name without case, blanks, quotes and byte order marks.
+pub(crate) fn plain(name: &str) -> String {
+    let is_kept = |letter: &char| !letter.is_whitespace() && !['"', '\'', '\u{feff}'].contains(letter);
+    name.chars().filter(is_kept).flat_map(char::to_lowercase).collect()
 }
 
 fn unreadable(name: &str, lines: &mut Lines<'_>, error: &csv::Error) -> BadInput {
@@ -156,41 +199,69 @@ impl Row<'_> {
         &self.record[column]
     }
 
+    /// File, line and column of a cell, for messages.
+    pub fn place(&self, column: usize) -> String {
+        format!("{}, line {}, column {}", self.name, self.line, excerpt(&self.header[column]))
+    }
+
+    /// The number in a cell, `None` if it has none; NaN and infinities are numbers here.
+    fn any_number(&self, column: usize) -> Result<Option<f64>> {
+        self.numbers.parse(self.text(column), self.line, || self.place(column))
+    }
+
+    /// True if a cell holds a finite number.
+    pub fn is_number(&self, column: usize) -> bool {
+        matches!(self.any_number(column), Ok(Some(number)) if number.is_finite())
+    }
+
     /// A finite number.
+    ///
+    /// # Errors
+    /// [`BadInput`] with file, line and column.
     pub fn number(&self, column: usize) -> Result<f64> {
-        self.value(column, "a finite number", |number: &f64| number.is_finite())
+        let number = self.any_number(column)?.filter(|number| number.is_finite());
+        number.ok_or_else(|| self.is_not(column, "a finite number"))
     }
 
     /// A finite number of at most `most` in magnitude.
+    ///
+    /// # Errors
+    /// [`BadInput`] with file, line and column.
     pub fn number_within(&self, column: usize, most: f64) -> Result<f64> {
-        self.number(column)?;
-        self.value(column, &format!("a number from -{most} to {most}"), |number: &f64| number.abs() <= most)
+        let value = self.number(column)?;
+        let most_shown = number(most);
+        let within = (value.abs() <= most).then_some(value);
+        within.ok_or_else(|| self.is_not(column, &format!("a number from -{most_shown} to {most_shown}")))
     }
 
     /// A finite number of at most `most` in magnitude, or `None` for a cell with a dash.
+    ///
+    /// # Errors
+    /// [`BadInput`] with file, line and column.
     pub fn number_or_dash(&self, column: usize, most: f64) -> Result<Option<f64>> {
         match self.text(column) {
             "-" => Ok(None),
-            "" => self.value(column, "a finite number; expected `-` for a missing reading", |_: &f64| false).map(Some),
+            "" => Err(self.is_not(column, "a finite number; expected `-` for a missing reading")),
             _ => self.number_within(column, most).map(Some),
         }
     }
 
     /// A whole number, 0 or more.
+    ///
+    /// # Errors
+    /// [`BadInput`] with file, line and column.
     pub fn whole(&self, column: usize) -> Result<usize> {
-        self.value(column, "a whole number", |_| true)
+        self.text(column).parse().map_err(|_| self.is_not(column, "a whole number"))
     }
 
-    fn value<T: FromStr>(&self, column: usize, what: &str, fits: impl Fn(&T) -> bool) -> Result<T> {
-        let Some(value) = self.text(column).parse().ok().filter(fits) else {
-            let (text, Self { name, line, .. }) = (self.text(column), self);
-            let column = excerpt(&self.header[column]);
-            if unclosed(text) {
-                bad_input!("{name}, line {line}, column {column}: {UNCLOSED}; expected {what}");
-            }
-            bad_input!("{name}, line {line}, column {column}: `{}` is not {what}", excerpt(text))
-        };
-        Ok(value)
+    /// The error for a cell that is not `what`.
+    pub fn is_not(&self, column: usize, what: &str) -> anyhow::Error {
+        let (text, place) = (self.text(column), self.place(column));
+        if unclosed(text) {
+            return BadInput(format!("{place}: {UNCLOSED}; expected {what}")).into();
+        }
+        let hint = if has_thousands_separators(text) { " (without separators of thousands)" } else { "" };
+        BadInput(format!("{place}: `{}` is not {what}{hint}", excerpt(text))).into()
     }
 }
 

@@ -5,7 +5,7 @@
 //! The equations are those of [`model::extended`].
 
 mod one_or_more;
-mod place;
+pub(crate) mod place;
 
 use std::path::Path;
 

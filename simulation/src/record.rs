@@ -1,4 +1,13 @@
-//! Records of an experiment as CSV: the columns `time_s`, `voltage_v` and optionally a measured one.
+//! Records of an experiment as CSV: the columns `time_s`, `voltage_v` and optionally a measured one. Records with other
+//! columns and units are opened by [`Format`].
+
+pub mod columns_file;
+mod measured;
+mod names;
+mod times;
+
+pub use measured::{Format, MeasuredRecord};
+pub use names::ColumnNames;
 
 use std::path::Path;
 
@@ -17,7 +26,7 @@ pub struct Row {
     pub time_s: f64,
     /// Commanded voltage, in V.
     pub voltage_v: f64,
-    /// Measured stiffness as the equivalent static voltage, in V; `None` without such a column, or where it holds `-`.
+    /// Reading in its own unit, by default stiffness as the equivalent static voltage in V; `None` if it is missing.
     pub measured: Option<f64>,
 }
 
@@ -37,8 +46,11 @@ pub struct Record {
     pub rows: Vec<Row>,
 }
 
-/// Largest magnitude accepted, in V; anything larger is an error of the file.
+/// Largest magnitude of a voltage, in V; anything larger is an error of the file.
 const MOST_V: f64 = 1e6;
+
+/// Largest magnitude of a reading, in its unit: larger than the Young's moduli in Pa and the counts of any instrument.
+const MOST_READING: f64 = 1e15;
 
 /// Column of the voltage across the spring, in files that lack the commanded voltage.
 pub const APPLIED: &str = "applied_v";
@@ -70,15 +82,6 @@ impl Record {
         Self::parse(&path.display().to_string(), &read(path)?, measured)
     }
 
-    /// Reads a record that must have the column `measured`. Files of `vsj stair --out` are accepted: the voltage may be
-    /// in [`APPLIED`].
-    ///
-    /// # Errors
-    /// The errors of [`Record::open`], and [`crate::bad_input::BadInput`] without the measured column.
-    pub fn open_measured(path: &Path, measured: &str) -> Result<Self> {
-        Self::parse_measured(&path.display().to_string(), &read(path)?, measured)
-    }
-
     /// Parses a record; `name` is what messages call it.
     ///
     /// # Errors
@@ -87,21 +90,14 @@ impl Record {
         let table = Table::new(name, text)?;
         // Only the default column may be absent.
         let measured = (measured != MEASURED || table.find(measured).is_some()).then_some(measured);
-        Self::from_table(table, &["voltage_v"], measured)
+        Self::from_table(table, measured)
     }
 
-    /// Parses a record under the conditions of [`Record::open_measured`].
-    fn parse_measured(name: &str, text: &str, measured: &str) -> Result<Self> {
-        Self::from_table(Table::new(name, text)?, &["voltage_v", APPLIED], Some(measured))
-    }
-
-    /// Takes the voltage from the first of the columns `voltages` that exists.
-    fn from_table(mut table: Table<'_>, voltages: &[&str], measured: Option<&str>) -> Result<Self> {
+    fn from_table(mut table: Table<'_>, measured: Option<&str>) -> Result<Self> {
         let expected: Vec<&str> = ["time_s", "voltage_v"].into_iter().chain(measured).collect();
         let expected = expected.join(", ");
         let time = table.require("time_s", &expected)?;
-        let voltage = voltages.iter().find_map(|column| table.find(column));
-        let voltage = voltage.map_or_else(|| table.require("voltage_v", &expected), Ok)?;
+        let voltage = table.require("voltage_v", &expected)?;
         let measured = measured.map(|column| table.require(column, &expected)).transpose()?;
 
         let name = table.name();
@@ -111,16 +107,17 @@ impl Record {
                 line: row.line,
                 time_s: row.number(time)?,
                 voltage_v: row.number_within(voltage, MOST_V)?,
-                measured: measured.map_or(Ok(None), |column| row.number_or_dash(column, MOST_V))?,
+                measured: measured.map_or(Ok(None), |column| row.number_or_dash(column, MOST_READING))?,
             };
             if let Some(last) = rows.last()
                 && row.time_s <= last.time_s
             {
                 bad_input!(
-                    "{name}, line {}, column time_s: {} follows {}; expected increasing times",
+                    "{name}, line {}, column time_s: {} follows {}; expected increasing times after line {}",
                     row.line,
                     number(row.time_s),
-                    number(last.time_s)
+                    number(last.time_s),
+                    last.line
                 );
             }
             rows.push(row);
@@ -136,6 +133,7 @@ impl Record {
 mod tests {
     use super::*;
     use crate::bad_input::BadInput;
+    use crate::csv_table::text::Source;
 
     fn message(text: &str) -> String {
         let error = Record::parse("data.csv", text, MEASURED).unwrap_err();
@@ -162,13 +160,14 @@ mod tests {
 
     #[test]
     fn required_readings_accept_the_applied_voltage() {
-        let error = Record::parse_measured("r", "# a\ntime_s,voltage_v\n0,1\n1,2\n", MEASURED).unwrap_err().to_string();
+        let open = |text: &str| Format::default().read(Source::new("r", text)).map(|measured| measured.record);
+        let error = open("# a\ntime_s,voltage_v\n0,1\n1,2\n").unwrap_err().to_string();
         assert!(error.starts_with("r, line 2: no column `stiffness`"), "{error}");
         let text = "time_s,target_v,applied_v,stiffness\n0,1,2,3\n1,1,2,3\n";
-        assert_eq!(Record::parse_measured("r", text, MEASURED).unwrap().rows[1].voltage_v, 2.0);
+        assert_eq!(open(text).unwrap().rows[1].voltage_v, 2.0);
         assert!(Record::parse("r", text, MEASURED).is_err(), "a schedule needs the commanded voltage");
         let both = "time_s,applied_v,voltage_v,stiffness\n0,1,2,3\n1,1,2,3\n";
-        assert_eq!(Record::parse_measured("r", both, MEASURED).unwrap().rows[1].voltage_v, 2.0);
+        assert_eq!(open(both).unwrap().rows[1].voltage_v, 2.0);
     }
 
     #[test]

@@ -32,13 +32,46 @@ impl Default for Units {
     }
 }
 
-/// Names and sizes of the units of time, in s.
-const TIMES: &[(&str, f64)] =
-    &[("s", 1.0), ("ns", 1e-9), ("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("min", 60.0), ("h", 3600.0), ("d", 86400.0)];
+/// Sizes of the units of time in s, their names and other spellings.
+const TIMES: &[(f64, &str, &[&str])] = &[
+    (1.0, "s", &["sec", "second", "seconds"]),
+    (1e-9, "ns", &[]),
+    (1e-6, "us", &["\u{b5}s", "\u{3bc}s", "usec"]),
+    (1e-3, "ms", &["msec"]),
+    (60.0, "min", &["minute", "minutes"]),
+    (3600.0, "h", &["hr", "hour", "hours"]),
+    (86400.0, "d", &["day", "days"]),
+];
 
-/// Decimal prefixes of the volt.
-const PREFIXES: &[(&str, f64)] =
-    &[("", 1.0), ("n", 1e-9), ("u", 1e-6), ("µ", 1e-6), ("m", 1e-3), ("k", 1e3), ("M", 1e6)];
+/// Decimal prefixes of the volt, their sizes and other spellings.
+const PREFIXES: &[(f64, &str, &[&str])] = &[
+    (1.0, "", &[]),
+    (1e-9, "n", &[]),
+    (1e-6, "u", &["\u{b5}", "\u{3bc}"]),
+    (1e-3, "m", &[]),
+    (1e3, "k", &["K"]),
+    (1e6, "M", &[]),
+];
+
+/// Units of readings that a column's name may end in.
+const READINGS: &[&str] = &[
+    "nm", "um", "\u{b5}m", "\u{3bc}m", "mm", "cm", "m", "uN", "mN", "N", "kN", "N/m", "kN/m", "mN/m", "N/mm", "uN/m",
+    "N m/rad", "Nm/rad", "Nm", "N m", "Pa", "kPa", "MPa", "GPa", "bar", "mbar", "degC", "\u{b0}C", "degF", "\u{b0}F",
+    "K", "deg", "\u{b0}", "rad", "mrad", "%", "percent", "counts", "codes", "lsb", "uA", "mA", "A", "W", "Hz", "rpm",
+    "g", "kg",
+];
+
+/// The name of a unit of voltage, as [`Unit::of_voltage`] knows it, in its usual spelling; `None` for any other unit.
+pub(crate) fn usual_volts(name: &str) -> Option<String> {
+    let prefix = name.strip_suffix(['V', 'v'])?;
+    let known = PREFIXES.iter().find(|(_, usual, others)| *usual == prefix || others.contains(&prefix));
+    known.map(|(_, usual, _)| format!("{usual}V"))
+}
+
+/// True for a usual unit of readings other than volts.
+pub(crate) fn usual_reading(name: &str) -> bool {
+    READINGS.contains(&name)
+}
 
 impl Unit {
     fn of(name: &str, si: f64) -> Self {
@@ -50,15 +83,17 @@ impl Unit {
     /// # Errors
     /// [`BadInput`] with the names that are known.
     pub fn of_time(name: &str) -> Result<Self, BadInput> {
-        let known = TIMES.iter().find(|(known, _)| *known == name).map(|&(_, si)| Self::of(name, si));
+        let known = TIMES.iter().find(|(_, usual, others)| *usual == name || others.contains(&name));
+        let known = known.map(|&(si, usual, _)| Self::of(usual, si));
         known.ok_or_else(|| BadInput(format!("`{name}` is not a unit of time; expected ns, us, ms, s, min, h or d")))
     }
 
     /// Returns the unit of voltage with a name. A command in any other unit (a heater's percent, an ampere, a code) is
     /// accepted as it is: its unit takes the place of the volt.
     pub fn of_voltage(name: &str) -> Self {
-        let known = PREFIXES.iter().find(|(prefix, _)| name.strip_suffix('V') == Some(prefix));
-        Self::of(name, known.map_or(1.0, |&(_, si)| si))
+        let name = usual_volts(name).unwrap_or_else(|| name.to_owned());
+        let known = PREFIXES.iter().find(|(_, prefix, _)| name.strip_suffix('V') == Some(prefix));
+        Self::of(&name, known.map_or(1.0, |&(si, ..)| si))
     }
 }
 

@@ -12,11 +12,12 @@ use host_sim::output::terminal::{json, print, wrote};
 use identify::plant::base::Base;
 use identify::{Input, Options, examine};
 use indicatif::ProgressBar;
+use simulation::bad_input;
 use simulation::plant_file;
-use simulation::record::{MEASURED, Record};
+use simulation::record::MeasuredRecord;
 use simulation::schedule::Schedule;
 
-use super::choice::{INPUT, one_of};
+use super::record_arguments::RecordArguments;
 
 /// Tolerance in s within which a row of the stair may have the voltage before or after a step.
 const RAMP_S: f64 = 0.1;
@@ -39,20 +40,13 @@ Examples:
 Verdicts: consistent (no difference beyond noise), explained, ambiguous (other causes explain it as well), unexplained (no \
 known cause does), insufficient (too little excitation to decide). All of them exit with 0.")]
 pub(crate) struct Arguments {
-    /// The record
-    #[arg(value_name = "DATA.csv")]
-    data: PathBuf,
+    #[command(flatten)]
+    record: RecordArguments,
     /// The simulation to compare with: `paper`, or a plant file. Parts of the file (memory, law, leakage, amplifier,
     /// further time constants) that the spring does not have are named in a sentence and in the field `take_out` of the
     /// JSON, and omitted from the extended spring
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
-    /// Interpolation of the voltage between the rows
-    #[arg(long, default_value = "hold", value_parser = one_of(INPUT))]
-    input: Input,
-    /// Column with the measured stiffness
-    #[arg(long, default_value = MEASURED, value_name = "NAME")]
-    column: String,
     /// Write report.html, diagnosis.json, residuals.csv, the plots and the extended spring (plant.toml) to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -62,14 +56,14 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    fn origin(&self, record: &Record) -> Origin {
+    fn origin(measured: &MeasuredRecord, input: Input) -> Origin {
         // The path of the program is omitted, since the page may be read elsewhere.
         let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
         let command: Vec<String> = iter::once("vsj".to_owned()).chain(words).collect();
         Origin {
-            record: record.name.clone(),
-            column: self.column.clone(),
-            input: self.input,
+            record: measured.record.name.clone(),
+            column: measured.column.clone(),
+            input,
             command: command.join(" "),
         }
     }
@@ -88,22 +82,26 @@ fn quoted(word: &str) -> String {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let base = Base::new(plant_file::load(&arguments.plant)?)?;
-    let record = Record::open_measured(&arguments.data, &arguments.column)?;
-    if arguments.input == Input::Stair {
-        Schedule::stair().check_commanded("the report's stair (--input stair)", &record, RAMP_S)?;
+    let (measured, input) = arguments.record.open()?;
+    let [measured] = measured.as_slice() else {
+        bad_input!("{} records; expected one: a diagnosis is of a single record", measured.len());
+    };
+    let record = &measured.record;
+    if input == Input::Stair {
+        Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
     }
-    let options = Options { input: arguments.input, base };
+    let options = Options { input, base };
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
-    let mut diagnosis = examine(&record, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
+    let mut diagnosis = examine(record, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
     bar.finish_and_clear();
     if let Some(folder) = &arguments.out {
         diagnosis.report.extended.model = Some(folder.join(output::PLANT_FILE).display().to_string());
     }
     let paths = match files {
-        Some(files) => output::write(files, &diagnosis, &arguments.origin(&record))?,
+        Some(files) => output::write(files, &diagnosis, &Arguments::origin(measured, input))?,
         None => Vec::new(),
     };
     print(&if arguments.json {

@@ -9,6 +9,7 @@ pub(crate) mod joint;
 pub(crate) mod link;
 pub(crate) mod log;
 mod option_names;
+mod record_arguments;
 pub(crate) mod reproduce;
 pub(crate) mod stair;
 pub(crate) mod tune;

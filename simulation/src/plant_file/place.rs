@@ -4,7 +4,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// File name, line and column of the byte at index `at` of `text`.
-pub(super) fn line_and_column(name: &str, text: &str, at: usize) -> String {
+pub(crate) fn line_and_column(name: &str, text: &str, at: usize) -> String {
     let before = text.get(..at).unwrap_or(text);
     let line = before.matches('\n').count() + 1;
     let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;

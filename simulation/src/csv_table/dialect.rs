@@ -1,0 +1,188 @@
+//! The dialect of a table: the character between its columns, the decimal mark, and the lines above its header.
+
+use std::cell::Cell;
+use std::str::FromStr;
+
+use anyhow::Result;
+
+use crate::bad_input;
+use crate::bad_input::BadInput;
+
+/// Number of rows that have to agree with the header about the separator.
+const CHECKED_ROWS: usize = 10;
+
+/// How a table is written, as far as its user says; the rest is found in the table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dialect {
+    /// Separator of the columns.
+    pub separator: Option<Separator>,
+    /// Decimal mark.
+    pub decimal: Option<Decimal>,
+}
+
+/// The ASCII character that separates the columns of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Separator(pub(super) u8);
+
+impl Separator {
+    /// One or more blanks.
+    pub(super) const BLANKS: Self = Self(b' ');
+    /// The comma.
+    pub(super) const COMMA: Self = Self(b',');
+    /// The separators that are recognised, the rarest inside a name first.
+    const USUAL: [Self; 4] = [Self(b'\t'), Self(b';'), Self::COMMA, Self::BLANKS];
+
+    /// Number of fields of a line without empty ones at its end.
+    fn fields(self, line: &str) -> usize {
+        let (mut fields, mut last, mut quoted, mut is_empty) = (0, 0, false, true);
+        for letter in line.trim_end().bytes().chain([self.0]) {
+            if letter == self.0 && !quoted {
+                // Several blanks are one separator.
+                fields += usize::from(!is_empty || self != Self::BLANKS);
+                last = if is_empty { last } else { fields };
+                is_empty = true;
+            } else {
+                quoted ^= letter == b'"';
+                is_empty &= letter == b' ';
+            }
+        }
+        last
+    }
+
+    /// Returns the separator of a text that starts with its header: of those that split the header, the first for which the
+    /// rows have as many fields.
+    pub(super) fn of(text: &str) -> Self {
+        let mut lines = text.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
+        let header = lines.next().unwrap_or_default();
+        let rows: Vec<&str> = lines.take(CHECKED_ROWS).collect();
+        let splits = Self::USUAL.into_iter().filter(|separator| separator.fields(header) > 1);
+        let splits: Vec<Self> = splits.collect();
+        let fits = |separator: &&Self| rows.iter().all(|row| separator.fields(row) == separator.fields(header));
+        *splits.iter().find(fits).or(splits.first()).unwrap_or(&Self::COMMA)
+    }
+}
+
+impl FromStr for Separator {
+    type Err = BadInput;
+
+    fn from_str(name: &str) -> Result<Self, BadInput> {
+        match (name, name.as_bytes()) {
+            ("tab" | "\\t", _) => Ok(Self(b'\t')),
+            ("blank" | "blanks", _) => Ok(Self::BLANKS),
+            (_, [letter]) if !letter.is_ascii_alphanumeric() && !b"\"#.+-\r\n".contains(letter) => Ok(Self(*letter)),
+            _ => Err(BadInput(format!(
+                "`{name}` is not a separator; expected `,`, `;`, `tab`, `blanks` or another character"
+            ))),
+        }
+    }
+}
+
+/// The mark between the whole part and the fraction of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decimal {
+    /// A point.
+    Point,
+    /// A comma.
+    Comma,
+}
+
+impl Decimal {
+    /// The mark in a cell; `None` for a whole number.
+    fn of(text: &str) -> Option<Self> {
+        if text.contains(',') { Some(Self::Comma) } else { text.contains('.').then_some(Self::Point) }
+    }
+
+    fn name(self) -> &'static str {
+        if self == Self::Comma { "comma" } else { "point" }
+    }
+}
+
+impl FromStr for Decimal {
+    type Err = BadInput;
+
+    fn from_str(name: &str) -> Result<Self, BadInput> {
+        match name {
+            "." | "point" => Ok(Self::Point),
+            "," | "comma" => Ok(Self::Comma),
+            _ => Err(BadInput(format!("`{name}` is not a decimal mark; expected `.` or `,`"))),
+        }
+    }
+}
+
+/// Reads the numbers of a table. One decimal mark holds for the whole table: `1,234` would else be two different numbers.
+pub(super) struct Numbers {
+    accepted: Option<Decimal>,
+    /// The first mark found, and its line.
+    found: Cell<Option<(Decimal, usize)>>,
+}
+
+impl Numbers {
+    /// Where commas separate the columns, a decimal comma has to be asked for.
+    pub(super) fn new(dialect: Dialect, separator: Separator) -> Self {
+        let point = (separator == Separator::COMMA).then_some(Decimal::Point);
+        Self { accepted: dialect.decimal.or(point), found: Cell::new(None) }
+    }
+
+    /// The number in a cell of line `line`, not necessarily finite; `None` if it is no number.
+    ///
+    /// # Errors
+    /// [`BadInput`] for a decimal mark other than that of an earlier line; `place` starts the message.
+    pub(super) fn parse(&self, text: &str, line: usize, place: impl Fn() -> String) -> Result<Option<f64>> {
+        let mark = Decimal::of(text);
+        let number: Option<f64> = match mark {
+            Some(Decimal::Comma) if self.accepted != Some(Decimal::Point) => text.replacen(',', ".", 1).parse().ok(),
+            Some(Decimal::Point) if self.accepted == Some(Decimal::Comma) => None,
+            _ => text.parse().ok(),
+        };
+        let Some((number, mark)) = number.zip(mark) else { return Ok(number) };
+        match self.found.get() {
+            None => self.found.set(Some((mark, line))),
+            Some((other, first)) if other != mark => bad_input!(
+                "{}: `{text}` has a decimal {}, line {first} a decimal {}; expected one of them (see --decimal)",
+                place(),
+                mark.name(),
+                other.name()
+            ),
+            Some(_) => (),
+        }
+        Ok(Some(number))
+    }
+}
+
+/// True if a text would be a whole number without points, commas, blanks and apostrophes between its digits.
+pub(super) fn has_thousands_separators(text: &str) -> bool {
+    const MARKS: [char; 7] = ['.', ',', ' ', '\'', '’', '\u{a0}', '\u{202f}'];
+    let digits = text.trim_start_matches(['+', '-']);
+    digits.starts_with(|letter: char| letter.is_ascii_digit())
+        && digits.ends_with(|letter: char| letter.is_ascii_digit())
+        && digits.contains(MARKS)
+        && digits.chars().all(|letter| letter.is_ascii_digit() || MARKS.contains(&letter))
+}
+
+/// The lines above a header.
+pub(super) struct Preamble {
+    /// Their length, in bytes.
+    pub(super) bytes: usize,
+    /// Their number.
+    pub(super) lines: usize,
+    /// The separator that a line `sep=;` names.
+    pub(super) separator: Option<Separator>,
+}
+
+impl Preamble {
+    /// Blank lines, comments that start with `#`, `%` or `//`, and a spreadsheet's line `sep=;`.
+    pub(super) fn of(text: &str) -> Self {
+        let mut preamble = Self { bytes: 0, lines: 0, separator: None };
+        for line in text.split_inclusive('\n') {
+            let content = line.trim();
+            match content.strip_prefix("sep=").map(Separator::from_str) {
+                Some(Ok(separator)) => preamble.separator = Some(separator),
+                _ if content.is_empty() || ["#", "%", "//"].iter().any(|mark| content.starts_with(mark)) => (),
+                _ => break,
+            }
+            preamble.bytes += line.len();
+            preamble.lines += 1;
+        }
+        preamble
+    }
+}

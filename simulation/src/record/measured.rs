@@ -1,0 +1,235 @@
+//! A measured record as its instrument wrote it: any column names, units, separators and usual encodings.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use super::names::{Column, ColumnNames, Columns};
+use super::times::{Clock, Time};
+use super::{MOST_READING, MOST_V, Record, Row};
+use crate::bad_input;
+use crate::bad_input::{BadInput, number};
+use crate::csv_table::Table;
+use crate::csv_table::dialect::Dialect;
+use crate::csv_table::text::Source;
+use crate::units::{Unit, Units, usual_volts};
+
+/// How to read a file with a measured record; everything that is not said is found in the file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Format {
+    /// The columns and their units.
+    pub columns: ColumnNames,
+    /// Separator and decimal mark.
+    pub dialect: Dialect,
+    /// True if rows may be in any order and occur twice.
+    pub sort: bool,
+}
+
+/// A measured record, and what its file says about itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredRecord {
+    /// The record: times in s, voltages in V, readings in their own unit.
+    pub record: Record,
+    /// The units of the file.
+    pub units: Units,
+    /// Name of the column of the readings.
+    pub column: String,
+    /// What the user should know about how the file was read, one line each.
+    pub remarks: Vec<String>,
+}
+
+/// Name of the unit of a reading without unit.
+const NO_UNIT: &str = "units";
+
+impl Format {
+    /// Reads a record from a file.
+    ///
+    /// # Errors
+    /// [`BadInput`] with file, line, column and what was expected.
+    pub fn open(&self, path: &Path) -> Result<MeasuredRecord> {
+        self.read(Source::open(path)?)
+    }
+
+    /// Reads a record from the bytes of a file.
+    ///
+    /// # Errors
+    /// The errors of [`Format::open`].
+    pub fn read(&self, source: Source) -> Result<MeasuredRecord> {
+        let name = source.name.clone();
+        let (text, remark) = source.decode()?;
+        let mut remarks: Vec<String> = remark.into_iter().collect();
+        let table = || Table::with_dialect(&name, &text, self.dialect);
+
+        let columns = self.columns.find(&table()?)?;
+        let below_header = below_header(&mut table()?, &columns)?;
+        let [time, voltage, reading] = &below_header;
+        let units = self.units(&columns, &below_header)?;
+        let mut rows = Rows {
+            table: table()?,
+            columns: &columns,
+            units: &units,
+            clock: Clock::default(),
+            sort: self.sort,
+            missing: 0,
+        };
+        if time.is_some() {
+            rows.table.next_row()?;
+            let shown = [time, voltage, reading].map(|unit| unit.as_deref().unwrap_or("-"));
+            remarks.push(format!("{name}: units {} below the header", shown.join(", ")));
+        }
+        let mut timed = rows.read()?;
+        let (missing, has_stamps) = (rows.missing, rows.clock.has_stamps());
+        if has_stamps && let Some(unit) = &columns.time.unit {
+            bad_input!("{name}: the times are time stamps, not numbers in {unit}; expected no unit of time");
+        }
+        if self.sort {
+            timed = sorted(&name, timed, &mut remarks)?;
+        }
+        if missing > 0 {
+            remarks.push(format!("{name}: {missing} of {} rows without a reading", timed.len()));
+        }
+        let from_first = has_stamps || are_closer_than_digits(&timed);
+        if from_first {
+            remarks.push(format!("{name}: times are counted from the first row"));
+        }
+        let time_of = |time: Time| if from_first { time.since_first } else { time.value };
+        let rows = timed.into_iter().map(|(time, row)| Row { time_s: time_of(time) * units.time.si, ..row });
+        let column = rows_column(&table()?, &columns.reading);
+        let record = Record { name, rows: rows.collect() };
+        Ok(MeasuredRecord { record, units, column, remarks })
+    }
+
+    /// The units: those asked for or in the columns' names, else those in the row below the header, else s and V; a reading
+    /// has no unit unless its column is that of this program's records.
+    fn units(&self, columns: &Columns, below_header: &[Option<String>; 3]) -> Result<Units> {
+        let of = |column: &Column, index: usize| column.unit.clone().or_else(|| below_header[index].clone());
+        let default = Units::default();
+        let time = match of(&columns.time, 0) {
+            Some(unit) => Unit::of_time(&unit).map_err(|error| match &self.columns.time {
+                Some(asked) => BadInput(format!("--time {asked}: {error}")),
+                None => BadInput(format!("the column of times: {error}")),
+            })?,
+            None => default.time,
+        };
+        let voltage = of(&columns.voltage, 1).map_or(default.voltage, |unit| Unit::of_voltage(&unit));
+        let is_stiffness = self.columns.reading.is_none() && columns.reading.unit.is_none();
+        let without = if is_stiffness { default.reading } else { NO_UNIT.to_owned() };
+        Ok(Units { time, voltage, reading: of(&columns.reading, 2).unwrap_or(without) })
+    }
+}
+
+fn rows_column(table: &Table<'_>, column: &Column) -> String {
+    table.columns().nth(column.index).unwrap_or_default().to_owned()
+}
+
+/// The units of time, voltage and reading in the first row below the header, if it is a row of units.
+fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<String>; 3]> {
+    const BRACKETS: [char; 5] = ['[', ']', '(', ')', ' '];
+    let Some(row) = table.next_row()? else { return Ok([None, None, None]) };
+    let units = [&columns.time, &columns.voltage, &columns.reading].map(|column| {
+        let unit = row.text(column.index).trim_matches(BRACKETS);
+        (!unit.is_empty() && !row.is_number(column.index) && !is_missing(unit)).then(|| unit.to_owned())
+    });
+    let is_of_units = units[0].as_deref().is_some_and(|unit| Unit::of_time(unit).is_ok());
+    Ok(if is_of_units { units } else { [None, None, None] })
+}
+
+/// True for a cell that says that there is no reading.
+fn is_missing(text: &str) -> bool {
+    ["", "-", "nan", "na", "n/a"].iter().any(|missing| text.eq_ignore_ascii_case(missing))
+}
+
+/// The rows of a table in the order of the file, their times not yet in s.
+struct Rows<'a> {
+    table: Table<'a>,
+    columns: &'a Columns,
+    units: &'a Units,
+    clock: Clock,
+    sort: bool,
+    missing: usize,
+}
+
+impl Rows<'_> {
+    fn read(&mut self) -> Result<Vec<(Time, Row)>> {
+        let Columns { time, voltage, reading } = self.columns;
+        let unit = &self.units.voltage;
+        // Amplifiers end below a megavolt; a command in another unit may be a code or a force.
+        let most_voltage = if usual_volts(&unit.name).is_some() { MOST_V / unit.si } else { MOST_READING };
+        let mut rows: Vec<(Time, Row)> = Vec::new();
+        while let Some(row) = self.table.next_row()? {
+            let at = self.clock.read(&row, time.index)?;
+            let voltage_v = row.number_within(voltage.index, most_voltage)? * unit.si;
+            let is_missing = is_missing(row.text(reading.index));
+            self.missing += usize::from(is_missing);
+            let measured = (!is_missing).then(|| row.number_within(reading.index, MOST_READING)).transpose()?;
+            if let Some((last, Row { line, .. })) = rows.last()
+                && !self.sort
+                && !at.is_after(*last)
+            {
+                bad_input!(
+                    "{}: {} follows {}; expected increasing times after line {line} (--sort orders them)",
+                    row.place(time.index),
+                    if self.clock.has_stamps() { row.text(time.index).to_owned() } else { number(at.value) },
+                    if self.clock.has_stamps() { "a later or equal time".to_owned() } else { number(last.value) }
+                );
+            }
+            rows.push((at, Row { line: row.line, time_s: at.value, voltage_v, measured }));
+        }
+        if rows.len() < 2 {
+            bad_input!("{}: {} row(s) of data; expected at least 2", self.table.name(), rows.len());
+        }
+        Ok(rows)
+    }
+}
+
+/// True if times are so close to each other, compared with their size, that doubles keep fewer than four digits of the
+/// distance.
+fn are_closer_than_digits(rows: &[(Time, Row)]) -> bool {
+    const DIGITS: f64 = 1e3;
+    let (Some((first, _)), Some((last, _))) = (rows.first(), rows.last()) else { return false };
+    first.value.abs() > last.since_first
+        && rows.windows(2).any(|pair| {
+            let distance = pair[1].0.since_first - pair[0].0.since_first;
+            distance < DIGITS * f64::EPSILON * pair[1].0.value.abs()
+        })
+}
+
+/// Orders rows by time; those at the same time become one, whose reading is the mean.
+fn sorted(name: &str, mut rows: Vec<(Time, Row)>, remarks: &mut Vec<String>) -> Result<Vec<(Time, Row)>> {
+    let disordered = rows.windows(2).filter(|pair| pair[0].0.is_after(pair[1].0)).count();
+    rows.sort_by(|(a, _), (b, _)| a.value.total_cmp(&b.value).then(a.since_first.total_cmp(&b.since_first)));
+    let (mut merged, mut repeated, mut averaged) = (Vec::new(), 0, 0);
+    for same in rows.chunk_by(|(a, _), (b, _)| !b.is_after(*a)) {
+        let (time, mut row) = same[0];
+        if let Some((_, other)) = same.iter().find(|(_, other)| other.voltage_v != row.voltage_v) {
+            bad_input!(
+                "{name}, lines {} and {}: two voltages at the same time, {} V and {} V; expected one",
+                row.line,
+                other.line,
+                number(row.voltage_v),
+                number(other.voltage_v)
+            );
+        }
+        let readings: Vec<f64> = same.iter().filter_map(|(_, row)| row.measured).collect();
+        row.measured = readings.first().copied();
+        if readings.iter().any(|reading| Some(*reading) != row.measured) {
+            averaged += 1;
+            row.measured = Some(readings.iter().sum::<f64>() / readings.len() as f64);
+        }
+        repeated += same.len() - 1;
+        merged.push((time, row));
+    }
+    for (count, what) in [
+        (disordered, "places where the time goes back, sorted"),
+        (repeated, "rows at the time of another, merged"),
+        (averaged, "times with different readings, averaged"),
+    ] {
+        if count > 0 {
+            remarks.push(format!("{name}: {count} {what}"));
+        }
+    }
+    if merged.len() < 2 {
+        bad_input!("{name}: {} time(s); expected at least 2", merged.len());
+    }
+    Ok(merged)
+}

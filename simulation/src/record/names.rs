@@ -1,0 +1,306 @@
+//! Names of columns: the columns that a user asks for, and usual names with units in them.
+
+use anyhow::Result;
+
+use super::{APPLIED, MEASURED};
+use crate::bad_input;
+use crate::bad_input::{BadInput, excerpt};
+use crate::csv_table::{Table, plain};
+use crate::units::{Unit, usual_reading, usual_volts};
+
+/// The columns of a record as a user names them, `NAME` or `NAME:UNIT`; those without a name are recognised.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ColumnNames {
+    /// Column of the time.
+    pub time: Option<String>,
+    /// Column of the commanded voltage.
+    pub voltage: Option<String>,
+    /// Column of the reading.
+    pub reading: Option<String>,
+    /// Column of a reading that is the stiffness as the equivalent static voltage, in V; takes the place of `reading`.
+    pub stiffness: Option<String>,
+}
+
+/// A column of a table and its unit, as far as known from its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Column {
+    pub(super) index: usize,
+    pub(super) unit: Option<String>,
+}
+
+/// The columns of a record.
+#[derive(Debug)]
+pub(super) struct Columns {
+    pub(super) time: Column,
+    pub(super) voltage: Column,
+    pub(super) reading: Column,
+}
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    Time,
+    Voltage,
+    Reading,
+}
+
+impl Role {
+    const ALL: [Self; 3] = [Self::Time, Self::Voltage, Self::Reading];
+
+    fn option(self) -> &'static str {
+        ["--time", "--voltage", "--reading"][self as usize]
+    }
+
+    /// Names of the column in a record of this program, the first of which is written.
+    fn contract(self) -> &'static [&'static str] {
+        [&["time_s"][..], &["voltage_v", APPLIED], &[MEASURED]][self as usize]
+    }
+
+    /// Names of the column without its unit, as other programs write them.
+    fn usual(self) -> &'static [&'static str] {
+        const VOLTAGES: &[&str] =
+            &["u", "v", "voltage", "command", "input", "drive", "v_in", "vin", "applied", "command_voltage"];
+        [&["time", "t", "timestamp", "datetime", "elapsed"][..], VOLTAGES, &[MEASURED]][self as usize]
+    }
+
+    /// True if a unit is one of this quantity.
+    fn takes(self, unit: &str) -> bool {
+        match self {
+            Self::Time => Unit::of_time(unit).is_ok(),
+            Self::Voltage => usual_volts(unit).is_some(),
+            Self::Reading => Unit::of_time(unit).is_err(),
+        }
+    }
+}
+
+impl ColumnNames {
+    fn of(&self, role: Role) -> Option<&str> {
+        [&self.time, &self.voltage, &self.reading][role as usize].as_deref()
+    }
+
+    /// Finds the columns in a table: those that are asked for, else those of this program's records, else those whose names
+    /// and units leave no choice.
+    ///
+    /// # Errors
+    /// [`BadInput`] that lists the columns and an option line that names them.
+    pub(super) fn find(&self, table: &Table<'_>) -> Result<Columns> {
+        let asked = |role: Role| match (role, &self.stiffness) {
+            (Role::Reading, Some(name)) => Some((name.as_str(), Column::plain(table, name))),
+            _ => self.of(role).map(|name| (name, Column::asked(table, name))),
+        };
+        let mut found = Role::ALL.map(|role| match asked(role) {
+            Some((_, column)) => column,
+            None => role.contract().iter().find_map(|name| Column::named(table, name)),
+        });
+        for role in Role::ALL {
+            if found[role as usize].is_none() && asked(role).is_none() {
+                found[role as usize] = Self::guess(table, role, &found);
+            }
+        }
+        let [Some(time), Some(voltage), Some(reading)] = found.clone() else {
+            let missing = Role::ALL.into_iter().find(|role| found[*role as usize].is_none()).unwrap_or(Role::Reading);
+            let name = asked(missing).map_or(missing.contract()[0], |(name, _)| name);
+            return Err(self.lacks(table, name, &found).into());
+        };
+        if voltage.index == time.index || (reading.index == time.index && self.stiffness.is_none()) {
+            let column = excerpt(table.columns().nth(time.index).unwrap_or_default());
+            bad_input!(
+                "{}, line {}: column `{column}` is the time; expected another one for --voltage and --reading",
+                table.name(),
+                table.header_line()
+            );
+        }
+        Ok(Columns { time, voltage, reading })
+    }
+
+    /// The only column that can have the role: by its name, or by its unit for a voltage or a reading.
+    fn guess(table: &Table<'_>, role: Role, found: &[Option<Column>; 3]) -> Option<Column> {
+        let free = || {
+            let is_free = |index: usize| found.iter().flatten().all(|column| column.index != index);
+            table.columns().enumerate().filter(move |(index, _)| is_free(*index))
+        };
+        let has_unit = |unit: &Option<String>| unit.as_deref().is_some_and(|unit| role.takes(unit));
+        let by_name = free().filter(|(_, name)| {
+            let (base, unit) = split_unit(name);
+            // A capital T is a temperature as often as a time.
+            base != "T" && role.usual().contains(&plain(base).as_str()) && (unit.is_none() || has_unit(&unit))
+        });
+        let by_unit = free().filter(|(_, name)| role != Role::Time && has_unit(&split_unit(name).1));
+        let only = |columns: Vec<usize>| (columns.len() == 1).then(|| columns[0]);
+        let by_name: Vec<usize> = by_name.map(|(index, _)| index).collect();
+        let index = if by_name.is_empty() { only(by_unit.map(|(index, _)| index).collect()) } else { only(by_name) };
+        index.map(|index| Column::at(table, index))
+    }
+
+    /// The error for a missing column `name`: the columns that there are, and options that name them.
+    fn lacks(&self, table: &Table<'_>, name: &str, found: &[Option<Column>; 3]) -> BadInput {
+        const MOST_COLUMNS: usize = 12;
+        let taken = |index: usize| found.iter().flatten().any(|column| column.index == index);
+        let spec = |index: usize, role: Role| {
+            let name = table.columns().nth(index).unwrap_or_default();
+            let unit = split_unit(name).1.filter(|unit| role.takes(unit)).map(|unit| format!(":{unit}"));
+            let spec = excerpt(name) + &unit.unwrap_or_default();
+            if spec.contains(|letter: char| !(letter.is_alphanumeric() || "_-:%./".contains(letter))) {
+                format!("'{spec}'")
+            } else {
+                spec
+            }
+        };
+        let free: Vec<usize> = (0..table.columns().count()).filter(|index| !taken(*index)).take(MOST_COLUMNS).collect();
+        let options = Role::ALL.map(|role| {
+            let option = if role == Role::Reading && self.stiffness.is_some() { "--column" } else { role.option() };
+            let choice = match &found[role as usize] {
+                Some(column) => self.of(role).map_or_else(|| spec(column.index, role), str::to_owned),
+                None => match free.iter().map(|index| spec(*index, role)).collect::<Vec<_>>().as_slice() {
+                    [] => "NAME:UNIT".to_owned(),
+                    [only] => only.clone(),
+                    several => format!("one of {}", several.join(", ")),
+                },
+            };
+            format!("{option} {choice}")
+        });
+        let names = Role::ALL.map(|role| match (role, &self.stiffness) {
+            (Role::Reading, Some(name)) => name,
+            _ => self.of(role).unwrap_or(role.contract()[0]),
+        });
+        let names = names.join(", ");
+        table.lacks(name, &if free.is_empty() { names } else { format!("{names}, or {}", options.join(" ")) })
+    }
+}
+
+impl Column {
+    fn at(table: &Table<'_>, index: usize) -> Self {
+        Self { index, unit: split_unit(table.columns().nth(index).unwrap_or_default()).1 }
+    }
+
+    fn named(table: &Table<'_>, name: &str) -> Option<Self> {
+        table.find(name).map(|index| Self::at(table, index))
+    }
+
+    /// A column without unit.
+    fn plain(table: &Table<'_>, name: &str) -> Option<Self> {
+        table.find(name).map(|index| Self { index, unit: None })
+    }
+
+    /// The column `NAME` or `NAME:UNIT`; a column's own name may contain a colon.
+    fn asked(table: &Table<'_>, asked: &str) -> Option<Self> {
+        Self::named(table, asked).or_else(|| {
+            let (name, unit) = asked.rsplit_once(':')?;
+            let unit = Some(unit.trim().to_owned()).filter(|unit| !unit.is_empty());
+            table.find(name).map(|index| Self { index, unit })
+        })
+    }
+}
+
+/// Splits a column's name into its base and its unit: `x [mm]`, `x (mm)`, `x / mm`, `x_mm`, `x mm`. In brackets any unit is
+/// one, elsewhere a usual one only.
+fn split_unit(name: &str) -> (&str, Option<String>) {
+    let name = name.trim().trim_matches(['"', '\'', '\u{feff}']).trim();
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((base, unit)) = name.strip_suffix(close).and_then(|rest| rest.rsplit_once(open))
+            && !unit.trim().is_empty()
+            && !base.trim().is_empty()
+        {
+            return (base.trim_end_matches([' ', '_']), Some(usual(unit.trim()).unwrap_or(unit.trim().to_owned())));
+        }
+    }
+    let split = |at: Option<(&'_ str, &'_ str)>| {
+        at.filter(|(base, _)| !base.is_empty()).map(|(base, unit)| (base.len(), unit.len()))
+    };
+    for lengths in [
+        split(name.split_once('_')),
+        split(name.rsplit_once('_')),
+        split(name.split_once('/')),
+        split(name.rsplit_once(' ')),
+    ] {
+        let Some((base, unit)) = lengths else { continue };
+        if let Some(unit) = usual(name[name.len() - unit..].trim()) {
+            return (name[..base].trim_end(), Some(unit));
+        }
+    }
+    (name, None)
+}
+
+/// The name of a usual unit of time, voltage or reading; `None` for a word that is none.
+fn usual(unit: &str) -> Option<String> {
+    // A header in capitals: `TIME_MS`. A single capital is another unit.
+    let lower = if unit.len() > 1 { unit.to_lowercase() } else { unit.to_owned() };
+    let time = Unit::of_time(unit).or_else(|_| Unit::of_time(&lower)).ok().map(|unit| unit.name);
+    time.or_else(|| usual_volts(unit)).or_else(|| usual_reading(unit).then(|| unit.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(header: &str, names: &ColumnNames) -> Result<[(usize, Option<String>); 3], String> {
+        let columns = names.find(&Table::new("r", header).unwrap()).map_err(|error| error.to_string())?;
+        Ok([columns.time, columns.voltage, columns.reading].map(|column| (column.index, column.unit)))
+    }
+
+    #[test]
+    fn units_are_split_from_names() {
+        for (name, base, unit) in [
+            ("t_ms", "t", Some("ms")),
+            ("time [ms]", "time", Some("ms")),
+            ("Time(s)", "Time", Some("s")),
+            ("T1 (degC)", "T1", Some("degC")),
+            ("x / mm", "x", Some("mm")),
+            ("k_N/m", "k", Some("N/m")),
+            ("u kV", "u", Some("kV")),
+            ("voltage_v", "voltage", Some("V")),
+            ("U [kv]", "U", Some("kV")),
+            ("t [\u{b5}s]", "t", Some("us")),
+            ("flow [furlong/h]", "flow", Some("furlong/h")),
+            ("dac_code", "dac_code", None),
+            ("Q1", "Q1", None),
+            ("[mm]", "[mm]", None),
+        ] {
+            assert_eq!(split_unit(name), (base, unit.map(str::to_owned)), "{name}");
+        }
+    }
+
+    #[test]
+    fn usual_names_are_recognised_where_they_leave_no_choice() {
+        let none = ColumnNames::default();
+        let units = |time: &str, voltage: &str, reading: &str| {
+            [(0, time), (1, voltage), (2, reading)].map(|(index, unit)| (index, Some(unit.to_owned())))
+        };
+        assert_eq!(found("t_ms,u_kV,x_mm\n", &none), Ok(units("ms", "kV", "mm")));
+        assert_eq!(found("time [h],pump_v,T1 (degC)\n", &none), Ok(units("h", "V", "degC")));
+        assert_eq!(found(" TIME_MS ,Voltage_V,Stiffness [N/m]\n", &none), Ok(units("ms", "V", "N/m")));
+        assert_eq!(found("Time,U,F_N,note\n", &none), Ok([(0, None), (1, None), (2, Some("N".into()))]));
+        let error = found("t_ms,u_kV,x_mm,force_N\n", &none).unwrap_err();
+        assert_eq!(
+            error,
+            "r, line 1: no column `stiffness`; expected a header with time_s, voltage_v, stiffness, or --time t_ms:ms \
+             --voltage u_kV:kV --reading one of x_mm:mm, force_N:N, found `t_ms,u_kV,x_mm,force_N`"
+        );
+        for (header, expected) in [
+            ("Time,Q1,T1\n", "--time Time --voltage one of Q1, T1 --reading one of Q1, T1"),
+            ("time_s,pump_v,level_v\n", "--time time_s:s --voltage one of pump_v:V, level_v:V"),
+            ("T,U,x_mm\n", "--time T --voltage U --reading x_mm:mm"),
+            ("time_s,voltage_v,strain\n", "no column `stiffness`"),
+            ("time_s,volts,stiffness\n", "no column `voltage_v`"),
+        ] {
+            let error = found(header, &none).unwrap_err();
+            assert!(error.contains(expected), "{header}: {error}");
+        }
+    }
+
+    #[test]
+    fn asked_columns_win_over_recognised_ones() {
+        let asked = ColumnNames {
+            time: Some("T Ms:ms".into()),
+            reading: Some("force_N".into()),
+            voltage: Some("a:b".into()),
+            ..ColumnNames::default()
+        };
+        let expected = [(2, Some("ms".to_owned())), (1, None), (3, Some("N".to_owned()))];
+        assert_eq!(found("x_mm,a:b,\"t ms\",force_N,time_s\n", &asked), Ok(expected));
+        let error = found("time_s,voltage_v,x_mm\n", &ColumnNames { reading: Some("y:mm".into()), ..asked.clone() });
+        assert!(error.unwrap_err().contains("no column `T Ms:ms`"));
+        let twice = ColumnNames { time: Some("a".into()), voltage: Some("a".into()), ..ColumnNames::default() };
+        assert!(found("a,b,stiffness\n", &twice).unwrap_err().contains("column `a` is the time; expected another"));
+    }
+}
