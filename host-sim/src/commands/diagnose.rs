@@ -10,11 +10,10 @@ use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
 use host_sim::output::terminal::{json, print, wrote};
 use identify::plant::base::Base;
-use identify::{Input, Options, examine};
+use identify::{Input, Options, examine_several};
 use indicatif::ProgressBar;
-use simulation::bad_input;
 use simulation::plant_file;
-use simulation::record::MeasuredRecord;
+use simulation::record::{MeasuredRecord, Record};
 use simulation::schedule::Schedule;
 
 use super::record_arguments::RecordArguments;
@@ -28,12 +27,16 @@ const RAMP_S: f64 = 0.1;
 /// for a missing reading). It must contain every change of the voltage. The voltage of a row applies from its time on,
 /// and its reading is taken just after, so that it includes the instantaneous part of a step to this voltage. If
 /// voltage_v is missing, applied_v is used, as written by `vsj stair --out`.
+///
+/// Several files are records of one spring: each has its own initial state, zero offset and noise, the causes are shared, and
+/// what is in one record only is listed as a fault of that record.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj diagnose record.csv                      three sentences and a table
   vsj diagnose record.csv --out out/diagnosis  with a page, plots, residuals
   vsj stair --plant out/diagnosis/plant.toml   the controller on the result
+  vsj diagnose monday.csv tuesday.csv          two records of one spring
   vsj diagnose record.csv --json | jq .findings
   vsj diagnose data/table3_stair.csv --column measured --input stair
 
@@ -56,17 +59,22 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    fn origin(measured: &MeasuredRecord, input: Input) -> Origin {
+    fn origin(measured: &[MeasuredRecord], input: Input) -> Origin {
         // The path of the program is omitted, since the page may be read elsewhere.
         let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
         let command: Vec<String> = iter::once("vsj".to_owned()).chain(words).collect();
         Origin {
-            record: measured.record.name.clone(),
-            column: measured.column.clone(),
+            record: names(measured),
+            column: measured.first().map(|measured| measured.column.clone()).unwrap_or_default(),
             input,
             command: command.join(" "),
         }
     }
+}
+
+/// Names of the records, separated by commas.
+fn names(measured: &[MeasuredRecord]) -> String {
+    measured.iter().map(|measured| measured.record.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// Quotes a word for a shell where necessary.
@@ -83,30 +91,30 @@ fn quoted(word: &str) -> String {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let base = Base::new(plant_file::load(&arguments.plant)?)?;
     let (measured, input) = arguments.record.open()?;
-    let [measured] = measured.as_slice() else {
-        bad_input!("{} records; expected one: a diagnosis is of a single record", measured.len());
-    };
-    let record = &measured.record;
+    let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
     if input == Input::Stair {
-        Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
+        for record in &records {
+            Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
+        }
     }
     let options = Options { input, base };
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
-    let mut diagnosis = examine(record, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
+    let several = examine_several(&records, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
+    let mut diagnosis = several.joint;
     bar.finish_and_clear();
     if let Some(folder) = &arguments.out {
         diagnosis.report.extended.model = Some(folder.join(output::PLANT_FILE).display().to_string());
     }
     let paths = match files {
-        Some(files) => output::write(files, &diagnosis, &Arguments::origin(measured, input))?,
+        Some(files) => output::write(files, &diagnosis, &Arguments::origin(&measured, input))?,
         None => Vec::new(),
     };
     print(&if arguments.json {
         json(&diagnosis.report)?
     } else {
-        text::text(&record.name, &diagnosis.report) + &wrote(&paths)
+        text::text(&names(&measured), &diagnosis.report) + &wrote(&paths)
     })
 }

@@ -2,6 +2,7 @@
 
 mod files;
 mod records;
+mod several;
 mod table3;
 
 use std::fmt::Write;
