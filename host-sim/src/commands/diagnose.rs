@@ -62,6 +62,13 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
+    /// The options of the diagnosis: the one place where its nominal spring is made.
+    fn options(&self) -> Result<Options> {
+        let file = plant_file::load_for_host(&self.plant)?;
+        let units = file.units.clone().unwrap_or_default().units()?;
+        Ok(Options { plant: self.plant.clone(), units, input: self.input, base: Base::new(file)? })
+    }
+
     fn origin(&self, record: &Record) -> Origin {
         // The path of the program is omitted, since the page may be read elsewhere.
         let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
@@ -87,12 +94,11 @@ fn quoted(word: &str) -> String {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let base = Base::new(plant_file::load(&arguments.plant)?)?;
     let record = Record::open_measured(&arguments.data, &arguments.column)?;
     if arguments.input == Input::Stair {
         Schedule::stair().check_commanded("the report's stair (--input stair)", &record, RAMP_S)?;
     }
-    let options = Options { input: arguments.input, base };
+    let options = arguments.options()?;
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();
@@ -109,6 +115,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     print(&if arguments.json {
         json(&diagnosis.report)?
     } else {
-        text::text(&record.name, &diagnosis.report) + &wrote(&paths)
+        text::text(&record.name, &diagnosis.report, diagnosis.data.scales()) + &wrote(&paths)
     })
 }

@@ -7,21 +7,23 @@
 //! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
 //! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
 //!
-//! Every pass runs a `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that
+//! All passes work on a normalised record; the diagnosis is converted back to the file's units at the end. Every pass runs a `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that
 //! is higher by `CLEARLY_LIKELIER` nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that
 //! one's best models.
 
 use anyhow::Result;
 
 use simulation::bad_input;
+use simulation::plant_file::Reading;
 use simulation::record::Record;
 
-use crate::answer::{Report, Verdict};
+use crate::answer::{Nominal, Report, Verdict};
 use crate::effects::index_of;
 use crate::examine::options::Options;
 use crate::fit::engine::Engine;
 use crate::plant::base::Base;
 use crate::record::data::{Data, Input};
+use crate::record::normalisation::Normalisation;
 use crate::record::observed::Observed;
 use crate::search::{Scored, Search, WarmStart};
 use crate::stats::thresholds::empirical::{LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
@@ -42,7 +44,10 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
-    let data = Data::new(record, options.input);
+    let normalisation = Normalisation::of(record, options.base.file(), options.input, options.units.clone());
+    let base = options.base.normalised(&normalisation);
+    let normalised = normalisation.record(record);
+    let data = Data::thinned(&normalised, options.input, 1, &normalisation);
     if data.rows() < ROWS_TO_DIAGNOSE.count() {
         bad_input!(
             "{}: {} row(s) with a reading; expected at least {} to tell causes apart",
@@ -55,12 +60,21 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
-    let record = ExaminedRecord { record, input: options.input, data: &data };
-    let found = of_readings(&record, &options.base, progress);
-    Ok(without_unsupported_terms(&record, &options.base, found, progress))
+    let examined = ExaminedRecord { record: &normalised, input: options.input, data: &data };
+    let found = of_readings(&examined, &base, progress);
+    let mut found = without_unsupported_terms(&examined, &base, found, progress).restored(record, &normalisation);
+    found.report.nominal = nominal(options);
+    Ok(found)
 }
 
-/// A record as all passes take it.
+/// The nominal spring for the report.
+fn nominal(Options { plant, base, .. }: &Options) -> Nominal {
+    let Reading { gain, zero } = base.file().reading.unwrap_or_default();
+    let relaxation = &base.file().relaxation;
+    Nominal { plant: plant.clone(), gain, zero, share: relaxation.share, tau_s: relaxation.tau_s.clone() }
+}
+
+/// A normalised record as all passes take it.
 struct ExaminedRecord<'r> {
     record: &'r Record,
     input: Input,
@@ -187,7 +201,8 @@ fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, pr
     if rows <= LONG_RECORD_ROWS.count() {
         return None;
     }
-    let part = Data::thinned(record.record, record.input, rows.div_ceil(ROWS_TO_SEARCH.count()));
+    let every = rows.div_ceil(ROWS_TO_SEARCH.count());
+    let part = Data::thinned(record.record, record.input, every, &record.data.normalisation);
     let observed = Observed::new(&part).with_conclusions_of(observed);
     let mut engine = Engine::new(&part, &observed, base);
     let mut search = Search::new(&mut engine);

@@ -13,7 +13,7 @@ use identify::{Diagnosis, Input};
 
 /// The whole page; texts from files are escaped.
 pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -> String {
-    let report = &diagnosis.report;
+    let (report, scales) = (&diagnosis.report, diagnosis.data.scales());
     let [readings, residual, residual_voltage, correlations @ ..] = figures else { unreachable!("see `figures`") };
     let page = html! {
         (DOCTYPE)
@@ -28,10 +28,11 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 h1 { "Diagnosis of " (origin.record) }
                 p { span.verdict { (verdict(report.verdict)) } }
                 div.sentences {
-                    @for sentence in text::sentences(&origin.record, report) { p { (sentence) } }
+                    p { (text::nominal(&report.nominal, scales)) }
+                    @for sentence in text::sentences(&origin.record, report, scales) { p { (sentence) } }
                 }
                 h2 { "Causes" }
-                (tables::findings(&report.findings))
+                (tables::findings(&report.findings, scales))
                 h2 { "Readings and simulations" }
                 @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
                 h2 { "Residual tests" }
@@ -42,7 +43,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 @if is_extended(diagnosis) {
                     h2 { "Held-out improvement" }
                     (tables::quality(diagnosis))
-                    @if let Some(sentence) = text::in_fixed_point(&report.extended) { p { (sentence) } }
+                    @if let Some(sentence) = text::in_fixed_point(&report.extended, scales) { p { (sentence) } }
                     h2 { "Improvement on each held-out segment" }
                     (tables::folds(diagnosis))
                 } @else {
