@@ -2,6 +2,8 @@
 
 use serde::{Serialize, Serializer};
 
+use crate::dimension::Dimension;
+
 /// Version of the JSON format.
 pub const SCHEMA: u32 = 1;
 
@@ -14,7 +16,9 @@ pub struct Report {
     pub rows: usize,
     /// The conclusion.
     pub verdict: Verdict,
-    /// Errors of the simulation as it is given.
+    /// The simulation as it is given.
+    pub nominal: Nominal,
+    /// Its errors.
     pub baseline: Quality,
     /// Named causes, the one that explains the largest mean square error first.
     pub findings: Vec<Finding>,
@@ -78,16 +82,31 @@ pub enum Verdict {
     Insufficient,
 }
 
+/// The nominal spring: the simulation that a record is compared with.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Nominal {
+    /// `paper`, or the plant file's name.
+    pub plant: String,
+    /// Change of the reading per V of equivalent static voltage, in the reading's unit per V.
+    pub gain: f64,
+    /// Reading at 0 V, in the reading's unit.
+    pub zero: f64,
+    /// Instantaneous part of a step.
+    pub share: f64,
+    /// Time constants, in s.
+    pub tau_s: Vec<f64>,
+}
+
 /// Errors of a simulation.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Quality {
-    /// Root mean square of the free-running error, in V.
+    /// Root mean square of the free-running error, in the reading's unit.
     pub rmse: f64,
     /// `100 (1 - |error| / |reading - mean|)` with Euclidean norms over all rows, in percent; 100 is a perfect fit.
     pub fit_percent: f64,
-    /// Root mean square of the free-running error on held-out segments, in V.
+    /// Root mean square of the free-running error on held-out segments, in the reading's unit.
     pub held_out_rmse: f64,
-    /// Root mean square of the error of predicting each reading from the ones before it, in V.
+    /// Root mean square of the error of predicting each reading from the ones before it, in the reading's unit.
     pub one_step_rmse: f64,
 }
 
@@ -117,9 +136,9 @@ pub struct Finding {
     /// Its parameters with their names, in the order of the cause's page in the manual.
     #[serde(serialize_with = "by_name")]
     pub parameters: Vec<(String, Parameter)>,
-    /// Root mean square error of the best fit without the cause, in V.
+    /// Root mean square error of the best fit without the cause, in the reading's unit.
     pub rmse_before: f64,
-    /// Root mean square error with the cause, in V.
+    /// Root mean square error with the cause, in the reading's unit.
     pub rmse_after: f64,
     /// The evidence, in one sentence.
     pub evidence: String,
@@ -139,13 +158,24 @@ pub struct Parameter {
     /// Upper end of the 95 % interval, in `unit`.
     pub high: f64,
     /// Unit, "" for a dimensionless number.
-    pub unit: &'static str,
+    pub unit: String,
+    /// True if the value is at a bound of its range, so that the spring may need a value beyond.
+    #[serde(skip_serializing_if = "is_false")]
+    pub at_bound: bool,
+    /// Dimension, which decides the unit in which texts show the value.
+    #[serde(skip)]
+    pub dimension: Dimension,
+}
+
+/// Returns true for false; serde omits such a field.
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// Parameters of the noise of the readings.
 #[derive(Clone, Debug, Serialize)]
 pub struct NoiseReport {
-    /// Scale of the innovations, in V.
+    /// Scale of the innovations, in the reading's unit.
     pub sigma: f64,
     /// Degrees of freedom of Student's t distribution; `None` for normal noise.
     pub tail: Option<f64>,

@@ -1,12 +1,13 @@
 //! Diagnosis of a measured record: what a simulation gets wrong, the cause, and the held-out improvement of the extended model.
 //!
-//! - *Record*: rows of time in s, commanded voltage in V, and measured stiffness, expressed as the equivalent static voltage in V.
+//! - *Record*: rows of time in s, commanded voltage in V, and a reading of the stiffness in any unit, e.g. as the equivalent static
+//!   voltage in V.
 //! - *Cause*: a named physical effect that may be missing in the simulation, e.g. `gain-error` or `hysteresis`.
 //! - *Finding*: a cause that the record supports, with its parameters and their 95 % intervals.
 //! - *Held-out error*: the error of a prediction by a fit that did not use the predicted segment of the record.
 //!
 //! ```text
-//! record -> Data -> Observed -> Search (Engine: Simulator, Noise; held-out score) -> Diagnosis -> Report
+//! record -> Normalisation -> Data -> Observed -> Search (Engine: Simulator, Noise; held-out score) -> Diagnosis -> Report
 //! ```
 //!
 //! The simulation assumes a gain of 1; the gain of this spring is 1.1:
@@ -42,6 +43,7 @@
 //! | folder | what comes in | what goes out |
 //! | --- | --- | --- |
 //! | [`stats`] | numbers | medians, sums, scales, a periodogram; the thresholds of all decisions |
+//! | [`dimension`] | | dimensions of reported numbers, and their units |
 //! | [`answer`] | | the data types of a report |
 //! | [`record`] | a record's rows | the command as a signal, the readings, the grid that they lie on |
 //! | [`plant`] | a plant file | the chain from command to stiffness that effects change |
@@ -55,6 +57,7 @@
 
 pub mod adequacy;
 pub mod answer;
+pub mod dimension;
 pub mod effects;
 pub mod examine;
 pub mod fit;

@@ -59,6 +59,13 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
+    /// The options of the diagnosis: the one place where its nominal spring is made.
+    fn options(&self, measured: &[MeasuredRecord], input: Input) -> Result<Options> {
+        let file = plant_file::load_for_host(&self.plant)?;
+        let units = measured.first().map(|measured| measured.units.clone()).unwrap_or_default();
+        Ok(Options { plant: self.plant.clone(), units, input, base: Base::new(file)? })
+    }
+
     fn origin(measured: &[MeasuredRecord], input: Input) -> Origin {
         // The path of the program is omitted, since the page may be read elsewhere.
         let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
@@ -89,7 +96,6 @@ fn quoted(word: &str) -> String {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let base = Base::new(plant_file::load(&arguments.plant)?)?;
     let (measured, input) = arguments.record.open()?;
     let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
     if input == Input::Stair {
@@ -97,7 +103,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
         }
     }
-    let options = Options { input, base };
+    let options = arguments.options(&measured, input)?;
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();
@@ -115,6 +121,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     print(&if arguments.json {
         json(&diagnosis.report)?
     } else {
-        text::text(&names(&measured), &diagnosis.report) + &wrote(&paths)
+        text::text(&names(&measured), &diagnosis.report, diagnosis.data.scales()) + &wrote(&paths)
     })
 }

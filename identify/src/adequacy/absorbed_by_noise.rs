@@ -16,6 +16,7 @@
 
 use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 use crate::adequacy::localisation::Localisation;
+use crate::dimension::Dimension;
 use crate::fit::engine::Engine;
 use crate::noise::autocorrelation::Autocorrelation;
 use crate::record::data::Data;
@@ -61,7 +62,8 @@ fn absorbed(data: &Data, errors: &[f64], memory: &Autocorrelation) -> Option<Unm
         return Some(found("as a rhythm that changes along the record", (1.0 - new * new).max(0.0)));
     }
     let line = spectrum::most_prominent_line(errors, data).filter(|line| line.prominence > LINE_TO_NEIGHBOURS.get())?;
-    Some(found(&format!("at a frequency of {:.3} Hz", line.frequency_hz), line.share))
+    let frequency = data.scales().shown(Dimension::Frequency, line.frequency_hz, 3);
+    Some(found(&format!("at a frequency of {frequency}"), line.share))
 }
 
 /// Mean square of the parts' means over the mean square of all errors, 0 to 1.

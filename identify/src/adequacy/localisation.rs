@@ -6,19 +6,22 @@
 
 use std::ops::Range;
 
+use crate::dimension::Dimension;
 use crate::record::data::Data;
+use crate::record::scales::Scales;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::POWER_TO_NAME_VOLTAGES;
 
 /// A stretch of time and a range of voltages where an error is largest.
-pub(crate) struct Localisation {
-    /// First and last time, in s.
+pub(crate) struct Localisation<'d> {
+    scales: &'d Scales,
+    /// First and last time, in normalised s.
     time_s: [f64; 2],
-    /// Decimals that distinguish the times of two rows.
+    /// Decimals that distinguish the times of two rows in the user's unit.
     decimals: usize,
     /// Fractions of the error's power and of the rows within the stretch of time.
     in_time: Density,
-    /// First and last absolute voltage, in V, with the fractions of power and rows there; `None` if time localises better.
+    /// First and last absolute voltage, in normalised V, with the fractions of power and rows there; `None` if time localises better.
     at_voltages: Option<([f64; 2], Density)>,
 }
 
@@ -35,9 +38,9 @@ impl Density {
     }
 }
 
-impl Localisation {
+impl<'d> Localisation<'d> {
     /// Localises errors, in V or in any other unit, one for each row of the record.
-    pub(crate) fn new(data: &Data, errors: &[f64]) -> Self {
+    pub(crate) fn new(data: &'d Data, errors: &[f64]) -> Self {
         let power = dot(errors, errors).max(f64::MIN_POSITIVE);
         let density = |power, rows: usize| Density { power, rows: rows as f64 / errors.len() as f64 };
         let each_row: Vec<(f64, usize)> = errors.iter().map(|error| (error * error / power, 1)).collect();
@@ -55,9 +58,13 @@ impl Localisation {
         let there = density(share, rows);
         let denser = there.power > POWER_TO_NAME_VOLTAGES.get() && there.power_per_row() > in_time.power_per_row();
         let voltages_v = [run.start, run.end - 1].map(|level| levels[level][0].0);
+        let scales = data.scales();
+        let sample =
+            scales.restored(Dimension::Time, data.sample_s) / Dimension::Time.size_of_shown_unit(&scales.units);
         Self {
+            scales,
             time_s,
-            decimals: (-(1.001 * data.sample_s).log10().floor()).clamp(0.0, 9.0) as usize,
+            decimals: (-(1.001 * sample).log10().floor()).clamp(0.0, 9.0) as usize,
             in_time,
             at_voltages: denser.then_some((voltages_v, there)),
         }
@@ -65,11 +72,16 @@ impl Localisation {
 
     /// The words that follow a description of the error in a report.
     pub(crate) fn words(&self) -> String {
-        let [from, to] = self.time_s.map(|time| format!("{time:.0$}", self.decimals));
+        let unit = Dimension::TimePoint.size_of_shown_unit(&self.scales.units);
+        let [from, to] = self.time_s.map(|time_s| {
+            let time = self.scales.restored(Dimension::TimePoint, time_s) / unit;
+            format!("{time:.*} {}", self.decimals, self.scales.unit(Dimension::TimePoint))
+        });
         let [percent, of_rows] = [self.in_time.power, self.in_time.rows].map(|part| 100.0 * part);
-        let mut words = format!(", {percent:.0} % of it from {from} s to {to} s, in {of_rows:.0} % of the readings");
+        let mut words = format!(", {percent:.0} % of it from {from} to {to}, in {of_rows:.0} % of the readings");
         if let Some(([low, high], there)) = self.at_voltages {
-            words += &format!(", and {:.0} % at voltages from {low:.0} V to {high:.0} V", 100.0 * there.power);
+            let [low, high] = [low, high].map(|voltage| self.scales.shown(Dimension::Voltage, voltage, 0));
+            words += &format!(", and {:.0} % at voltages from {low} to {high}", 100.0 * there.power);
         }
         words
     }

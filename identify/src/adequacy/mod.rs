@@ -16,9 +16,9 @@
 mod absorbed_by_noise;
 mod check;
 mod comparison;
+mod excitation;
 mod gain_and_time_constant;
 mod in_step;
-mod informative;
 mod localisation;
 mod residual_regression;
 mod spikes;
@@ -69,11 +69,11 @@ pub struct Entry {
 /// records.
 pub static CHECKS: [Entry; 6] = [
     Entry {
-        check: &informative::Informative,
+        check: &excitation::Excitation,
         when: When::BeforeSearch,
-        looks_for: "a record in which the gain or the time constant could take almost any value",
+        looks_for: "a constant voltage, or readings that are all equal",
         false_alarm_rate: 0.015,
-        departure: "noise of 3000 V, so that the record hides a spring of 0 V to 500 V",
+        departure: "a reading of 100 V in every row",
         power: 0.98,
     },
     Entry {

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 use crate::adequacy::localisation::Localisation;
+use crate::dimension::Dimension;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::Jacobian;
 use crate::record::data::Data;
@@ -117,7 +118,7 @@ fn spectral_line(data: &Data, fit: &Fit, target: &[f64], found: UnmodelledDynami
     let power = 0.5 * data.rows() as f64 * share;
     // Half as many lines as rows are searched.
     if power - (data.rows() as f64 / 2.0).ln() > LINE_NATS && share > found.share {
-        let place = format!("at a frequency of {:.3} Hz", peak.frequency_hz);
+        let place = format!("at a frequency of {}", data.scales().shown(Dimension::Frequency, peak.frequency_hz, 3));
         return UnmodelledDynamics::certain(place, share, share.sqrt() * fit.noise.sigma);
     }
     found
@@ -176,17 +177,19 @@ fn features(data: &Data) -> Vec<Group> {
         Group { place: "just after changes of the voltage".into(), columns: after.collect() },
         Group { place: "in the direction of the last change".into(), columns: vec![direction, directed] },
     ];
+    let time = |time_s| data.scales().shown(Dimension::TimePoint, time_s, 1);
+    let voltage = |voltage| data.scales().shown(Dimension::Voltage, voltage, 0);
     for part in 0..FEATURE_PARTS {
         let (from, to) = (part as f64 / FEATURE_PARTS as f64, (part + 1) as f64 / FEATURE_PARTS as f64);
         let inside = |x: f64| f64::from(u8::from(x >= from && (x < to || part + 1 == FEATURE_PARTS)));
         let (early, late) = (start + from * duration, start + to * duration);
         groups.push(Group {
-            place: format!("from {early:.1} s to {late:.1} s"),
+            place: format!("from {} to {}", time(early), time(late)),
             columns: vec![per_row(&mut |row| inside((data.time_s[row] - start) / duration))],
         });
         let scale = data.full_scale_v.max(1e-9);
         groups.push(Group {
-            place: format!("at voltages from {:.0} V to {:.0} V", from * scale, to * scale),
+            place: format!("at voltages from {} to {}", voltage(from * scale), voltage(to * scale)),
             columns: vec![per_row(&mut |row| inside(data.voltage_v[row].abs() / scale))],
         });
     }

@@ -32,7 +32,7 @@ impl Check for Standstill {
 
     fn test(&self, engine: &mut Engine, Candidate { fit, score }: &Candidate) -> Option<Inadequacy> {
         let constant = !fit.model.blocks.is_empty() && constant_is_as_likely(engine, &fit.model, *score);
-        constant.then(|| Unidentifiable::Sensor(Comparison::new(engine).constant_readings()).into())
+        constant.then(|| Unidentifiable::Noise(Comparison::new(engine).constant_readings()).into())
     }
 }
 

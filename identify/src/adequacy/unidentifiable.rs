@@ -7,16 +7,18 @@ use crate::answer::Verdict;
 pub enum Unidentifiable {
     /// The voltage excites the spring too little, or noise hides its response.
     Excitation,
-    /// The readings are not those of a spring; the sentence says what they do instead.
-    Sensor(String),
+    /// The reading is the same in every row; the sentence says what the voltage does.
+    DeadSensor(String),
+    /// The readings are not those of a spring but noise; the sentence says what the voltage does.
+    Noise(String),
 }
 
 impl Unidentifiable {
-    /// Verdict of the report: `insufficient` for too little excitation, `unexplained` for a faulty sensor.
+    /// Verdict of the report: `insufficient` for too little excitation, `unexplained` for a sensor that does not read the spring.
     pub(crate) fn verdict(&self) -> Verdict {
         match self {
             Self::Excitation => Verdict::Insufficient,
-            Self::Sensor(_) => Verdict::Unexplained,
+            Self::DeadSensor(_) | Self::Noise(_) => Verdict::Unexplained,
         }
     }
 
@@ -24,7 +26,7 @@ impl Unidentifiable {
     pub(crate) fn leftover(&self) -> Option<String> {
         match self {
             Self::Excitation => None,
-            Self::Sensor(what) => Some(what.clone()),
+            Self::DeadSensor(what) | Self::Noise(what) => Some(what.clone()),
         }
     }
 
@@ -35,9 +37,10 @@ impl Unidentifiable {
                 "run a stair over the whole range up and down again, each step held for five time constants: this \
                  record does not identify the gain or the time constant"
             }
-            Self::Sensor(_) => {
-                "check the sensor, its cable and its unit (volts of equivalent static voltage are expected), then repeat \
-                 the record"
+            Self::DeadSensor(_) => "check the sensor and its cable, then repeat the record",
+            Self::Noise(_) => {
+                "check that the sensor reads this spring and that voltage and readings are those of one experiment, then \
+                 repeat the record"
             }
         }
     }

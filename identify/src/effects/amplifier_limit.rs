@@ -1,5 +1,6 @@
 //! The amplifier's voltage saturates below the command: `|u| = min(|command|, limit)`.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
@@ -35,7 +36,7 @@ impl Effect for AmplifierLimit {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("limit_v", "V", point[0])]
+        vec![Quantity::new("limit_v", Dimension::Voltage, point[0])]
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

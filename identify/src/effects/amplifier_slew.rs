@@ -9,10 +9,12 @@
 //! If the record may not begin at rest, the voltage of a rate-limited amplifier before the first row is a further
 //! coordinate.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
-use crate::stats::thresholds::empirical::SLOWEST_OUTPUT_S;
+use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
+use crate::stats::thresholds::empirical::SLOWEST_OUTPUT;
 
 pub(super) struct AmplifierSlew;
 
@@ -37,7 +39,7 @@ fn range(data: &Data) -> (f64, f64) {
 
 /// Returns the bounds of the output's time constant, in s; a shorter one looks like a delay.
 fn taus(data: &Data) -> (f64, f64) {
-    (data.sample_s, SLOWEST_OUTPUT_S.get().max(2.0 * data.sample_s))
+    (data.sample_s, (SLOWEST_OUTPUT.get() * REFERENCE_TIME_CONSTANT_S).max(2.0 * data.sample_s))
 }
 
 impl Effect for AmplifierSlew {
@@ -91,14 +93,14 @@ impl Effect for AmplifierSlew {
         let value = point[0].exp();
         match form {
             RESISTANCE => vec![
-                Quantity::new("slew_v_per_s", "V/s", stroke(data) / value),
-                Quantity::new("output_tau_s", "s", value),
+                Quantity::new("slew_v_per_s", Dimension::VoltageRate, stroke(data) / value),
+                Quantity::new("output_tau_s", Dimension::Time, value),
             ],
             TWO_RATES => vec![
-                Quantity::new("slew_v_per_s", "V/s", value),
-                Quantity::new("falling_v_per_s", "V/s", point[1].exp()),
+                Quantity::new("slew_v_per_s", Dimension::VoltageRate, value),
+                Quantity::new("falling_v_per_s", Dimension::VoltageRate, point[1].exp()),
             ],
-            _ => vec![Quantity::new("slew_v_per_s", "V/s", value)],
+            _ => vec![Quantity::new("slew_v_per_s", Dimension::VoltageRate, value)],
         }
     }
 

@@ -8,15 +8,20 @@
 //!
 //! Leakage lowers the settled value by `share`; creep does not change it, and drift depends on time alone.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
 use crate::plant::leakage::Loss;
 use crate::record::data::Data;
-use crate::stats::thresholds::empirical::FASTEST_LEAKAGE_S;
+use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
+use crate::stats::thresholds::empirical::FASTEST_LEAKAGE;
 
 pub(super) struct ChargeLeakage;
 
 const WITH_INSTANTANEOUS_PART: usize = 1;
+
+/// Time constants of the loss at initial points, in normalised s: 0.7 to 23 reference time constants.
+const INITIAL_TIME_CONSTANTS_S: [f64; 6] = [4.0, 8.0, 16.0, 32.0, 64.0, 128.0];
 
 fn loss(point: &[f64]) -> Loss {
     Loss { share: point[0], tau_s: point[1].exp(), instantaneous: point.get(2).copied().unwrap_or(0.0) }
@@ -44,15 +49,16 @@ impl Effect for ChargeLeakage {
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
-        let longest = 10.0 * data.duration_s().max(FASTEST_LEAKAGE_S.get());
-        let mut coordinates = vec![Coordinate::new(0.0, 1.0), Coordinate::log(FASTEST_LEAKAGE_S.get(), longest)];
+        let fastest = FASTEST_LEAKAGE.get() * REFERENCE_TIME_CONSTANT_S;
+        let longest = 10.0 * data.duration_s().max(fastest);
+        let mut coordinates = vec![Coordinate::new(0.0, 1.0), Coordinate::log(fastest, longest)];
         coordinates.extend((form == WITH_INSTANTANEOUS_PART).then_some(Coordinate::new(0.0, 1.0)));
         coordinates
     }
 
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let longest = data.duration_s();
-        [4.0, 8.0, 16.0, 32.0, 64.0, 128.0]
+        INITIAL_TIME_CONSTANTS_S
             .into_iter()
             .filter(|&tau: &f64| tau < longest)
             .map(|tau| [0.1, tau.ln()].into_iter().chain((form == WITH_INSTANTANEOUS_PART).then_some(0.5)).collect())
@@ -60,7 +66,10 @@ impl Effect for ChargeLeakage {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
+        vec![
+            Quantity::new("share", Dimension::Ratio, point[0]),
+            Quantity::new("tau_s", Dimension::Time, point[1].exp()),
+        ]
     }
 
     /// A plant file represents one loss, all of which passes the relaxation.

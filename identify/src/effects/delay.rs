@@ -6,6 +6,7 @@
 //! of whole rows, the usual one, is at the upper bound. Rows are those of the whole record, also if only some of them
 //! are in use.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
@@ -62,7 +63,7 @@ impl Effect for Delay {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("delay_s", "s", point[0] + point[1])]
+        vec![Quantity::new("delay_s", Dimension::Time, point[0] + point[1])]
     }
 
     fn ln_candidates(&self, _: usize, data: &Data) -> f64 {

@@ -6,6 +6,7 @@
 //! | exponential | `y exp(rate t)` |
 //! | added | `y + rate t full scale` |
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 
@@ -50,7 +51,7 @@ impl Effect for Drift {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("per_s", "1/s", point[0])]
+        vec![Quantity::new("per_s", Dimension::Rate, point[0])]
     }
 
     fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {

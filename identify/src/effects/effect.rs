@@ -8,6 +8,7 @@
 //! moves. It may have several *forms*: different laws of the same cause. A new effect is one file in `effects/` and one
 //! line in the catalogue.
 
+use crate::dimension::Dimension;
 use crate::plant::chain::Chain;
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
@@ -61,6 +62,11 @@ impl Coordinate {
         Self { lowest, highest, fitted: true }
     }
 
+    /// Returns a coordinate that the fit moves between two bounds in any order.
+    pub fn between(one: f64, other: f64) -> Self {
+        Self::new(one.min(other), one.max(other))
+    }
+
     /// Returns the logarithm of a quantity between two positive bounds.
     pub fn log(lowest: f64, highest: f64) -> Self {
         Self::new(lowest.ln(), highest.ln())
@@ -77,16 +83,16 @@ impl Coordinate {
 pub struct Quantity {
     /// Name in the report.
     pub name: String,
-    /// SI unit, or "" for a ratio.
-    pub unit: &'static str,
-    /// Value in that unit.
+    /// Dimension, which decides the unit.
+    pub dimension: Dimension,
+    /// Value, normalised.
     pub value: f64,
 }
 
 impl Quantity {
     /// Returns a named value.
-    pub fn new(name: impl Into<String>, unit: &'static str, value: f64) -> Self {
-        Self { name: name.into(), unit, value }
+    pub fn new(name: impl Into<String>, dimension: Dimension, value: f64) -> Self {
+        Self { name: name.into(), dimension, value }
     }
 }
 
@@ -189,8 +195,9 @@ pub fn logarithms((from, to): (f64, f64), count: u32) -> impl Iterator<Item = f6
     (0..count).map(move |part| from + (to - from) * f64::from(part) / f64::from(count - 1))
 }
 
-/// Returns the reported parameters as a table of a plant file.
+/// Returns the reported parameters as a table of a plant file, in the file's units.
 pub fn table<E: Effect + ?Sized>(effect: &E, form: usize, point: &[f64], data: &Data) -> toml::Value {
     let quantities = effect.quantities(form, point, data).into_iter();
-    toml::Value::Table(quantities.map(|quantity| (quantity.name, quantity.value.into())).collect())
+    let restored = |Quantity { name, dimension, value }| (name, data.scales().restored(dimension, value).into());
+    toml::Value::Table(quantities.map(restored).collect())
 }

@@ -1,10 +1,16 @@
-//! The static gain is not 1: `f = gain u`.
+//! The static gain is not the nominal one, which is 1: `f = gain u`.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct GainError;
+
+/// Returns the size of the gain relative to the nominal one: 1, or that of the search's start, of any sign and size.
+pub(super) fn size(data: &Data) -> f64 {
+    data.normalisation.start.map_or(1.0, |start| start.gain)
+}
 
 impl Effect for GainError {
     fn cause(&self) -> &'static str {
@@ -27,16 +33,16 @@ impl Effect for GainError {
         &["static-nonlinearity"]
     }
 
-    fn coordinates(&self, _: usize, _: &Data) -> Vec<Coordinate> {
-        vec![Coordinate::new(0.02, 50.0)]
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        vec![Coordinate::between(0.02 * size(data), 50.0 * size(data))]
     }
 
-    fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
-        vec![vec![0.9], vec![1.1]]
+    fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
+        vec![vec![0.9 * size(data)], vec![1.1 * size(data)]]
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("gain", "", point[0])]
+        vec![Quantity::new("gain", Dimension::Ratio, point[0])]
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

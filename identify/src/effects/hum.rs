@@ -1,5 +1,6 @@
 //! A periodic disturbance is added to the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 use crate::record::spectrum;
@@ -50,7 +51,10 @@ impl Effect for Hum {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("amplitude", "V", point[1].hypot(point[2])), Quantity::new("freq_hz", "Hz", point[0])]
+        vec![
+            Quantity::new("amplitude", Dimension::ReadingSize, point[1].hypot(point[2])),
+            Quantity::new("freq_hz", Dimension::Frequency, point[0]),
+        ]
     }
 
     fn ln_candidates(&self, _: usize, data: &Data) -> f64 {

@@ -12,6 +12,7 @@
 //!
 //! The initial condition belongs to the record, not to the spring.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
 use crate::plant::play_bank::PlayBank;
@@ -99,7 +100,7 @@ impl Effect for Hysteresis {
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("width_v", "V", bank(form, point).width(data.full_scale_v))]
+        vec![Quantity::new("width_v", Dimension::Voltage, bank(form, point).width(data.full_scale_v))]
     }
 
     /// A plant file holds a limited number of plays.

@@ -1,10 +1,14 @@
-//! The feedthrough, the part of a step that is reached without delay, is not 1/11.
+//! The feedthrough, the part of a step that is reached without delay, is not the nominal one.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct InstantaneousShare;
+
+/// Nominal share from which initial points on both sides of it are added.
+const LARGE: f64 = 0.25;
 
 impl Effect for InstantaneousShare {
     fn cause(&self) -> &'static str {
@@ -27,12 +31,14 @@ impl Effect for InstantaneousShare {
         vec![Coordinate::new(-0.2, 1.0)]
     }
 
-    fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
-        vec![vec![0.04], vec![0.2]]
+    fn initial_points(&self, _: usize, context: &FitContext) -> Vec<Vec<f64>> {
+        let nominal = context.data.normalisation.share;
+        let of_large = [0.5 * nominal, 0.5 * (1.0 + nominal)].into_iter().filter(|_| nominal > LARGE);
+        [0.04, 0.2].into_iter().chain(of_large).map(|share| vec![share]).collect()
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("share", "", point[0])]
+        vec![Quantity::new("share", Dimension::Ratio, point[0])]
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

@@ -5,6 +5,7 @@
 //! | run | one interval of them |
 //! | whole | all of them: the sensor's zero |
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 use crate::stats::median::{median, robust_deviation};
@@ -131,9 +132,10 @@ impl Effect for ReadingOffset {
         let rows = data.rows() as f64;
         let most = 2.0 * data.full_scale_v.max(1.0);
         let offset = Coordinate::new(-most, most);
+        let start = data.normalisation.start.map_or(0.0, |start| start.offset);
         match form {
             RUN => vec![Coordinate::fixed(0.0, rows), Coordinate::fixed(0.0, rows), offset],
-            _ => vec![offset],
+            _ => vec![Coordinate::new(-most + 2.0 * start.min(0.0), most + 2.0 * start.max(0.0))],
         }
     }
 
@@ -151,9 +153,9 @@ impl Effect for ReadingOffset {
         let (run, offset) = shifted(form, point, data.rows());
         let last = data.rows() - 1;
         vec![
-            Quantity::new("from_s", "s", data.time_s[run.start.min(last)]),
-            Quantity::new("to_s", "s", data.time_s[run.end.saturating_sub(1).min(last)]),
-            Quantity::new("offset", "V", offset),
+            Quantity::new("from_s", Dimension::TimePoint, data.time_s[run.start.min(last)]),
+            Quantity::new("to_s", Dimension::TimePoint, data.time_s[run.end.saturating_sub(1).min(last)]),
+            Quantity::new("offset", Dimension::ReadingDifference, offset),
         ]
     }
 

@@ -12,9 +12,11 @@
 
 use std::f64::consts::TAU;
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms};
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
+use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
 use crate::record::signal::{Lag, Piece, Signal};
 use crate::stats::thresholds::empirical::{LEAST_DAMPED, MOST_DAMPED};
 
@@ -22,8 +24,8 @@ pub(super) struct Resonance;
 
 const WHOLE: usize = 0;
 const QUICK: usize = 2;
-/// Time constant `T` of the high-pass filter at initial points, in s.
-const QUICK_S: f64 = 0.5;
+/// Time constant `T` of the high-pass filter at initial points, in reference time constants.
+const QUICK_TIME_CONSTANT: f64 = 1.0 / 11.0;
 
 /// Returns the range of frequencies, in Hz, from one period per record to half a cycle per sample.
 fn range(data: &Data) -> (f64, f64) {
@@ -72,10 +74,11 @@ impl Effect for Resonance {
 
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (lowest, highest) = range(data);
+        let quick = [1.0, (QUICK_TIME_CONSTANT * REFERENCE_TIME_CONSTANT_S).ln()];
         let frequencies = logarithms((8.0 * lowest, 0.95 * highest), 24);
         let (dampings, rest): (&[f64], &[f64]) = match form {
             WHOLE => (&[0.05, 0.3], &[]),
-            QUICK => (&[0.1], &[1.0, QUICK_S.ln()]),
+            QUICK => (&[0.1], &quick),
             _ => (&[0.05, 0.3], &[0.2]),
         };
         let start = |freq: f64, zeta: &f64| [&[freq, zeta.ln()], rest].concat();
@@ -83,7 +86,10 @@ impl Effect for Resonance {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("freq_hz", "Hz", point[0].exp()), Quantity::new("zeta", "", point[1].exp())]
+        vec![
+            Quantity::new("freq_hz", Dimension::Frequency, point[0].exp()),
+            Quantity::new("zeta", Dimension::Ratio, point[1].exp()),
+        ]
     }
 
     fn ln_candidates(&self, _: usize, _: &Data) -> f64 {

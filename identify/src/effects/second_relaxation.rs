@@ -7,13 +7,18 @@
 //! | by decades | as of everything, in three equal parts: `slow / 10`, `slow`, `10 slow` (logarithmic creep) |
 //! | spread | of the rest, in two equal parts, to both sides: `slow` and `tau^2 / slow` (a broad relaxation) |
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::plant::relaxation::Part;
 use crate::record::data::Data;
-use crate::stats::thresholds::empirical::FASTEST_CREEP_S;
+use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
+use crate::stats::thresholds::empirical::FASTEST_CREEP;
 
 pub(super) struct SecondRelaxation;
+
+/// Slow time constants at initial points, in normalised s: 1.6 to 55 reference time constants.
+const INITIAL_TIME_CONSTANTS_S: [f64; 7] = [9.0, 15.0, 25.0, 45.0, 80.0, 150.0, 300.0];
 
 const OF_THE_REST: usize = 0;
 const OF_EVERYTHING: usize = 1;
@@ -41,14 +46,12 @@ impl Effect for SecondRelaxation {
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        vec![
-            Coordinate::new(0.0, 0.9),
-            Coordinate::log(FASTEST_CREEP_S.get(), 10.0 * data.duration_s().max(FASTEST_CREEP_S.get())),
-        ]
+        let fastest = FASTEST_CREEP.get() * REFERENCE_TIME_CONSTANT_S;
+        vec![Coordinate::new(0.0, 0.9), Coordinate::log(fastest, 10.0 * data.duration_s().max(fastest))]
     }
 
     fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
-        [9.0, 15.0, 25.0, 45.0, 80.0, 150.0, 300.0]
+        INITIAL_TIME_CONSTANTS_S
             .into_iter()
             .filter(|&tau: &f64| tau < 3.0 * data.duration_s())
             .map(|tau| vec![0.1, tau.ln()])
@@ -56,7 +59,10 @@ impl Effect for SecondRelaxation {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("share", "", point[0]), Quantity::new("tau_s", "s", point[1].exp())]
+        vec![
+            Quantity::new("share", Dimension::Ratio, point[0]),
+            Quantity::new("tau_s", Dimension::Time, point[1].exp()),
+        ]
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

@@ -3,6 +3,7 @@
 //! Where several readings are exactly the extreme, the bound is known and [`crate::record::observed`] treats those rows
 //! as censored. These forms are for a bound in front of the noise.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 
@@ -51,7 +52,7 @@ impl Effect for SensorSaturation {
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("limit", "V", point[0])]
+        vec![Quantity::new("limit", Dimension::Reading, point[0])]
     }
 
     fn ln_candidates(&self, _: usize, _: &Data) -> f64 {

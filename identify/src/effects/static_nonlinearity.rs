@@ -7,10 +7,14 @@
 //! | exponential with gain | `g` times that |
 //! | quadratic, cubic, quintic | `g + a x`, `+ b x^2`, `+ c x^3 + d x^4`, with a gain of its own |
 //!
+//! Gains are relative to the size of the gain: 1, unless the nominal spring is far from the record.
+//!
 //! The curve is in front of the relaxation (Hammerstein model), or in some forms behind it (Wiener model), where `u` is
 //! the relaxed value. The settled curve is the same; the instantaneous part and the speed of a step distinguish both.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
+use crate::effects::gain_error::size;
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -57,6 +61,13 @@ impl Curve {
             Polynomial(_) => point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient),
         }
     }
+}
+
+/// Returns `f / u` of a form at a voltage; a gain of its own is relative to the size of the gain.
+fn secant(form: usize, point: &[f64], voltage: f64, data: &Data) -> f64 {
+    let (curve, _) = FORMS[form];
+    let secant = curve.secant(point, voltage.abs() / data.full_scale_v);
+    if matches!(curve, Bend | Exponential) { secant } else { size(data) * secant }
 }
 
 impl Effect for StaticNonlinearity {
@@ -125,14 +136,16 @@ impl Effect for StaticNonlinearity {
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        // Voltages are rounded to two digits of their step, so that names give them exactly.
-        let step = data.full_scale_v / f64::from(POINTS);
+        // The file's voltages are rounded to two digits of their step, so that names give them exactly.
+        let volt_v = data.scales().volt_v;
+        let step = data.full_scale_v * volt_v / f64::from(POINTS);
         let decimals = (1.0 - step.log10().floor()).clamp(-300.0, 300.0) as i32;
         let unit = 10f64.powi(-decimals);
         let at = |part: u32| {
             let voltage = (step / unit).round() * unit * f64::from(part);
             let name = format!("at_{voltage:.*}_v", decimals.max(0) as usize);
-            Quantity::new(name, "V", voltage * FORMS[form].0.secant(point, voltage / data.full_scale_v))
+            let voltage = voltage / volt_v;
+            Quantity::new(name, Dimension::Stiffness, voltage * secant(form, point, voltage, data))
         };
         (1..=POINTS).map(at).collect()
     }
@@ -143,8 +156,7 @@ impl Effect for StaticNonlinearity {
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
-        let (curve, behind) = FORMS[form];
-        let law = if behind { &mut chain.law_behind } else { &mut chain.law };
-        law.push(move |voltage| voltage * curve.secant(point, voltage.abs() / data.full_scale_v));
+        let law = if FORMS[form].1 { &mut chain.law_behind } else { &mut chain.law };
+        law.push(move |voltage| voltage * secant(form, point, voltage, data));
     }
 }

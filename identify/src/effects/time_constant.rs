@@ -1,10 +1,14 @@
-//! The time constant of the relaxation is not 5.5 s.
+//! The time constant of the relaxation is not the nominal one.
 
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct TimeConstant;
+
+/// Time constants at initial points, in normalised s: 0.18 to 5.5 reference time constants.
+const INITIAL_TIME_CONSTANTS_S: [f64; 8] = [1.0, 2.5, 4.0, 5.0, 6.0, 8.0, 14.0, 30.0];
 
 impl Effect for TimeConstant {
     fn cause(&self) -> &'static str {
@@ -32,11 +36,11 @@ impl Effect for TimeConstant {
     }
 
     fn initial_points(&self, _: usize, _: &FitContext) -> Vec<Vec<f64>> {
-        [1.0, 2.5, 4.0, 5.0, 6.0, 8.0, 14.0, 30.0].map(|tau: f64| vec![tau.ln()]).to_vec()
+        INITIAL_TIME_CONSTANTS_S.map(|tau: f64| vec![tau.ln()]).to_vec()
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("tau_s", "s", point[0].exp())]
+        vec![Quantity::new("tau_s", Dimension::Time, point[0].exp())]
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

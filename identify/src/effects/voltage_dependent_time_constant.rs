@@ -1,18 +1,21 @@
 //! The time constant of the relaxation depends on the voltage: linearly or geometrically from `tau_low` at 0 V to
-//! `tau_high` at 500 V.
+//! `tau_high` at the nominal spring's reference voltage: 500 V, or its file's `tau_high_at_v`.
 //!
 //! | form | interpolation | depends on |
 //! | --- | --- | --- |
 //! | 0, 1 | linear, geometric | the voltage across the spring |
 //! | 2, 3 | linear, geometric | the spring's own state: the relaxed part, and a fraction of the remaining change |
 
-use model::Plant;
-
+use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct VoltageDependentTimeConstant;
+
+/// Time constants at both voltages at initial points, in normalised s, in which the reference time constant is 5.5 s.
+const INITIAL_TIME_CONSTANTS_S: [(f64, f64); 8] =
+    [(5.5, 6.5), (5.5, 4.5), (6.5, 4.5), (4.5, 6.5), (4.5, 5.5), (6.5, 5.5), (9.0, 3.0), (3.0, 9.0)];
 
 /// Each form: geometric interpolation, and dependence on the spring's own state.
 const FORMS: [(bool, bool); 4] = [(false, false), (true, false), (false, true), (true, true)];
@@ -53,16 +56,17 @@ impl Effect for VoltageDependentTimeConstant {
         }
         let start = |(low, high): (f64, f64)| {
             let mut point = vec![low.ln(), high.ln()];
-            point.extend(FORMS[form].1.then_some(Plant::PAPER.share));
+            point.extend(FORMS[form].1.then_some(context.data.normalisation.share));
             point
         };
-        [(5.5, 6.5), (5.5, 4.5), (6.5, 4.5), (4.5, 6.5), (4.5, 5.5), (6.5, 5.5), (9.0, 3.0), (3.0, 9.0)]
-            .map(start)
-            .to_vec()
+        INITIAL_TIME_CONSTANTS_S.map(start).to_vec()
     }
 
     fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("tau_low_s", "s", point[0].exp()), Quantity::new("tau_high_s", "s", point[1].exp())]
+        vec![
+            Quantity::new("tau_low_s", Dimension::Time, point[0].exp()),
+            Quantity::new("tau_high_s", Dimension::Time, point[1].exp()),
+        ]
     }
 
     /// In the fixed-point tick the time constant is linear in the voltage.

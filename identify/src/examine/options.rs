@@ -1,11 +1,17 @@
 //! The options of a diagnosis.
 
+use simulation::units::Units;
+
 use crate::plant::base::Base;
 use crate::record::data::Input;
 
 /// How a record is read, and with what it is compared.
 #[derive(Clone, Debug)]
 pub struct Options {
+    /// Name of the simulation that is diagnosed, for the report: `paper` or a plant file.
+    pub plant: String,
+    /// Units in which numbers are shown.
+    pub units: Units,
     /// Course of the voltage between rows.
     pub input: Input,
     /// The simulation that is diagnosed.
@@ -15,6 +21,6 @@ pub struct Options {
 impl Default for Options {
     /// Voltage held between rows, and the paper's spring.
     fn default() -> Self {
-        Self { input: Input::Hold, base: Base::paper() }
+        Self { plant: "paper".into(), units: Units::default(), input: Input::Hold, base: Base::paper() }
     }
 }

@@ -7,21 +7,23 @@
 //! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
 //! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
 //!
-//! Every pass runs a `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that
+//! All passes work on a normalised record; the diagnosis is converted back to the file's units at the end. Every pass runs a `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that
 //! is higher by `CLEARLY_LIKELIER` nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that
 //! one's best models.
 
 use anyhow::Result;
 
 use simulation::bad_input;
+use simulation::plant_file::Reading;
 use simulation::record::Record;
 
-use crate::answer::{Report, Verdict};
+use crate::answer::{Nominal, Report, Verdict};
 use crate::effects::index_of;
 use crate::examine::options::Options;
 use crate::fit::engine::Engine;
 use crate::plant::base::Base;
 use crate::record::data::{Data, Input};
+use crate::record::normalisation::Normalisation;
 use crate::record::observed::Observed;
 use crate::search::{Scored, Search, WarmStart};
 use crate::stats::thresholds::empirical::{LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
@@ -50,7 +52,11 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
 /// # Errors
 /// The errors of [`examine`], for the first record that has one.
 pub(super) fn joint(records: &[Record], options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
-    let prepared: Vec<Data> = records.iter().map(|record| Data::new(record, options.input)).collect();
+    let normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
+    let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
+    let base = options.base.normalised(&normalisations[0]);
+    let prepare = |(record, of)| Data::thinned(record, options.input, 1, of);
+    let prepared: Vec<Data> = normalised.iter().zip(&normalisations).map(prepare).collect();
     for (record, data) in records.iter().zip(&prepared) {
         if data.rows() < ROWS_TO_DIAGNOSE.count() {
             bad_input!(
@@ -66,12 +72,22 @@ pub(super) fn joint(records: &[Record], options: &Options, progress: &mut dyn Fn
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
-    let record = ExaminedRecord { records, input: options.input, data: &data };
-    let found = of_readings(&record, &options.base, progress);
-    Ok(without_unsupported_terms(&record, &options.base, found, progress))
+    let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data };
+    let found = of_readings(&examined, &base, progress);
+    let found = without_unsupported_terms(&examined, &base, found, progress);
+    let mut found = found.restored(records, &normalisations);
+    found.report.nominal = nominal(options);
+    Ok(found)
 }
 
-/// One record, or several of one spring, as all passes take them.
+/// The nominal spring for the report.
+fn nominal(Options { plant, base, .. }: &Options) -> Nominal {
+    let Reading { gain, zero } = base.file().reading.unwrap_or_default();
+    let relaxation = &base.file().relaxation;
+    Nominal { plant: plant.clone(), gain, zero, share: relaxation.share, tau_s: relaxation.tau_s.clone() }
+}
+
+/// One normalised record, or several of one spring, as all passes take them.
 struct ExaminedRecord<'r> {
     records: &'r [Record],
     input: Input,
@@ -199,7 +215,9 @@ fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, pr
         return None;
     }
     let every = rows.div_ceil(ROWS_TO_SEARCH.count());
-    let part = Data::joined(record.records.iter().map(|of| Data::thinned(of, record.input, every)).collect());
+    let normalisation = &record.data.normalisation;
+    let part = record.records.iter().map(|of| Data::thinned(of, record.input, every, normalisation));
+    let part = Data::joined(part.collect());
     let observed = Observed::new(&part).with_conclusions_of(observed);
     let mut engine = Engine::new(&part, &observed, base);
     let mut search = Search::new(&mut engine);

@@ -37,7 +37,8 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
     let mut spring = joint.plant.clone();
     spring.unmodelled = None;
-    let options = Options { base: Base::new(spring)?, ..options.clone() };
+    let plant = "the spring with the shared causes".to_owned();
+    let options = Options { plant, base: Base::new(spring)?, ..options.clone() };
     for (record, offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
         let alone = examine(&from_zero, &options, |causes| progress(&format!("{}: {causes}", record.name)))?;

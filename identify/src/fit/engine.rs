@@ -84,7 +84,7 @@ const MOST_JUMPS: usize = 30;
 /// let model = Model::default().with(Block { effect, form: 0 }, vec![5.5f64.ln()]);
 /// let fit = engine.fit_twice(model);
 /// let (name, tau) = &interval::parameters(&mut engine, &fit, effect)[0];
-/// assert_eq!((name.as_str(), tau.unit), ("tau_s", "s"));
+/// assert_eq!((name.as_str(), tau.dimension), ("tau_s", identify::dimension::Dimension::Time));
 /// assert!((tau.value - 8.0).abs() < 0.01 && tau.low < tau.value && tau.value < tau.high);
 /// # Ok::<(), anyhow::Error>(())
 /// ```

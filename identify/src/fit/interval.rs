@@ -8,17 +8,23 @@
 //! `B` is the information of the bounds: `(1.96 / (highest - lowest))^2` for each coordinate. It is the only
 //! information where two effects are equivalent (a delay below one row, and the feedthrough).
 //!
+//! A parameter whose value is an end of what its bounds allow is marked as at a bound.
+//!
 //! A parameter that only a search finds has the range that the search returns.
 
 use nalgebra::DMatrix;
 
 use crate::answer::Parameter;
+use crate::dimension::Dimension;
 use crate::effects::effect::{FitContext, Quantity};
 use crate::effects::model::Block;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::normal_equations;
 use crate::record::data::Data;
 use crate::stats::thresholds::probability::Z;
+
+/// Distance from a bound, relative to it, at which a value is at that bound.
+const AT_BOUND: f64 = 1e-6;
 
 /// Returns the information matrix of the fitted coordinates.
 pub(crate) fn information(engine: &mut Engine, fit: &Fit) -> DMatrix<f64> {
@@ -43,7 +49,7 @@ pub(crate) fn covariance(engine: &mut Engine, fit: &Fit) -> Option<DMatrix<f64>>
     known.try_inverse().filter(|matrix| matrix.iter().all(|value| value.is_finite()))
 }
 
-/// Returns the reported parameters of an effect with their intervals, by the delta method.
+/// Returns the reported parameters of an effect with their intervals, by the delta method; values are normalised.
 pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String, Parameter)> {
     let data = engine.data;
     let covariance = covariance(engine, fit);
@@ -55,7 +61,7 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
         if block.effect == effect {
             let quantities = |point: &[f64]| block.effect().quantities(block.form, point, data);
             let values = quantities(point);
-            for (index, Quantity { name, unit, value }) in values.into_iter().enumerate() {
+            for (index, Quantity { name, dimension, value }) in values.into_iter().enumerate() {
                 let slope: Vec<f64> = places
                     .iter()
                     .map(|&place| {
@@ -73,7 +79,7 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
                     (slope.transpose() * matrix * &slope)[(0, 0)].max(0.0).sqrt()
                 });
                 let reach = reach(block, point, data, index);
-                found.push((name, interval(value, error, unit, reach)));
+                found.push((name, interval(value, error, dimension, reach)));
             }
             let residual = engine.residual(&fit.model.without(effect));
             let context = FitContext { data, residual: &residual, sigma: fit.noise.sigma };
@@ -107,7 +113,7 @@ fn reach(block: &Block, point: &[f64], data: &Data, index: usize) -> (f64, f64) 
 
 /// Returns a symmetric interval; if the quantity cannot be negative, a logarithmic one instead of one that would cross
 /// zero. Limited to `reach` where that contains the value.
-fn interval(value: f64, error: f64, unit: &'static str, reach: (f64, f64)) -> Parameter {
+fn interval(value: f64, error: f64, dimension: Dimension, reach: (f64, f64)) -> Parameter {
     let error = if error.is_finite() { error } else { 10.0 * value.abs() };
     let (mut low, mut high) = (value - Z * error, value + Z * error);
     if value > 0.0 && low < 0.0 && reach.0 >= 0.0 {
@@ -120,5 +126,6 @@ fn interval(value: f64, error: f64, unit: &'static str, reach: (f64, f64)) -> Pa
     if reach.1 >= value {
         high = high.min(reach.1);
     }
-    Parameter { value, low, high, unit }
+    let at_bound = [reach.0, reach.1].iter().any(|bound| (value - bound).abs() <= AT_BOUND * bound.abs());
+    Parameter { value, low, high, unit: String::new(), at_bound, dimension }
 }

@@ -21,7 +21,7 @@ pub struct Simulator<'a> {
     amplified: Cached<Signal>,
     static_response: Cached<Signal>,
     chained: Cached<Signal>,
-    /// Stiffness at each row, before any effect on the readings.
+    /// Reading of the stiffness at each row, before any effect on the readings.
     response: Cached<Vec<f64>>,
     /// Response of the stiffness to each initial state.
     kernels: Cached<Vec<Vec<f64>>>,
@@ -74,7 +74,8 @@ impl<'a> Simulator<'a> {
         if !self.response.update_key(model, Affects::Response) {
             let mut value = std::mem::take(&mut self.response.value);
             value.clear();
-            value.extend(self.responded(model).at_rows());
+            let output = self.data.scales().output;
+            value.extend(self.responded(model).at_rows().map(|stiffness| output * stiffness));
             self.response.value = value;
         }
         readings.clone_from(&self.response.value);
@@ -135,7 +136,8 @@ impl<'a> Simulator<'a> {
                 (state, states) = (state + 1, start.states());
                 // A state that changes no row is not estimated.
                 if self.signal.at_rows().any(|value| value != 0.0) {
-                    self.kernels.value.push(self.signal.at_rows().collect());
+                    let output = self.data.scales().output;
+                    self.kernels.value.push(self.signal.at_rows().map(|value| output * value).collect());
                 }
             }
         }

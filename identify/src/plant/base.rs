@@ -6,6 +6,7 @@ use model::Plant;
 use crate::plant::chain::Chain;
 use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
+use crate::record::normalisation::Normalisation;
 use simulation::bad_input;
 use simulation::plant_file::PlantFile;
 
@@ -37,6 +38,12 @@ impl Base {
         }
         let relaxation = Relaxation::of(&file.relaxation);
         Ok(Self { file, relaxation })
+    }
+
+    /// Returns the same plant in the coordinates of a record.
+    pub fn normalised(&self, normalisation: &Normalisation) -> Self {
+        let file = normalisation.plant(&self.file);
+        Self { relaxation: Relaxation::of(&file.relaxation), file }
     }
 
     /// Returns, for each optional part that the file has, the part's name and the same plant without it.

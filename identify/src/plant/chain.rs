@@ -1,7 +1,7 @@
 //! The chain from command to stiffness, in the order of [`model::extended`]:
 //!
 //! ```text
-//! command -> limit -> slew -> output lag -> delay -> hysteresis -> law -> leakage -> relaxation -> output law ->
+//! command -> limit -> slew -> output lag -> delay -> (magnitude) -> hysteresis -> law -> leakage -> relaxation -> output law ->
 //! stiffness
 //! ```
 //!
@@ -18,6 +18,7 @@ use crate::plant::law::Law;
 use crate::plant::leakage::{InstantaneousLoss, Loss};
 use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
+use crate::record::scales::REFERENCE_VOLTAGE_V;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 
@@ -35,6 +36,8 @@ pub struct Chain<'a> {
     pub output_tau_s: f64,
     /// Delay of the amplifier, in s.
     pub delay_s: f64,
+    /// True if the spring responds to the voltage's magnitude.
+    pub even: bool,
     /// Hysteresis: a bank of play operators.
     pub memory: PlayBank,
     /// Static law from voltage to settled stiffness.
@@ -52,8 +55,8 @@ pub struct Chain<'a> {
 const DELAY_ROUNDING: f64 = 1e-5;
 /// Number of intervals of the delay in which the voltage sent before the first row may have had different values.
 const DELAY_INTERVALS: usize = 6;
-/// A voltage above that of any record, in V.
-const HIGHEST_V: f64 = 1e6;
+/// A voltage above that of any record, in normalised V.
+const HIGHEST_V: f64 = 2000.0 * REFERENCE_VOLTAGE_V;
 
 impl<'a> Chain<'a> {
     /// Returns the chain of a plant file, with the given relaxation.
@@ -68,6 +71,7 @@ impl<'a> Chain<'a> {
             initial_v: None,
             output_tau_s: 0.0,
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
+            even: file.even,
             memory: PlayBank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
             law_behind: Law::of(None),
@@ -105,7 +109,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Maps the commanded voltage to the voltage on the spring's electrodes.
+    /// Maps the commanded voltage to the voltage on the spring's electrodes, or to its magnitude where that alone counts.
     pub fn amplify(&self, signal: &mut Signal) {
         if self.limit_v.is_finite() {
             signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
@@ -120,6 +124,9 @@ impl<'a> Chain<'a> {
         }
         if self.delay_s > 0.0 {
             *signal = signal.delayed(self.delay_s * (1.0 - DELAY_ROUNDING));
+        }
+        if self.even {
+            *signal = signal.magnitude();
         }
     }
 

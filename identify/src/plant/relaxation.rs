@@ -9,6 +9,7 @@
 //! output of the first lag for a part of 0 and the whole stiffness for a part of `share`.
 
 use crate::plant::initial_state::InitialState;
+use crate::record::scales::REFERENCE_VOLTAGE_V;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{self, PlantFile};
 
@@ -48,8 +49,8 @@ pub struct Relaxation {
 }
 
 impl Relaxation {
-    /// Voltage at which the time constant is `tau_high_s`, in V.
-    pub const HIGH_V: f64 = 500.0;
+    /// Voltage at which the time constant is `tau_high_s`, in normalised V.
+    pub const HIGH_V: f64 = REFERENCE_VOLTAGE_V;
 
     /// Returns a relaxation with one feedthrough and one constant time constant, in s.
     pub fn plain(share: f64, tau_s: f64) -> Self {
@@ -86,11 +87,11 @@ impl Relaxation {
             _ => std::iter::once(self.first_weight()).chain(self.parts().map(|part| part.part)).collect(),
         };
         let tau_high_s = self.varies().then_some(self.tau_high_s);
-        let tau_high_at_v = file.relaxation.tau_high_at_v.filter(|_| tau_high_s.is_some());
+        let tau_high_at_v = file.relaxation.tau_high_at_v;
         file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s, tau_high_at_v };
     }
 
-    /// Returns the relaxation of a plant file, which must be valid.
+    /// Returns the relaxation of a normalised plant file, which must be valid.
     pub fn of(file: &plant_file::Relaxation) -> Self {
         let tau_s = file.tau_s.first().copied().unwrap_or_default();
         let mut relaxation = Self { tau_high_s: file.tau_high_s.unwrap_or(tau_s), ..Self::plain(file.share, tau_s) };

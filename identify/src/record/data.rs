@@ -3,13 +3,13 @@
 use std::iter;
 use std::ops::Range;
 
-use model::Plant;
-
 use simulation::record::Record;
 use simulation::schedule::{Between, Schedule};
 
 use crate::record::decay::relaxes_from_earlier_input;
 use crate::record::folds::folds;
+use crate::record::normalisation::Normalisation;
+use crate::record::scales::Scales;
 use crate::record::signal::Signal;
 
 /// Voltage between two rows of the record.
@@ -55,6 +55,8 @@ pub struct Data {
     pub fold: Vec<u8>,
     /// Number of folds.
     pub folds: usize,
+    /// The coordinates of all these numbers, and what is expected of the spring.
+    pub normalisation: Normalisation,
     /// The records that were joined; empty for a single record.
     pub parts: Vec<Part>,
 }
@@ -71,14 +73,15 @@ pub struct Part {
 }
 
 impl Data {
-    /// Prepares a record. Rows without a reading are left out; the commanded voltage keeps their values.
+    /// Prepares a record for the paper's spring, in the record's own numbers. Rows without a reading are left out; the
+    /// commanded voltage keeps their values.
     pub fn new(record: &Record, input: Input) -> Self {
-        Self::thinned(record, input, 1)
+        Self::thinned(record, input, 1, &Normalisation::default())
     }
 
-    /// Prepares every `every`-th reading of a record, under the voltage of all rows, for a quick search on a long
-    /// record.
-    pub fn thinned(record: &Record, input: Input, every: usize) -> Self {
+    /// Prepares every `every`-th reading of a normalised record, under the voltage of all rows; more than 1 for a quick
+    /// search on a long record.
+    pub fn thinned(record: &Record, input: Input, every: usize, normalisation: &Normalisation) -> Self {
         let schedule = match input {
             Input::Hold => Schedule::from_record(record, Between::Hold),
             Input::Linear => Schedule::from_record(record, Between::Linear),
@@ -89,8 +92,9 @@ impl Data {
         let voltage_v: Vec<f64> = rows().map(|(row, _)| row.voltage_v).collect();
         let reading: Vec<f64> = rows().map(|(_, reading)| reading).collect();
         let first_v = voltage_v.first().copied().unwrap_or(0.0);
+        let offset = normalisation.start.map_or(0.0, |start| start.offset);
         // Decided from all rows, so that a subset gets the same coordinates.
-        let initial_state_unknown = first_v != 0.0 || relaxes_from_earlier_input(&time_s, &voltage_v, &reading);
+        let initial_state_unknown = first_v != 0.0 || relaxes_from_earlier_input(&time_s, &voltage_v, &reading, offset);
         let [time_s, voltage_v, reading] = [time_s, voltage_v, reading].map(|all| match every {
             1 => all,
             _ => all.into_iter().step_by(every).collect(),
@@ -103,8 +107,9 @@ impl Data {
         let uniform =
             gaps.last().zip(gaps.first()).is_some_and(|(longest, shortest)| longest - shortest < 0.01 * sample_s);
         // A voltage at the first row was either applied before (the reading follows it) or is a step at that row.
-        let first = reading.first().copied().unwrap_or(0.0);
-        let stepped = first / first_v < 2.0 * Plant::PAPER.share;
+        let first = reading.first().copied().unwrap_or(0.0) - offset;
+        let responds_to_v = if normalisation.even { first_v.abs() } else { first_v };
+        let stepped = first / responds_to_v < share_of_a_step(normalisation.share);
         let before = if stepped { 0.0 } else { first_v };
         let command = match every {
             1 => Signal::new(&schedule, &time_s, before),
@@ -124,8 +129,14 @@ impl Data {
             initial_state_unknown,
             fold,
             folds,
+            normalisation: normalisation.clone(),
             parts: Vec::new(),
         }
+    }
+
+    /// Returns the scales of all numbers.
+    pub fn scales(&self) -> &Scales {
+        &self.normalisation.scales
     }
 
     /// Joins several records of one spring; each is simulated from its own initial state and has its own zero offset. Each record
@@ -153,6 +164,7 @@ impl Data {
             initial_state_unknown: records.iter().any(|data| data.initial_state_unknown),
             fold: Vec::new(),
             folds: records.len(),
+            normalisation: records[0].normalisation.clone(),
             parts: Vec::new(),
         };
         for (fold, mut data) in records.into_iter().enumerate() {
@@ -194,6 +206,12 @@ impl Data {
     }
 }
 
+/// Returns the first reading over its settled value below which the voltage of the first row is a step at that row, for a
+/// spring with an instantaneous part of `share`: twice that part, but within what distinguishes it from 0 and 1.
+fn share_of_a_step(share: f64) -> f64 {
+    (2.0 * share).max(0.1).min((1.0 + share) / 2.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -214,7 +232,7 @@ mod tests {
             let record = record(start_v);
             for every in [1, 2, 8, 40] {
                 assert_eq!(
-                    Data::thinned(&record, Input::Hold, every).initial_state_unknown,
+                    Data::thinned(&record, Input::Hold, every, &Normalisation::default()).initial_state_unknown,
                     initial_state_unknown,
                     "{start_v} V, every {every}"
                 );

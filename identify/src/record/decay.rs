@@ -1,29 +1,31 @@
 //! Detection of a spring that is not at rest when its record begins: its readings decay before the first voltage.
 
-use model::Plant;
-
+use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
 use crate::stats::scale::{robust_scale, second_differences};
 use crate::stats::thresholds::empirical::{FEWEST_ROWS_AT_REST, LARGEST_CORRELATION, SHORT_REST, SIGNIFICANT_DECAY};
 
-/// Time constants of the decays that are tried, relative to the paper's.
+/// Time constants of the decays that are tried, relative to the reference.
 const DECAY_TIMES: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// Returns true if the readings before the first voltage contain an exponential decay from an earlier stiffness; where
-/// the rest is too short to show a decay, if the readings differ from zero.
-pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], reading: &[f64]) -> bool {
+/// the rest is too short to show a decay, if the readings differ from `zero`.
+pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], reading: &[f64], zero: f64) -> bool {
     let rest = voltage_v.iter().take_while(|voltage| **voltage == 0.0).count();
     if rest == 0 {
         return false;
     }
     let (time_s, at_rest) = (&time_s[..rest], &reading[..rest]);
-    let tau_s = Plant::PAPER.time_constant_s;
+    let tau_s = REFERENCE_TIME_CONSTANT_S;
     let short = rest < FEWEST_ROWS_AT_REST.count() || time_s[rest - 1] - time_s[0] < SHORT_REST.get() * tau_s;
     let new_v = robust_scale(&second_differences(reading).collect::<Vec<_>>());
     let falls = |tau_s: f64| {
         let decay: Vec<f64> = time_s.iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
         // Least squares on the decay, and on a constant where the two can be distinguished.
-        let mean = |values: &[f64]| if short { 0.0 } else { values.iter().sum::<f64>() / rest as f64 };
-        let (mean_decay, mean_reading) = (mean(&decay), mean(at_rest));
+        let mean = |values: &[f64], short_mean: f64| match short {
+            true => short_mean,
+            false => values.iter().sum::<f64>() / rest as f64,
+        };
+        let (mean_decay, mean_reading) = (mean(&decay, 0.0), mean(at_rest, zero));
         let pairs = || decay.iter().zip(at_rest).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
         let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
         let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;

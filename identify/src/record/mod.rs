@@ -1,7 +1,8 @@
 //! The prepared record: rows of a measured record come in; the commanded voltage as a signal, the readings and what is
 //! known about each reading go out.
 //!
-//! - *Reading*: measured stiffness, expressed as the equivalent static voltage, in V.
+//! - *Normalised*: in the coordinates of the search, in which every spring has the time constant and the voltages of the paper's.
+//! - *Reading*: measured stiffness, normalised to the equivalent static voltage, in V.
 //! - *Command*: the voltage that was sent to the amplifier, in V.
 //! - *Fold*: the rows that one fit of a cross-validation does not use; its prediction of these rows is held out.
 //! - *Segment*: neighbouring rows that belong to the same fold.
@@ -10,9 +11,12 @@
 
 pub mod data;
 mod decay;
+mod first_order;
 mod folds;
 pub mod heteroscedasticity;
+pub mod normalisation;
 pub mod observed;
 pub mod quantisation_grid;
+pub mod scales;
 pub mod signal;
 pub mod spectrum;

@@ -6,9 +6,11 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use crate::dimension::Dimension;
 use crate::record::data::Data;
 use crate::record::heteroscedasticity;
 use crate::record::quantisation_grid::QuantisationGrid;
+use crate::record::scales::Scales;
 use crate::stats::median::robust_deviation;
 use crate::stats::scale::second_differences;
 use crate::stats::thresholds::empirical::{
@@ -39,8 +41,11 @@ pub struct Observed {
     pub lower: Option<f64>,
     /// Scale of the noise from row to row, in V.
     pub scatter_v: f64,
-    /// Mean error of truncation, in V: half a step if the converter truncates, 0 if it rounds.
+    /// Mean error of truncation, in V: half a step if the converter truncates, 0 if it rounds; negative for readings that fall
+    /// as the stiffness rises.
     pub truncation_v: f64,
+    /// Sign of the reading's change with the stiffness, 1 or -1.
+    pub sign: f64,
     /// The reciprocal scale of each row's noise, with a geometric mean of 1; `None` if the scale is constant.
     pub weights: Option<Arc<[f64]>>,
 }
@@ -63,7 +68,7 @@ impl Observed {
         let inner: Vec<f64> = counts.iter().map(|&(value, _)| value).collect();
         let grid = match inner.len() {
             0..=5 => None,
-            many => QuantisationGrid::of(&inner[1..many - 1]),
+            many => printed_grid(&inner[1..many - 1], data.scales()),
         };
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
@@ -92,7 +97,8 @@ impl Observed {
                 }
             })
             .collect();
-        let mut observed = Self { kinds, grid, upper, lower, scatter_v, truncation_v: 0.0, weights: None };
+        let sign = data.scales().reading.signum();
+        let mut observed = Self { kinds, grid, upper, lower, scatter_v, truncation_v: 0.0, sign, weights: None };
         // Rounding makes the scale constant.
         if observed.step_beyond(COARSE.get()).is_none() {
             observed.weights = heteroscedasticity::weights(data, |row| observed.kinds[row] == Kind::Exact);
@@ -124,6 +130,7 @@ impl Observed {
             lower: common(|record| record.lower),
             scatter_v,
             truncation_v: 0.0,
+            sign: records[0].sign,
             weights: weights.iter().any(|weight| (weight - 1.0).abs() > 1e-9).then_some(weights),
         }
     }
@@ -147,7 +154,7 @@ impl Observed {
     /// Returns the same for a converter that truncates instead of rounding; `None` if the step is too small to matter.
     pub fn truncated(&self) -> Option<Self> {
         let step = self.step_beyond(LEAST_TRUNCATION.get())?;
-        Some(Self { truncation_v: step / 2.0, ..self.clone() })
+        Some(Self { truncation_v: self.sign * step / 2.0, ..self.clone() })
     }
 
     /// Returns the smallest error of each row that explains its reading, in V: 0 for a reading at a bound when the
@@ -176,6 +183,18 @@ impl Observed {
     pub fn all_exact(&self) -> bool {
         self.kinds.iter().all(|kind| *kind == Kind::Exact)
     }
+}
+
+/// Returns the normalised grid of distinct normalised readings in ascending order. It is found in the file's numbers, whose
+/// printed digits count.
+fn printed_grid(values: &[f64], scales: &Scales) -> Option<QuantisationGrid> {
+    let mut file: Vec<f64> = values.iter().map(|&value| scales.restored(Dimension::Reading, value)).collect();
+    file.sort_by(f64::total_cmp);
+    let [step, low, high] = {
+        let grid = QuantisationGrid::of(&file)?;
+        [grid.step, grid.low, grid.high].map(|size| size / scales.reading.abs())
+    };
+    Some(QuantisationGrid { step, low, high })
 }
 
 /// Returns true if at least half of the readings with this value have a neighbour within `far`, in V; isolated error

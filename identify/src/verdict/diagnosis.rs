@@ -1,16 +1,18 @@
 //! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict.
 
 use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
-use crate::answer::{Extended, Finding, Margins, Report, SCHEMA, Verdict};
+use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, Verdict};
+use crate::dimension::Dimension;
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
+use crate::record::scales::Scales;
 use crate::search::{Scored, WarmStart};
 
 use crate::stats::thresholds::empirical::{FINEST_V, SHARE_UNEXPLAINED, STEPS_BEYOND_BOUND};
 use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
-use crate::verdict::export::export;
+use crate::verdict::export::{export, restored};
 use crate::verdict::finding::{explained, finding};
 use crate::verdict::found::{self, Found};
 use crate::verdict::margins;
@@ -19,7 +21,8 @@ use crate::verdict::ranking::{RankedCauses, ranking};
 use crate::verdict::reading_findings::reading_findings;
 use simulation::plant_file::PlantFile;
 
-/// A finished diagnosis: the report and what is needed to draw it.
+/// A finished diagnosis: the report and what is needed to draw it. All numbers are in the file's units, but for the points of
+/// the models and the laws of the noise, which are normalised ([`crate::record::normalisation`]).
 #[derive(Clone, Debug)]
 pub struct Diagnosis {
     /// The report.
@@ -30,9 +33,9 @@ pub struct Diagnosis {
     pub baseline: Fit,
     /// The simulation extended by the named causes.
     pub extended: Fit,
-    /// The extended simulation as a plant file.
+    /// The extended simulation as a plant file, in the file's units.
     pub plant: PlantFile,
-    /// Readings less predictions of `baseline` and of `extended` on held-out segments, in V.
+    /// Readings less predictions of `baseline` and of `extended` on held-out segments, in the reading's unit.
     pub held_out: [Vec<f64>; 2],
     /// The best sets of causes with their scores and errors, the best first.
     pub ranking: Vec<RankedCauses>,
@@ -96,7 +99,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
     let unexplained = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let would_show = (findings.is_empty() && !unexplained)
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
-    let verdict = verdict(unexplained, &alternatives, would_show.as_ref(), &findings);
+    let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));
+    let verdict = verdict(unexplained, &alternatives, insufficient, &findings);
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
     let export = export(engine, found.model(), held);
 
@@ -104,6 +108,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         schema: SCHEMA,
         rows: data.rows(),
         verdict,
+        nominal: Nominal::default(),
         baseline: before,
         extended: Extended {
             gain,
@@ -117,7 +122,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         take_out: Vec::new(),
         would_show,
         alternatives,
-        leftover: unmodelled.as_ref().map(sentence),
+        leftover: unmodelled.as_ref().map(|found| sentence(found, data.scales())),
         noise: noise_report(&extended.noise),
         residual: residual_report(data, extended),
         records: Vec::new(),
@@ -148,24 +153,20 @@ fn findings(engine: &mut Engine, found: &Found) -> Vec<Finding> {
 }
 
 /// The verdict, by the first that applies: unexplained structure, alternatives, margins too wide, no findings.
-fn verdict(
-    unexplained: bool,
-    alternatives: &[Vec<&'static str>],
-    would_show: Option<&Margins>,
-    findings: &[Finding],
-) -> Verdict {
+fn verdict(unexplained: bool, alternatives: &[Vec<&'static str>], insufficient: bool, findings: &[Finding]) -> Verdict {
     match () {
         () if unexplained => Verdict::Unexplained,
         () if !alternatives.is_empty() => Verdict::Ambiguous,
-        () if would_show.is_some_and(|margins| !margins::informative(margins)) => Verdict::Insufficient,
+        () if insufficient => Verdict::Insufficient,
         () if findings.is_empty() => Verdict::Consistent,
         () => Verdict::Explained,
     }
 }
 
 /// The report's sentence on unmodelled dynamics.
-fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics) -> String {
-    format!("{:.1} % of the residual ({rms:.3} V RMS) is structure, not noise: it shows {place}", 100.0 * share)
+fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics, scales: &Scales) -> String {
+    let rms = scales.shown(Dimension::ReadingSize, *rms, 3);
+    format!("{:.1} % of the residual ({rms} RMS) is structure, not noise: it shows {place}", 100.0 * share)
 }
 
 /// Reports a record that identifies no spring.
@@ -177,6 +178,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         schema: SCHEMA,
         rows: data.rows(),
         verdict: reason.verdict(),
+        nominal: Nominal::default(),
         baseline: quality,
         findings: Vec::new(),
         take_out: Vec::new(),
@@ -195,7 +197,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         score: baseline.log_likelihood,
         extended: baseline.clone(),
         baseline,
-        plant: engine.base().file().clone(),
+        plant: restored(engine, engine.base().file()),
         held_out: [held_out.clone(), held_out],
         ranking: Vec::new(),
         zero_offsets: vec![0.0; data.parts.len()],

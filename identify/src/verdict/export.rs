@@ -1,9 +1,11 @@
 //! The extended simulation as a plant file, and the error of the fixed-point tick that runs it.
 
+use crate::dimension::Dimension;
 use crate::effects::model::Model;
 use crate::fit::engine::Engine;
 use crate::plant::base::Base;
 use crate::record::data::Data;
+use crate::record::scales::Scales;
 use crate::record::signal::Signal;
 use simulation::open_loop;
 use simulation::plant_file::PlantFile;
@@ -12,9 +14,9 @@ use simulation::schedule::{Between, Schedule};
 
 /// Rate of the tick, in Hz.
 const RATE_HZ: f64 = 1000.0;
-/// Duration of a record, in s, from which it is not run tick by tick.
+/// Duration of a record, in s of the tick's clock, from which it is not run tick by tick.
 const LONGEST_TICKED_S: f64 = 5000.0;
-/// Error of the tick, in V, above which reports point it out.
+/// Error of the tick, in normalised V, above which reports point it out: 0.002 of the reference voltage.
 pub const SMALL_ERROR_V: f64 = 1.0;
 
 /// The extended simulation, exported.
@@ -33,11 +35,17 @@ pub struct Export {
 /// Exports a fitted model; `held` says that the record's voltage is held between rows.
 pub(crate) fn export(engine: &Engine, model: &Model, held: bool) -> Export {
     let (data, base) = (engine.data, engine.base());
-    let file = model.extend(base, data);
+    let file = restored(engine, &model.extend(base, data));
     let tick_refuses = file.check().err().map(|error| error.to_string());
-    let runs = held && data.duration_s() < LONGEST_TICKED_S && tick_refuses.is_none();
+    let duration_s = data.scales().restored(Dimension::Time, data.duration_s());
+    let runs = held && duration_s < LONGEST_TICKED_S && tick_refuses.is_none();
     let fixed_point_error_v = runs.then(|| tick_error(model, base, data, &file)).flatten();
     Export { file, fixed_point_error_v, tick_refuses }
+}
+
+/// Returns a normalised spring in the file's units.
+pub(crate) fn restored(engine: &Engine, file: &PlantFile) -> PlantFile {
+    engine.data.normalisation.restored_plant(file)
 }
 
 /// Largest absolute difference between the tick and the fitted spring, in V; `None` if the tick fails.
@@ -49,7 +57,10 @@ fn tick_error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Opti
     let row = |(&time_s, voltage_v)| Row { line: 0, time_s, voltage_v, measured: None };
     let rows: Vec<Row> = data.time_s.iter().zip(applied.at_rows()).map(row).collect();
     let voltage_v: Vec<f64> = rows.iter().map(|row| row.voltage_v).collect();
-    let fixed = open_loop::simulate(&file.extended(), RATE_HZ, &data.time_s, &voltage_v).ok()?;
+    let of_file = |of: &[f64], size: f64| of.iter().map(|value| size * value).collect::<Vec<f64>>();
+    let Scales { second_s, volt_v, .. } = *data.scales();
+    let (time_s, applied_v) = (of_file(&data.time_s, second_s), of_file(&voltage_v, volt_v));
+    let fixed = open_loop::simulate(&file.extended(), RATE_HZ, &time_s, &applied_v).ok()?;
 
     let schedule = Schedule::from_record(&Record { name: String::new(), rows }, Between::Hold);
     let voltage = Signal::new(&schedule, &data.time_s, 0.0);
@@ -62,5 +73,5 @@ fn tick_error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Opti
     let mut fitted = voltage.clone();
     chain.static_response(&mut fitted);
     chain.relax(&mut fitted, &voltage, &mut Vec::new());
-    Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (fitted - fixed).abs()).fold(0.0, f64::max))
+    Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (volt_v * fitted - fixed).abs()).fold(0.0, f64::max))
 }

@@ -1,6 +1,7 @@
 //! A named cause: its odds against the best explanation without it, and its parameters.
 
-use crate::answer::Finding;
+use crate::answer::{Finding, Parameter};
+use crate::dimension::Dimension;
 use crate::effects::EFFECTS;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::parameters;
@@ -23,22 +24,39 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, cause: &Cause) -> Find
     let odds = best.score - without.score;
     let [before, rival, after] = [left_out, without, best].map(|scored| rms(engine, &scored.fit));
     let others: Vec<&str> = effects(&without.fit.model).into_iter().map(|other| EFFECTS[other].cause()).collect();
+    let scales = engine.data.scales();
+    let rival = scales.shown(Dimension::ReadingSize, rival, 3);
     let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others.join(" and ") };
     let better = if best.fit.model.searched(effect) {
         format!("with the price of all searched places deducted, the readings are {odds:.1} nats likelier")
     } else {
         format!("on held-out segments this is {odds:.1} nats better")
     };
+    let parameters = parameters(engine, &best.fit, effect);
+    let at_bounds = at_bounds(&parameters);
     Finding {
         cause: EFFECTS[effect].cause(),
         probability: 1.0 / (1.0 + (-odds.clamp(-LARGEST_ODDS, LARGEST_ODDS)).exp()),
-        parameters: parameters(engine, &best.fit, effect),
+        parameters,
         rmse_before: before.max(after),
         rmse_after: after,
         evidence: format!(
-            "{}: {better} than the best explanation without it ({against}, {rival:.3} V)",
-            EFFECTS[effect].description()
+            "{}: {better} than the best explanation without it ({against}, {rival}){}",
+            EFFECTS[effect].description(),
+            at_bounds
         ),
+    }
+}
+
+/// The words on parameters at their bounds that follow the evidence; empty if there are none.
+fn at_bounds(parameters: &[(String, Parameter)]) -> String {
+    let names: Vec<&str> = parameters.iter().filter(|(_, it)| it.at_bound).map(|(name, _)| name.as_str()).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        [name] => format!("; {name} is at the bound of its range, and the best value may be beyond"),
+        names => {
+            format!("; {} are at the bounds of their ranges, and the best values may be beyond", names.join(" and "))
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use crate::adequacy::{gain_and_time_constant, model_of_both};
 use crate::answer::Margins;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::information;
+use crate::plant::base::Base;
 use crate::search::Evaluator;
 use crate::stats::thresholds::empirical::{WIDEST_GAIN_MARGIN, WIDEST_TIME_CONSTANT_MARGIN};
 use crate::stats::thresholds::probability::{RIVAL_ODDS, Z_POWER};
@@ -27,6 +28,8 @@ pub(crate) fn margins(engine: &mut Engine, nothing: &Fit, penalty_factor: f64) -
 }
 
 /// True if both margins are narrow enough for the verdict that nothing is wrong.
-pub(crate) fn informative(margins: &Margins) -> bool {
-    margins.gain < WIDEST_GAIN_MARGIN.get() && margins.time_constant < WIDEST_TIME_CONSTANT_MARGIN.get()
+pub(crate) fn informative(margins: &Margins, base: &Base) -> bool {
+    // The time constant of a spring that is all instantaneous has no effect.
+    let lags = base.relaxation.share < 1.0;
+    margins.gain < WIDEST_GAIN_MARGIN.get() && (!lags || margins.time_constant < WIDEST_TIME_CONSTANT_MARGIN.get())
 }

@@ -8,6 +8,7 @@
 //! | margins | smallest errors of gain and time constant that a record without findings would have shown |
 //! | export | the extended simulation as a plant file |
 //! | ranking | the best sets of causes compared by score and held-out error |
+//! | restored | converted from the coordinates of the search to the file's units |
 //!
 //! [`diagnosis`] puts the parts together.
 
@@ -20,3 +21,4 @@ pub mod margins;
 pub mod quality;
 pub mod ranking;
 pub mod reading_findings;
+mod restore;

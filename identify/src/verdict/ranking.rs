@@ -13,13 +13,13 @@ use crate::stats::scale::root_mean_square;
 pub struct RankedCauses {
     /// Names of the causes, in the order of the chain; empty for the simulation as it is given.
     pub causes: Vec<&'static str>,
-    /// Parameters of the fit to all rows, as `name = value unit, ...`.
+    /// Parameters of the fit to all rows in the user's units, as `name = value unit, ...`.
     pub values: String,
     /// Held-out log-likelihood less the price of the blocks, in nats.
     pub score: f64,
-    /// Root mean square error on the rows that it was fitted to, in V.
+    /// Root mean square error on the rows that it was fitted to, in the reading's unit.
     pub rmse: f64,
-    /// Root mean square error on held-out segments, in V.
+    /// Root mean square error on held-out segments, in the reading's unit.
     pub held_out_rmse: f64,
 }
 
@@ -54,10 +54,10 @@ pub(crate) fn ranking(engine: &mut Engine, contenders: &[Scored], known: [(&Fit,
     contenders.iter().map(ranked).collect()
 }
 
-/// Parameters of all blocks, as `name = value unit, ...`.
+/// Parameters of all blocks in the user's units, as `name = value unit, ...`.
 fn values(data: &Data, model: &Model) -> String {
     let of_block = |(block, point): &(Block, Vec<f64>)| block.effect().quantities(block.form, point, data);
     let quantities = model.blocks.iter().flat_map(of_block);
-    let said = |Quantity { name, unit, value }| format!("{name} = {value:.4} {unit}").trim_end().to_owned();
+    let said = |Quantity { name, dimension, value }| format!("{name} = {}", data.scales().shown(dimension, value, 4));
     quantities.map(said).collect::<Vec<_>>().join(", ")
 }

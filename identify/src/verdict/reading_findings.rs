@@ -2,6 +2,7 @@
 
 use crate::adequacy::far_off;
 use crate::answer::{Finding, Parameter};
+use crate::dimension::Dimension;
 use crate::fit::engine::Fit;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
@@ -17,11 +18,12 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
     let raw = root_mean_square(&fit.residual);
     let stopped_raw = root_mean_square(&observed.errors(&fit.residual));
     let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
-    let single = |name: &str, value: f64, low: f64, high: f64, unit| {
-        vec![(name.to_owned(), Parameter { value, low, high, unit })]
+    let scales = data.scales();
+    let single = |name: &str, value: f64, low: f64, high: f64, dimension| {
+        vec![(name.to_owned(), Parameter { value, low, high, unit: String::new(), at_bound: false, dimension })]
     };
     if let Some(QuantisationGrid { step, low, high }) = observed.grid
-        && (step > (STEP_TO_REPORT.get() * stopped_raw).max(2.0 * FINEST_V.get()) || observed.truncation_v > 0.0)
+        && (step > (STEP_TO_REPORT.get() * stopped_raw).max(2.0 * FINEST_V.get()) || observed.truncation_v != 0.0)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data
@@ -33,13 +35,14 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
         findings.push(Finding {
             cause: "quantisation",
             probability: 1.0,
-            parameters: single("step", step, low, high, "V"),
+            parameters: single("step", step, low, high, Dimension::ReadingSize),
             rmse_before: root_mean_square(
                 &fit.residual.iter().map(|left| left - observed.truncation_v).collect::<Vec<_>>(),
             ),
             rmse_after: root_mean_square(&after).min(raw),
             evidence: format!(
-                "all readings differ from the first by multiples of {step:.6} V, {:.1} times the remaining error{}",
+                "all readings differ from the first by multiples of {}, {:.1} times the remaining error{}",
+                scales.shown(Dimension::ReadingSize, step, 6),
                 step / raw,
                 if observed.truncation_v == 0.0 {
                     ""
@@ -55,12 +58,19 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
         findings.push(Finding {
             cause: "sensor-saturation",
             probability: 1.0,
-            parameters: single("limit", bound, bound - 1e-6 * bound.abs(), bound + 1e-6 * bound.abs(), "V"),
+            parameters: single(
+                "limit",
+                bound,
+                bound - 1e-6 * bound.abs(),
+                bound + 1e-6 * bound.abs(),
+                Dimension::Reading,
+            ),
             rmse_before: raw,
             rmse_after: stopped_raw,
             evidence: format!(
-                "{stopped} readings are exactly {bound}, the {} of all",
-                if upper { "highest" } else { "lowest" }
+                "{stopped} readings are exactly {}, the {} of all",
+                scales.restored(Dimension::Reading, bound),
+                if upper == (scales.reading > 0.0) { "highest" } else { "lowest" }
             ),
         });
     }
@@ -74,11 +84,12 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
         findings.push(Finding {
             cause: "outliers",
             probability: 1.0,
-            parameters: single("fraction", fraction, (fraction - Z * spread).max(0.0), fraction + Z * spread, ""),
+            parameters: single("fraction", fraction, (fraction - Z * spread).max(0.0), fraction + Z * spread, Dimension::Ratio),
             rmse_before: stopped_raw,
             rmse_after: root_mean_square(&kept),
             evidence: format!(
-                "{off} readings are off by about {wide:.2} V, {:.0} times the noise: a mixture of two normal distributions fits far better than one heavy tail",
+                "{off} readings are off by about {}, {:.0} times the noise: a mixture of two normal distributions fits far better than one heavy tail",
+                scales.shown(Dimension::ReadingSize, wide, 2),
                 wide / fit.noise.sigma
             ),
         });

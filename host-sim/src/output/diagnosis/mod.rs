@@ -10,6 +10,7 @@ use identify::Diagnosis;
 
 mod extension;
 mod figures;
+mod number;
 mod origin;
 mod page;
 pub mod panels;

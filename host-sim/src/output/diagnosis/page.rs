@@ -14,7 +14,7 @@ use identify::{Diagnosis, Input};
 
 /// The whole page; texts from files are escaped.
 pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -> String {
-    let report = &diagnosis.report;
+    let (report, scales) = (&diagnosis.report, diagnosis.data.scales());
     let [readings, residual, residual_voltage, correlations @ ..] = figures else { unreachable!("see `figures`") };
     let page = html! {
         (DOCTYPE)
@@ -29,11 +29,12 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 h1 { "Diagnosis of " (origin.record) }
                 p { span.verdict { (verdict(report.verdict)) } }
                 div.sentences {
-                    @for sentence in text::sentences(&origin.record, report) { p { (sentence) } }
+                    p { (text::nominal(&report.nominal, scales)) }
+                    @for sentence in text::sentences(&origin.record, report, scales) { p { (sentence) } }
                 }
                 h2 { "Causes" }
-                (tables::findings(&report.findings))
-                (records::section(&report.records))
+                (tables::findings(&report.findings, scales))
+                (records::section(&report.records, scales))
                 h2 { "Readings and simulations" }
                 @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
                 h2 { "Residual tests" }
@@ -44,7 +45,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 @if is_extended(diagnosis) {
                     h2 { "Held-out improvement" }
                     (tables::quality(diagnosis))
-                    @if let Some(sentence) = text::in_fixed_point(&report.extended) { p { (sentence) } }
+                    @if let Some(sentence) = text::in_fixed_point(&report.extended, scales) { p { (sentence) } }
                     h2 { "Improvement on each held-out segment" }
                     (tables::folds(diagnosis))
                 } @else {

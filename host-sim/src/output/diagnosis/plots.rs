@@ -6,6 +6,7 @@ use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned};
 use identify::answer;
+use identify::dimension::Dimension;
 use identify::record::data::Data;
 use identify::verdict::diagnosis::Diagnosis;
 
@@ -20,20 +21,47 @@ const BEYOND: f64 = 0.015;
 /// Readings compared with both simulations.
 pub fn readings(diagnosis: &Diagnosis) -> String {
     let Diagnosis { data, baseline, extended, .. } = diagnosis;
-    let mut plots: Vec<Plot> = vec![
-        line(command(data), COMMAND, "commanded").with_dashed().into(),
+    let mut plots: Vec<Plot> = Vec::new();
+    if in_volts(data) {
+        plots.push(line(command(data), COMMAND, "commanded").with_dashed().into());
+    }
+    plots.extend([
         by_row(data, |row| data.reading[row], READ, READING, "reading"),
         by_row(data, |row| data.reading[row] - baseline.residual[row], SIMULATED, BEFORE, "simulation"),
-    ];
+    ]);
     if is_extended(diagnosis) {
         plots.push(by_row(data, |row| data.reading[row] - extended.residual[row], SIMULATED, AFTER, "extended"));
     }
-    over_time(data, plots, "Readings and simulations", "voltage, scaled stiffness [V]")
+    over_time(data, plots, "Readings and simulations", &readings_label(data))
+}
+
+/// True if readings have the unit of the voltage, so that both can be drawn in one plot.
+fn in_volts(data: &Data) -> bool {
+    data.scales().unit(Dimension::Reading) == data.scales().unit(Dimension::Voltage)
+}
+
+fn readings_label(data: &Data) -> String {
+    let unit = data.scales().unit(Dimension::Reading);
+    if in_volts(data) { format!("voltage, scaled stiffness [{unit}]") } else { format!("reading [{unit}]") }
+}
+
+fn difference_label(data: &Data) -> String {
+    format!("reading less simulation [{}]", data.scales().unit(Dimension::Reading))
+}
+
+/// Size of the unit of time that is shown, in s.
+fn time_unit(data: &Data) -> f64 {
+    data.scales().units.time.si
+}
+
+/// Size of the unit of voltage that is shown, in V.
+fn voltage_unit(data: &Data) -> f64 {
+    data.scales().units.voltage.si
 }
 
 /// A value of each row over time, as a line or as points of the given radius.
 fn by_row(data: &Data, value: impl Fn(usize) -> f64, radius: f64, colour: &str, name: &str) -> Plot {
-    let values = (0..data.rows()).map(|row| (data.time_s[row], value(row))).collect();
+    let values = (0..data.rows()).map(|row| (data.time_s[row] / time_unit(data), value(row))).collect();
     if data.rows() > POINTS {
         line(thinned(values), colour, name).into()
     } else {
@@ -43,9 +71,11 @@ fn by_row(data: &Data, value: impl Fn(usize) -> f64, radius: f64, colour: &str, 
 
 /// The commanded voltage, also between the rows; plateaus are reduced to their ends.
 pub(super) fn command(data: &Data) -> Vec<(f64, f64)> {
+    let [time_unit, voltage_unit] = [time_unit(data), voltage_unit(data)];
     let mut time = data.time_s[0];
     let mut corners: Vec<(f64, f64)> = Vec::new();
-    let mut add = |corner: (f64, f64)| {
+    let mut add = |(time, voltage): (f64, f64)| {
+        let corner = (time / time_unit, voltage / voltage_unit);
         if let [.., before, last] = corners.as_mut_slice()
             && before.1 == corner.1
             && last.1 == corner.1
@@ -69,12 +99,7 @@ pub fn residual(diagnosis: &Diagnosis) -> String {
     let data = &diagnosis.data;
     let of =
         |(residual, colour, name): (&[f64], &str, &str)| by_row(data, |row| residual[row], SIMULATED, colour, name);
-    over_time(
-        data,
-        residuals(diagnosis).into_iter().map(of).collect(),
-        "Residual over time",
-        "reading less simulation [V]",
-    )
+    over_time(data, residuals(diagnosis).into_iter().map(of).collect(), "Residual over time", &difference_label(data))
 }
 
 /// Residuals of both simulations over the commanded voltage.
@@ -84,11 +109,14 @@ pub fn residual_by_voltage(diagnosis: &Diagnosis) -> String {
     for (residual, colour, name) in residuals(diagnosis) {
         // Thinned along the rows, so that each stretch of the record keeps its extremes.
         let rows = thinned(residual.iter().enumerate().map(|(row, &left)| (row as f64, left)).collect());
-        let left = rows.into_iter().map(|(row, left)| (data.voltage_v[row as usize], left)).collect();
+        let left =
+            rows.into_iter().map(|(row, left)| (data.voltage_v[row as usize] / voltage_unit(data), left)).collect();
         plots.push(points(left, colour, name).with_size(2.5).with_marker_opacity(0.6).into());
     }
-    let axes = Axes { title: "Residual against voltage", x: "commanded voltage [V]", y: "reading less simulation [V]" };
+    let x = format!("commanded voltage [{}]", data.scales().unit(Dimension::Voltage));
+    let axes = Axes { title: "Residual against voltage", x: &x, y: &difference_label(data) };
     let (low, high) = data.voltage_v.iter().fold((f64::MAX, f64::MIN), |(low, high), &v| (low.min(v), high.max(v)));
+    let [low, high] = [low, high].map(|voltage| voltage / voltage_unit(data));
     let layout = beyond(draw::layout(&plots, axes), low, high);
     render_to_svg(plots, layout)
 }
@@ -105,8 +133,9 @@ pub fn input_correlation(report: &answer::Report) -> String {
 
 /// Plots over the time of a record.
 fn over_time(data: &Data, plots: Vec<Plot>, title: &str, y: &str) -> String {
-    let layout = draw::layout(&plots, Axes { title, x: "time [s]", y });
-    let (first, last) = (data.time_s[0], data.time_s[data.rows() - 1]);
+    let x = format!("time [{}]", data.scales().unit(Dimension::Time));
+    let layout = draw::layout(&plots, Axes { title, x: &x, y });
+    let [first, last] = [0, data.rows() - 1].map(|row| data.time_s[row] / time_unit(data));
     let layout = if data.rows() > POINTS {
         layout.with_x_axis_min(first).with_x_axis_max(last)
     } else {

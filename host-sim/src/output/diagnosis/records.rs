@@ -3,12 +3,13 @@
 use std::fmt::Write;
 
 use identify::answer::{Finding, RecordReport};
+use identify::record::scales::Scales;
 use maud::{Markup, html};
 
 use crate::output::diagnosis::tables::{interval, number};
 
 /// The table for the terminal; empty for a single record.
-pub(super) fn text(records: &[RecordReport]) -> String {
+pub(super) fn text(records: &[RecordReport], scales: &Scales) -> String {
     let mut text = String::new();
     if records.is_empty() {
         return text;
@@ -22,14 +23,14 @@ pub(super) fn text(records: &[RecordReport]) -> String {
     for of in records {
         let numbers = [of.offset, of.sigma, of.rmse].map(number);
         let [offset, sigma, rmse] = &numbers;
-        let only = only(of).join("; ");
+        let only = only(of, scales).join("; ");
         let _ = writeln!(text, "{:width$} {:>7} {offset:>12} {sigma:>10} {rmse:>10}   {only}", of.name, of.rows);
     }
     text
 }
 
 /// The section of the page; empty for a single record.
-pub(super) fn section(records: &[RecordReport]) -> Markup {
+pub(super) fn section(records: &[RecordReport], scales: &Scales) -> Markup {
     html! {
         @if !records.is_empty() {
             h2 { "Each record" }
@@ -47,7 +48,7 @@ pub(super) fn section(records: &[RecordReport]) -> Markup {
                         tr {
                             td { (of.name) } td.number { (of.rows) }
                             @for value in [of.offset, of.sigma, of.rmse] { td.number { (number(value)) } }
-                            td { ul.parameters { @for fault in only(of) { li { (fault) } } } }
+                            td { ul.parameters { @for fault in only(of, scales) { li { (fault) } } } }
                         }
                     }
                 }
@@ -57,9 +58,10 @@ pub(super) fn section(records: &[RecordReport]) -> Markup {
 }
 
 /// The findings of one record, each as `cause (parameters)`, and structure that no cause explains; `none` without any.
-fn only(of: &RecordReport) -> Vec<String> {
+fn only(of: &RecordReport, scales: &Scales) -> Vec<String> {
     let parameters = |finding: &Finding| {
-        let each = finding.parameters.iter().map(|(name, parameter)| format!("{name} = {}", interval(parameter)));
+        let each =
+            finding.parameters.iter().map(|(name, parameter)| format!("{name} = {}", interval(parameter, scales)));
         each.collect::<Vec<_>>().join(", ")
     };
     let faults = of.findings.iter().map(|finding| format!("{} ({})", finding.cause, parameters(finding)));
@@ -72,10 +74,18 @@ mod tests {
     use super::*;
     use identify::Verdict;
     use identify::answer::Parameter;
+    use identify::dimension::Dimension;
 
     #[test]
     fn a_fault_is_listed_with_its_record() {
-        let limit = Parameter { value: 380.0, low: 379.9, high: 380.1, unit: "V" };
+        let limit = Parameter {
+            value: 380.0,
+            low: 379.9,
+            high: 380.1,
+            unit: "V".into(),
+            dimension: Dimension::Reading,
+            at_bound: false,
+        };
         let finding = Finding {
             cause: "sensor-saturation",
             probability: 1.0,
@@ -94,11 +104,12 @@ mod tests {
             findings,
             leftover: None,
         };
-        let text = text(&[of("a.csv", Vec::new()), of("second.csv", vec![finding])]);
+        let scales = Scales::default();
+        let text = text(&[of("a.csv", Vec::new()), of("second.csv", vec![finding])], &scales);
         let lines: Vec<&str> = text.lines().skip(1).collect();
         assert_eq!(lines[0], "record        rows  zero offset      noise       RMSE   in this record only");
         assert_eq!(lines[1], "a.csv          500       -8.000     0.5000     0.5000   none");
         assert!(lines[2].ends_with("   sensor-saturation (limit = 380.0 [379.9, 380.1] V)"), "{text}");
-        assert!(section(&[]).into_string().is_empty());
+        assert!(section(&[], &scales).into_string().is_empty());
     }
 }

@@ -3,13 +3,18 @@
 use maud::{Markup, html};
 
 use crate::output::diagnosis::extension::is_extended;
+use crate::output::diagnosis::number::significant;
+use crate::output::diagnosis::text::shown_name;
 use identify::answer::{Finding, Parameter};
+use identify::dimension::Dimension;
+use identify::record::scales::Scales;
 use identify::stats::scale::root_mean_square;
 use identify::verdict::diagnosis::Diagnosis;
 use identify::verdict::ranking::RankedCauses as Standing;
 
 /// Each cause with its parameters.
-pub(super) fn findings(findings: &[Finding]) -> Markup {
+pub(super) fn findings(findings: &[Finding], scales: &Scales) -> Markup {
+    let unit = scales.unit(Dimension::ReadingSize);
     if findings.is_empty() {
         return html! { p { "No cause was found." } };
     }
@@ -17,7 +22,7 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
         div.scroll { table {
             thead { tr {
                 th { "cause" } th.number { "probability" } th { "parameters with 95 % intervals" }
-                th.number { "RMSE without [V]" } th.number { "with [V]" }
+                th.number { "RMSE without [" (unit) "]" } th.number { "with [" (unit) "]" }
             } }
             tbody {
                 @for finding in findings {
@@ -25,7 +30,9 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
                         td.cause { (finding.cause) }
                         td.number { (format!("{:.3}", finding.probability)) }
                         td { ul.parameters {
-                            @for (name, parameter) in &finding.parameters { li { (name) " = " (interval(parameter)) } }
+                            @for (name, parameter) in &finding.parameters { li {
+                                (shown_name(name, parameter.dimension, scales)) " = " (interval(parameter, scales))
+                            } }
                         } }
                         td.number { (number(finding.rmse_before)) }
                         td.number { (number(finding.rmse_after)) }
@@ -40,6 +47,7 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
 /// The best sets of causes, each with its distance from the best and the cause that it lacks.
 pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
     let standings = &diagnosis.ranking;
+    let unit = diagnosis.data.scales().unit(Dimension::ReadingSize);
     let Some(best) = standings.first() else {
         return html! { p { "No causes were compared: the record has too little excitation." } };
     };
@@ -54,8 +62,8 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
         }
         div.scroll { table {
             thead { tr {
-                th { "causes" } th.number { "behind [nats]" } th { "" } th.number { "RMSE [V]" }
-                th.number { "held-out RMSE [V]" } th { "" }
+                th { "causes" } th.number { "behind [nats]" } th { "" } th.number { "RMSE [" (unit) "]" }
+                th.number { "held-out RMSE [" (unit) "]" } th { "" }
             } }
             tbody {
                 @for (place, standing) in standings.iter().enumerate() {
@@ -104,11 +112,13 @@ pub(super) fn quality(diagnosis: &Diagnosis) -> Markup {
     // Readings that are all equal have no spread to compare errors with.
     let spread = diagnosis.data.reading.windows(2).any(|pair| pair[0] != pair[1]);
     let of_spread = |percent| if spread { number(percent) } else { "-".to_owned() };
+    let unit = diagnosis.data.scales().unit(Dimension::ReadingSize);
+    let error = |of: &str| format!("{of} RMSE [{unit}]");
     let rows = [
-        ("free-run RMSE [V]", number(before.rmse), number(after.rmse)),
-        ("held-out RMSE [V]", number(before.held_out_rmse), number(after.held_out_rmse)),
-        ("one-step RMSE [V]", number(before.one_step_rmse), number(after.one_step_rmse)),
-        ("fit [%]", of_spread(before.fit_percent), of_spread(after.fit_percent)),
+        (error("free-run"), number(before.rmse), number(after.rmse)),
+        (error("held-out"), number(before.held_out_rmse), number(after.held_out_rmse)),
+        (error("one-step"), number(before.one_step_rmse), number(after.one_step_rmse)),
+        ("fit [%]".to_owned(), of_spread(before.fit_percent), of_spread(after.fit_percent)),
     ];
     html! {
         div.scroll { table {
@@ -139,10 +149,11 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
         .collect();
     let largest = rows.iter().map(|row| row.2.max(row.3)).fold(1e-12, f64::max);
     let width = |rmse: f64| format!("width:{:.1}%", 100.0 * rmse / largest);
+    let unit = data.scales().unit(Dimension::ReadingSize);
     html! {
         div.scroll { table {
             thead { tr {
-                th.number { "fold" } th.number { "rows" } th.number.before { "simulation [V]" } th.number.after { "extended [V]" } th { "" }
+                th.number { "fold" } th.number { "rows" } th.number.before { "simulation [" (unit) "]" } th.number.after { "extended [" (unit) "]" } th { "" }
                 th.number { "improvement [%]" }
             } }
             tbody {
@@ -166,7 +177,8 @@ fn gain(before: f64, after: f64) -> String {
 
 /// The noise model.
 pub(super) fn noise(diagnosis: &Diagnosis) -> Markup {
-    let noise = &diagnosis.report.noise;
+    let (noise, scales) = (&diagnosis.report.noise, diagnosis.data.scales());
+    let unit = scales.unit(Dimension::ReadingSize);
     let tail = match noise.tail {
         Some(freedom) => format!("Student's t distribution with {} degrees of freedom", number(freedom)),
         None => "normal distribution".to_owned(),
@@ -177,48 +189,26 @@ pub(super) fn noise(diagnosis: &Diagnosis) -> Markup {
         rows => format!("autocorrelated over {rows} rows"),
     };
     let wide = diagnosis.extended.noise.outliers.map(|(fraction, wide)| {
-        format!(" {} % of the readings are outliers with a scale of {} V.", number(100.0 * fraction), number(wide))
+        let wide = scales.restored(Dimension::ReadingSize, wide);
+        format!(" {} % of the readings are outliers with a scale of {} {unit}.", number(100.0 * fraction), number(wide))
     });
-    html! { p { "Scale " (number(noise.sigma)) " V, " (tail) ", " (autocorrelation) "." (wide.unwrap_or_default()) } }
+    html! { p { "Scale " (number(noise.sigma)) " " (unit) ", " (tail) ", " (autocorrelation) "." (wide.unwrap_or_default()) } }
 }
 
 /// Formats a parameter with its interval and unit.
-pub(super) fn interval(Parameter { value, low, high, unit }: &Parameter) -> String {
-    format!("{} [{}, {}] {unit}", number(*value), number(*low), number(*high)).trim_end().to_owned()
+pub(super) fn interval(&Parameter { value, low, high, dimension, .. }: &Parameter, scales: &Scales) -> String {
+    let shown = |value: f64| number(value / dimension.size_of_shown_unit(&scales.units));
+    format!("{} [{}, {}] {}", shown(value), shown(low), shown(high), scales.unit(dimension)).trim_end().to_owned()
 }
 
 /// Formats a number with four significant digits.
 pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    if !(1e-4..1e7).contains(&size) {
-        return format!("{value:.3e}");
-    }
-    let decimals = (3 - size.log10().floor() as i32).clamp(0, 7) as usize;
-    format!("{value:.decimals$}")
+    significant(value, 4)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_have_four_digits_at_any_size() {
-        for (value, text) in [
-            (0.0, "0"),
-            (0.000_404_2, "0.0004042"),
-            (1.0, "1.000"),
-            (-47.921_3, "-47.92"),
-            (499.96, "500.0"),
-            (12_345.6, "12346"),
-            (1.3e-9, "1.300e-9"),
-            (f64::INFINITY, "inf"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-    }
 
     #[test]
     fn a_fold_without_error_has_no_improvement() {

@@ -2,75 +2,85 @@
 
 use std::fmt::Write;
 
-use crate::output::diagnosis::records;
-use identify::answer::{self, Extended, Finding, Margins, Quality, Verdict};
+use identify::answer::{self, Extended, Finding, Margins, Nominal, Quality, Verdict};
+use identify::dimension::Dimension;
 use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
+use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
+
+use crate::output::diagnosis::number::significant;
+use crate::output::diagnosis::records;
 
 /// Smallest held-out improvement that is reported as one.
 const SMALLEST_IMPROVEMENT: f64 = 0.005;
 
 /// The text for the terminal.
-pub fn text(name: &str, report: &answer::Report) -> String {
+pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
     let mut text = String::new();
-    for sentence in sentences(name, report) {
+    let _ = writeln!(text, "{}", nominal(&report.nominal, scales));
+    for sentence in sentences(name, report, scales) {
         let _ = writeln!(text, "{sentence}");
     }
     if !report.findings.is_empty() {
         let _ = writeln!(text, "\n{:34} {:>11}   parameters with 95 % intervals", "cause", "probability");
         for finding in &report.findings {
-            row(&mut text, finding);
+            row(&mut text, finding, scales);
         }
     }
-    text += &records::text(&report.records);
+    text += &records::text(&report.records, scales);
     let (before, after) = (&report.baseline, &report.extended.quality);
     let extends = !report.findings.is_empty() || !report.take_out.is_empty();
     let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
+    let error = |of: &str| format!("{of} RMSE [{}]", scales.unit(Dimension::ReadingSize));
     for (what, before, after) in [
-        ("free-run RMSE [V]", before.rmse, after.rmse),
-        ("held-out RMSE [V]", before.held_out_rmse, after.held_out_rmse),
-        ("one-step RMSE [V]", before.one_step_rmse, after.one_step_rmse),
-        ("fit [%]", before.fit_percent, after.fit_percent),
+        (error("free-run"), before.rmse, after.rmse),
+        (error("held-out"), before.held_out_rmse, after.held_out_rmse),
+        (error("one-step"), before.one_step_rmse, after.one_step_rmse),
+        ("fit [%]".to_owned(), before.fit_percent, after.fit_percent),
     ] {
-        let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".into() };
+        let dimension = if what == "fit [%]" { Dimension::Ratio } else { Dimension::ReadingSize };
+        let number = |value: f64| if value.is_finite() { scales.number(dimension, value, 3) } else { "-".into() };
         let after = if extends { format!(" {:>12}", number(after)) } else { String::new() };
         let _ = writeln!(text, "{what:22} {:>12}{after}", number(before));
     }
-    if extends && let Some(sentence) = in_fixed_point(&report.extended) {
+    if extends && let Some(sentence) = in_fixed_point(&report.extended, scales) {
         let _ = writeln!(text, "{sentence}");
     }
     text
 }
 
 /// States whether the fixed-point tick simulates the extended spring; `None` if that was not tested.
-pub fn in_fixed_point(extended: &Extended) -> Option<String> {
+pub fn in_fixed_point(extended: &Extended, scales: &Scales) -> Option<String> {
     if let Some(why) = &extended.tick_refuses {
         return Some(format!("The fixed-point tick can NOT simulate the extended spring: {why}."));
     }
     let error_v = extended.fixed_point_error_v?;
-    Some(if error_v <= SMALL_ERROR_V {
-        format!("The fixed-point tick simulates the extended spring within {error_v:.3} V of the fit.")
+    let error = scales.with_unit(Dimension::Voltage, error_v, 3);
+    let small_v = scales.restored(Dimension::Voltage, SMALL_ERROR_V);
+    Some(if error_v <= small_v {
+        format!("The fixed-point tick simulates the extended spring within {error} of the fit.")
     } else {
         format!(
             "The written extended spring is NOT the fitted one: in the fixed-point tick it differs by up to \
-             {error_v:.3} V, more than {SMALL_ERROR_V} V."
+             {error}, more than {}.",
+            scales.with_unit(Dimension::Voltage, small_v, 0)
         )
     })
 }
 
 /// States which parts of the plant file this spring does not have; `None` if it has all of them.
-fn parts_to_take_out(report: &answer::Report) -> Option<String> {
+fn parts_to_take_out(report: &answer::Report, scales: &Scales) -> Option<String> {
     let parts = &report.take_out;
     let (are, them) = if parts.len() == 1 { ("is", "it") } else { ("are", "them") };
     let (before, after) = (&report.baseline, &report.extended.quality);
     (!parts.is_empty()).then(|| {
         format!(
             "The plant file's {} {are} not in this spring: take {them} out. The held-out error decreases \
-             from {:.3} to {:.3} V without {them}{}.",
+             from {} to {} without {them}{}.",
             parts.join(" and "),
-            before.held_out_rmse,
-            after.held_out_rmse,
+            scales.number(Dimension::ReadingSize, before.held_out_rmse, 3),
+            scales.with_unit(Dimension::ReadingSize, after.held_out_rmse, 3),
             if report.findings.is_empty() { "" } else { " and with the causes below" }
         )
     })
@@ -87,8 +97,39 @@ fn off_by(part: f64) -> String {
     }
 }
 
+/// States which nominal spring is judged.
+pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
+    let taus: Vec<String> = nominal.tau_s.iter().map(|&tau_s| four_digits(Dimension::Time, tau_s, scales)).collect();
+    let reading = match (nominal.gain, nominal.zero) {
+        (1.0, 0.0) => String::new(),
+        (gain, zero) => {
+            let per = scales.units.voltage.si;
+            let unit = format!("{}/{}", scales.unit(Dimension::Reading), scales.unit(Dimension::Voltage));
+            format!(
+                ", gain {} {unit}, zero {}",
+                significant(gain * per, 4),
+                four_digits(Dimension::Reading, zero, scales)
+            )
+        }
+    };
+    format!(
+        "Nominal spring: {}, time constant {}, instantaneous part {}{reading}.",
+        nominal.plant,
+        taus.join(" and "),
+        significant(nominal.share, 3)
+    )
+}
+
+/// A number of the file in the user's unit with four significant digits.
+fn four_digits(dimension: Dimension, restored: f64, scales: &Scales) -> String {
+    let shown = restored / dimension.size_of_shown_unit(&scales.units);
+    format!("{} {}", significant(shown, 4), scales.unit(dimension)).trim_end().to_owned()
+}
+
 /// The findings, the held-out improvement, and the next experiment, one sentence each.
-pub fn sentences(name: &str, report: &answer::Report) -> Vec<String> {
+pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<String> {
+    let error = |value| scales.number(Dimension::ReadingSize, value, 3);
+    let unit = scales.unit(Dimension::ReadingSize);
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
     let in_readings = effects.clone().all(|effect| effect.location() == Location::Reading);
     let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.description())).collect();
@@ -96,7 +137,7 @@ pub fn sentences(name: &str, report: &answer::Report) -> Vec<String> {
         format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
     });
     let (one, rows) = (causes.len() == 1, report.rows);
-    let mut sentences: Vec<String> = parts_to_take_out(report).into_iter().collect();
+    let mut sentences: Vec<String> = parts_to_take_out(report, scales).into_iter().collect();
     sentences.push(match report.verdict {
         Verdict::Explained if causes.is_empty() => {
             format!("Without that, the simulation agrees with {name} within the noise of {rows} readings.")
@@ -138,19 +179,20 @@ pub fn sentences(name: &str, report: &answer::Report) -> Vec<String> {
         let (before, after) = (&report.baseline, &report.extended.quality);
         sentences.push(if report.extended.gain > SMALLEST_IMPROVEMENT {
             format!(
-                "With {it} in the model, the held-out error decreases from {:.3} to {:.3} V, by {:.1} %.",
-                before.held_out_rmse,
-                after.held_out_rmse,
+                "With {it} in the model, the held-out error decreases from {} to {} {unit}, by {:.1} %.",
+                error(before.held_out_rmse),
+                error(after.held_out_rmse),
                 100.0 * report.extended.gain
             )
         } else if after.rmse > (1.0 - SMALLEST_IMPROVEMENT) * before.rmse {
             let whose = if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is noise of the readings" };
-            format!("With {it} in the model, the error stays at {:.3} V{whose}.", after.rmse)
+            format!("With {it} in the model, the error stays at {} {unit}{whose}.", error(after.rmse))
         } else {
             format!(
-                "With {it} in the model, the error decreases from {:.3} to {:.3} V, but the held-out error does not: the \
+                "With {it} in the model, the error decreases from {} to {} {unit}, but the held-out error does not: the \
                  other parts of the record do not predict it.",
-                before.rmse, after.rmse
+                error(before.rmse),
+                error(after.rmse)
             )
         });
     }
@@ -162,8 +204,10 @@ pub fn sentences(name: &str, report: &answer::Report) -> Vec<String> {
     if report.verdict == Verdict::Consistent && report.next_experiment.is_some() {
         let Quality { rmse, one_step_rmse, .. } = report.extended.quality;
         sentences.push(format!(
-            "The noise is autocorrelated: {rmse:.3} V in free run, {one_step_rmse:.3} V in one step. A slow effect of the spring \
-             could be mistaken for it."
+            "The noise is autocorrelated: {} {unit} in free run, {} {unit} in one step. A slow effect of the spring \
+             could be mistaken for it.",
+            error(rmse),
+            error(one_step_rmse)
         ));
     }
     if let Some(leftover) = &report.leftover {
@@ -176,16 +220,26 @@ pub fn sentences(name: &str, report: &answer::Report) -> Vec<String> {
     sentences
 }
 
-fn row(text: &mut String, finding: &Finding) {
+fn row(text: &mut String, finding: &Finding, scales: &Scales) {
     let parameters: Vec<String> = finding
         .parameters
         .iter()
         .map(|(name, it)| {
-            format!("{name} = {:.4} [{:.4}, {:.4}] {}", it.value, it.low, it.high, it.unit).trim().to_owned()
+            let number = |value| scales.number(it.dimension, value, 4);
+            let (name, unit) = (shown_name(name, it.dimension, scales), scales.unit(it.dimension));
+            format!("{name} = {} [{}, {}] {unit}", number(it.value), number(it.low), number(it.high)).trim().to_owned()
         })
         .collect();
     let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
     let _ = writeln!(text, "  {}", finding.evidence);
+}
+
+/// Name of a parameter without the suffix for its unit where the user's unit is another.
+pub(super) fn shown_name<'n>(name: &'n str, dimension: Dimension, scales: &Scales) -> &'n str {
+    if dimension.size_of_shown_unit(&scales.units) == 1.0 {
+        return name;
+    }
+    ["_v_per_s", "_s", "_v", "_hz"].into_iter().find_map(|suffix| name.strip_suffix(suffix)).unwrap_or(name)
 }
 
 #[cfg(test)]
@@ -208,6 +262,7 @@ mod tests {
             schema: SCHEMA,
             rows: 600,
             verdict,
+            nominal: Nominal::default(),
             baseline: quality,
             findings: causes.iter().map(finding).collect(),
             take_out: Vec::new(),
@@ -220,7 +275,7 @@ mod tests {
             residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
             records: Vec::new(),
         };
-        sentences("r.csv", &report)[..2].join(" ")
+        sentences("r.csv", &report, &Scales::default())[..2].join(" ")
     }
 
     #[test]

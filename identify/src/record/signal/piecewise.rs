@@ -144,6 +144,36 @@ impl Signal {
         slewed
     }
 
+    /// Returns the magnitude of the signal; a piece that crosses zero becomes two.
+    pub fn magnitude(&self) -> Self {
+        let mut magnitude = self.emptied();
+        magnitude.before = self.before.abs();
+        let mut rows = self.rows.iter().peekable();
+        for (index, &Piece { duration_s, from, to }) in self.pieces.iter().enumerate() {
+            if rows.next_if(|&&row| row as usize == index).is_some() {
+                magnitude.start_row();
+            }
+            let crossing_s = duration_s * from / (from - to);
+            if from * to < 0.0 && crossing_s > 0.0 && crossing_s < duration_s {
+                magnitude.pieces.push(Piece { duration_s: crossing_s, from: from.abs(), to: 0.0 });
+                magnitude.pieces.push(Piece { duration_s: duration_s - crossing_s, from: 0.0, to: to.abs() });
+            } else {
+                magnitude.pieces.push(Piece { duration_s, from: from.abs(), to: to.abs() });
+            }
+        }
+        magnitude
+    }
+
+    /// Returns the signal with its values multiplied by `value`, and its durations by `duration`, both positive.
+    pub fn scaled(&self, duration: f64, value: f64) -> Self {
+        let mut scaled = self.clone();
+        scaled.before *= value;
+        for piece in &mut scaled.pieces {
+            *piece = Piece { duration_s: duration * piece.duration_s, from: value * piece.from, to: value * piece.to };
+        }
+        scaled
+    }
+
     fn emptied(&self) -> Self {
         Self {
             before: self.before,
@@ -183,6 +213,20 @@ mod tests {
         assert_eq!(rows(&step().delayed(0.5)), [0.0, 0.0, 100.0, 100.0, 100.0]);
         assert_eq!(rows(&step().delayed(1.5)), [0.0, 0.0, 0.0, 100.0, 100.0]);
         assert_eq!(rows(&step().delayed(9.0)), [0.0; 5]);
+    }
+
+    #[test]
+    fn magnitude_of_a_ramp_through_zero_has_a_kink() {
+        let mut ramp = step();
+        let rises = ramp.rows[1] as usize;
+        for (part, piece) in ramp.pieces[rises..].iter_mut().enumerate() {
+            (piece.from, piece.to) = if part == 0 { (-30.0, 10.0) } else { (10.0, 10.0) };
+        }
+        let magnitude = ramp.magnitude();
+        let kink = &magnitude.pieces[rises..rises + 2];
+        assert_eq!((kink[0].from, kink[0].to, kink[1].from, kink[1].to), (30.0, 0.0, 0.0, 10.0));
+        assert!((kink[0].duration_s - 3.0 * kink[1].duration_s).abs() < 1e-12);
+        assert_eq!(rows(&magnitude), [0.0, 30.0, 10.0, 10.0, 10.0]);
     }
 
     #[test]

@@ -26,9 +26,9 @@ macro_rules! thresholds {
 
 thresholds! {
     // stats
-    /// Smallest scale of noise that is assumed: the resolution of the fixed-point tick. A noise-free record of another simulation
-    /// differs from this one by the time steps of both.
-    FINEST_V = 0.01, "V";
+    /// Smallest scale of noise that is assumed: the resolution of the fixed-point tick, 2e-5 of the reference voltage. A noise-free
+    /// record of another simulation differs from this one by the time steps of both.
+    FINEST_V = 0.01, "normalised volts (500 are the reference voltage)";
 
     // record
     /// Fewer readings before the first voltage cannot show a decay of the spring.
@@ -97,7 +97,7 @@ thresholds! {
 
     // effects
     /// Largest time constant of an amplifier's output; a larger one could not be distinguished from the spring's.
-    SLOWEST_OUTPUT_S = 1.0, "s";
+    SLOWEST_OUTPUT = 0.181_818_181_818_181_82, "reference time constants";
     /// Smallest damping ratio of a resonance; an oscillation that a polymer damps less is a periodicity of the schedule.
     LEAST_DAMPED = 0.005, "damping ratio";
     /// Largest damping ratio of a resonance; with an overshoot below a sixth, an oscillation cannot be distinguished from a lag.
@@ -111,9 +111,9 @@ thresholds! {
     /// Number of first rows from which the sensor's zero is estimated.
     ROWS_FOR_ZERO = 10.0, "rows";
     /// Smallest time constant of a charge leakage; a faster loss hardly lets the stiffness fall and looks like a gain.
-    FASTEST_LEAKAGE_S = 3.5, "s";
-    /// Smallest time constant of a second relaxation: the paper's time constant.
-    FASTEST_CREEP_S = 5.5, "s";
+    FASTEST_LEAKAGE = 0.636_363_636_363_636_4, "reference time constants";
+    /// Smallest time constant of a second relaxation: the reference time constant.
+    FASTEST_CREEP = 1.0, "reference time constants";
 
     // fit
     /// The autocorrelation is strong if it predicts so much that the errors exceed the innovations by this factor.
@@ -127,17 +127,7 @@ thresholds! {
     /// An error in step with the spring counts from this ratio of its root mean square to its scatter within the parts.
     ERROR_PER_SCATTER = 2.0, "of the scatter";
     /// If the simulation's range is larger, constant readings are a fault of the sensor and not a lack of excitation.
-    RANGE_OF_A_DEAD_SENSOR_V = 5.0, "V";
-    /// Absolute correlation with the simulation above which readings beyond any gain are readings in another unit.
-    CORRELATION_OF_OTHER_UNIT = 0.98, "correlation";
-    /// Absolute correlation with the simulation below which the readings may not depend on the voltage.
-    CORRELATION_OF_NO_SPRING = 0.2, "correlation";
-    /// Gain in log-likelihood by gain and time constant above which their covariance at the fit may be used.
-    NATS_TO_TRUST_FIT = 20.0, "nats";
-    /// Largest useful standard deviation of the gain.
-    GAIN_DEVIATION = 0.5, "of the nominal gain";
-    /// Largest useful standard deviation of the time constant's natural logarithm.
-    LOG_TIME_CONSTANT_DEVIATION = 1.0, "factors of e";
+    RANGE_OF_A_DEAD_SENSOR = 0.01, "reference voltages";
     /// Fewest rows for each feature of the residual's regression.
     ROWS_PER_FEATURE = 10.0, "rows";
     /// Whitened residuals are clipped here before their spectrum is taken.

@@ -1,0 +1,113 @@
+//! Physical dimensions of reported numbers, and their units.
+
+use simulation::units::Units;
+
+/// Dimension of a number in a report, which decides its unit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Dimension {
+    /// A dimensionless number.
+    #[default]
+    Ratio,
+    /// A duration.
+    Time,
+    /// A time on the record's own clock.
+    TimePoint,
+    /// Periods per time.
+    Frequency,
+    /// A relative change per time.
+    Rate,
+    /// A voltage in front of the spring.
+    Voltage,
+    /// A change of voltage per time.
+    VoltageRate,
+    /// The reading of a settled stiffness, which the model holds as the equivalent static voltage.
+    Stiffness,
+    /// A reading.
+    Reading,
+    /// A difference of two readings.
+    ReadingDifference,
+    /// The size of a difference of readings, not negative: an amplitude, a step, a root mean square.
+    ReadingSize,
+}
+
+impl Dimension {
+    /// Returns the unit in which reports and files hold a number: s, Hz, V, or the reading's own; "" for a ratio.
+    pub fn unit(self, units: &Units) -> String {
+        match self {
+            Self::Ratio => String::new(),
+            Self::Time | Self::TimePoint => "s".into(),
+            Self::Frequency => "Hz".into(),
+            Self::Rate => "1/s".into(),
+            Self::Voltage => "V".into(),
+            Self::VoltageRate => "V/s".into(),
+            Self::Stiffness | Self::Reading | Self::ReadingDifference | Self::ReadingSize => units.reading.clone(),
+        }
+    }
+
+    /// Returns the unit in which a number is shown to the user: a time in the user's unit of time, a frequency per that unit.
+    pub fn shown_unit(self, units: &Units) -> String {
+        let (time, voltage) = (&units.time.name, &units.voltage.name);
+        match self {
+            Self::Time | Self::TimePoint => time.clone(),
+            Self::Frequency => match time.as_str() {
+                "s" => "Hz".into(),
+                "ms" => "kHz".into(),
+                "us" | "µs" => "MHz".into(),
+                "ns" => "GHz".into(),
+                _ => format!("1/{time}"),
+            },
+            Self::Rate => format!("1/{time}"),
+            Self::Voltage => voltage.clone(),
+            Self::VoltageRate => format!("{voltage}/{time}"),
+            _ => self.unit(units),
+        }
+    }
+
+    /// Returns the size of [`Dimension::shown_unit`] in [`Dimension::unit`].
+    pub fn size_of_shown_unit(self, units: &Units) -> f64 {
+        let (time, voltage) = (units.time.si, units.voltage.si);
+        match self {
+            Self::Time | Self::TimePoint => time,
+            Self::Frequency | Self::Rate => 1.0 / time,
+            Self::Voltage => voltage,
+            Self::VoltageRate => voltage / time,
+            _ => 1.0,
+        }
+    }
+}
+
+/// Formats a number with `decimals` decimals where its unit has the size of the model's own, and with as many more or fewer as
+/// the size `unit` of the model's unit in the number's requires: three decimals of a volt are six of a kilovolt. From nine
+/// decimals on the number has an exponent instead.
+pub fn decimals(value: f64, decimals: usize, unit: f64) -> String {
+    let shift = -unit.abs().log10().round();
+    let wanted = decimals as f64 + if shift.is_finite() { shift } else { 0.0 };
+    match wanted {
+        ..9.0 => format!("{value:.*}", wanted.max(0.0) as usize),
+        _ => format!("{value:.decimals$e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decimals_follow_the_size_of_the_unit() {
+        assert_eq!(decimals(0.123_456, 3, 1.0), "0.123");
+        assert_eq!(decimals(0.000_123_456, 3, 1e-3), "0.000123");
+        assert_eq!(decimals(123.456, 3, 1e3), "123");
+        assert_eq!(decimals(1.234_56e-7, 3, 1e-6), "1.235e-7");
+    }
+
+    #[test]
+    fn frequencies_are_shown_per_unit_of_time() {
+        let mut units = Units::default();
+        assert_eq!(Dimension::Frequency.shown_unit(&units), "Hz");
+        units.time = simulation::units::Unit::of_time("ms").unwrap();
+        assert_eq!(Dimension::Frequency.shown_unit(&units), "kHz");
+        assert_eq!(Dimension::Frequency.size_of_shown_unit(&units), 1e3);
+        units.time = simulation::units::Unit::of_time("h").unwrap();
+        assert_eq!(Dimension::VoltageRate.shown_unit(&units), "V/h");
+    }
+}
