@@ -64,27 +64,19 @@ impl Format {
         let below_header = below_header(&mut table()?, &columns)?;
         let [time, voltage, reading] = &below_header;
         let units = self.units(&columns, &below_header)?;
-        let mut rows = Rows {
-            table: table()?,
-            columns: &columns,
-            units: &units,
-            clock: Clock::default(),
-            sort: self.sort,
-            missing: 0,
-        };
+        let mut rows =
+            Rows { table: table()?, columns: &columns, units: &units, clock: Clock::default(), sort: self.sort };
         if time.is_some() {
             rows.table.next_row()?;
             let shown = [time, voltage, reading].map(|unit| unit.as_deref().unwrap_or("-"));
             remarks.push(format!("{name}: units {} below the header", shown.join(", ")));
         }
         let mut timed = rows.read()?;
-        let (missing, has_stamps) = (rows.missing, rows.clock.has_stamps());
-        if has_stamps && let Some(unit) = &columns.time.unit {
-            bad_input!("{name}: the times are time stamps, not numbers in {unit}; expected no unit of time");
-        }
+        let has_stamps = rows.clock.has_stamps();
         if self.sort {
             timed = sorted(&name, timed, &mut remarks)?;
         }
+        let missing = timed.iter().filter(|(_, row)| row.measured.is_none()).count();
         if missing > 0 {
             remarks.push(format!("{name}: {missing} of {} rows without a reading", timed.len()));
         }
@@ -146,7 +138,6 @@ struct Rows<'a> {
     units: &'a Units,
     clock: Clock,
     sort: bool,
-    missing: usize,
 }
 
 impl Rows<'_> {
@@ -158,10 +149,19 @@ impl Rows<'_> {
         let mut rows: Vec<(Time, Row)> = Vec::new();
         while let Some(row) = self.table.next_row()? {
             let at = self.clock.read(&row, time.index)?;
+            if self.clock.has_stamps()
+                && let Some(unit) = &time.unit
+            {
+                bad_input!(
+                    "{}: `{}` is a time stamp, not a number in {unit}; expected a number, or no unit of time",
+                    row.place(time.index),
+                    row.text(time.index)
+                );
+            }
             let voltage_v = row.number_within(voltage.index, most_voltage)? * unit.si;
-            let is_missing = is_missing(row.text(reading.index));
-            self.missing += usize::from(is_missing);
-            let measured = (!is_missing).then(|| row.number_within(reading.index, MOST_READING)).transpose()?;
+            let measured = (!is_missing(row.text(reading.index)))
+                .then(|| row.number_within(reading.index, MOST_READING))
+                .transpose()?;
             if let Some((last, Row { line, .. })) = rows.last()
                 && !self.sort
                 && !at.is_after(*last)
@@ -220,9 +220,9 @@ fn sorted(name: &str, mut rows: Vec<(Time, Row)>, remarks: &mut Vec<String>) -> 
         merged.push((time, row));
     }
     for (count, what) in [
-        (disordered, "places where the time goes back, sorted"),
-        (repeated, "rows at the time of another, merged"),
-        (averaged, "times with different readings, averaged"),
+        (disordered, "row(s) earlier than the one above, sorted"),
+        (repeated, "row(s) at the time of another, merged"),
+        (averaged, "time(s) with different readings, averaged"),
     ] {
         if count > 0 {
             remarks.push(format!("{name}: {count} {what}"));

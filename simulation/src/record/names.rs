@@ -103,7 +103,7 @@ impl ColumnNames {
             return Err(self.lacks(table, name, &found).into());
         };
         if voltage.index == time.index || (reading.index == time.index && self.stiffness.is_none()) {
-            let column = excerpt(table.columns().nth(time.index).unwrap_or_default());
+            let column = excerpt(table.columns().nth(time.index).unwrap_or_default()).replace(['\n', '\r'], " ");
             bad_input!(
                 "{}, line {}: column `{column}` is the time; expected another one for --voltage and --reading",
                 table.name(),
@@ -139,7 +139,7 @@ impl ColumnNames {
         let spec = |index: usize, role: Role| {
             let name = table.columns().nth(index).unwrap_or_default();
             let unit = split_unit(name).1.filter(|unit| role.takes(unit)).map(|unit| format!(":{unit}"));
-            let spec = excerpt(name) + &unit.unwrap_or_default();
+            let spec = excerpt(name).replace(['\n', '\r'], " ") + &unit.unwrap_or_default();
             if spec.contains(|letter: char| !(letter.is_alphanumeric() || "_-:%./".contains(letter))) {
                 format!("'{spec}'")
             } else {
