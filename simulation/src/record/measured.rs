@@ -66,7 +66,7 @@ impl Format {
         let units = self.units(&columns, &below_header)?;
         let mut rows =
             Rows { table: table()?, columns: &columns, units: &units, clock: Clock::default(), sort: self.sort };
-        if time.is_some() {
+        if below_header.iter().any(Option::is_some) {
             rows.table.next_row()?;
             let shown = [time, voltage, reading].map(|unit| unit.as_deref().unwrap_or("-"));
             remarks.push(format!("{name}: units {} below the header", shown.join(", ")));
@@ -122,7 +122,11 @@ fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<Stri
         let unit = row.text(column.index).trim_matches(BRACKETS);
         (!unit.is_empty() && !row.is_number(column.index) && !is_missing(unit)).then(|| unit.to_owned())
     });
-    let is_of_units = units[0].as_deref().is_some_and(|unit| Unit::of_time(unit).is_ok());
+    // A column of time stamps has no unit.
+    let is_of_units = match &units[0] {
+        Some(unit) => Unit::of_time(unit).is_ok(),
+        None => row.text(columns.time.index).is_empty() && units[1].is_some(),
+    };
     Ok(if is_of_units { units } else { [None, None, None] })
 }
 
