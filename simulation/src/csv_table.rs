@@ -94,6 +94,11 @@ impl<'a> Table<'a> {
         self.header.iter()
     }
 
+    /// Name of the column with an index; empty if there is none.
+    pub fn column(&self, index: usize) -> &str {
+        self.header.get(index).unwrap_or_default()
+    }
+
     /// Index of a column, `None` if the table does not have it. Without a column of exactly this name, the only one that has
     /// it apart from case, blanks and quotes.
     pub fn find(&self, column: &str) -> Option<usize> {

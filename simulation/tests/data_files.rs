@@ -311,6 +311,9 @@ fn sorting_mends_order_and_repetitions_but_not_two_voltages() {
             "r.csv: 1 time(s) with different readings, averaged",
         ]
     );
+    let stamps = "Time,u_V,x_mm\n2026-01-31T00:00:02,1,4\n2026-01-31T00:00:00.5,0,0\n";
+    let times: Vec<f64> = read(stamps, &sort).unwrap().record.rows.iter().map(|row| row.time_s).collect();
+    assert_eq!(times, [0.0, 1.5]);
     let error = read("t_ms,u_V,x_mm\n1,1,4\n0,0,0\n1,2,4\n", &sort).unwrap_err();
     assert_eq!(error, "r.csv, lines 2 and 4: two voltages at the same time, 1 V and 2 V; expected one");
 }
@@ -344,6 +347,15 @@ fn encodings_that_are_guessed_are_remarked_on() {
         let read = read(bytes, &Format::default()).unwrap();
         assert_eq!((read.remarks, &*read.units.reading), (remarks.into_iter().map(str::to_owned).collect(), "\u{b0}C"));
     }
+}
+
+#[test]
+fn a_column_without_unit_is_remarked_on_unless_it_holds_time_stamps() {
+    let remarks = |text: &str| read(text, &Format::default()).unwrap().remarks;
+    let plain = remarks("Time,U,x_mm\n0,0,1\n1,0,1\n");
+    assert_eq!(plain, ["r.csv: column `Time` has no unit; read in s", "r.csv: column `U` has no unit; read in V"]);
+    assert!(remarks("time_s,applied_v,stiffness\n0,0,1\n1,0,1\n").is_empty());
+    assert!(remarks("Time,U,stiffness\ns,kV,mm\n0,0,1\n1,0,1\n").len() == 1, "the units are below the header");
 }
 
 #[test]

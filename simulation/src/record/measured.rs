@@ -8,7 +8,7 @@ use super::names::{Column, ColumnNames, Columns};
 use super::times::{Clock, Time};
 use super::{MOST_READING, MOST_V, Record, Row};
 use crate::bad_input;
-use crate::bad_input::{BadInput, number};
+use crate::bad_input::{BadInput, excerpt, number};
 use crate::csv_table::Table;
 use crate::csv_table::dialect::Dialect;
 use crate::csv_table::text::Source;
@@ -73,6 +73,15 @@ impl Format {
         }
         let mut timed = rows.read()?;
         let has_stamps = rows.clock.has_stamps();
+        for (column, below, unit, is_known) in [
+            (&columns.time, time, &units.time.name, has_stamps),
+            (&columns.voltage, voltage, &units.voltage.name, false),
+        ] {
+            if column.unit.is_none() && below.is_none() && !is_known {
+                let column = excerpt(rows.table.column(column.index));
+                remarks.push(format!("{name}: column `{column}` has no unit; read in {unit}"));
+            }
+        }
         if self.sort {
             timed = sorted(&name, timed, &mut remarks)?;
         }
@@ -84,9 +93,11 @@ impl Format {
         if from_first {
             remarks.push(format!("{name}: times are counted from the first row"));
         }
-        let time_of = |time: Time| if from_first { time.since_first } else { time.value };
+        // Sorted, the earliest row is the first one.
+        let first = timed.first().map_or(0.0, |(time, _)| time.since_first);
+        let time_of = |time: Time| if from_first { time.since_first - first } else { time.value };
         let rows = timed.into_iter().map(|(time, row)| Row { time_s: time_of(time) * units.time.si, ..row });
-        let column = rows_column(&table()?, &columns.reading);
+        let column = table()?.column(columns.reading.index).to_owned();
         let record = Record { name, rows: rows.collect() };
         Ok(MeasuredRecord { record, units, column, remarks })
     }
@@ -104,14 +115,13 @@ impl Format {
             None => default.time,
         };
         let voltage = of(&columns.voltage, 1).map_or(default.voltage, |unit| Unit::of_voltage(&unit));
-        let is_stiffness = self.columns.reading.is_none() && columns.reading.unit.is_none();
-        let without = if is_stiffness { default.reading } else { NO_UNIT.to_owned() };
-        Ok(Units { time, voltage, reading: of(&columns.reading, 2).unwrap_or(without) })
+        let without = if self.columns.reading.is_none() { default.reading.clone() } else { NO_UNIT.to_owned() };
+        let reading = match self.columns.stiffness {
+            Some(_) => default.reading,
+            None => of(&columns.reading, 2).unwrap_or(without),
+        };
+        Ok(Units { time, voltage, reading })
     }
-}
-
-fn rows_column(table: &Table<'_>, column: &Column) -> String {
-    table.columns().nth(column.index).unwrap_or_default().to_owned()
 }
 
 /// The units of time, voltage and reading in the first row below the header, if it is a row of units.
@@ -125,7 +135,10 @@ fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<Stri
     // A column of time stamps has no unit.
     let is_of_units = match &units[0] {
         Some(unit) => Unit::of_time(unit).is_ok(),
-        None => row.text(columns.time.index).is_empty() && units[1].is_some(),
+        None => {
+            let [time, reading] = [&columns.time, &columns.reading].map(|column| column.index);
+            row.text(time).is_empty() && units[1].is_some() && !row.is_number(reading)
+        }
     };
     Ok(if is_of_units { units } else { [None, None, None] })
 }
