@@ -105,7 +105,7 @@ mod tests {
         for (line, missing) in [
             ("vsj link", "'vsj link' requires a subcommand but one was not provided [subcommands: status,"),
             ("vsj link", "; Usage: vsj link [OPTIONS] <PORT> <COMMAND>"),
-            ("vsj diagnose", "not provided: <DATA.csv>; see `--help`"),
+            ("vsj diagnose", "not provided: <DATA.csv>...; see `--help`"),
         ] {
             let said = one_line(&Cli::try_parse_from(line.split(' ')).err().expect("something is missing"));
             assert!(said.contains(missing) && !said.contains('\n'), "{line}: {said}");

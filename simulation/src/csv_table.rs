@@ -71,8 +71,9 @@ impl<'a> Table<'a> {
         let mut lines = Lines { text, byte: 0, line: 1 + preamble.lines };
         let mut header = reader.headers().map_err(|error| unreadable(name, &mut lines, &error))?.clone();
         let line = lines.at(header.position());
-        let empty_at_end = header.iter().rev().take_while(|column| column.is_empty()).count();
-        keep_columns(&mut header, separator, |index, count| index < (count - empty_at_end).max(1));
+        let names = header.iter().enumerate().filter(|(_, column)| !column.is_empty());
+        let last_name = names.map(|(index, _)| index).last().unwrap_or(0);
+        keep_columns(&mut header, separator, |index| index <= last_name);
         let twice =
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
         if let Some((_, column)) = header.iter().enumerate().find(twice) {
@@ -91,6 +92,11 @@ impl<'a> Table<'a> {
     /// Names of the columns, in their order.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.header.iter()
+    }
+
+    /// Name of the column with an index; empty if there is none.
+    pub fn column(&self, index: usize) -> &str {
+        self.header.get(index).unwrap_or_default()
     }
 
     /// Index of a column, `None` if the table does not have it. Without a column of exactly this name, the only one that has
@@ -123,6 +129,11 @@ impl<'a> Table<'a> {
         if self.columns().any(unclosed) {
             return BadInput(format!("{name}, line {line}: {UNCLOSED}; expected a header with {expected}"));
         }
+        if self.columns().all(|column| column.parse::<f64>().is_ok()) {
+            return BadInput(format!(
+                "{name}, line {line}: numbers instead of names; expected a header with {expected}"
+            ));
+        }
         let found = excerpt(&self.columns().collect::<Vec<_>>().join(","));
         BadInput(format!(
             "{name}, line {line}: no column `{column}`; expected a header with {expected}, found `{found}`"
@@ -142,11 +153,9 @@ impl<'a> Table<'a> {
                 Err(error) => return Err(unreadable(name, &mut self.lines, &error).into()),
             }
             let line = self.lines.at(self.record.position());
-            let is_trailing = |index: usize, cell: &str| index >= expected && cell.is_empty();
             if self.separator == Separator::BLANKS || self.record.len() > expected {
-                let trailing =
-                    self.record.iter().enumerate().skip(expected).all(|(index, cell)| is_trailing(index, cell));
-                keep_columns(&mut self.record, self.separator, |index, _| index < expected || !trailing);
+                let is_trailing = self.record.iter().skip(expected).all(str::is_empty);
+                keep_columns(&mut self.record, self.separator, |index| index < expected || !is_trailing);
             }
             let found = self.record.len();
             if found == 0 {
@@ -165,13 +174,11 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Keeps the cells for whose index and number of cells `keep` holds; of cells between blanks, those that are not empty.
-fn keep_columns(record: &mut StringRecord, separator: Separator, keep: impl Fn(usize, usize) -> bool) {
+/// Keeps the cells for whose index `keep` holds; of cells between blanks, those that are not empty.
+fn keep_columns(record: &mut StringRecord, separator: Separator, keep: impl Fn(usize) -> bool) {
     let position = record.position().cloned();
     let cells = record.iter().filter(|cell| separator != Separator::BLANKS || !cell.is_empty());
-    let cells: Vec<&str> = cells.collect();
-    let kept = (0..).zip(&cells).filter(|(index, _)| keep(*index, cells.len())).map(|(_, cell)| *cell);
-    let mut kept: StringRecord = kept.collect();
+    let mut kept: StringRecord = (0..).zip(cells).filter(|(index, _)| keep(*index)).map(|(_, cell)| cell).collect();
     kept.set_position(position);
     *record = kept;
 }
@@ -201,7 +208,12 @@ impl Row<'_> {
 
     /// File, line and column of a cell, for messages.
     pub fn place(&self, column: usize) -> String {
-        format!("{}, line {}, column {}", self.name, self.line, excerpt(&self.header[column]))
+        format!(
+            "{}, line {}, column {}",
+            self.name,
+            self.line,
+            excerpt(&self.header[column]).replace(['\n', '\r'], " ")
+        )
     }
 
     /// The number in a cell, `None` if it has none; NaN and infinities are numbers here.

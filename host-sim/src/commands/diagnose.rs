@@ -24,7 +24,7 @@ const RAMP_S: f64 = 0.1;
 /// Find out how the simulation differs from measured data, name the cause, and measure the held-out improvement
 ///
 /// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (as the equivalent static voltage in V, or -
-/// for a missing reading). It must contain every change of the voltage. The voltage of a row applies from its time on,
+/// for a missing reading), or others that the options below name with their units. It must contain every change of the voltage. The voltage of a row applies from its time on,
 /// and its reading is taken just after, so that it includes the instantaneous part of a step to this voltage. If
 /// voltage_v is missing, applied_v is used, as written by `vsj stair --out`.
 ///
@@ -39,6 +39,8 @@ Examples:
   vsj diagnose monday.csv tuesday.csv          two records of one spring
   vsj diagnose record.csv --json | jq .findings
   vsj diagnose data/table3_stair.csv --column measured --input stair
+  vsj diagnose a.csv --time t_ms:ms --voltage u_kV:kV --reading x_mm:mm
+  vsj diagnose a.csv --columns instrument.toml --sort
 
 Verdicts: consistent (no difference beyond noise), explained, ambiguous (other causes explain it as well), unexplained (no \
 known cause does), insufficient (too little excitation to decide). All of them exit with 0.")]

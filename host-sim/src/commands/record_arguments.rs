@@ -14,7 +14,6 @@ use super::choice::{INPUT, one_of};
 
 /// The records and how their files are written.
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Record")]
 pub(crate) struct RecordArguments {
     /// The records: tables with a header, separated by commas, semicolons, tabs or blanks
     #[arg(value_name = "DATA.csv", required = true)]

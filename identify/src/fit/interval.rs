@@ -126,6 +126,8 @@ fn interval(value: f64, error: f64, dimension: Dimension, reach: (f64, f64)) -> 
     if reach.1 >= value {
         high = high.min(reach.1);
     }
-    let at_bound = [reach.0, reach.1].iter().any(|bound| (value - bound).abs() <= AT_BOUND * bound.abs());
+    let near = |one: f64, other: f64| (one - other).abs() <= AT_BOUND * other.abs();
+    // A quantity that no coordinate changes has no range.
+    let at_bound = !near(reach.0, reach.1) && (near(value, reach.0) || near(value, reach.1));
     Parameter { value, low, high, unit: String::new(), at_bound, dimension }
 }

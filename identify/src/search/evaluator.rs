@@ -6,6 +6,7 @@ use crate::effects::effect::FitContext;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
+use crate::search::initial_models::initial_models;
 use crate::search::penalty_factor::penalty_factor;
 use crate::search::predicted_gain::GainPredictor;
 use crate::stats::scale::{negligible, robust_scale, root_mean_square};
@@ -15,6 +16,11 @@ use crate::stats::thresholds::empirical::{
 
 /// Fits structures and evaluates them.
 pub trait Evaluator {
+    /// Returns the models from which the search starts in addition to the simulation as it is given.
+    fn initial_models(&self) -> Vec<Model> {
+        Vec::new()
+    }
+
     /// Returns the likeliest fit near the model's own point.
     fn fit(&mut self, model: Model) -> Fit;
 
@@ -46,6 +52,11 @@ pub trait Evaluator {
 }
 
 impl Evaluator for Engine<'_> {
+    fn initial_models(&self) -> Vec<Model> {
+        let relaxation = &self.base().relaxation;
+        initial_models(self.data, relaxation.tau_s, relaxation.share)
+    }
+
     fn fit(&mut self, model: Model) -> Fit {
         self.fit_twice(model)
     }

@@ -22,6 +22,7 @@
 //! | `warm_start` | what one search passes to another |
 //! | `predicted_gain` | the predicted gain of a block |
 //! | `penalty_factor` | the penalty factor of a residual |
+//! | `initial_models` | models from which the search also starts, if the nominal spring is far from the record |
 //! | `evaluator` | what a search asks about structures, and its answer from a record |
 //! | `evaluated` | all structures evaluated so far, and the prices |
 //! | `structure_search` | the search |
@@ -30,6 +31,7 @@
 mod evaluated;
 mod evaluator;
 mod extend;
+mod initial_models;
 mod penalty_factor;
 mod predicted_gain;
 mod scored;

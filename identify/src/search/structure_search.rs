@@ -141,6 +141,15 @@ impl<'e, E: Evaluator> Search<'e, E> {
         self.evaluated.evaluate(self.evaluator, Model::default())
     }
 
+    /// The best of the simulation as it is given and of the evaluator's initial models.
+    fn start(&mut self) -> Scored {
+        let root = self.root();
+        let models = self.evaluator.initial_models();
+        let others: Vec<Scored> =
+            models.into_iter().map(|model| self.evaluated.evaluate_from(self.evaluator, model)).collect();
+        others.into_iter().fold(root, |best, other| if other.score > best.score { other } else { best })
+    }
+
     /// The structure without one of its effects, the other blocks fitted again.
     pub fn left_out(&mut self, scored: &Scored, effect: usize) -> Scored {
         self.evaluated.evaluate_from(self.evaluator, scored.fit.model.without(effect))
@@ -164,9 +173,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
 
     /// One beam search at the present penalty factor.
     fn pass(&mut self, progress: &mut impl FnMut(&Scored)) -> Scored {
-        let root = self.root();
-        let mut best = root.clone();
-        let mut beam = vec![root];
+        let mut best = self.start();
+        let mut beam = vec![best.clone()];
         let mut waited = 0;
         for _ in 0..MOST_BLOCKS {
             // A structure that leaves nothing but noise is the only one that is extended: no other can be much likelier.

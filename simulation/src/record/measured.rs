@@ -8,7 +8,7 @@ use super::names::{Column, ColumnNames, Columns};
 use super::times::{Clock, Time};
 use super::{MOST_READING, MOST_V, Record, Row};
 use crate::bad_input;
-use crate::bad_input::{BadInput, number};
+use crate::bad_input::{BadInput, excerpt, number};
 use crate::csv_table::Table;
 use crate::csv_table::dialect::Dialect;
 use crate::csv_table::text::Source;
@@ -64,27 +64,28 @@ impl Format {
         let below_header = below_header(&mut table()?, &columns)?;
         let [time, voltage, reading] = &below_header;
         let units = self.units(&columns, &below_header)?;
-        let mut rows = Rows {
-            table: table()?,
-            columns: &columns,
-            units: &units,
-            clock: Clock::default(),
-            sort: self.sort,
-            missing: 0,
-        };
-        if time.is_some() {
+        let mut rows =
+            Rows { table: table()?, columns: &columns, units: &units, clock: Clock::default(), sort: self.sort };
+        if below_header.iter().any(Option::is_some) {
             rows.table.next_row()?;
             let shown = [time, voltage, reading].map(|unit| unit.as_deref().unwrap_or("-"));
             remarks.push(format!("{name}: units {} below the header", shown.join(", ")));
         }
         let mut timed = rows.read()?;
-        let (missing, has_stamps) = (rows.missing, rows.clock.has_stamps());
-        if has_stamps && let Some(unit) = &columns.time.unit {
-            bad_input!("{name}: the times are time stamps, not numbers in {unit}; expected no unit of time");
+        let has_stamps = rows.clock.has_stamps();
+        for (column, below, unit, is_known) in [
+            (&columns.time, time, &units.time.name, has_stamps),
+            (&columns.voltage, voltage, &units.voltage.name, false),
+        ] {
+            if column.unit.is_none() && below.is_none() && !is_known {
+                let column = excerpt(rows.table.column(column.index));
+                remarks.push(format!("{name}: column `{column}` has no unit; read in {unit}"));
+            }
         }
         if self.sort {
             timed = sorted(&name, timed, &mut remarks)?;
         }
+        let missing = timed.iter().filter(|(_, row)| row.measured.is_none()).count();
         if missing > 0 {
             remarks.push(format!("{name}: {missing} of {} rows without a reading", timed.len()));
         }
@@ -92,9 +93,11 @@ impl Format {
         if from_first {
             remarks.push(format!("{name}: times are counted from the first row"));
         }
-        let time_of = |time: Time| if from_first { time.since_first } else { time.value };
+        // Sorted, the earliest row is the first one.
+        let first = timed.first().map_or(0.0, |(time, _)| time.since_first);
+        let time_of = |time: Time| if from_first { time.since_first - first } else { time.value };
         let rows = timed.into_iter().map(|(time, row)| Row { time_s: time_of(time) * units.time.si, ..row });
-        let column = rows_column(&table()?, &columns.reading);
+        let column = table()?.column(columns.reading.index).to_owned();
         let record = Record { name, rows: rows.collect() };
         Ok(MeasuredRecord { record, units, column, remarks })
     }
@@ -112,14 +115,13 @@ impl Format {
             None => default.time,
         };
         let voltage = of(&columns.voltage, 1).map_or(default.voltage, |unit| Unit::of_voltage(&unit));
-        let is_stiffness = self.columns.reading.is_none() && columns.reading.unit.is_none();
-        let without = if is_stiffness { default.reading } else { NO_UNIT.to_owned() };
-        Ok(Units { time, voltage, reading: of(&columns.reading, 2).unwrap_or(without) })
+        let without = if self.columns.reading.is_none() { default.reading.clone() } else { NO_UNIT.to_owned() };
+        let reading = match self.columns.stiffness {
+            Some(_) => default.reading,
+            None => of(&columns.reading, 2).unwrap_or(without),
+        };
+        Ok(Units { time, voltage, reading })
     }
-}
-
-fn rows_column(table: &Table<'_>, column: &Column) -> String {
-    table.columns().nth(column.index).unwrap_or_default().to_owned()
 }
 
 /// The units of time, voltage and reading in the first row below the header, if it is a row of units.
@@ -130,7 +132,14 @@ fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<Stri
         let unit = row.text(column.index).trim_matches(BRACKETS);
         (!unit.is_empty() && !row.is_number(column.index) && !is_missing(unit)).then(|| unit.to_owned())
     });
-    let is_of_units = units[0].as_deref().is_some_and(|unit| Unit::of_time(unit).is_ok());
+    // A column of time stamps has no unit.
+    let is_of_units = match &units[0] {
+        Some(unit) => Unit::of_time(unit).is_ok(),
+        None => {
+            let [time, reading] = [&columns.time, &columns.reading].map(|column| column.index);
+            row.text(time).is_empty() && units[1].is_some() && !row.is_number(reading)
+        }
+    };
     Ok(if is_of_units { units } else { [None, None, None] })
 }
 
@@ -146,7 +155,6 @@ struct Rows<'a> {
     units: &'a Units,
     clock: Clock,
     sort: bool,
-    missing: usize,
 }
 
 impl Rows<'_> {
@@ -158,10 +166,19 @@ impl Rows<'_> {
         let mut rows: Vec<(Time, Row)> = Vec::new();
         while let Some(row) = self.table.next_row()? {
             let at = self.clock.read(&row, time.index)?;
+            if self.clock.has_stamps()
+                && let Some(unit) = &time.unit
+            {
+                bad_input!(
+                    "{}: `{}` is a time stamp, not a number in {unit}; expected a number, or no unit of time",
+                    row.place(time.index),
+                    row.text(time.index)
+                );
+            }
             let voltage_v = row.number_within(voltage.index, most_voltage)? * unit.si;
-            let is_missing = is_missing(row.text(reading.index));
-            self.missing += usize::from(is_missing);
-            let measured = (!is_missing).then(|| row.number_within(reading.index, MOST_READING)).transpose()?;
+            let measured = (!is_missing(row.text(reading.index)))
+                .then(|| row.number_within(reading.index, MOST_READING))
+                .transpose()?;
             if let Some((last, Row { line, .. })) = rows.last()
                 && !self.sort
                 && !at.is_after(*last)
@@ -220,9 +237,9 @@ fn sorted(name: &str, mut rows: Vec<(Time, Row)>, remarks: &mut Vec<String>) -> 
         merged.push((time, row));
     }
     for (count, what) in [
-        (disordered, "places where the time goes back, sorted"),
-        (repeated, "rows at the time of another, merged"),
-        (averaged, "times with different readings, averaged"),
+        (disordered, "row(s) earlier than the one above, sorted"),
+        (repeated, "row(s) at the time of another, merged"),
+        (averaged, "time(s) with different readings, averaged"),
     ] {
         if count > 0 {
             remarks.push(format!("{name}: {count} {what}"));

@@ -103,7 +103,7 @@ impl ColumnNames {
             return Err(self.lacks(table, name, &found).into());
         };
         if voltage.index == time.index || (reading.index == time.index && self.stiffness.is_none()) {
-            let column = excerpt(table.columns().nth(time.index).unwrap_or_default());
+            let column = excerpt(table.column(time.index)).replace(['\n', '\r'], " ");
             bad_input!(
                 "{}, line {}: column `{column}` is the time; expected another one for --voltage and --reading",
                 table.name(),
@@ -137,9 +137,9 @@ impl ColumnNames {
         const MOST_COLUMNS: usize = 12;
         let taken = |index: usize| found.iter().flatten().any(|column| column.index == index);
         let spec = |index: usize, role: Role| {
-            let name = table.columns().nth(index).unwrap_or_default();
+            let name = table.column(index);
             let unit = split_unit(name).1.filter(|unit| role.takes(unit)).map(|unit| format!(":{unit}"));
-            let spec = excerpt(name) + &unit.unwrap_or_default();
+            let spec = excerpt(name).replace(['\n', '\r'], " ") + &unit.unwrap_or_default();
             if spec.contains(|letter: char| !(letter.is_alphanumeric() || "_-:%./".contains(letter))) {
                 format!("'{spec}'")
             } else {
@@ -170,7 +170,7 @@ impl ColumnNames {
 
 impl Column {
     fn at(table: &Table<'_>, index: usize) -> Self {
-        Self { index, unit: split_unit(table.columns().nth(index).unwrap_or_default()).1 }
+        Self { index, unit: split_unit(table.column(index)).1 }
     }
 
     fn named(table: &Table<'_>, name: &str) -> Option<Self> {

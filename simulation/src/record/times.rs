@@ -64,9 +64,12 @@ impl Clock {
             }
             (First::Stamp(Stamp { has_zone, .. }), _) => {
                 let zone = if has_zone { "with" } else { "without" };
-                Err(row.is_not(column, &format!("a time stamp {zone} a zone, as in the first row")))
+                Err(row
+                    .is_not(column, &format!("a time stamp {zone} a zone, as in the first row; expected another such")))
             }
-            (First::Number(..), Some(_)) => Err(row.is_not(column, "a finite number, as in the first row")),
+            (First::Number(..), Some(_)) => {
+                Err(row.is_not(column, "a finite number, as in the first row; expected another"))
+            }
             (First::Number(first, exact), None) => {
                 let value = row.number(column)?;
                 let exactly = exact.zip(Exact::parse(text)).map(|(first, time)| time.since(first));

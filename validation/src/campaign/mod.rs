@@ -6,7 +6,7 @@
 //! | module | contents |
 //! | --- | --- |
 //! | [`statistics`] | a normal quantile and sample quantiles |
-//! | [`diagnosis`] | the only module that calls `identify` |
+//! | [`diagnosis`], [`real`] | the only modules that call `identify` |
 //! | [`cramer_rao`] | lower bound of a parameter's error |
 //! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
 //! | [`score`] | the diagnosis of one record compared with the truth |
@@ -25,6 +25,7 @@ pub mod isolable;
 pub mod mixture;
 pub mod out_of_model;
 pub mod part;
+pub mod real;
 pub mod rivals;
 pub mod score;
 pub mod sensitivity;

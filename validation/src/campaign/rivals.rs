@@ -58,20 +58,13 @@ pub const RECORDS: usize = Cause::ALL.len() + 1;
 /// # Errors
 /// Python with the packages is not available, or a tool fails.
 pub fn run(first: u64, progress: &ProgressBar) -> Result<Vec<Row>> {
-    let python = python()?;
     let mut rows = Vec::new();
     for (place, cause) in Cause::ALL.into_iter().map(Some).chain([None]).enumerate() {
         let seed = first.wrapping_mul(1_000_000_007) + 900_000_000 + place as u64;
         let hidden = Recipe::of(cause.as_slice()).draw(seed);
         let folder = tempfile::tempdir()?;
         hidden.write(folder.path(), "record")?;
-        let script = bench().join("identification.py");
-        // One thread: the waiting of others would count as CPU time.
-        let output = Command::new(&python).env("OMP_NUM_THREADS", "1").arg(script).arg(folder.path()).output()?;
-        if !output.status.success() {
-            bail!("identification.py: {}", String::from_utf8_lossy(&output.stderr).trim());
-        }
-        let answers: Value = serde_json::from_slice(&output.stdout).context("identification.py prints JSON")?;
+        let answers = identification(folder.path(), &[])?;
         let of = |tool: &str| serde_json::from_value::<Answer>(answers["record"][tool].clone());
         rows.push(Row {
             cause,
@@ -81,6 +74,21 @@ pub fn run(first: u64, progress: &ProgressBar) -> Result<Vec<Row>> {
         progress.inc(1);
     }
     Ok(rows)
+}
+
+/// Answers of the other tools for the CSV files of a folder.
+///
+/// # Errors
+/// Python with the packages is not available, or the script fails.
+pub(super) fn identification(folder: &Path, arguments: &[&str]) -> Result<Value> {
+    let script = bench().join("identification.py");
+    // One thread: the waiting of others would count as CPU time.
+    let mut command = Command::new(python()?);
+    let output = command.env("OMP_NUM_THREADS", "1").arg(script).arg(folder).args(arguments).output()?;
+    if !output.status.success() {
+        bail!("identification.py: {}", String::from_utf8_lossy(&output.stderr).trim());
+    }
+    serde_json::from_slice(&output.stdout).context("identification.py prints JSON")
 }
 
 fn paper(hidden: &LabelledRecord) -> Answer {

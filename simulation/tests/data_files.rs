@@ -1,0 +1,378 @@
+//! Measured records in every supported dialect, and damaged ones.
+
+use proptest::prelude::*;
+use simulation::bad_input::BadInput;
+use simulation::csv_table::text::Source;
+use simulation::record::{ColumnNames, Format, MeasuredRecord};
+
+/// How the columns of a written record are named and their units given.
+#[derive(Clone, Copy, Debug)]
+enum Units {
+    InNames,
+    InOptions,
+    BelowHeader,
+}
+
+/// A way to write a record.
+#[derive(Clone, Debug)]
+struct Dialect {
+    separator: char,
+    decimal: char,
+    encoding: &'static str,
+    line_end: &'static str,
+    order: Vec<usize>,
+    time: (&'static str, f64),
+    voltage: (&'static str, f64),
+    units: Units,
+    quoted: bool,
+    trailing: bool,
+    preamble: &'static str,
+}
+
+/// Time, voltage and reading of a row as decimal numbers with a point.
+type Cells = (String, String, Option<String>);
+
+fn dialects() -> impl Strategy<Value = Dialect> {
+    let separators =
+        prop::sample::select(vec![(',', '.'), (';', '.'), (';', ','), ('\t', '.'), ('\t', ','), (' ', '.')]);
+    let times =
+        vec![("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("s", 1.0), ("min", 60.0), ("h", 3600.0), ("d", 86400.0)];
+    let voltages = vec![("nV", 1e-9), ("mV", 1e-3), ("V", 1.0), ("kV", 1e3), ("MV", 1e6)];
+    let encodings = vec!["utf-8", "utf-8-bom", "utf-16le", "utf-16be", "latin-1"];
+    let preambles = vec!["", "# a comment, with; separators\n\n", "% a\n// b\n", "\n"];
+    let how = (
+        separators,
+        prop::sample::select(encodings),
+        prop::sample::select(vec!["\n", "\r\n", "\r"]),
+        Just(vec![0, 1, 2, 3]).prop_shuffle(),
+        prop::sample::select(preambles),
+    );
+    let what = (
+        prop::sample::select(times),
+        prop::sample::select(voltages),
+        prop::sample::select(vec![Units::InNames, Units::InOptions, Units::BelowHeader]),
+        any::<bool>(),
+        any::<bool>(),
+    );
+    (how, what).prop_map(|((marks, encoding, line_end, order, preamble), (time, voltage, units, quoted, trailing))| {
+        let (separator, decimal) = marks;
+        Dialect { separator, decimal, encoding, line_end, order, time, voltage, units, quoted, trailing, preamble }
+    })
+}
+
+fn rows() -> impl Strategy<Value = Vec<Cells>> {
+    let number = |most: i64| (-most..=most, 0..1000u32).prop_map(|(whole, part)| format!("{whole}.{part:03}"));
+    let row = (1..1_000_000u64, number(900_000), prop::option::weighted(0.8, number(1_000_000_000)));
+    (prop::collection::vec(row, 2..30), 0..2_000_000_000_000u64).prop_map(|(rows, start)| {
+        let mut thousandths = start;
+        let mut cells = Vec::new();
+        for (step, voltage, reading) in rows {
+            thousandths += step;
+            // Such a voltage is allowed in every unit but MV, for which it is made small.
+            cells.push((format!("{}.{:03}", thousandths / 1000, thousandths % 1000), voltage, reading));
+        }
+        cells
+    })
+}
+
+impl Dialect {
+    /// The voltage in this dialect's unit, within the range of amplifiers.
+    fn voltage(&self, cell: &str) -> String {
+        if self.voltage.1 > 1.0 {
+            format!("0.{}", cell.trim_start_matches('-').replace('.', ""))
+        } else {
+            cell.to_owned()
+        }
+    }
+
+    fn line(&self, cells: [String; 4]) -> String {
+        let quoted = |cell: &String| {
+            let is_quoted = self.quoted || (self.separator == ' ' && cell.contains(' '));
+            if is_quoted { format!("\"{cell}\"") } else { cell.clone() }
+        };
+        let cells: Vec<String> = self.order.iter().map(|&index| quoted(&cells[index])).collect();
+        let trailing = if self.trailing { self.separator.to_string() } else { String::new() };
+        cells.join(&self.separator.to_string()) + &trailing + self.line_end
+    }
+
+    fn file(&self, rows: &[Cells]) -> Vec<u8> {
+        let (time, voltage) = (self.time.0, self.voltage.0);
+        let mut text = self.preamble.replace('\n', self.line_end);
+        let header = match self.units {
+            Units::InNames => [format!("Time [{time}]"), format!("u_{voltage}"), "T (\u{b0}C)".into(), "note".into()],
+            _ => ["zeit", "command", "m\u{e4}rz", "note"].map(str::to_owned),
+        };
+        text += &self.line(header);
+        if matches!(self.units, Units::BelowHeader) {
+            text += &self.line([format!("[{time}]"), voltage.to_owned(), "\u{b0}C".to_owned(), "-".to_owned()]);
+        }
+        let missing = if self.separator == ' ' { ["NaN", "-"] } else { ["", "n/a"] };
+        for (index, (time, voltage, reading)) in rows.iter().enumerate() {
+            let marked = |cell: &str| cell.replace('.', &self.decimal.to_string());
+            let reading = reading.as_deref().map_or(missing[index % 2].to_owned(), marked);
+            text += &self.line([marked(time), marked(&self.voltage(voltage)), reading, "fine".to_owned()]);
+        }
+        match self.encoding {
+            "utf-8" => text.into_bytes(),
+            "utf-8-bom" => format!("\u{feff}{text}").into_bytes(),
+            "utf-16le" => format!("\u{feff}{text}").encode_utf16().flat_map(u16::to_le_bytes).collect(),
+            "utf-16be" => format!("\u{feff}{text}").encode_utf16().flat_map(u16::to_be_bytes).collect(),
+            _ => text.chars().map(|letter| u8::try_from(u32::from(letter)).expect("Latin-1")).collect(),
+        }
+    }
+
+    fn format(&self) -> Format {
+        let columns = match self.units {
+            Units::InNames => ColumnNames::default(),
+            Units::BelowHeader => {
+                ColumnNames { time: Some("ZEIT".into()), reading: Some("m\u{e4}rz".into()), ..ColumnNames::default() }
+            }
+            Units::InOptions => ColumnNames {
+                time: Some(format!("Zeit:{}", self.time.0)),
+                voltage: Some(format!("command:{}", self.voltage.0)),
+                reading: Some("M\u{e4}rz:\u{b0}C".into()),
+                stiffness: None,
+            },
+        };
+        Format { columns, ..Format::default() }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_record_reads_back_from_every_dialect(dialect in dialects(), rows in rows()) {
+        let source = Source::new("r", dialect.file(&rows));
+        let MeasuredRecord { record, units, .. } = dialect.format().read(source).map_err(|error| {
+            TestCaseError::fail(format!("{error}\n{}", String::from_utf8_lossy(&dialect.file(&rows))))
+        })?;
+        prop_assert_eq!((&*units.time.name, units.time.si), dialect.time);
+        prop_assert_eq!((&*units.voltage.name, units.voltage.si), dialect.voltage);
+        prop_assert_eq!(&units.reading, "\u{b0}C");
+        prop_assert_eq!(record.rows.len(), rows.len());
+        let number = |cell: &str| cell.parse::<f64>().expect("a number");
+        for (read, (time, voltage, reading)) in record.rows.iter().zip(&rows) {
+            prop_assert_eq!(read.time_s, number(time) * dialect.time.1);
+            prop_assert_eq!(read.voltage_v, number(&dialect.voltage(voltage)) * dialect.voltage.1);
+            prop_assert_eq!(read.measured, reading.as_deref().map(number));
+        }
+    }
+
+    #[test]
+    fn a_damaged_file_is_read_or_rejected_in_one_line(
+        dialect in dialects(),
+        rows in rows(),
+        damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        sort in any::<bool>(),
+    ) {
+        let mut bytes = dialect.file(&rows);
+        for (place, byte) in damage {
+            let place = place.index(bytes.len());
+            bytes[place] = byte;
+        }
+        if let Err(error) = (Format { sort, ..dialect.format() }).read(Source::new("r.csv", bytes)) {
+            prop_assert!(error.is::<BadInput>(), "{error}");
+            let error = error.to_string();
+            prop_assert!(error.starts_with("r.csv") && says_what_was_expected(&error), "{error}");
+        }
+    }
+}
+
+/// True for one line with the word "expected", or one that says what a cell is not.
+fn says_what_was_expected(error: &str) -> bool {
+    (error.contains("expected") || error.contains("` is not a ")) && !error.contains('\n')
+}
+
+fn read(text: impl Into<Vec<u8>>, format: &Format) -> Result<MeasuredRecord, String> {
+    format.read(Source::new("r.csv", text)).map_err(|error| {
+        assert!(error.is::<BadInput>(), "{error}");
+        error.to_string()
+    })
+}
+
+#[test]
+fn every_damage_is_named_with_line_column_and_what_was_expected() {
+    let any = Format::default();
+    let asked = |time: &str| Format {
+        columns: ColumnNames { time: Some(time.into()), ..ColumnNames::default() },
+        ..Format::default()
+    };
+    let utf_16 = |text: &str| -> Vec<u8> { text.encode_utf16().flat_map(u16::to_le_bytes).collect() };
+    let head = "t_ms;u_kV;x_mm\n";
+    for (text, format, expected) in [
+        (
+            format!("{head}0;1;2\n1;1,5;2.5\n"),
+            &any,
+            "r.csv, line 3, column x_mm: `2.5` has a decimal point, line 3 a decimal comma",
+        ),
+        (
+            format!("{head}0;1;1.234,5\n"),
+            &any,
+            "line 2, column x_mm: `1.234,5` is not a finite number (without separators of thousands)",
+        ),
+        (format!("{head}0;1;1 234\n"), &any, "`1 234` is not a finite number (without separators of thousands)"),
+        (format!("{head}0;1;inf\n"), &any, "line 2, column x_mm: `inf` is not a finite number"),
+        (format!("{head}0;NaN;1\n"), &any, "line 2, column u_kV: `NaN` is not a finite number"),
+        (format!("{head};1;1\n"), &any, "line 2, column t_ms: `` is not a finite number"),
+        (format!("{head}0;1001;1\n"), &any, "line 2, column u_kV: `1001` is not a number from -1000 to 1000"),
+        (format!("{head}0;1;1e16\n"), &any, "line 2, column x_mm: `1e16` is not a number from -1e15 to 1e15"),
+        (
+            format!("{head}0;1;1\n# a\n2;1;1\n1;1;1\n"),
+            &any,
+            "line 5, column t_ms: 1 follows 2; expected increasing times after line 4 (--sort",
+        ),
+        (format!("{head}0;1;1\n0;1\n"), &any, "line 3: 2 field(s); expected 3 as in the header"),
+        (format!("{head}0;1;1;4\n"), &any, "line 2: 4 field(s); expected 3 as in the header"),
+        (format!("{head}0;1;1\n"), &any, "1 row(s) of data; expected at least 2"),
+        (
+            "t_ms,u_kV,x_mm\n0,5,1,5,2,5\n".into(),
+            &any,
+            "line 2: 6 field(s); expected 3 as in the header (decimal commas need another separator",
+        ),
+        (
+            "a,u,stiffness\n0,1,2\n1,1,2\n".into(),
+            &asked("a:parsec"),
+            "--time a:parsec: `parsec` is not a unit of time; expected ns, us, ms, s, min, h or d",
+        ),
+        (
+            "t [weeks],u_V,x_mm\n0,1,2\n".into(),
+            &asked("t [weeks]"),
+            "--time t [weeks]: `weeks` is not a unit of time; expected ns",
+        ),
+        (
+            "time,u_V,x_mm\n2026-01-31,1,2\n".into(),
+            &any,
+            "line 2, column time: `2026-01-31` is a date without time; expected",
+        ),
+        (
+            "time,u_V,x_mm\n2026-01-31T01:00,1,2\n5,1,2\n".into(),
+            &any,
+            "line 3, column time: `5` is not a time stamp without a zone, as in the first row; expected",
+        ),
+        (
+            "time,u_V,x_mm\n2026-01-31T01:00Z,1,2\n2026-01-31T01:01,1,2\n".into(),
+            &any,
+            "line 3, column time: `2026-01-31T01:01` is not a time stamp with a zone",
+        ),
+        (
+            "time,u_V,x_mm\n0,1,2\n2026-01-31T01:01,1,2\n".into(),
+            &any,
+            "line 3, column time: `2026-01-31T01:01` is not a finite number, as in the first row",
+        ),
+        (
+            "time,u_V,x_mm\n2026-01-31T02:00,1,2\n2026-01-31T01:00,1,2\n".into(),
+            &any,
+            "line 3, column time: 2026-01-31T01:00 follows",
+        ),
+        (
+            "time [ms],u_V,x_mm\n2026-01-31T01:00,1,2\n2026-01-31T02:00,1,2\n".into(),
+            &any,
+            "line 2, column time [ms]: `2026-01-31T01:00` is a time stamp, not a number in ms; expected",
+        ),
+        (
+            "t u y\n0 1 2\n1 2\n".into(),
+            &asked("t"),
+            "line 1: no column `stiffness`; expected a header with t, voltage_v, stiffness, or --time t --voltage u --reading y, found `t,u,y`",
+        ),
+        (
+            "0,1,2\n1,2,3\n".into(),
+            &any,
+            "line 1: numbers instead of names; expected a header with time_s, voltage_v, stiffness",
+        ),
+        (
+            "t_ms,u_kV,\"x_mm\n0,1,2\n".into(),
+            &any,
+            "line 1: a line break, perhaps after an unclosed quote; expected a header with",
+        ),
+    ] {
+        let error = read(text.clone(), format).unwrap_err();
+        assert!(error.contains(expected) && says_what_was_expected(&error), "{text:?}: {error}");
+    }
+    let broken: Vec<u8> = utf_16("\u{feff}time_s,voltage_v\n").into_iter().chain([0x00, 0xd8]).collect();
+    assert_eq!(
+        read(broken, &any).unwrap_err(),
+        "r.csv: not UTF-16LE, although it starts with its mark; expected UTF-8"
+    );
+}
+
+#[test]
+fn sorting_mends_order_and_repetitions_but_not_two_voltages() {
+    let sort = Format { sort: true, ..Format::default() };
+    let text = "t_ms,u_V,x_mm\n3,1,7\n1,1,4\n1,1,4\n2,1,5\n2,1,6\n2,1,-\n";
+    let MeasuredRecord { record, remarks, .. } = read(text, &sort).unwrap();
+    let rows: Vec<_> = record.rows.iter().map(|row| (row.line, row.time_s, row.measured)).collect();
+    assert_eq!(rows, [(3, 0.001, Some(4.0)), (5, 0.002, Some(5.5)), (2, 0.003, Some(7.0))]);
+    assert_eq!(
+        remarks,
+        [
+            "r.csv: 1 row(s) earlier than the one above, sorted",
+            "r.csv: 3 row(s) at the time of another, merged",
+            "r.csv: 1 time(s) with different readings, averaged",
+        ]
+    );
+    let stamps = "Time,u_V,x_mm\n2026-01-31T00:00:02,1,4\n2026-01-31T00:00:00.5,0,0\n";
+    let times: Vec<f64> = read(stamps, &sort).unwrap().record.rows.iter().map(|row| row.time_s).collect();
+    assert_eq!(times, [0.0, 1.5]);
+    let error = read("t_ms,u_V,x_mm\n1,1,4\n0,0,0\n1,2,4\n", &sort).unwrap_err();
+    assert_eq!(error, "r.csv, lines 2 and 4: two voltages at the same time, 1 V and 2 V; expected one");
+}
+
+#[test]
+fn time_stamps_and_times_since_1970_are_counted_from_the_first_row() {
+    let times = |text: &str| {
+        let read = read(text, &Format::default()).unwrap();
+        (read.record.rows.iter().map(|row| row.time_s).collect::<Vec<_>>(), read.units.time.name, read.remarks)
+    };
+    let from_first = vec!["r.csv: times are counted from the first row".to_owned()];
+    let stamps = "Time;u_V;x_mm\n2026-01-31T23:59:59,5;0;1\n2026-02-01 00:00:01;0;1\n";
+    assert_eq!(times(stamps), (vec![0.0, 1.5], "s".to_owned(), from_first.clone()));
+    // The difference is a nanosecond; doubles of this size are 256 apart.
+    let epoch = "t_ns,u_V,x_mm\n1767225600123456789,0,1\n1767225600123456790,0,1\n";
+    assert_eq!(times(epoch), (vec![0.0, 1e-9], "ns".to_owned(), from_first));
+    let seconds = "t_s,u_V,x_mm\n1767225600.25,0,1\n1767225600.5,0,1\n";
+    assert_eq!(times(seconds), (vec![1767225600.25, 1767225600.5], "s".to_owned(), vec![]));
+}
+
+#[test]
+fn encodings_that_are_guessed_are_remarked_on() {
+    let text = "t_ms,u_V,T (\u{b0}C)\n0,0,1\n1,0,1\n";
+    let latin: Vec<u8> = text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect();
+    let utf_16: Vec<u8> = format!("\u{feff}{text}").encode_utf16().flat_map(u16::to_be_bytes).collect();
+    for (bytes, remarks) in [
+        (text.as_bytes().to_vec(), vec![]),
+        (latin, vec!["r.csv, line 1: not UTF-8; read as Latin-1 (Windows-1252)"]),
+        (utf_16, vec!["r.csv: read as UTF-16BE; UTF-8 is the usual encoding"]),
+    ] {
+        let read = read(bytes, &Format::default()).unwrap();
+        assert_eq!((read.remarks, &*read.units.reading), (remarks.into_iter().map(str::to_owned).collect(), "\u{b0}C"));
+    }
+}
+
+#[test]
+fn a_column_without_unit_is_remarked_on_unless_it_holds_time_stamps() {
+    let remarks = |text: &str| read(text, &Format::default()).unwrap().remarks;
+    let plain = remarks("Time,U,x_mm\n0,0,1\n1,0,1\n");
+    assert_eq!(plain, ["r.csv: column `Time` has no unit; read in s", "r.csv: column `U` has no unit; read in V"]);
+    assert!(remarks("time_s,applied_v,stiffness\n0,0,1\n1,0,1\n").is_empty());
+    assert!(remarks("Time,U,stiffness\ns,kV,mm\n0,0,1\n1,0,1\n").len() == 1, "the units are below the header");
+}
+
+#[test]
+fn separators_and_decimal_marks_can_be_forced() {
+    let forced = |separator: &str, decimal: &str| Format {
+        dialect: simulation::csv_table::dialect::Dialect {
+            separator: separator.parse().ok(),
+            decimal: decimal.parse().ok(),
+        },
+        ..Format::default()
+    };
+    let readings = |text: &str, format: &Format| {
+        read(text, format).map(|read| read.record.rows.iter().filter_map(|row| row.measured).collect::<Vec<_>>())
+    };
+    assert_eq!(readings("t_ms|u_V|x_mm\n0|0|1\n1|0|2\n", &forced("|", "")), Ok(vec![1.0, 2.0]));
+    assert_eq!(readings("t_ms,u_V,x_mm\n0,0,\"1,5\"\n1,0,2\n", &forced("", ",")), Ok(vec![1.5, 2.0]));
+    assert_eq!(readings("sep=|\nt_ms|u_V|x_mm\n0|0|1\n1|0|2\n", &Format::default()), Ok(vec![1.0, 2.0]));
+    let error = readings("t_ms;u_V;x_mm\n0;0;1,5\n", &forced(";", ".")).unwrap_err();
+    assert!(error.contains("line 2, column x_mm: `1,5` is not a finite number"), "{error}");
+}
