@@ -15,6 +15,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::{ColumnNames, Format};
 use crate::bad_input::BadInput;
@@ -27,6 +28,9 @@ use crate::plant_file::place::line_and_column;
 #[serde(deny_unknown_fields)]
 struct File {
     columns: Columns,
+    /// What is known to be in the record, for `cargo campaign real`.
+    #[serde(default)]
+    known: IgnoredAny,
 }
 
 /// The table `[columns]`; every entry may be absent.
@@ -53,7 +57,7 @@ pub fn open(path: &Path) -> Result<(Format, Option<String>)> {
 }
 
 fn parse(name: &str, text: &str) -> Result<(Format, Option<String>)> {
-    let File { columns } = toml::from_str(text).map_err(|error| {
+    let File { columns, .. } = toml::from_str(text).map_err(|error| {
         let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
         let expected = "expected [columns] with time, voltage, reading, input, separator, decimal, sort";
         BadInput(format!("{}: {what}; {expected}", line_and_column(name, text, at)))

@@ -13,7 +13,7 @@ use validation::campaign::diagnosis::diagnose;
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
-use validation::campaign::{criteria, out_of_model, rivals, tables};
+use validation::campaign::{criteria, out_of_model, real, rivals, tables};
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
@@ -36,12 +36,17 @@ Examples:
   cargo campaign --write out/hidden --cause hysteresis --seed 3
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
   cargo campaign rivals                      comparison with PySINDy and SysIdentPy
+  cargo campaign real FOLDER                 measured records: FOLDER/NAME.csv, with an optional NAME.toml
+  cargo campaign instruments                 the same on simulated instruments in their own units
   RAYON_NUM_THREADS=1 cargo campaign speed   CPU time by rows and noise, one record at a time
   cargo thresholds                           every threshold at half and twice its value
 
 Exit codes: 0 success, 1 a criterion is not met or the work failed, 2 bad arguments."
 )]
+#[command(args_conflicts_with_subcommands = true, subcommand_precedence_over_arg = true)]
 struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
     /// Parts to run
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
@@ -63,6 +68,25 @@ struct Cli {
     write: Option<PathBuf>,
     #[command(flatten)]
     record: Wanted,
+}
+
+/// What has arguments of its own.
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Identify and diagnose measured records: every FOLDER/NAME.csv, whose columns NAME.toml may name
+    ///
+    /// NAME.toml has a table [columns] with time, voltage and reading, each NAME:UNIT, and input; and `known`, a sentence. Without
+    /// it the first three columns are time, voltage and reading.
+    Real {
+        /// Folder with the records
+        folder: PathBuf,
+        /// Without PySINDy and SysIdentPy
+        #[arg(long)]
+        no_python: bool,
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 /// Options of the record to write.
@@ -131,6 +155,8 @@ enum Part {
     OutOfModel,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
     Rivals,
+    /// Six other instruments, simulated, in their own units
+    Instruments,
     /// Every empirical threshold at half and twice its value: 53 records at each value. Run it as `cargo thresholds`
     Thresholds,
 }
@@ -215,6 +241,15 @@ fn main() -> ExitCode {
 
 /// True if every criterion is met.
 fn run(cli: &Cli) -> Result<bool> {
+    if let Some(Command::Real { folder, no_python, json }) = &cli.command {
+        let rows = measured("real", &real::open(folder)?, !no_python)?;
+        if *json {
+            println!("{}", json!({ "real": rows }));
+        } else {
+            print!("{}", real::table(&rows));
+        }
+        return Ok(true);
+    }
     if let Some(folder) = &cli.write {
         return write(folder, &cli.record).map(|()| true);
     }
@@ -274,6 +309,11 @@ impl Cli {
                 let rows = rivals::run(first, &bar)?;
                 bar.finish_and_clear();
                 let markdown = rivals::table(&rows);
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows) })
+            }
+            Part::Instruments => {
+                let rows = measured("instruments", &real::twins(first), true)?;
+                let markdown = real::table(&rows);
                 Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows) })
             }
             #[cfg(not(feature = "sensitivity"))]
@@ -355,6 +395,14 @@ impl Done {
         }
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
+}
+
+/// Results of records with their own units; with `python`, also of the other tools.
+fn measured(what: &str, subjects: &[real::Subject], python: bool) -> Result<Vec<real::Row>> {
+    let bar = bar(what, subjects.len())?;
+    let rows = real::run(subjects, python, &bar)?;
+    bar.finish_and_clear();
+    Ok(rows)
 }
 
 fn bar(what: &str, length: usize) -> Result<ProgressBar> {

@@ -1,8 +1,10 @@
-//! Interface to the diagnosis: the only module of this crate that calls `identify`.
+//! Interface to the diagnosis: with `real`, the only module of this crate that calls `identify`.
 
 use anyhow::Result;
-use identify::fit::simulator::Simulator;
+use identify::Diagnosis;
+use identify::fit::engine::Engine;
 use identify::record::data::Data;
+use identify::record::observed::Observed;
 #[cfg(feature = "sensitivity")]
 pub use identify::stats::thresholds::vary;
 pub use identify::stats::thresholds::{Threshold, empirical::ALL as THRESHOLDS};
@@ -29,13 +31,10 @@ pub fn diagnose(hidden: &LabelledRecord) -> Result<Value> {
 /// # Errors
 /// As [`diagnose`].
 pub fn predict(hidden: &LabelledRecord, rows: usize) -> Result<(Vec<f64>, Vec<&'static str>)> {
-    let (whole, options) = (hidden.record(), Options::default());
-    let first = Record { name: whole.name.clone(), rows: whole.rows[..rows].to_vec() };
-    let identified = examine(&first, &options, |_| ())?;
-    // Some parameters of the model are relative to the full scale of the record that it was identified on.
-    let data = Data { full_scale_v: identified.data.full_scale_v, ..Data::new(&whole, options.input) };
-    let mut predicted = Vec::new();
-    Simulator::new(&data, &options.base).run(&identified.extended.model, &mut predicted);
+    let whole = hidden.record();
+    let (residual, identified) = residual(&whole, rows, &Options::default())?;
+    let read = whole.rows.iter().filter_map(|row| row.measured);
+    let mut predicted: Vec<f64> = read.zip(&residual).map(|(read, residual)| read - residual).collect();
     // A limit that readings stopped at exactly is a finding, but not part of the model.
     let middle = identified.data.reading.iter().sum::<f64>() / rows as f64;
     for limit in identified
@@ -47,4 +46,28 @@ pub fn predict(hidden: &LabelledRecord, rows: usize) -> Result<(Vec<f64>, Vec<&'
         predicted.iter_mut().for_each(|y| *y = if limit > middle { y.min(limit) } else { y.max(limit) });
     }
     Ok((predicted, identified.report.findings.iter().map(|finding| finding.cause).collect()))
+}
+
+/// Readings less predictions beyond the first `rows` rows of a record, by the model identified on these, in the reading's unit. An
+/// initial state that is not known is estimated from the rows in which it has not decayed.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn residual_beyond(record: &Record, rows: usize, options: &Options) -> Result<Vec<f64>> {
+    let (mut residual, identified) = residual(record, rows, options)?;
+    Ok(residual.split_off(identified.data.rows()))
+}
+
+/// Readings less predictions of a whole record by the model identified on its first `rows` rows, and the diagnosis of these.
+fn residual(record: &Record, rows: usize, options: &Options) -> Result<(Vec<f64>, Diagnosis)> {
+    let first = Record { name: record.name.clone(), rows: record.rows[..rows].to_vec() };
+    let identified = examine(&first, options, |_| ())?;
+    let normalisation = &identified.data.normalisation;
+    let data = Data::thinned(&normalisation.record(record), options.input, 1, normalisation);
+    // Some parameters of the model are relative to the full scale of the record that it was identified on.
+    let full_scale_v = identified.data.full_scale_v / normalisation.scales.volt_v;
+    let data = Data { full_scale_v, ..data };
+    let (observed, base) = (Observed::new(&data), options.base.normalised(normalisation));
+    let residual = Engine::new(&data, &observed, &base).residual(&identified.extended.model);
+    Ok((residual.into_iter().map(|left| normalisation.scales.reading * left).collect(), identified))
 }

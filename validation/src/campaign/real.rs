@@ -273,8 +273,3 @@ asked for, or diverged.
     }
     text
 }
-
-/// The rows as JSON.
-pub fn json(rows: &[Row]) -> Value {
-    serde_json::to_value(rows).unwrap_or_default()
-}
