@@ -44,6 +44,7 @@
 //! | [`stats`] | numbers | medians, sums, scales, a periodogram; the thresholds of all decisions |
 //! | [`answer`] | | the data types of a report |
 //! | [`record`] | a record's rows | the command as a signal, the readings, the grid that they lie on |
+//! | [`linear`] | a record | the best linear models of order 0 to 4 |
 //! | [`plant`] | a plant file | the chain from command to stiffness that effects change |
 //! | [`noise`] | residuals | the likelihood of readings |
 //! | [`effects`] | | what may be wrong, one file an effect, and sets of effects as models |
@@ -58,6 +59,7 @@ pub mod answer;
 pub mod effects;
 pub mod examine;
 pub mod fit;
+pub mod linear;
 pub mod noise;
 pub mod plant;
 pub mod record;

@@ -10,7 +10,7 @@
 
 pub mod data;
 mod decay;
-mod folds;
+pub(crate) mod folds;
 pub mod heteroscedasticity;
 pub mod observed;
 pub mod quantisation_grid;
