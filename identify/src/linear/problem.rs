@@ -154,10 +154,12 @@ impl Problem {
         Self { series, spacing, bounds, readings, means, weights: Vec::new(), starts }
     }
 
-    /// The problem with every `every`-th reading, the voltage of all rows, and the same bounds.
-    pub fn thinned(&self, every: usize) -> Self {
-        let thinned = Self::new(self.series.iter().map(|series| series.thinned(every)).collect());
-        Self { bounds: self.bounds, ..thinned }
+    /// A part of the problem with about `rows` readings under at most `pieces` pieces of voltage, and the same bounds.
+    pub(super) fn part(&self, rows: usize, pieces: usize) -> Self {
+        let records = self.series.len();
+        let lively: Vec<Series> = self.series.iter().map(|series| series.liveliest(pieces / records)).collect();
+        let every = lively.iter().map(Series::rows).sum::<usize>().div_ceil(rows).max(1);
+        Self { bounds: self.bounds, ..Self::new(lively.iter().map(|series| series.thinned(every)).collect()) }
     }
 
     /// The problem with the readings of some rows, the voltage of all rows, and the same bounds and means.
@@ -250,6 +252,35 @@ impl Problem {
     pub(super) fn fit_on(&self, paths: &[Path], poles: Poles) -> Fit {
         let responses = self.responses(paths, &poles.sections);
         self.fitted(paths, &responses, poles)
+    }
+
+    /// The costs of a fitted model with each of several further sections, which are cheaper than a fit of each.
+    pub(super) fn costs_with(&self, paths: &[Path], base: &Fit, sections: &[Section]) -> Vec<f64> {
+        let residual = Column { first: 0, values: base.residual.clone() };
+        let cost = |section: Section| {
+            let responses: Vec<Response> = paths.iter().map(|path| path.response(section)).collect();
+            let mut further = Orthonormal::new();
+            let mut add = |column: Column| {
+                let (mut column, whole) = (self.weighted(column), further.count());
+                let before = column.times(&column).sqrt();
+                base.basis.project(&mut column);
+                base.basis.project(&mut column);
+                let independent = column.times(&column).sqrt() > 1e-7 * before;
+                if independent && further.add(column) { further.q[whole].times(&residual).powi(2) } else { 0.0 }
+            };
+            let mut reduction = 0.0;
+            for (response, &first) in responses.iter().zip(&self.starts) {
+                for values in response.free.iter().take(section.order()) {
+                    reduction += add(Column { first, values: values.clone() });
+                }
+            }
+            for part in 0..section.order() {
+                let parts: Vec<&[f64]> = responses.iter().map(|of| of.forced[part].as_slice()).collect();
+                reduction += add(Column { first: 0, values: parts.concat() });
+            }
+            base.cost - reduction
+        };
+        sections.iter().map(|&section| cost(section)).collect()
     }
 
     /// The responses by record and section.
@@ -410,6 +441,12 @@ impl Problem {
         }
         let later = step.get(at).copied().unwrap_or(0.0).clamp(-LONGEST_DELAY_STEP, LONGEST_DELAY_STEP) * self.spacing;
         self.within(Poles { sections, delay: poles.delay + later })
+    }
+
+    /// The section, moved into the bounds.
+    pub(super) fn section_within(&self, section: Section) -> Section {
+        let poles = self.within(Poles { sections: vec![section], delay: 0.0 });
+        poles.sections[0]
     }
 
     /// The poles, moved into the bounds.

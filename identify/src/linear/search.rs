@@ -13,6 +13,8 @@ pub const LARGEST_ORDER: usize = 4;
 const READINGS_PER_PARAMETER: usize = 3;
 /// Most readings of the part of a record that is searched.
 const ROWS_TO_SEARCH: usize = 2_000;
+/// Most pieces of the voltage in the part of a record that is searched.
+const PIECES_TO_SEARCH: usize = 20_000;
 /// Ratio of neighbouring time constants on the grid.
 const TAU_RATIO: f64 = 2.2;
 /// Ratio of neighbouring frequencies on the grid.
@@ -25,6 +27,9 @@ const STARTS: (usize, usize) = (5, 2);
 const STEPS: (usize, usize) = (5, 25);
 /// Most jumps of the delay by a row or two after a refinement.
 const MOST_DELAY_JUMPS: usize = 6;
+/// Most steps on all rows of a record of which only a part was searched, and the relative reduction of the cost below which they
+/// end.
+const STEPS_ON_ALL: (usize, f64) = (4, 1e-5);
 /// Spectral lines of the residual at which a pair of poles is tried.
 const PEAKS: usize = 4;
 /// Relative reduction of the cost below which a refinement ends: of a quick one, of one on part of the rows, and of the last one.
@@ -32,8 +37,7 @@ const LEAST: (f64, f64, f64) = (1e-3, 1e-5, 1e-13);
 
 /// Fits the best models of order 0 to [`LARGEST_ORDER`], as far as the readings allow.
 pub fn best_of_each_order(problem: &Problem) -> Vec<Fit> {
-    let every = problem.rows().div_ceil(ROWS_TO_SEARCH);
-    let part = (every > 1).then(|| problem.thinned(every));
+    let part = (problem.rows() > ROWS_TO_SEARCH).then(|| problem.part(ROWS_TO_SEARCH, PIECES_TO_SEARCH));
     let searched = part.as_ref().unwrap_or(problem);
     let mut found: Vec<Vec<Poles>> = Vec::new();
     for order in 0..=LARGEST_ORDER {
@@ -41,21 +45,21 @@ pub fn best_of_each_order(problem: &Problem) -> Vec<Fit> {
         if order > 0 && problem.rows() < READINGS_PER_PARAMETER * parameters {
             break;
         }
-        let starts = starts(searched, order, &found);
-        found.push(best(searched, starts));
+        found.push(best(searched, starts(searched, order, &found)));
     }
+    let (steps, least) = if part.is_some() { STEPS_ON_ALL } else { (STEPS.1, LEAST.2) };
     found
         .into_iter()
         .map(|models| {
             let first = models.into_iter().next().expect("a best model");
-            problem.refined(first, STEPS.1, LEAST.2)
+            problem.refined(problem.within(first), steps, least)
         })
         .collect()
 }
 
 /// Refines the most promising starts; returns the best models, the best first.
-fn best(problem: &Problem, starts: Vec<Poles>) -> Vec<Poles> {
-    let mut tried: Vec<(f64, Poles)> = costs(problem, starts);
+fn best(problem: &Problem, mut tried: Vec<(f64, Poles)>) -> Vec<Poles> {
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     tried.truncate(STARTS.0);
     let refine = |tried: Vec<(f64, Poles)>, steps: usize, least: f64| {
         let fits = tried.into_iter().map(|(_, poles)| problem.refined(poles, steps, least));
@@ -115,36 +119,44 @@ fn costs(problem: &Problem, mut starts: Vec<Poles>) -> Vec<(f64, Poles)> {
     costs
 }
 
-/// The starts of an order; `found` holds the best models of all lower orders.
-fn starts(problem: &Problem, order: usize, found: &[Vec<Poles>]) -> Vec<Poles> {
-    let delays = || delays(problem);
-    let taus = || geometric(0.5 * problem.spacing, problem.bounds.tau.1, TAU_RATIO);
+/// The starts of an order with their costs; `found` holds the best models of all lower orders.
+fn starts(problem: &Problem, order: usize, found: &[Vec<Poles>]) -> Vec<(f64, Poles)> {
+    let none = |delay| Poles { sections: Vec::new(), delay };
+    let taus = geometric(0.5 * problem.spacing, problem.bounds.tau.1, TAU_RATIO).map(|tau| Section::First { tau });
+    let lags: Vec<Section> = taus.collect();
+    let mut starts = Vec::new();
     match order {
-        0 => delays().map(|delay| Poles { sections: Vec::new(), delay }).collect(),
-        1 => delays()
-            .flat_map(|delay| taus().map(move |tau| Poles { sections: vec![Section::First { tau }], delay }))
-            .collect(),
+        0 => return costs(problem, delays(problem).map(none).collect()),
+        1 => delays(problem).for_each(|delay| starts.extend(with_each(problem, none(delay), |_| lags.clone()))),
         _ => {
-            let mut starts = Vec::new();
             for base in with_less_delay(&found[order - 1]) {
-                starts.extend(taus().map(|tau| with_lag(&base, tau)));
+                starts.extend(with_each(problem, base, |_| lags.clone()));
             }
             for base in with_less_delay(&found[order - 2]) {
-                let pair = |frequency, damping| {
-                    let mut poles = base.clone();
-                    poles.sections.insert(0, Section::Second { frequency, damping });
-                    poles
-                };
-                let frequencies = geometric(1.0 / problem.bounds.decay, problem.bounds.frequency.1, FREQUENCY_RATIO);
-                starts.extend(frequencies.flat_map(|frequency| DAMPINGS.map(|damping| pair(frequency, damping))));
-                let residual = problem.fit(base.clone()).residual;
-                for (frequency, width) in peaks(problem, &residual) {
-                    starts.extend([0.5, 2.0].map(|of| pair(frequency, (of * width / frequency).min(0.7))));
-                }
+                starts.extend(with_each(problem, base, |fit| pairs(problem, fit)));
             }
-            starts
         }
     }
+    starts
+}
+
+/// A model with each of several further sections, and their costs.
+fn with_each(problem: &Problem, base: Poles, sections: impl Fn(&Fit) -> Vec<Section>) -> Vec<(f64, Poles)> {
+    let paths = problem.paths(base.delay);
+    let fit = problem.fit_on(&paths, base);
+    let sections: Vec<Section> = sections(&fit).into_iter().map(|section| problem.section_within(section)).collect();
+    let costs = problem.costs_with(&paths, &fit, &sections);
+    costs.into_iter().zip(sections).map(|(cost, section)| (cost, with(&fit.poles, section))).collect()
+}
+
+/// Pairs of poles on a grid, and at the highest peaks of a fit's residual.
+fn pairs(problem: &Problem, fit: &Fit) -> Vec<Section> {
+    let frequencies = geometric(1.0 / problem.bounds.decay, problem.bounds.frequency.1, FREQUENCY_RATIO);
+    let on_grid = frequencies.flat_map(|frequency| DAMPINGS.map(|damping| Section::Second { frequency, damping }));
+    let at_peaks = peaks(problem, &fit.residual).into_iter().flat_map(|(frequency, width)| {
+        [0.5, 2.0].map(|of| Section::Second { frequency, damping: (of * width / frequency).min(0.7) })
+    });
+    on_grid.chain(at_peaks).collect()
 }
 
 /// The best model, and the same with less delay where it has one: a further pole takes the place of a part of the delay.
@@ -154,15 +166,16 @@ fn with_less_delay(models: &[Poles]) -> Vec<Poles> {
     parts.iter().map(|part| Poles { delay: part * best.delay, ..best.clone() }).collect()
 }
 
-/// A model with a further lag.
-fn with_lag(base: &Poles, tau: f64) -> Poles {
+/// A model with a further section; two lags become one section of second order.
+fn with(base: &Poles, section: Section) -> Poles {
     let mut poles = base.clone();
-    match poles.sections.last().copied() {
-        Some(Section::First { tau: other }) => {
+    match (poles.sections.last().copied(), section) {
+        (Some(Section::First { tau: other }), Section::First { tau }) => {
             poles.sections.pop();
             poles.sections.insert(0, Section::of_lags(tau, other));
         }
-        _ => poles.sections.push(Section::First { tau }),
+        (_, Section::First { .. }) => poles.sections.push(section),
+        _ => poles.sections.insert(0, section),
     }
     poles
 }

@@ -88,7 +88,7 @@ impl Series {
     }
 
     /// The series with the readings of some rows and the voltage of all; its first reading stays the start.
-    pub fn only(&self, mut keeps: impl FnMut(usize) -> bool) -> Self {
+    pub(super) fn only(&self, mut keeps: impl FnMut(usize) -> bool) -> Self {
         let mut part = self.clone();
         part.uniform = false;
         let kept: Vec<bool> = (0..self.rows()).map(&mut keeps).collect();
@@ -98,6 +98,27 @@ impl Series {
         part.reading.retain(|_| *of.next().expect("a row"));
         let mut of = kept.iter();
         part.fold.retain(|_| *of.next().expect("a row"));
+        part
+    }
+
+    /// The part of the series in which `pieces` successive pieces of the voltage change it most; the whole series if it has no more.
+    pub fn liveliest(&self, pieces: usize) -> Self {
+        if self.pieces.len() <= pieces {
+            return self.clone();
+        }
+        let changes = self.pieces.windows(2).map(|pair| (pair[1].from - pair[0].from).powi(2));
+        let total: Vec<f64> = std::iter::once(0.0)
+            .chain(changes.scan(0.0, |sum, change| {
+                *sum += change;
+                Some(*sum)
+            }))
+            .collect();
+        let change = |first: &usize| total[first + pieces - 1] - total[*first];
+        let most = (0..=total.len() - pieces).max_by(|a, b| change(a).total_cmp(&change(b))).unwrap_or(0);
+        let (from, to) = (self.pieces[most].start, self.pieces[most + pieces - 1].start);
+        let mut part = self.only(|row| (from..=to).contains(&self.time[row]));
+        part.start = from.max(self.start);
+        part.pieces = self.pieces[most..most + pieces].to_vec();
         part
     }
 
