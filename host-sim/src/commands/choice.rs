@@ -31,6 +31,9 @@ pub(crate) const INPUT: Choices<identify::Input> = &[
     ("stair", "The report's stair, with its 0.1 s ramps", identify::Input::Stair),
 ];
 
+/// `--input` of `vsj identify`: the commanded voltage between two rows of a record.
+pub(crate) const RECORDED: Choices<identify::Input> = &[INPUT[0], INPUT[1]];
+
 /// The model of `vsj dynamics`.
 pub(crate) const MODEL: Choices<Model> = &[
     ("zener", "Spring in series with a parallel spring and damper", Model::Zener),

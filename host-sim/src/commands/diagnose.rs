@@ -63,16 +63,14 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     fn origin(&self, record: &Record) -> Origin {
-        // The path of the program is omitted, since the page may be read elsewhere.
-        let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
-        let command: Vec<String> = iter::once("vsj".to_owned()).chain(words).collect();
-        Origin {
-            record: record.name.clone(),
-            column: self.column.clone(),
-            input: self.input,
-            command: command.join(" "),
-        }
+        Origin { record: record.name.clone(), column: self.column.clone(), input: self.input, command: command_line() }
     }
+}
+
+/// The command line that was run, without the path of the program, since its answer may be read elsewhere.
+pub(super) fn command_line() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    iter::once("vsj".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 /// Quotes a word for a shell where necessary.

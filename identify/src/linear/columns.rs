@@ -43,7 +43,7 @@ impl Column {
     }
 
     /// Subtracts `factor` times another column on the rows of both.
-    fn subtract(&mut self, factor: f64, other: &Self) {
+    pub(super) fn subtract(&mut self, factor: f64, other: &Self) {
         let (here, there) = self.common(other);
         self.values[here].iter_mut().zip(&other.values[there]).for_each(|(value, other)| *value -= factor * other);
     }
@@ -126,6 +126,18 @@ impl Orthonormal {
             for row in 0..column {
                 x[row] -= self.r[column][row] * x[column];
             }
+        }
+        x
+    }
+
+    /// Solves `R' x = right`; dependent columns get 0.
+    pub(super) fn solve_transposed(&self, right: &[f64]) -> Vec<f64> {
+        let mut x: Vec<f64> = Vec::with_capacity(right.len());
+        for (column, right) in right.iter().enumerate() {
+            let entries = &self.r[column];
+            let before: f64 = x.iter().zip(entries).map(|(x, entry)| x * entry).sum();
+            let pivot = entries[column];
+            x.push(if pivot > 0.0 { (right - before) / pivot } else { 0.0 });
         }
         x
     }

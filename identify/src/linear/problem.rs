@@ -25,7 +25,7 @@ const LONGEST_TAU: f64 = 3.0;
 /// Longest delay, in lengths of the record.
 const LONGEST_DELAY: f64 = 0.1;
 /// Longest decay of an oscillation, in lengths of the record.
-const LONGEST_DECAY: f64 = 0.2;
+const LONGEST_DECAY: f64 = 1.0;
 /// Rejected steps in succession after which a refinement ends.
 const MOST_REJECTED: usize = 6;
 
@@ -117,6 +117,61 @@ impl Fit {
             rest = others;
             (section, [own[0], own.get(1).copied().unwrap_or(0.0)])
         })
+    }
+
+    /// All parameters in the order of the basis: those of each record, then instantaneous part and numerators, then, of a linearised
+    /// fit, the logarithms of the sections' parameters and the delay in spacings.
+    pub fn parameters(&self, problem: &Problem) -> Vec<f64> {
+        let searched = self.basis.count() - self.coefficients.len();
+        let logarithms = self.poles.sections.iter().flat_map(|section| section.logarithms());
+        let delay = self.poles.delay / problem.spacing;
+        self.coefficients.iter().copied().chain(logarithms.chain([delay]).take(searched)).collect()
+    }
+
+    /// The fit with other parameters, in the order of [`Fit::parameters`]; without its basis.
+    pub fn with_parameters(&self, problem: &Problem, parameters: &[f64]) -> Self {
+        let (coefficients, searched) = parameters.split_at(self.coefficients.len());
+        let mut poles = self.poles.clone();
+        let mut at = 0;
+        for section in &mut poles.sections {
+            let old: Vec<f64> = section.logarithms().collect();
+            for (which, old) in old.into_iter().enumerate() {
+                *section = section.times(which, (searched[at] - old).exp());
+                at += 1;
+            }
+        }
+        if let Some(delay) = searched.get(at) {
+            poles.delay = delay * problem.spacing;
+        }
+        let (residual, coefficients) = (Vec::new(), coefficients.to_vec());
+        Self { poles, residual, cost: self.cost, coefficients, basis: Orthonormal::new() }
+    }
+
+    /// The error of a function of the parameters as a linear function of the readings' errors: weights of all rows, from the
+    /// function's derivatives by the parameters. `fit` is linearised.
+    pub fn influence(&self, derivatives: &[f64]) -> Vec<f64> {
+        let rows = self.residual.len();
+        let mut influence = Column { first: 0, values: vec![0.0; rows] };
+        for (coordinate, q) in self.basis.solve_transposed(derivatives).into_iter().zip(&self.basis.q) {
+            influence.subtract(-coordinate, q);
+        }
+        influence.values
+    }
+
+    /// Number of independent parameters.
+    pub fn degrees(&self) -> usize {
+        self.basis.q.iter().filter(|column| !column.values.is_empty()).count()
+    }
+
+    /// Deviation of the model's first reading of a record from the reading that the first voltage would settle at.
+    pub fn start(&self, record: usize) -> f64 {
+        let mut rest = &self.own(record)[1..];
+        let mut sum = 0.0;
+        for section in &self.poles.sections {
+            sum += rest[0];
+            rest = &rest[section.order()..];
+        }
+        sum
     }
 
     /// Zero of a record relative to the mean of its readings, and the coefficients of its free responses.
@@ -215,6 +270,31 @@ impl Problem {
     /// Number of readings.
     pub fn rows(&self) -> usize {
         self.readings.values.len()
+    }
+
+    /// The parameters of a model that lie on a bound of the search, each in a few words.
+    pub fn on_bounds(&self, poles: &Poles) -> Vec<&'static str> {
+        let Bounds { tau, frequency, decay, delay, .. } = self.bounds;
+        let at = |value: f64, bound: f64| (value / bound - 1.0).abs() < 1e-6;
+        let mut found = Vec::new();
+        for section in &poles.sections {
+            match *section {
+                Section::First { tau: of } if at(of, tau.0) => found.push("the shortest time constant"),
+                Section::First { tau: of } if at(of, tau.1) => found.push("the longest time constant"),
+                Section::Second { frequency: of, .. } if at(of, frequency.1) => found.push("the highest frequency"),
+                Section::Second { damping, frequency } if damping < 1.0 && at(damping * frequency * decay, 1.0) => {
+                    found.push("the longest decay of an oscillation");
+                }
+                Section::Second { damping, frequency } if at(2.0 * damping / frequency, tau.1) => {
+                    found.push("the longest time constant");
+                }
+                _ => (),
+            }
+        }
+        if delay.1 > 0.0 && poles.delay > delay.1 - self.spacing {
+            found.push("the longest delay");
+        }
+        found
     }
 
     /// First row of each record among the rows of all.

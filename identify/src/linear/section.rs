@@ -65,6 +65,15 @@ impl Section {
         }
     }
 
+    /// The parameters that are searched: the natural logarithm of the time constant, or of frequency and damping ratio.
+    pub(super) fn logarithms(self) -> impl Iterator<Item = f64> {
+        let (values, count) = match self {
+            Self::First { tau } => ([tau, 1.0], 1),
+            Self::Second { frequency, damping } => ([frequency, damping], 2),
+        };
+        values.into_iter().take(count).map(f64::ln)
+    }
+
     /// The section with its `which`-th parameter multiplied by `factor`.
     pub(super) fn times(self, which: usize, factor: f64) -> Self {
         match (self, which) {
