@@ -46,6 +46,8 @@
 //! | [`dimension`] | | dimensions of reported numbers, and their units |
 //! | [`answer`] | | the data types of a report |
 //! | [`record`] | a record's rows | the command as a signal, the readings, the grid that they lie on |
+//! | [`linear`] | a record | the best linear models of order 0 to 4 |
+//! | [`nominal`] | records | the smallest linear model that no larger one beats, as a plant file |
 //! | [`plant`] | a plant file | the chain from command to stiffness that effects change |
 //! | [`noise`] | residuals | the likelihood of readings |
 //! | [`effects`] | | what may be wrong, one file an effect, and sets of effects as models |
@@ -61,7 +63,9 @@ pub mod dimension;
 pub mod effects;
 pub mod examine;
 pub mod fit;
+pub mod linear;
 pub mod noise;
+pub mod nominal;
 pub mod plant;
 pub mod record;
 pub mod search;
@@ -70,5 +74,6 @@ pub mod verdict;
 
 pub use answer::{Margins, Report, Verdict};
 pub use examine::{Options, Several, diagnose, examine, examine_several};
+pub use nominal::{Identified, identify};
 pub use record::data::Input;
 pub use verdict::diagnosis::Diagnosis;

@@ -10,7 +10,7 @@ use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
 use host_sim::output::terminal::{json, print, wrote};
 use identify::plant::base::Base;
-use identify::{Input, Options, examine_several};
+use identify::{Input, Options, examine_several, identify};
 use indicatif::ProgressBar;
 use simulation::plant_file;
 use simulation::record::{MeasuredRecord, Record};
@@ -47,10 +47,10 @@ known cause does), insufficient (too little excitation to decide). All of them e
 pub(crate) struct Arguments {
     #[command(flatten)]
     record: RecordArguments,
-    /// The simulation to compare with: `paper`, or a plant file. Parts of the file (memory, law, leakage, amplifier,
+    /// The simulation to compare with: `paper`, `identify` for what `vsj identify` finds in the records, or a plant file. Parts of the file (memory, law, leakage, amplifier,
     /// further time constants) that the spring does not have are named in a sentence and in the field `take_out` of the
     /// JSON, and omitted from the extended spring
-    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
+    #[arg(long, default_value = "paper", value_name = "paper|identify|FILE.toml")]
     plant: String,
     /// Write report.html, diagnosis.json, residuals.csv, the plots and the extended spring (plant.toml) to this folder
     #[arg(long, value_name = "DIR")]
@@ -62,28 +62,30 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     /// The options of the diagnosis: the one place where its nominal spring is made.
-    fn options(&self, measured: &[MeasuredRecord], input: Input) -> Result<Options> {
-        let file = plant_file::load_for_host(&self.plant)?;
+    fn options(&self, measured: &[MeasuredRecord], records: &[Record], input: Input) -> Result<Options> {
         let units = measured.first().map(|measured| measured.units.clone()).unwrap_or_default();
+        let file = match self.plant.as_str() {
+            "identify" => identify(records, input, &units)?.plant,
+            plant => plant_file::load_for_host(plant)?,
+        };
         Ok(Options { plant: self.plant.clone(), units, input, base: Base::new(file)? })
     }
 
     fn origin(measured: &[MeasuredRecord], input: Input) -> Origin {
-        // The path of the program is omitted, since the page may be read elsewhere.
-        let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
-        let command: Vec<String> = iter::once("vsj".to_owned()).chain(words).collect();
-        Origin {
-            record: names(measured),
-            column: measured.first().map(|measured| measured.column.clone()).unwrap_or_default(),
-            input,
-            command: command.join(" "),
-        }
+        let column = measured.first().map(|measured| measured.column.clone()).unwrap_or_default();
+        Origin { record: names(measured), column, input, command: command_line() }
     }
 }
 
 /// Names of the records, separated by commas.
 fn names(measured: &[MeasuredRecord]) -> String {
     measured.iter().map(|measured| measured.record.name.as_str()).collect::<Vec<_>>().join(", ")
+}
+
+/// The command line that was run, without the path of the program, since its answer may be read elsewhere.
+pub(super) fn command_line() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    iter::once("vsj".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 /// Quotes a word for a shell where necessary.
@@ -105,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
         }
     }
-    let options = arguments.options(&measured, input)?;
+    let options = arguments.options(&measured, &records, input)?;
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();

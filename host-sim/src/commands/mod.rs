@@ -5,6 +5,7 @@ mod choice;
 pub(crate) mod compare;
 pub(crate) mod diagnose;
 pub(crate) mod dynamics;
+pub(crate) mod identify;
 pub(crate) mod joint;
 pub(crate) mod link;
 pub(crate) mod log;

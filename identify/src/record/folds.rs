@@ -11,7 +11,7 @@ const SEGMENTS: usize = 40;
 
 /// Returns the fold of each row: whole stairs of a short record with enough stairs, else segments of equal length in
 /// turn.
-pub(super) fn folds(voltage_v: &[f64]) -> Vec<u8> {
+pub(crate) fn folds(voltage_v: &[f64]) -> Vec<u8> {
     let rows = voltage_v.len();
     if rows < FEW_ROWS.count() {
         let stairs: Vec<usize> = voltage_v.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();

@@ -12,7 +12,7 @@
 pub mod data;
 mod decay;
 mod first_order;
-mod folds;
+pub(crate) mod folds;
 pub mod heteroscedasticity;
 pub mod normalisation;
 pub mod observed;

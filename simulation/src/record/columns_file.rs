@@ -29,8 +29,8 @@ use crate::plant_file::place::line_and_column;
 struct File {
     columns: Columns,
     /// What is known to be in the record, for `cargo campaign real`.
-    #[serde(default)]
-    known: IgnoredAny,
+    #[serde(default, rename = "known")]
+    _known: IgnoredAny,
 }
 
 /// The table `[columns]`; every entry may be absent.

@@ -25,7 +25,6 @@ use identify::plant::base::Base;
 use identify::{Input, Options, examine};
 use indicatif::ProgressBar;
 use serde::Serialize;
-use serde_json::Value;
 use simulation::record::{Format, Record, columns_file};
 use simulation::units::Units;
 
@@ -169,7 +168,13 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
     let identifying = start.elapsed().as_secs_f64();
     let report = &identified.report;
     let plant = "identify".to_owned();
-    let options = Options { plant, units: units.clone(), input: *input, base: Base::new(identified.plant.clone())?, ..Options::default() };
+    let options = Options {
+        plant,
+        units: units.clone(),
+        input: *input,
+        base: Base::new(identified.plant.clone())?,
+        ..Options::default()
+    };
     let diagnosis = examine(record, &options, |_| ())?;
     let seconds = [identifying, start.elapsed().as_secs_f64()];
 

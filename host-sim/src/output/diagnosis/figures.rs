@@ -6,13 +6,13 @@ use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::plots;
 
 /// A plot of a diagnosis.
-pub(super) struct Figure {
+pub(in crate::output) struct Figure {
     /// File name.
-    pub(super) name: &'static str,
+    pub(in crate::output) name: &'static str,
     /// Caption on the page.
-    pub(super) caption: &'static str,
+    pub(in crate::output) caption: &'static str,
     /// The drawing.
-    pub(super) svg: String,
+    pub(in crate::output) svg: String,
 }
 
 /// All plots, in the order of the page.

@@ -9,15 +9,15 @@ use figures::{Figure, figures};
 use identify::Diagnosis;
 
 mod extension;
-mod figures;
+pub(super) mod figures;
 mod number;
 mod origin;
-mod page;
+pub(super) mod page;
 pub mod panels;
 pub mod plots;
 mod records;
 mod residuals;
-mod style;
+pub(super) mod style;
 mod tables;
 pub mod text;
 

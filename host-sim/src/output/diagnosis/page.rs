@@ -79,7 +79,7 @@ fn verdict(verdict: Verdict) -> &'static str {
 }
 
 /// An SVG inside the page: scaled to the column, without its namespace.
-fn drawn(Figure { caption, svg, .. }: &Figure) -> Markup {
+pub(in crate::output) fn drawn(Figure { caption, svg, .. }: &Figure) -> Markup {
     let inline = svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
     let side = |name: &str| {
         inline.split_once(&format!(" {name}=\"")).and_then(|(_, rest)| rest.split_once('"')).map(|it| it.0)

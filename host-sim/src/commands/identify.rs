@@ -1,0 +1,67 @@
+//! `vsj identify`: the linear spring that records show.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::output::files::Files;
+use host_sim::output::identify::{self as output, Origin};
+use host_sim::output::terminal::{json, print, wrote};
+use identify::{Input, identify};
+use simulation::bad_input;
+use simulation::record::Record;
+
+use super::diagnose::command_line;
+use super::record_arguments::RecordArguments;
+
+/// Find the spring that records show: gain, zero, instantaneous share, delay, time constants, start, noise
+///
+/// From any record in which the voltage changes, whatever its unit, offset and sign. The smallest linear model that no larger one
+/// beats by more than its noise, with 95 % intervals, compared with the best linear models of order 1 to 4 on held-out segments.
+/// Several records are of one spring; each has its own zero and start, and each is held out as a whole.
+///
+/// RECORD.csv has the columns time_s, voltage_v (commanded) and the measured one. It must contain every change of the voltage. The
+/// voltage of a row applies from its time on, and its reading is taken just after.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj identify data/sample_hysteresis.csv          a table and remarks
+  vsj identify a.csv b.csv                         two records of one spring
+  vsj identify hv.csv --time t_ms:ms --voltage u_kV:kV --reading x_mm:mm
+  vsj identify record.csv --out out/nominal        with a page and plant.toml
+  vsj diagnose record.csv --plant out/nominal/plant.toml
+  vsj identify record.csv --json | jq .nominal")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    record: RecordArguments,
+    /// Write report.html, identify.json, the plots and the spring (plant.toml) to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let (measured, input) = arguments.record.open()?;
+    if input == Input::Stair {
+        bad_input!("--input stair: expected hold or linear; the report's stair is for `vsj diagnose`");
+    }
+    let units = measured.first().map(|measured| measured.units.clone()).unwrap_or_default();
+    let records: Vec<Record> = measured.into_iter().map(|measured| measured.record).collect();
+    let files = arguments.out.as_deref().map(Files::new).transpose()?;
+    let mut identified = identify(&records, input, &units)?;
+    if let Some(folder) = &arguments.out {
+        identified.report.model = Some(folder.join(output::PLANT_FILE).display().to_string());
+    }
+    let paths = match files {
+        Some(files) => output::write(files, &identified, &units, &Origin { command: command_line() })?,
+        None => Vec::new(),
+    };
+    print(&if arguments.json {
+        json(&identified.report)?
+    } else {
+        output::text::text(&identified, &units) + &wrote(&paths)
+    })
+}

@@ -1,0 +1,40 @@
+//! The answer of `vsj identify`: text, a page with plots, JSON, and the spring as a plant file.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use identify::Identified;
+use simulation::units::Units;
+
+use crate::output::files::Files;
+
+mod page;
+mod plots;
+mod table;
+pub mod text;
+
+/// Name of the file with the spring, for `--plant`.
+pub const PLANT_FILE: &str = "plant.toml";
+
+/// The origin of an identification.
+#[derive(Clone, Debug)]
+pub struct Origin {
+    /// The command line that was run.
+    pub command: String,
+}
+
+/// Writes all files; returns their paths.
+///
+/// # Errors
+/// Returns the errors of [`Files`].
+pub fn write(mut files: Files, identified: &Identified, units: &Units, origin: &Origin) -> Result<Vec<PathBuf>> {
+    let figures = plots::figures(identified, units);
+    let page = page::page(identified, units, origin, &figures);
+    files.add("report.html", |out| out.write_all(page.as_bytes()))?;
+    let names: Vec<String> = identified.records.iter().map(|record| record.name.replace(['\n', '\r'], " ")).collect();
+    let plant = identified.plant.to_toml()?;
+    files.add(PLANT_FILE, |out| write!(out, "# Identified from {}\n{plant}", names.join(", ")))?;
+    let answer = serde_json::to_string_pretty(&identified.report).context("identify.json")?;
+    files.add("identify.json", |out| writeln!(out, "{answer}"))?;
+    files.finish()
+}

@@ -1,0 +1,209 @@
+//! One record as linear models take it: readings at their times, and the voltage as straight pieces.
+
+use simulation::record::Record;
+use simulation::schedule::Schedule;
+
+use crate::record::data::Input;
+use crate::record::folds::folds;
+
+/// Largest deviation of the rows' times from equal spacing, in spacings, that is attributed to the rounding of the times.
+const ROUNDING: f64 = 1e-3;
+
+/// The voltage from a time on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Piece {
+    /// Time at which the piece starts, after the first row.
+    pub(super) start: f64,
+    /// Voltage at the start.
+    pub(super) from: f64,
+    /// Change of the voltage per unit of time.
+    pub(super) slope: f64,
+}
+
+/// A record: readings with their times, and the voltage.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Time at which the free responses start, after the record's first row.
+    pub start: f64,
+    /// Time of each reading after the record's first row, in the record's unit, increasing.
+    pub time: Vec<f64>,
+    /// The readings, in their unit.
+    pub reading: Vec<f64>,
+    /// The fold in which each reading is held out if the record is the only one.
+    pub fold: Vec<u8>,
+    /// Median time between rows.
+    pub spacing: f64,
+    /// True if the voltage is held between rows.
+    pub held: bool,
+    /// True if the rows are equally spaced.
+    pub even: bool,
+    /// True if the readings are equally spaced.
+    pub uniform: bool,
+    pieces: Vec<Piece>,
+}
+
+impl Series {
+    /// Prepares a record. Rows without a reading only tell the voltage. Times that are equally spaced but for their rounding
+    /// are taken as equally spaced.
+    pub fn new(record: &Record, input: Input) -> Self {
+        let first = record.rows.first().map_or(0.0, |row| row.time_s);
+        let mut times: Vec<f64> = record.rows.iter().map(|row| row.time_s - first).collect();
+        let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        gaps.sort_by(f64::total_cmp);
+        let spacing = gaps.get(gaps.len() / 2).copied().unwrap_or(1.0);
+        let step = times.last().unwrap_or(&0.0) / (times.len().max(2) - 1) as f64;
+        let evenly = times.iter().enumerate().all(|(row, time)| (time - row as f64 * step).abs() <= ROUNDING * step);
+        if evenly {
+            times.iter_mut().enumerate().for_each(|(row, time)| *time = row as f64 * step);
+        }
+        let voltage: Vec<f64> = record.rows.iter().map(|row| row.voltage_v).collect();
+        let pieces = match input {
+            Input::Hold => held(&times, &voltage),
+            Input::Linear => straight(&times, &voltage),
+            Input::Stair => of_schedule(&Schedule::stair(), first),
+        };
+        let rows = || record.rows.iter().zip(&times).filter_map(|(row, time)| Some((row, *time, row.measured?)));
+        let commanded: Vec<f64> = rows().map(|(row, ..)| row.voltage_v).collect();
+        let time: Vec<f64> = rows().map(|(_, time, _)| time).collect();
+        Self {
+            start: time.first().copied().unwrap_or(0.0),
+            time,
+            reading: rows().map(|(.., reading)| reading).collect(),
+            fold: folds(&commanded),
+            spacing: if evenly { step } else { spacing },
+            held: input == Input::Hold,
+            even: evenly,
+            uniform: evenly && commanded.len() == voltage.len(),
+            pieces,
+        }
+    }
+
+    /// The series with every `every`-th reading and the voltage of all rows.
+    pub fn thinned(&self, every: usize) -> Self {
+        let mut thin = self.clone();
+        thin.time = self.time.iter().copied().step_by(every).collect();
+        thin.reading = self.reading.iter().copied().step_by(every).collect();
+        thin.fold = self.fold.iter().copied().step_by(every).collect();
+        thin
+    }
+
+    /// The series with the readings of some rows and the voltage of all; its first reading stays the start.
+    pub(super) fn only(&self, mut keeps: impl FnMut(usize) -> bool) -> Self {
+        let mut part = self.clone();
+        part.uniform = false;
+        let kept: Vec<bool> = (0..self.rows()).map(&mut keeps).collect();
+        let mut of = kept.iter();
+        part.time.retain(|_| *of.next().expect("a row"));
+        let mut of = kept.iter();
+        part.reading.retain(|_| *of.next().expect("a row"));
+        let mut of = kept.iter();
+        part.fold.retain(|_| *of.next().expect("a row"));
+        part
+    }
+
+    /// The part of the series in which `pieces` successive pieces of the voltage change it most; the whole series if it has no more.
+    pub fn liveliest(&self, pieces: usize) -> Self {
+        if self.pieces.len() <= pieces {
+            return self.clone();
+        }
+        let changes = self.pieces.windows(2).map(|pair| (pair[1].from - pair[0].from).powi(2));
+        let total: Vec<f64> = std::iter::once(0.0)
+            .chain(changes.scan(0.0, |sum, change| {
+                *sum += change;
+                Some(*sum)
+            }))
+            .collect();
+        let change = |first: &usize| total[first + pieces - 1] - total[*first];
+        let most = (0..=total.len() - pieces).max_by(|a, b| change(a).total_cmp(&change(b))).unwrap_or(0);
+        let (from, to) = (self.pieces[most].start, self.pieces[most + pieces - 1].start);
+        let mut part = self.only(|row| (from..=to).contains(&self.time[row]));
+        part.start = from.max(self.start);
+        part.pieces = self.pieces[most..most + pieces].to_vec();
+        part
+    }
+
+    /// The series under the magnitude of its voltage.
+    pub fn rectified(&self) -> Self {
+        let mut rectified = self.clone();
+        rectified.pieces = Vec::with_capacity(self.pieces.len());
+        for (index, piece) in self.pieces.iter().enumerate() {
+            let end = self.pieces.get(index + 1).map_or(f64::INFINITY, |next| next.start);
+            let sign = match piece.from {
+                0.0 => piece.slope.signum(),
+                from => from.signum(),
+            };
+            rectified.pieces.push(Piece { start: piece.start, from: piece.from.abs(), slope: sign * piece.slope });
+            let zero = piece.start - piece.from / piece.slope;
+            if piece.slope != 0.0 && piece.start < zero && zero < end {
+                rectified.pieces.push(Piece { start: zero, from: 0.0, slope: piece.slope.abs() });
+            }
+        }
+        rectified
+    }
+
+    /// True if the voltage has both signs.
+    pub fn has_both_signs(&self) -> bool {
+        self.pieces.iter().any(|piece| piece.from < 0.0) && self.pieces.iter().any(|piece| piece.from > 0.0)
+    }
+
+    /// Largest magnitude of the voltage.
+    pub fn full_scale(&self) -> f64 {
+        self.pieces.iter().fold(0.0, |most: f64, piece| most.max(piece.from.abs()))
+    }
+
+    /// Time from the first to the last reading.
+    pub fn duration(&self) -> f64 {
+        self.time.last().unwrap_or(&0.0) - self.time.first().unwrap_or(&0.0)
+    }
+
+    /// Number of readings.
+    pub fn rows(&self) -> usize {
+        self.reading.len()
+    }
+
+    pub(super) fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+}
+
+/// A voltage that is held between rows.
+fn held(times: &[f64], voltage: &[f64]) -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = Vec::new();
+    for (&start, &from) in times.iter().zip(voltage) {
+        if pieces.last().is_none_or(|last| last.from != from) {
+            pieces.push(Piece { start, from, slope: 0.0 });
+        }
+    }
+    pieces
+}
+
+/// A voltage that is linear between rows, and constant after the last.
+fn straight(times: &[f64], voltage: &[f64]) -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = Vec::new();
+    for row in 0..times.len() {
+        let (start, from) = (times[row], voltage[row]);
+        let slope = match (times.get(row + 1), voltage.get(row + 1)) {
+            (Some(end), Some(to)) => (to - from) / (end - start),
+            _ => 0.0,
+        };
+        let goes_on = |last: &Piece| last.slope == 0.0 && slope == 0.0 && last.from == from;
+        if !pieces.last().is_some_and(goes_on) {
+            pieces.push(Piece { start, from, slope });
+        }
+    }
+    pieces
+}
+
+/// The voltage of a schedule after the time `first`.
+fn of_schedule(schedule: &Schedule, first: f64) -> Vec<Piece> {
+    let slope = |piece: &simulation::schedule::Piece| {
+        let length = piece.end_s - piece.start_s;
+        if length > 0.0 && length.is_finite() { (piece.to_v - piece.from_v) / length } else { 0.0 }
+    };
+    let of = |piece: &simulation::schedule::Piece| Piece {
+        start: piece.start_s - first,
+        from: piece.from_v,
+        slope: slope(piece),
+    };
+    schedule.pieces().iter().map(of).collect()
+}

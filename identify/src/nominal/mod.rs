@@ -1,0 +1,336 @@
+//! The nominal model of a spring: records come in; the smallest linear model that no larger one beats by more than its noise goes
+//! out, in the terms of a spring, with intervals and held-out errors, and as a plant file.
+//!
+//! - *Share*: part of the static gain that is instantaneous.
+//! - *Weight*: part of the static gain that a time constant or an oscillation contributes.
+//! - *Even*: the spring responds to the magnitude of the voltage.
+
+mod canonical;
+pub mod covariance;
+mod plant;
+pub mod remarks;
+pub mod report;
+
+use anyhow::Result;
+
+use simulation::bad_input;
+use simulation::plant_file::PlantFile;
+use simulation::record::Record;
+use simulation::units::Units;
+
+use crate::answer::SCHEMA;
+use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
+use crate::nominal::canonical::Canonical;
+use crate::nominal::covariance::Spectrum;
+use crate::nominal::report::{
+    InputLaw, LinearError, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant,
+};
+use crate::record::data::Input;
+use crate::stats::median::robust_deviation;
+use crate::stats::scale::{root_mean_square, second_differences};
+use crate::stats::sums::dot;
+use crate::stats::thresholds::probability::Z;
+
+/// A larger model is preferred if its held-out error is smaller by this part.
+const WORTHWHILE: f64 = 0.005;
+/// Its advantage must also be this many times the standard error of the advantage over the segments, ...
+const BEYOND_CHANCE: f64 = 2.5;
+/// ... or this many times where its error is smaller by [`CLEAR`]: a record with few changes has few segments that tell.
+const BEYOND_CHANCE_IF_CLEAR: f64 = 1.0;
+/// Part by which a held-out error is clearly smaller.
+const CLEAR: f64 = 0.2;
+/// Fewest readings of a record.
+const FEWEST_READINGS: usize = 8;
+/// Part of a record to which a model is fitted that predicts the rest.
+const FIRST_PART: f64 = 0.6;
+/// Step of a parameter for a difference quotient, in standard deviations of the parameter.
+const DIFFERENCE: f64 = 1e-2;
+/// Steps of a refinement from a fit to similar readings, and the relative reduction of the cost below which it ends.
+const REFIT: (usize, f64) = (10, 1e-6);
+
+/// An identified spring.
+#[derive(Clone, Debug)]
+pub struct Identified {
+    /// The answer.
+    pub report: Report,
+    /// The spring as a plant file.
+    pub plant: PlantFile,
+    /// The readings of each record and the model of them.
+    pub records: Vec<Course>,
+}
+
+/// One record compared with the model; all vectors have one element per reading.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// Name of the record.
+    pub name: String,
+    /// Times, in s.
+    pub time_s: Vec<f64>,
+    /// Commanded voltages, in V.
+    pub voltage_v: Vec<f64>,
+    /// Readings, in their unit.
+    pub reading: Vec<f64>,
+    /// Reading minus model.
+    pub residual: Vec<f64>,
+    /// Reading minus prediction by a fit that did not use the segment.
+    pub held_out: Vec<f64>,
+}
+
+/// The best models under one input law.
+struct Models {
+    law: InputLaw,
+    problem: Problem,
+    /// Fit and held-out residual by order.
+    fits: Vec<(Fit, Vec<f64>)>,
+    chosen: usize,
+}
+
+impl Models {
+    fn of(series: Vec<Series>, law: InputLaw) -> Self {
+        let problem = Problem::new(series);
+        let with_error = |fit: Fit| {
+            let held_out = held_out_residual(&problem, &fit);
+            (fit, held_out)
+        };
+        let fits: Vec<(Fit, Vec<f64>)> = best_of_each_order(&problem).into_iter().map(with_error).collect();
+        let beaten =
+            |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large].1, &fits[small].1));
+        let chosen = (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten");
+        Self { law, problem, fits, chosen }
+    }
+
+    fn held_out_rmse(&self) -> f64 {
+        root_mean_square(&self.fits[self.chosen].1)
+    }
+}
+
+/// True if the residuals of a larger model are smaller by more than is worthwhile and than chance explains.
+fn beats(problem: &Problem, large: &[f64], small: &[f64]) -> bool {
+    let ratio = root_mean_square(large) / root_mean_square(small);
+    if ratio.is_nan() || ratio > 1.0 - WORTHWHILE {
+        return false;
+    }
+    let beyond = if ratio < 1.0 - CLEAR { BEYOND_CHANCE_IF_CLEAR } else { BEYOND_CHANCE };
+    let mut gains: Vec<f64> = Vec::new();
+    for (series, &first) in problem.series.iter().zip(problem.starts()) {
+        let mut row = first;
+        for segment in series.fold.chunk_by(|a, b| a == b) {
+            let rows = row..row + segment.len();
+            gains.push(dot(&small[rows.clone()], &small[rows.clone()]) - dot(&large[rows.clone()], &large[rows]));
+            row += segment.len();
+        }
+    }
+    let sum: f64 = gains.iter().sum();
+    let count = gains.len() as f64;
+    let spread: f64 = gains.iter().map(|gain| (gain - sum / count).powi(2)).sum();
+    sum > beyond * (spread * count / (count - 1.0).max(1.0)).sqrt()
+}
+
+/// Identifies the spring of one or several records; each has its own zero and start.
+///
+/// # Errors
+/// [`simulation::bad_input::BadInput`] for a record with too few readings, or whose voltage or reading never changes.
+pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Identified> {
+    if records.is_empty() {
+        bad_input!("no record; expected at least one");
+    }
+    for record in records {
+        check(record)?;
+    }
+    let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
+    let mut models = Models::of(series.clone(), InputLaw::Linear);
+    if series.iter().any(Series::has_both_signs) {
+        let even = Models::of(series.iter().map(Series::rectified).collect(), InputLaw::Even);
+        if even.held_out_rmse() < models.held_out_rmse() {
+            models = even;
+        }
+    }
+    Ok(identified(records, models, units))
+}
+
+fn check(record: &Record) -> Result<()> {
+    let readings = || record.rows.iter().filter_map(|row| row.measured);
+    if readings().count() < FEWEST_READINGS {
+        bad_input!(
+            "{}: {} row(s) with a reading; expected at least {FEWEST_READINGS}",
+            record.name,
+            readings().count()
+        );
+    }
+    let first = record.rows[0].voltage_v;
+    if record.rows.iter().all(|row| row.voltage_v == first) {
+        bad_input!("{}: the voltage never changes; expected a record in which it does", record.name);
+    }
+    let first = readings().next();
+    if readings().all(|reading| Some(reading) == first) {
+        bad_input!("{}: the reading never changes; expected a record in which it does", record.name);
+    }
+    Ok(())
+}
+
+fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
+    let Models { law, problem, fits, chosen } = &models;
+    let (fit, held_out) = &fits[*chosen];
+    let rows = problem.rows();
+    let spectrum = Spectrum::of(&fit.residual, problem.starts(), fit.degrees());
+    let canonical = Canonical::of(problem, fit);
+    let mut deviations = deviations(problem, fit, &canonical, &spectrum).into_iter();
+    let base = if units.voltage.si == 1.0 { units.voltage.name.as_str() } else { "V" };
+    let reading = units.reading.as_str();
+    let mut quantity = |value: f64, unit: &str| {
+        let half = Z * deviations.next().unwrap_or(0.0);
+        Quantity { value, low: value - half, high: value + half, unit: unit.into() }
+    };
+    // In the order of `Canonical::values`.
+    let gain = quantity(canonical.gain, &format!("{reading}/{base}"));
+    let share = quantity(canonical.share, "");
+    let delay = quantity(canonical.delay, "s");
+    let mut tau_s: Vec<TimeConstant> = canonical
+        .lags
+        .iter()
+        .map(|&(tau, weight)| TimeConstant { tau: positive(quantity(tau, "s")), weight: quantity(weight, "") })
+        .collect();
+    let oscillation: Vec<Oscillation> = canonical
+        .oscillations
+        .iter()
+        .map(|&[frequency, damping, weight]| Oscillation {
+            freq_hz: positive(quantity(frequency, "Hz")),
+            zeta: positive(quantity(damping, "")),
+            weight: quantity(weight, ""),
+        })
+        .collect();
+    let zeros: Vec<Quantity> = canonical.zeros.iter().map(|&zero| quantity(zero, reading)).collect();
+    let offsets: Vec<Quantity> = canonical.starts.iter().map(|&start| quantity(start, reading)).collect();
+    tau_s.sort_by(|a, b| b.weight.value.abs().total_cmp(&a.weight.value.abs()));
+    let delay_s = if problem.bounds.whole_rows { whole_rows(problem, fit, &spectrum) } else { not_negative(delay) };
+    let nominal = Nominal { gain, zero: zeros[0].clone(), share, delay_s, tau_s };
+    let start = records
+        .iter()
+        .zip(zeros.into_iter().zip(offsets))
+        .map(|(record, (zero, offset))| Start { record: record.name.clone(), zero, offset })
+        .collect();
+    let degrees = (rows.saturating_sub(fit.degrees())).max(1) as f64;
+    let differences = problem.starts().iter().zip(&problem.series).flat_map(|(&first, series)| {
+        second_differences(&fit.residual[first..first + series.rows()]).collect::<Vec<_>>()
+    });
+    let noise = Noise {
+        sigma: (fit.cost / degrees).sqrt(),
+        autocorrelation: spectrum.neighbours(&fit.residual),
+        scatter: robust_deviation(differences).unwrap_or(0.0),
+    };
+    let plant = plant::plant_file(&nominal, &oscillation, *law, units, problem.spacing);
+    let mut report = Report {
+        schema: SCHEMA,
+        rows,
+        order: *chosen,
+        nominal,
+        oscillation,
+        input_law: *law,
+        rmse: root_mean_square(&fit.residual),
+        held_out_rmse: models.held_out_rmse(),
+        last_40_percent_rmse: last_part(problem, &fit.poles),
+        static_held_out_rmse: root_mean_square(&fits[0].1),
+        linear: (1..fits.len())
+            .map(|order| LinearError { order, held_out_rmse: root_mean_square(&fits[order].1) })
+            .collect(),
+        start,
+        noise,
+        remarks: Vec::new(),
+        unit: reading.into(),
+        model: None,
+    };
+    report.remarks = remarks::remarks(&report, problem, fit, units);
+    let course = |(record, (&first, series)): (&Record, (&usize, &Series))| {
+        let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?)));
+        let part = first..first + series.rows();
+        Course {
+            name: record.name.clone(),
+            time_s: rows().map(|(row, _)| row.time_s).collect(),
+            voltage_v: rows().map(|(row, _)| row.voltage_v).collect(),
+            reading: rows().map(|(_, reading)| reading).collect(),
+            residual: fit.residual[part.clone()].to_vec(),
+            held_out: held_out[part].to_vec(),
+        }
+    };
+    let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
+    Identified { report, plant, records }
+}
+
+/// Standard deviations of the quantities, in the order of [`Canonical::values`].
+fn deviations(problem: &Problem, fit: &Fit, canonical: &Canonical, spectrum: &Spectrum) -> Vec<f64> {
+    let parameters = fit.parameters(problem);
+    let here = canonical.values(canonical).expect("the same numbers of lags and oscillations");
+    let mut derivatives = vec![vec![0.0; parameters.len()]; here.len()];
+    for at in 0..parameters.len() {
+        let mut unit = vec![0.0; parameters.len()];
+        unit[at] = 1.0;
+        let influence = fit.influence(&unit);
+        let step = DIFFERENCE * (spectrum.innovations * dot(&influence, &influence)).sqrt();
+        if step == 0.0 || !step.is_finite() {
+            continue;
+        }
+        let moved = |by: f64| {
+            let mut moved = parameters.clone();
+            moved[at] += by;
+            Canonical::of(problem, &fit.with_parameters(problem, &moved)).values(canonical)
+        };
+        // Near a double pole only one side may have two time constants.
+        let (from, to, width) = match (moved(-step), moved(step)) {
+            (Some(from), Some(to)) => (from, to, 2.0 * step),
+            (None, Some(to)) => (here.clone(), to, step),
+            (Some(from), None) => (from, here.clone(), step),
+            (None, None) => continue,
+        };
+        for (quantity, (from, to)) in from.iter().zip(&to).enumerate() {
+            derivatives[quantity][at] = (to - from) / width;
+        }
+    }
+    derivatives.iter().map(|derivatives| spectrum.deviation(&fit.influence(derivatives))).collect()
+}
+
+/// The interval of a positive quantity, symmetric in its logarithm.
+fn positive(quantity: Quantity) -> Quantity {
+    let factor = ((quantity.high - quantity.value) / quantity.value).exp();
+    Quantity { low: quantity.value / factor, high: quantity.value * factor, ..quantity }
+}
+
+fn not_negative(quantity: Quantity) -> Quantity {
+    Quantity { low: quantity.low.max(0.0), ..quantity }
+}
+
+/// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row cannot be told from
+/// another numerator, so that the interval reaches one row further down.
+fn whole_rows(problem: &Problem, fit: &Fit, spectrum: &Spectrum) -> Quantity {
+    const MOST: usize = 4;
+    let neighbours = spectrum.neighbours(&fit.residual).clamp(0.0, 0.95);
+    let degrees = problem.rows().saturating_sub(fit.degrees()).max(1) as f64;
+    let tolerated = Z * Z * fit.cost / degrees * (1.0 + neighbours) / (1.0 - neighbours);
+    let rows = (fit.poles.delay / problem.spacing).round();
+    let fits = |rows: f64| {
+        let poles = Poles { delay: rows * problem.spacing, ..fit.poles.clone() };
+        rows >= 0.0
+            && rows * problem.spacing <= problem.bounds.delay.1
+            && problem.refined(poles, REFIT.0, REFIT.1).cost <= fit.cost + tolerated
+    };
+    let reach = |sign: f64| (1..=MOST).map(|by| rows + sign * by as f64).take_while(|&rows| fits(rows)).last();
+    let low = (reach(-1.0).unwrap_or(rows) - 1.0).max(0.0) * problem.spacing;
+    let high = reach(1.0).unwrap_or(rows) * problem.spacing;
+    Quantity { value: fit.poles.delay, low, high, unit: "s".into() }
+}
+
+/// Root mean square error on the last part of each record by a fit to its first part.
+fn last_part(problem: &Problem, poles: &Poles) -> f64 {
+    let starts = problem.starts();
+    let ends: Vec<usize> = starts
+        .iter()
+        .zip(&problem.series)
+        .map(|(start, series)| start + (FIRST_PART * series.rows() as f64).round() as usize)
+        .collect();
+    let first = |row: usize| row < ends[starts.partition_point(|start| *start <= row) - 1];
+    let residual = problem.residual(&problem.only(first).refined(poles.clone(), REFIT.0, REFIT.1));
+    let last: Vec<f64> = (0..residual.len()).filter(|&row| !first(row)).map(|row| residual[row]).collect();
+    root_mean_square(&last)
+}
+
+#[cfg(test)]
+mod tests;

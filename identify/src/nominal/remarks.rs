@@ -1,0 +1,75 @@
+//! What records cannot tell about a spring, in sentences.
+
+use simulation::units::Units;
+
+use crate::linear::{Fit, Problem};
+use crate::nominal::report::Report;
+
+/// Errors that are larger than their scatter from row to row by this factor are no noise of the sensor.
+const STRUCTURED: f64 = 3.0;
+/// A time constant with a larger ratio of its bounds is hardly known.
+const HARDLY_KNOWN: f64 = 4.0;
+
+/// The remarks on an identification.
+pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {
+    let nominal = &report.nominal;
+    let mut remarks = Vec::new();
+    let time = |seconds: f64| format!("{} {}", digits(seconds / units.time.si), units.time.name);
+    if nominal.gain.low <= 0.0 && nominal.gain.high >= 0.0 {
+        remarks.push("The records show no static response: the interval of the gain contains 0.".into());
+    }
+    for bound in problem.on_bounds(&fit.poles) {
+        remarks
+            .push(format!("A parameter is on its bound, {bound} that is searched; its interval is not to be trusted."));
+    }
+    if !(0.0..=1.0).contains(&nominal.share.value) && report.order > 0 {
+        remarks.push(format!(
+            "The instantaneous share {} is outside of 0 to 1: the first response goes {}.",
+            digits(nominal.share.value),
+            if nominal.share.value < 0.0 { "the other way" } else { "beyond the settled one" }
+        ));
+    }
+    let duration = problem.series.iter().map(|series| series.duration()).fold(0.0, f64::max);
+    for lag in &nominal.tau_s {
+        if lag.tau.value > duration {
+            remarks.push(format!(
+                "The time constant {} is longer than the record ({}), so that it may be a drift.",
+                time(lag.tau.value),
+                time(duration)
+            ));
+        } else if lag.tau.high > HARDLY_KNOWN * lag.tau.low {
+            remarks.push(format!("The record hardly tells the time constant {}.", time(lag.tau.value)));
+        }
+    }
+    if problem.bounds.whole_rows && nominal.delay_s.value > 0.0 && report.order > 0 {
+        remarks.push(format!(
+            "Readings every {} cannot tell a part of this delay from a part of the instantaneous share: the delay is {} to {}.",
+            time(problem.spacing),
+            time(nominal.delay_s.low),
+            time(nominal.delay_s.high)
+        ));
+    }
+    if report.rmse > STRUCTURED * report.noise.scatter && report.noise.scatter > 0.0 {
+        remarks.push(format!(
+            "The errors ({} {}) exceed their scatter from row to row ({} {}): no linear model of order 4 or less describes all of the \
+             response; `vsj diagnose` names what else is in it.",
+            digits(report.rmse),
+            report.unit,
+            digits(report.noise.scatter),
+            report.unit
+        ));
+    }
+    remarks
+}
+
+/// A number with four significant digits.
+pub fn digits(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-4..7).contains(&exponent) {
+        return format!("{value:.3e}");
+    }
+    format!("{value:.*}", (3 - exponent).max(0) as usize)
+}

@@ -1,0 +1,130 @@
+//! The data types of an identification, as they are serialised to JSON. Names of fields are part of the interface.
+
+use serde::Serialize;
+
+/// A quantity with its 95 % interval.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Quantity {
+    /// Estimate, in `unit`.
+    pub value: f64,
+    /// Lower end of the interval, in `unit`.
+    pub low: f64,
+    /// Upper end of the interval, in `unit`.
+    pub high: f64,
+    /// Unit, "" for a dimensionless number.
+    pub unit: String,
+}
+
+/// A time constant with its part of the static gain.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TimeConstant {
+    /// The time constant, in s.
+    #[serde(flatten)]
+    pub tau: Quantity,
+    /// Its part of the static gain; parts of opposite sign are an overshoot.
+    pub weight: Quantity,
+}
+
+/// A complex pair of poles.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Oscillation {
+    /// Undamped frequency, in Hz.
+    pub freq_hz: Quantity,
+    /// Damping ratio, 0 to 1.
+    pub zeta: Quantity,
+    /// Its part of the static gain.
+    pub weight: Quantity,
+}
+
+/// The linear spring that a record shows.
+#[derive(Clone, Debug, Serialize)]
+pub struct Nominal {
+    /// Static change of the reading with the voltage, in the reading's unit per V.
+    pub gain: Quantity,
+    /// Reading at rest at 0 V, of the first record.
+    pub zero: Quantity,
+    /// Part of the static gain that is instantaneous.
+    pub share: Quantity,
+    /// Delay, in s.
+    pub delay_s: Quantity,
+    /// Time constants, the largest part of the static gain first.
+    pub tau_s: Vec<TimeConstant>,
+}
+
+/// The held-out error of the best linear model of one order.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LinearError {
+    /// Number of poles.
+    pub order: usize,
+    /// Held-out root mean square error, in the reading's unit.
+    pub held_out_rmse: f64,
+}
+
+/// What a record's first reading tells.
+#[derive(Clone, Debug, Serialize)]
+pub struct Start {
+    /// Name of the record.
+    pub record: String,
+    /// Zero of this record.
+    pub zero: Quantity,
+    /// The model's first reading minus the one that the first voltage settles at.
+    pub offset: Quantity,
+}
+
+/// The errors that the model leaves.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Noise {
+    /// Standard deviation, in the reading's unit.
+    pub sigma: f64,
+    /// Correlation of neighbouring errors.
+    pub autocorrelation: f64,
+    /// Scale of the errors from row to row, in the reading's unit: the standard deviation if they were independent.
+    pub scatter: f64,
+}
+
+/// How the spring responds to the sign of the voltage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum InputLaw {
+    /// The reading follows the voltage.
+    Linear,
+    /// The reading follows the magnitude of the voltage.
+    Even,
+}
+
+/// The answer of `vsj identify`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version of the JSON format.
+    pub schema: u32,
+    /// Number of readings of all records.
+    pub rows: usize,
+    /// Number of poles of the nominal model.
+    pub order: usize,
+    /// The model.
+    pub nominal: Nominal,
+    /// Complex pairs of poles.
+    pub oscillation: Vec<Oscillation>,
+    /// How the spring responds to the sign of the voltage.
+    pub input_law: InputLaw,
+    /// Root mean square of the free-running error, in the reading's unit.
+    pub rmse: f64,
+    /// The same on held-out segments; with several records, on held-out records.
+    pub held_out_rmse: f64,
+    /// The same on the last 40 % of each record, by a fit of this structure to the first 60 %.
+    pub last_40_percent_rmse: f64,
+    /// The same as `held_out_rmse` of gain and zero alone.
+    pub static_held_out_rmse: f64,
+    /// The best linear models of order 1 to 4.
+    pub linear: Vec<LinearError>,
+    /// Zero and start of each record.
+    pub start: Vec<Start>,
+    /// The errors that the model leaves.
+    pub noise: Noise,
+    /// What the records cannot tell, one sentence each.
+    pub remarks: Vec<String>,
+    /// Name of the reading's unit.
+    pub unit: String,
+    /// Path of the plant file that was written; `None` if none was.
+    pub model: Option<String>,
+}
