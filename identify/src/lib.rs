@@ -67,5 +67,7 @@ pub mod verdict;
 
 pub use answer::{Margins, Report, Verdict};
 pub use examine::{Options, diagnose, examine};
+pub use fit::budget::Effort;
+pub use fit::stop::Stop;
 pub use record::data::Input;
 pub use verdict::diagnosis::Diagnosis;

@@ -92,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if arguments.input == Input::Stair {
         Schedule::stair().check_commanded("the report's stair (--input stair)", &record, RAMP_S)?;
     }
-    let options = Options { input: arguments.input, base };
+    let options = Options { input: arguments.input, base, ..Options::default() };
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let bar = ProgressBar::new_spinner();

@@ -16,9 +16,10 @@ use anyhow::Result;
 use simulation::bad_input;
 use simulation::record::Record;
 
-use crate::answer::{Report, Verdict};
+use crate::answer::{Report, SearchReport, Verdict};
 use crate::effects::index_of;
 use crate::examine::options::Options;
+use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
 use crate::plant::base::Base;
 use crate::record::data::{Data, Input};
@@ -55,16 +56,33 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
-    let record = ExaminedRecord { record, input: options.input, data: &data };
+    let budget = Budget::new(options.effort, data.rows(), options.stop.clone());
+    let record = ExaminedRecord { record, input: options.input, data: &data, budget: &budget };
     let found = of_readings(&record, &options.base, progress);
-    Ok(without_unsupported_terms(&record, &options.base, found, progress))
+    let mut found = without_unsupported_terms(&record, &options.base, found, progress);
+    found.report.complete = !budget.is_stopped();
+    found.report.search = SearchReport {
+        effort: options.effort.name(),
+        work: budget.spent(),
+        allowed: budget.total(),
+        finished: !budget.was_cut(),
+    };
+    Ok(found)
 }
+
+/// Share of the work that is left for one search, the others for its report and for later passes.
+const SHARE_OF_SEARCH: f64 = 0.75;
+/// Share of the work that is left for the search on a part of the rows of a long record.
+const SHARE_OF_PART: f64 = 0.4;
+/// Share of the work that is left for the search without one part of the plant file.
+const SHARE_WITHOUT_PART: f64 = 0.15;
 
 /// A record as all passes take it.
 struct ExaminedRecord<'r> {
     record: &'r Record,
     input: Input,
     data: &'r Data,
+    budget: &'r Budget,
 }
 
 /// Receives each structure that becomes the best.
@@ -85,7 +103,9 @@ fn as_rounded(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagn
 
 /// Second pass: searches with readings cut off to their grid, which the readings alone cannot distinguish from rounding.
 fn as_cut_off(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
-    let Some(cut) = found.observed.truncated().filter(|cut| prefers(record, base, cut, &found)) else { return found };
+    let may = |_: &Observed| !record.budget.is_over();
+    let cut = found.observed.truncated().filter(may).filter(|cut| prefers(record, base, cut, &found));
+    let Some(cut) = cut else { return found };
     let cut = search(record, base, &cut, found.warm_start.clone(), progress);
     if cut.score > found.score + CLEARLY_LIKELIER { cut } else { found }
 }
@@ -96,7 +116,7 @@ fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnos
     let shift = index_of("reading-offset").expect("an effect");
     let model = found.extended.model.without(shift);
     let likelihood = |observed| {
-        let mut engine = Engine::new(record.data, observed, base);
+        let mut engine = Engine::within(record.data, observed, base, record.budget);
         engine.fit_twice(model.clone()).log_likelihood
     };
     likelihood(cut) > likelihood(&found.observed)
@@ -104,7 +124,7 @@ fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnos
 
 /// Third pass: searches without bounds of the sensor, where the model does not go beyond the plateau that looked like one.
 fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
-    if found.confirms_bounds() {
+    if record.budget.is_over() || found.confirms_bounds() {
         return found;
     }
     search(record, base, &found.observed.without_bounds(), found.warm_start, progress)
@@ -122,9 +142,9 @@ fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagno
     let Some(mut warm_start) = found.warm_start.clone() else { return found };
     let (mut score, mut base) = (found.score, base.clone());
     let mut unsupported_terms = Vec::new();
-    loop {
+    while !record.budget.is_over() {
         let tried = base.without_each().map(|(part, base)| {
-            let (score, warm_start) = best_score(record.data, &base, &found.observed, warm_start.clone(), progress);
+            let (score, warm_start) = best_score(record, &base, &found.observed, warm_start.clone(), progress);
             (part, base, score, warm_start)
         });
         let best = tried.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|best| best.2 > score + CLEARLY_LIKELIER);
@@ -141,16 +161,19 @@ fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagno
 
 /// The best score of a search from a warm start, in nats, with the warm start for the next one.
 fn best_score(
-    data: &Data,
+    record: &ExaminedRecord,
     base: &Base,
     observed: &Observed,
     warm_start: WarmStart,
     progress: Progress,
 ) -> (f64, WarmStart) {
-    let mut engine = Engine::new(data, observed, base);
+    let mut engine = Engine::within(record.data, observed, base, record.budget);
+    record.budget.grant(SHARE_WITHOUT_PART);
     let mut search = Search::new(&mut engine);
     let best = search.run_from(warm_start, progress);
-    (best.score, search.warm_start())
+    let found = (best.score, search.warm_start());
+    record.budget.close();
+    found
 }
 
 /// The diagnosis `without` some parts of the plant file, with the simulation that has them as its baseline.
@@ -176,8 +199,10 @@ fn search(
     warm_start: Option<WarmStart>,
     progress: Progress,
 ) -> Diagnosis {
+    let budget = record.budget;
     let warm_start = warm_start.or_else(|| on_part_of_rows(record, base, observed, progress));
-    let mut engine = Engine::new(record.data, observed, base);
+    budget.grant(SHARE_OF_SEARCH);
+    let mut engine = Engine::within(record.data, observed, base, budget);
     diagnosis::diagnose(&mut engine, record.input == Input::Hold, warm_start, progress)
 }
 
@@ -189,7 +214,8 @@ fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, pr
     }
     let part = Data::thinned(record.record, record.input, rows.div_ceil(ROWS_TO_SEARCH.count()));
     let observed = Observed::new(&part).with_conclusions_of(observed);
-    let mut engine = Engine::new(&part, &observed, base);
+    let mut engine = Engine::within(&part, &observed, base, record.budget);
+    record.budget.grant(SHARE_OF_PART);
     let mut search = Search::new(&mut engine);
     search.run(progress);
     Some(search.warm_start())

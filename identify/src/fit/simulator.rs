@@ -1,7 +1,7 @@
 //! Simulation of models on a record; simulations that differ only in later blocks reuse the earlier results.
 
 use crate::effects::effect::Affects;
-use crate::effects::model::Model;
+use crate::effects::model::{Block, Model};
 use crate::plant::base::Base;
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
@@ -25,6 +25,8 @@ pub struct Simulator<'a> {
     response: Cached<Vec<f64>>,
     /// Response of the stiffness to each initial state.
     kernels: Cached<Vec<Vec<f64>>>,
+    /// Pieces that went through a block since they were counted last.
+    work: u64,
 }
 
 /// A result, and the blocks that it was computed from.
@@ -47,6 +49,17 @@ impl<T> Cached<T> {
     }
 }
 
+/// Work of one piece in each stage, in units of one lag.
+const AMPLIFIER: u64 = 2;
+const STATIC_RESPONSE: u64 = 3;
+const RELAXATION: u64 = 1;
+const RESPONSE: u64 = 4;
+
+/// Returns the work of a block on a response.
+fn response_work(block: Block, signal: &Signal) -> u64 {
+    if block.effect().affects() == Affects::Response { RESPONSE * signal.len() as u64 } else { 0 }
+}
+
 impl<'a> Simulator<'a> {
     /// Prepares simulations of one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
@@ -60,7 +73,13 @@ impl<'a> Simulator<'a> {
             chained: Cached::default(),
             response: Cached::default(),
             kernels: Cached::default(),
+            work: 0,
         }
+    }
+
+    /// Returns the number of pieces that went through a block since the last call.
+    pub fn take_work(&mut self) -> u64 {
+        std::mem::take(&mut self.work)
     }
 
     /// Computes the prediction of a model for each row, in V.
@@ -93,8 +112,10 @@ impl<'a> Simulator<'a> {
                 let mut start = InitialState::off(state);
                 self.signal.clone_from(&self.amplified.value);
                 chain.initial_state_response(&mut self.signal, &mut start, &self.levels_v);
+                self.work += RELAXATION * chain.relaxation.work(&self.signal);
                 for (block, point) in &model.blocks {
                     block.effect().modify_response(block.form, point, &mut self.signal, &mut start);
+                    self.work += response_work(*block, &self.signal);
                 }
                 (state, states) = (state + 1, start.states());
                 // A state that changes no row is not estimated.
@@ -124,12 +145,15 @@ impl<'a> Simulator<'a> {
                 if !self.amplified.update_key(model, Affects::Amplifier) {
                     self.amplified.value.clone_from(&data.command);
                     chain.amplify(&mut self.amplified.value);
+                    self.work += AMPLIFIER * self.amplified.value.len() as u64;
                 }
                 self.static_response.value.clone_from(&self.amplified.value);
                 chain.static_response(&mut self.static_response.value);
+                self.work += STATIC_RESPONSE * self.static_response.value.len() as u64;
             }
             signal.clone_from(&self.static_response.value);
             chain.relax(signal, &self.amplified.value, &mut self.levels_v);
+            self.work += RELAXATION * chain.relaxation.work(signal);
         }
         if model.blocks.iter().all(|(block, _)| block.effect().affects() != Affects::Response) {
             return signal;
@@ -137,6 +161,7 @@ impl<'a> Simulator<'a> {
         self.signal.clone_from(signal);
         for (block, point) in &model.blocks {
             block.effect().modify_response(block.form, point, &mut self.signal, &mut InitialState::at_rest());
+            self.work += response_work(*block, &self.signal);
         }
         &self.signal
     }
@@ -146,7 +171,6 @@ impl<'a> Simulator<'a> {
 mod tests {
     use super::*;
     use crate::effects::index_of;
-    use crate::effects::model::Block;
     use crate::record::data::Input;
     use simulation::record::Record;
 

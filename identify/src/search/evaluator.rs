@@ -43,6 +43,9 @@ pub trait Evaluator {
 
     /// Factor by which prices are multiplied for the residual of a fit, 1 or more.
     fn penalty_factor(&mut self, fit: &Fit) -> f64;
+
+    /// True once the work for the search is done, or its end was requested: it ends with the best structure so far.
+    fn is_over(&self) -> bool;
 }
 
 impl Evaluator for Engine<'_> {
@@ -71,8 +74,14 @@ impl Evaluator for Engine<'_> {
             extensions
                 .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
-        let extensions = extensions.into_iter();
-        extensions.map(|Extension { block, point, .. }| self.fit(fit.model.with(block, point), &law)).collect()
+        let mut fits = Vec::new();
+        for Extension { block, point, .. } in extensions {
+            if self.is_over() {
+                break;
+            }
+            fits.push(self.fit(fit.model.with(block, point), &law));
+        }
+        fits
     }
 
     fn price(&self, block: &Block) -> f64 {
@@ -102,7 +111,14 @@ impl Evaluator for Engine<'_> {
     fn penalty_factor(&mut self, fit: &Fit) -> f64 {
         if negligible(&fit.residual) { 1.0 } else { penalty_factor(&self.terms(&fit.noise, &fit.residual)) }
     }
+
+    fn is_over(&self) -> bool {
+        self.budget().is_over()
+    }
 }
+
+/// Work of a predicted gain for each row, in units of one piece of the voltage through one lag.
+const PREDICTION: u64 = 5;
 
 /// A block that could be added, at one start.
 struct Extension {
@@ -126,6 +142,9 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
     let sigma = robust_scale(&fit.residual);
     let mut found: Vec<Extension> = Vec::new();
     for (index, effect) in EFFECTS.iter().enumerate().filter(|(index, _)| wanted(*index)) {
+        if engine.is_over() {
+            return Vec::new();
+        }
         let mut of_effect: Vec<Extension> = Vec::new();
         for form in 0..effect.forms() {
             let block = Block { effect: index, form };
@@ -133,6 +152,7 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
             let starts = effect.initial_points(form, &scene).into_iter().map(|point| {
                 let there = engine.residual(&fit.model.with(block, point.clone()));
                 let change: Vec<f64> = fit.residual.iter().zip(&there).map(|(a, b)| a - b).collect();
+                engine.budget().spend(PREDICTION * change.len() as u64);
                 let predicted_gain =
                     predictors.iter().map(|predictor| predictor.predicted_gain(&change)).fold(0.0, f64::max);
                 Extension { block, point, predicted_gain }

@@ -27,6 +27,9 @@ impl<E: Evaluator> Search<'_, E> {
         let first_fits = self.first_fits(&node.fit, None);
         let mut children = self.evaluated_best(&node.fit, first_fits);
         children.sort_by(|a, b| b.score.total_cmp(&a.score));
+        if self.evaluator.is_over() {
+            return children;
+        }
         self.extended.insert(key, children.clone());
         children
     }
@@ -79,7 +82,14 @@ impl<E: Evaluator> Search<'_, E> {
         if self.exhaustive && !node.noise.autocorrelation.is_white() {
             fits.extend(plain.into_iter().take(EVALUATED_AS_INDEPENDENT));
         }
-        fits.into_iter().map(|(_, fit)| self.evaluated.evaluate_again(self.evaluator, fit)).collect()
+        let mut evaluated = Vec::new();
+        for (_, fit) in fits {
+            if self.evaluator.is_over() {
+                break;
+            }
+            evaluated.push(self.evaluated.evaluate_again(self.evaluator, fit));
+        }
+        evaluated
     }
 }
 

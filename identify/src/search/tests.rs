@@ -25,6 +25,8 @@ struct Tabulated {
     hidden: Option<usize>,
     /// Number of fits; evaluations at a given point are not counted.
     fits: isize,
+    /// Number of fits at which the search has to end.
+    most_fits: isize,
 }
 
 fn effect(cause: &str) -> usize {
@@ -41,6 +43,7 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         clean: f64::INFINITY,
         hidden: None,
         fits: 0,
+        most_fits: isize::MAX,
     }
 }
 
@@ -97,6 +100,10 @@ impl Evaluator for Tabulated {
 
     fn penalty_factor(&mut self, _: &Fit) -> f64 {
         self.penalty_factor
+    }
+
+    fn is_over(&self) -> bool {
+        self.fits >= self.most_fits
     }
 }
 

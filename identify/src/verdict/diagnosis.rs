@@ -1,7 +1,7 @@
 //! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict.
 
 use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
-use crate::answer::{Extended, Finding, Margins, Report, SCHEMA, Verdict};
+use crate::answer::{Extended, Finding, Margins, Report, SCHEMA, SearchReport, Verdict};
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::record::data::Data;
@@ -101,6 +101,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
     let report = Report {
         schema: SCHEMA,
         rows: data.rows(),
+        complete: true,
+        search: SearchReport::default(),
         verdict,
         baseline: before,
         extended: Extended {
@@ -172,6 +174,8 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
     let report = Report {
         schema: SCHEMA,
         rows: data.rows(),
+        complete: true,
+        search: SearchReport::default(),
         verdict: reason.verdict(),
         baseline: quality,
         findings: Vec::new(),
