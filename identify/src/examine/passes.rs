@@ -71,7 +71,7 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
 }
 
 /// Share of the work that is left for one search, the others for its report and for later passes.
-const SHARE_OF_SEARCH: f64 = 0.75;
+const SHARE_OF_SEARCH: f64 = 0.85;
 /// Share of the work that is left for the search on a part of the rows of a long record.
 const SHARE_OF_PART: f64 = 0.4;
 /// Share of the work that is left for the search without one part of the plant file.

@@ -4,7 +4,7 @@
 //! takes the step only if the likelihood increases. Coordinates stay within their bounds.
 
 use crate::effects::effect::FitContext;
-use crate::effects::model::Model;
+use crate::effects::model::{Block, Model};
 use crate::fit::budget::{Budget, UNLIMITED};
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
@@ -50,6 +50,8 @@ impl Fit {
 mod work {
     /// The difference between reading and prediction.
     pub(super) const RESIDUAL: u64 = 1;
+    /// The estimate of one initial state.
+    pub(super) const INITIAL_STATE: u64 = 6;
     /// The scale of the noise and the likelihood.
     pub(super) const SCALE: u64 = 4;
     /// One column of derivatives, with its products with the others.
@@ -161,8 +163,33 @@ impl<'a> Engine<'a> {
             true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
         };
-        self.budget.spend(self.simulator.take_work() + work::RESIDUAL * residual.len() as u64);
+        let states = if self.data.initial_state_unknown { self.kernels.len() as u64 } else { 0 };
+        let of_row = work::RESIDUAL + work::INITIAL_STATE * states;
+        self.budget.spend(self.simulator.take_work() + of_row * residual.len() as u64);
         (residual, initial_state_cost)
+    }
+
+    /// Returns reading minus prediction of each row, in V, without an estimate of the initial state.
+    pub fn residual_from_rest(&mut self, model: &Model) -> Vec<f64> {
+        self.simulator.run(model, &mut self.predicted);
+        self.budget.spend(self.simulator.take_work() + work::RESIDUAL * self.predicted.len() as u64);
+        let truncation_v = self.observed.truncation_v;
+        self.data
+            .reading
+            .iter()
+            .zip(&self.predicted)
+            .map(|(reading, predicted)| reading + truncation_v - predicted)
+            .collect()
+    }
+
+    /// Returns the change of the prediction, in V, for each initial state that is 1 V away from rest; empty if the spring was at
+    /// rest.
+    pub fn initial_states(&mut self, model: &Model) -> &[Vec<f64>] {
+        self.kernels.clear();
+        if self.data.initial_state_unknown {
+            self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
+        }
+        &self.kernels
     }
 
     /// Evaluates a model at its present points, with the law of the noise fitted to its residual.
@@ -179,15 +206,29 @@ impl<'a> Engine<'a> {
     /// Fits the points of a model under a given law of the noise, whose scale is fitted as well, then the law to the
     /// residual.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
+        self.fit_across(model, law, |_| true)
+    }
+
+    /// Fits the same, but crosses discontinuities of the prediction by one effect only: when that is added to a model, those of
+    /// the others are where an earlier fit left them.
+    pub fn fit_added(&mut self, model: Model, law: &Noise, effect: usize) -> Fit {
+        self.fit_across(model, law, |block| block.effect == effect)
+    }
+
+    fn fit_across(&mut self, model: Model, law: &Noise, crosses: impl Fn(&Block) -> bool) -> Fit {
         let model = self.refine_searched(model, |_| true);
         let model = self.levenberg_marquardt(model, law);
         let here = self.evaluate(model);
-        self.across_jumps(here, law)
+        self.across_jumps(here, law, crosses)
     }
 
     /// Continues fits beyond discontinuities of the prediction on either side as long as the likelihood increases.
-    fn across_jumps(&mut self, mut here: Fit, law: &Noise) -> Fit {
-        for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
+    fn across_jumps(&mut self, mut here: Fit, law: &Noise, crosses: impl Fn(&Block) -> bool) -> Fit {
+        let sides = |index| [(index, -1.0), (index, 1.0)];
+        for (index, side) in (0..here.model.blocks.len()).flat_map(sides) {
+            if !crosses(&here.model.blocks[index].0) {
+                continue;
+            }
             let mut steps = side;
             for _ in 0..MOST_JUMPS {
                 if self.budget.is_over() {

@@ -27,6 +27,8 @@ pub struct Simulator<'a> {
     kernels: Cached<Vec<Vec<f64>>>,
     /// Pieces that went through a block since they were counted last.
     work: u64,
+    /// Work of a piece relative to one as long as the one before it, whose exponentials are known.
+    irregular: f64,
 }
 
 /// A result, and the blocks that it was computed from.
@@ -49,11 +51,17 @@ impl<T> Cached<T> {
     }
 }
 
+/// Smallest response to an initial state of 1 V that is one, in V.
+const LEAST_KERNEL: f64 = 1e-200;
+
 /// Work of one piece in each stage, in units of one lag.
 const AMPLIFIER: u64 = 2;
 const STATIC_RESPONSE: u64 = 3;
 const RELAXATION: u64 = 1;
 const RESPONSE: u64 = 4;
+const INITIAL_STATE: u64 = 3;
+/// Further work of a piece that is not as long as the one before it.
+const IRREGULAR: f64 = 3.0;
 
 /// Returns the work of a block on a response.
 fn response_work(block: Block, signal: &Signal) -> u64 {
@@ -63,9 +71,12 @@ fn response_work(block: Block, signal: &Signal) -> u64 {
 impl<'a> Simulator<'a> {
     /// Prepares simulations of one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
+        let pieces = data.command.len().max(1) as f64;
+        let irregular = 1.0 + IRREGULAR * data.command.changes_of_duration() as f64 / pieces;
         Self {
             data,
             base,
+            irregular,
             signal: Signal::default(),
             levels_v: Vec::new(),
             amplified: Cached::default(),
@@ -79,7 +90,7 @@ impl<'a> Simulator<'a> {
 
     /// Returns the number of pieces that went through a block since the last call.
     pub fn take_work(&mut self) -> u64 {
-        std::mem::take(&mut self.work)
+        (self.irregular * std::mem::take(&mut self.work) as f64) as u64
     }
 
     /// Computes the prediction of a model for each row, in V.
@@ -112,14 +123,15 @@ impl<'a> Simulator<'a> {
                 let mut start = InitialState::off(state);
                 self.signal.clone_from(&self.amplified.value);
                 chain.initial_state_response(&mut self.signal, &mut start, &self.levels_v);
-                self.work += RELAXATION * chain.relaxation.work(&self.signal);
+                self.work +=
+                    RELAXATION * chain.relaxation.work(&self.signal) + INITIAL_STATE * self.signal.len() as u64;
                 for (block, point) in &model.blocks {
                     block.effect().modify_response(block.form, point, &mut self.signal, &mut start);
                     self.work += response_work(*block, &self.signal);
                 }
                 (state, states) = (state + 1, start.states());
                 // A state that changes no row is not estimated.
-                if self.signal.at_rows().any(|value| value != 0.0) {
+                if self.signal.at_rows().any(|value| value.abs() > LEAST_KERNEL) {
                     self.kernels.value.push(self.signal.at_rows().collect());
                 }
             }

@@ -31,6 +31,8 @@ const MOST_STEPS: f64 = 200.0;
 
 /// Work of a step whose exponential is computed, relative to one whose exponential is known.
 const EXPONENTIAL: u64 = 4;
+/// Work of an integration step where the spring's state sets the time constant.
+const STEP_BY_STATE: u64 = 16;
 
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,7 +153,7 @@ impl Relaxation {
     pub fn work(&self, signal: &Signal) -> u64 {
         let lags = 1 + self.parts().count();
         match self.by_state.filter(|_| self.varies()) {
-            Some(_) => signal.durations_s().map(|duration_s| EXPONENTIAL * self.steps(duration_s) as u64).sum(),
+            Some(_) => signal.durations_s().map(|duration_s| STEP_BY_STATE * self.steps(duration_s) as u64).sum(),
             None if self.varies() => (lags - 1 + EXPONENTIAL as usize) as u64 * signal.len() as u64,
             None => (lags * signal.len()) as u64,
         }

@@ -73,14 +73,18 @@ impl<E: Evaluator> Search<'_, E> {
             *count <= FORMS
         });
         // While large errors remain, autocorrelation hides effects that independent noise shows.
-        let rest = fits.split_off(EVALUATED.min(fits.len()));
+        let (evaluated, as_independent) = match self.evaluator.is_scarce() {
+            true => (EVALUATED.div_ceil(2), EVALUATED_AS_INDEPENDENT.div_ceil(2)),
+            false => (EVALUATED, EVALUATED_AS_INDEPENDENT),
+        };
+        let rest = fits.split_off(evaluated.min(fits.len()));
         let mut plain: Vec<(f64, Fit)> = rest
             .into_iter()
             .filter(|(_, fit)| fit.white_noise_log_likelihood > node.white_noise_log_likelihood)
             .collect();
         plain.sort_by(|a, b| b.1.white_noise_log_likelihood.total_cmp(&a.1.white_noise_log_likelihood));
         if self.exhaustive && !node.noise.autocorrelation.is_white() {
-            fits.extend(plain.into_iter().take(EVALUATED_AS_INDEPENDENT));
+            fits.extend(plain.into_iter().take(as_independent));
         }
         let mut evaluated = Vec::new();
         for (_, fit) in fits {

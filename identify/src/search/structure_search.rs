@@ -185,6 +185,10 @@ impl<'e, E: Evaluator> Search<'e, E> {
             // A structure that leaves nothing but noise is the only one that is extended: no other can be much likelier.
             let doubts = self.evaluator.doubts(&best.fit);
             if !doubts {
+                // What is left of scarce work is for exchanges, which find a simpler block than the first that fits.
+                if self.evaluator.is_scarce() && !best.fit.model.blocks.is_empty() {
+                    break;
+                }
                 beam = vec![best.clone()];
             }
             let mut next = self.next(&beam);
@@ -216,6 +220,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
     fn next(&mut self, beam: &[Scored]) -> Vec<Scored> {
         let mut next: Vec<Scored> = Vec::new();
         for node in beam {
+            if self.evaluator.is_over() {
+                break;
+            }
             // Two blocks may gain only together, so that the first may lose score while the noise is autocorrelated.
             let may_lose = |child: &Scored| {
                 let gain = child.score - node.score;
@@ -229,7 +236,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
         }
         next.sort_by(|a, b| b.score.total_cmp(&a.score));
         distinct(&mut next);
-        let rest = next.split_off(BEAM.min(next.len()));
+        let beam = if self.evaluator.is_scarce() { 1 } else { BEAM };
+        let rest = next.split_off(beam.min(next.len()));
         next.extend(
             rest.into_iter()
                 .max_by(|a, b| a.fit.white_noise_log_likelihood.total_cmp(&b.fit.white_noise_log_likelihood)),

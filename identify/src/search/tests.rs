@@ -102,6 +102,10 @@ impl Evaluator for Tabulated {
         self.penalty_factor
     }
 
+    fn is_scarce(&self) -> bool {
+        2 * self.fits >= self.most_fits
+    }
+
     fn is_over(&self) -> bool {
         self.fits >= self.most_fits
     }
@@ -141,6 +145,24 @@ fn blocks_are_exchanged() {
     let pair: &[&str] = &["amplifier-slew", "charge-leakage"];
     let worth: [(&[&str], f64); 3] = [(&["delay"], 60.0), (&["delay", "charge-leakage"], 100.0), (pair, 150.0)];
     assert_eq!(found(&mut tabulated(&worth)), pair);
+}
+
+#[test]
+fn a_search_that_has_to_end_returns_the_best_so_far() {
+    let worth: [(&[&str], f64); 3] = [(&["delay"], 50.0), (&["hum"], 30.0), (&["delay", "hum"], 80.0)];
+    let whole = {
+        let mut evaluator = tabulated(&worth);
+        assert_eq!(found(&mut evaluator), ["delay", "hum"]);
+        evaluator.fits
+    };
+    let mut of_fits = (0..=whole).map(|most_fits| {
+        let mut evaluator = Tabulated { most_fits, ..tabulated(&worth) };
+        let found = found(&mut evaluator);
+        assert!(evaluator.fits <= most_fits + EFFECTS.len() as isize, "{} {most_fits}", evaluator.fits);
+        found.len()
+    });
+    // More work never gives a worse answer.
+    assert!(of_fits.by_ref().is_sorted() && found(&mut tabulated(&worth)).len() == 2);
 }
 
 #[test]

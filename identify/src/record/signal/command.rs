@@ -27,9 +27,11 @@ const MOST_EQUAL_PIECES: f64 = 20.0;
 /// Changes below this fraction of the full scale do not count.
 const STILL_FRACTION: f64 = 1e-4;
 /// Number of pieces for each row that is allowed.
-const PIECES_PER_ROW: usize = 2;
+const PIECES_PER_ROW: f64 = 2.0;
+/// The same where the voltage changes at most rows: rows of a thirtieth of the time constant are then not divided.
+const PIECES_PER_CHANGE: f64 = 1.5;
 /// Number of pieces that is allowed however few rows there are.
-const FEWEST_PIECES: usize = 4_000;
+const FEWEST_PIECES: usize = 3_000;
 
 impl From<&Stretch> for Piece {
     fn from(stretch: &Stretch) -> Self {
@@ -41,14 +43,33 @@ impl Signal {
     /// Returns the voltage of a schedule, in V, with a piece starting at each of `times_s`; `before` is the voltage
     /// before the first.
     pub fn new(schedule: &Schedule, times_s: &[f64], before: f64) -> Self {
-        Self::coarse(schedule, times_s, before, FEWEST_PIECES.max(PIECES_PER_ROW * times_s.len()), 0.0)
+        let allowed = |per_row: f64| FEWEST_PIECES.max((per_row * times_s.len() as f64) as usize);
+        let signal = Self::divided(schedule, times_s, before, 1.0, 0.0);
+        let at_rows: Vec<f64> = signal.at_rows().collect();
+        let changes = at_rows.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        let first = if 2 * changes > times_s.len() { PIECES_PER_CHANGE } else { PIECES_PER_ROW };
+        if signal.pieces.len() <= allowed(first) {
+            return signal;
+        }
+        Self::coarser(schedule, times_s, before, allowed(PIECES_PER_ROW), 0.0, 2.0)
     }
 
     /// Returns the same with at most `pieces` pieces, as far as changes of the voltage and rows leave a choice, and with
     /// neighbouring pieces replaced by a chord where that changes the voltage by `blur_v` or less.
     pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize, blur_v: f64) -> Self {
+        Self::coarser(schedule, times_s, before, pieces, blur_v, 1.0)
+    }
+
+    /// Returns the same, with at least a given coarseness.
+    fn coarser(
+        schedule: &Schedule,
+        times_s: &[f64],
+        before: f64,
+        pieces: usize,
+        blur_v: f64,
+        mut coarseness: f64,
+    ) -> Self {
         let duration_s = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
-        let mut coarseness = 1.0;
         loop {
             let signal = Self::divided(schedule, times_s, before, coarseness, blur_v);
             if signal.pieces.len() <= pieces || coarseness * SHORTEST_PIECE_S > duration_s {

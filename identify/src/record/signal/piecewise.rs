@@ -47,6 +47,12 @@ impl Signal {
         self.pieces.is_empty()
     }
 
+    /// Returns the number of pieces that are not as long as the one before them.
+    pub fn changes_of_duration(&self) -> usize {
+        let differ = |pair: &&[Piece]| (pair[1].duration_s - pair[0].duration_s).abs() > 1e-9 * pair[1].duration_s;
+        self.pieces.windows(2).filter(differ).count()
+    }
+
     /// Returns the duration of each piece, in s.
     pub fn durations_s(&self) -> impl Iterator<Item = f64> {
         self.pieces.iter().map(|piece| piece.duration_s)
