@@ -14,6 +14,10 @@ pub struct Report {
     pub schema: u32,
     /// Number of rows with a reading.
     pub rows: usize,
+    /// False if the search was stopped by time or by the user; the report is then the best answer so far.
+    pub complete: bool,
+    /// How far the search got.
+    pub search: SearchReport,
     /// The conclusion.
     pub verdict: Verdict,
     /// The simulation as it is given.
@@ -181,6 +185,19 @@ pub struct NoiseReport {
     pub tail: Option<f64>,
     /// Order of the autoregression, in rows; 0 for independent noise.
     pub memory_rows: usize,
+}
+
+/// How far a search got.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct SearchReport {
+    /// `quick`, `normal` or `thorough`.
+    pub effort: &'static str,
+    /// Work that was done, in pieces of the voltage through one lag.
+    pub work: u64,
+    /// Work that the effort allows.
+    pub allowed: u64,
+    /// False if the work was used up before the search had tried all that it would; a larger effort may find more.
+    pub finished: bool,
 }
 
 /// Correlations of a whitened residual.

@@ -68,7 +68,7 @@ impl Arguments {
             "identify" => identify(records, input, &units)?.plant,
             plant => plant_file::load_for_host(plant)?,
         };
-        Ok(Options { plant: self.plant.clone(), units, input, base: Base::new(file)? })
+        Ok(Options { plant: self.plant.clone(), units, input, base: Base::new(file)?, ..Options::default() })
     }
 
     fn origin(measured: &[MeasuredRecord], input: Input) -> Origin {

@@ -17,7 +17,7 @@ use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, 
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
-use crate::record::signal::{Lag, Piece, Signal};
+use crate::record::signal::{Lag, NO_SUBNORMAL, Piece, Signal};
 use crate::stats::thresholds::empirical::{LEAST_DAMPED, MOST_DAMPED};
 
 pub(super) struct Resonance;
@@ -119,8 +119,8 @@ impl Effect for Resonance {
                 let slope = (to - from) / duration_s;
                 let lag = 2.0 * zeta / omega * slope;
                 let (dx, dv) = (x - (from - lag), v - slope);
-                x = to - lag + step[0][0] * dx + step[0][1] * dv;
-                v = slope + step[1][0] * dx + step[1][1] * dv;
+                x = to - lag + NO_SUBNORMAL + step[0][0] * dx + step[0][1] * dv;
+                v = slope + NO_SUBNORMAL + step[1][0] * dx + step[1][1] * dv;
             }
             (piece.from + part * (start - from), piece.to + part * (x - to))
         });

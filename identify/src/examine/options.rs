@@ -2,6 +2,8 @@
 
 use simulation::units::Units;
 
+use crate::fit::budget::Effort;
+use crate::fit::stop::Stop;
 use crate::plant::base::Base;
 use crate::record::data::Input;
 
@@ -16,11 +18,22 @@ pub struct Options {
     pub input: Input,
     /// The simulation that is diagnosed.
     pub base: Base,
+    /// How long causes are searched for.
+    pub effort: Effort,
+    /// Ends the search early with the best answer so far.
+    pub stop: Stop,
 }
 
 impl Default for Options {
-    /// Voltage held between rows, and the paper's spring.
+    /// Voltage held between rows, the paper's spring, and the normal effort.
     fn default() -> Self {
-        Self { plant: "paper".into(), units: Units::default(), input: Input::Hold, base: Base::paper() }
+        Self {
+            plant: "paper".into(),
+            units: Units::default(),
+            input: Input::Hold,
+            base: Base::paper(),
+            effort: Effort::Normal,
+            stop: Stop::default(),
+        }
     }
 }

@@ -17,9 +17,10 @@ use simulation::bad_input;
 use simulation::plant_file::Reading;
 use simulation::record::Record;
 
-use crate::answer::{Nominal, Report, Verdict};
+use crate::answer::{Nominal, Report, SearchReport, Verdict};
 use crate::effects::index_of;
 use crate::examine::options::Options;
+use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
 use crate::plant::base::Base;
 use crate::record::data::{Data, Input};
@@ -72,11 +73,19 @@ pub(super) fn joint(records: &[Record], options: &Options, progress: &mut dyn Fn
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
-    let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data };
+    let budget = Budget::new(options.effort, data.rows(), options.stop.clone());
+    let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget };
     let found = of_readings(&examined, &base, progress);
     let found = without_unsupported_terms(&examined, &base, found, progress);
     let mut found = found.restored(records, &normalisations);
     found.report.nominal = nominal(options);
+    found.report.complete = !budget.is_stopped();
+    found.report.search = SearchReport {
+        effort: options.effort.name(),
+        work: budget.spent(),
+        allowed: budget.total(),
+        finished: !budget.was_cut(),
+    };
     Ok(found)
 }
 
@@ -87,11 +96,19 @@ fn nominal(Options { plant, base, .. }: &Options) -> Nominal {
     Nominal { plant: plant.clone(), gain, zero, share: relaxation.share, tau_s: relaxation.tau_s.clone() }
 }
 
+/// Share of the work that is left for one search, the others for its report and for later passes.
+const SHARE_OF_SEARCH: f64 = 0.85;
+/// Share of the work that is left for the search on a part of the rows of a long record.
+const SHARE_OF_PART: f64 = 0.4;
+/// Share of the work that is left for the search without one part of the plant file.
+const SHARE_WITHOUT_PART: f64 = 0.15;
+
 /// One normalised record, or several of one spring, as all passes take them.
 struct ExaminedRecord<'r> {
     records: &'r [Record],
     input: Input,
     data: &'r Data,
+    budget: &'r Budget,
 }
 
 /// Receives each structure that becomes the best.
@@ -112,7 +129,9 @@ fn as_rounded(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagn
 
 /// Second pass: searches with readings cut off to their grid, which the readings alone cannot distinguish from rounding.
 fn as_cut_off(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
-    let Some(cut) = found.observed.truncated().filter(|cut| prefers(record, base, cut, &found)) else { return found };
+    let may = |_: &Observed| !record.budget.is_over();
+    let cut = found.observed.truncated().filter(may).filter(|cut| prefers(record, base, cut, &found));
+    let Some(cut) = cut else { return found };
     let cut = search(record, base, &cut, found.warm_start.clone(), progress);
     if cut.score > found.score + CLEARLY_LIKELIER { cut } else { found }
 }
@@ -123,7 +142,7 @@ fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnos
     let shift = index_of("reading-offset").expect("an effect");
     let model = found.extended.model.without(shift);
     let likelihood = |observed| {
-        let mut engine = Engine::new(record.data, observed, base);
+        let mut engine = Engine::within(record.data, observed, base, record.budget);
         engine.fit_twice(model.clone()).log_likelihood
     };
     likelihood(cut) > likelihood(&found.observed)
@@ -131,7 +150,7 @@ fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnos
 
 /// Third pass: searches without bounds of the sensor, where the model does not go beyond the plateau that looked like one.
 fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
-    if found.confirms_bounds() {
+    if record.budget.is_over() || found.confirms_bounds() {
         return found;
     }
     search(record, base, &found.observed.without_bounds(), found.warm_start, progress)
@@ -149,9 +168,9 @@ fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagno
     let Some(mut warm_start) = found.warm_start.clone() else { return found };
     let (mut score, mut base) = (found.score, base.clone());
     let mut unsupported_terms = Vec::new();
-    loop {
+    while !record.budget.is_over() {
         let tried = base.without_each().map(|(part, base)| {
-            let (score, warm_start) = best_score(record.data, &base, &found.observed, warm_start.clone(), progress);
+            let (score, warm_start) = best_score(record, &base, &found.observed, warm_start.clone(), progress);
             (part, base, score, warm_start)
         });
         let best = tried.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|best| best.2 > score + CLEARLY_LIKELIER);
@@ -168,16 +187,19 @@ fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagno
 
 /// The best score of a search from a warm start, in nats, with the warm start for the next one.
 fn best_score(
-    data: &Data,
+    record: &ExaminedRecord,
     base: &Base,
     observed: &Observed,
     warm_start: WarmStart,
     progress: Progress,
 ) -> (f64, WarmStart) {
-    let mut engine = Engine::new(data, observed, base);
+    let mut engine = Engine::within(record.data, observed, base, record.budget);
+    record.budget.grant(SHARE_WITHOUT_PART);
     let mut search = Search::new(&mut engine);
     let best = search.run_from(warm_start, progress);
-    (best.score, search.warm_start())
+    let found = (best.score, search.warm_start());
+    record.budget.close();
+    found
 }
 
 /// The diagnosis `without` some parts of the plant file, with the simulation that has them as its baseline.
@@ -203,8 +225,10 @@ fn search(
     warm_start: Option<WarmStart>,
     progress: Progress,
 ) -> Diagnosis {
+    let budget = record.budget;
     let warm_start = warm_start.or_else(|| on_part_of_rows(record, base, observed, progress));
-    let mut engine = Engine::new(record.data, observed, base);
+    budget.grant(SHARE_OF_SEARCH);
+    let mut engine = Engine::within(record.data, observed, base, budget);
     diagnosis::diagnose(&mut engine, record.input == Input::Hold, warm_start, progress)
 }
 
@@ -219,7 +243,8 @@ fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, pr
     let part = record.records.iter().map(|of| Data::thinned(of, record.input, every, normalisation));
     let part = Data::joined(part.collect());
     let observed = Observed::new(&part).with_conclusions_of(observed);
-    let mut engine = Engine::new(&part, &observed, base);
+    let mut engine = Engine::within(&part, &observed, base, record.budget);
+    record.budget.grant(SHARE_OF_PART);
     let mut search = Search::new(&mut engine);
     search.run(progress);
     Some(search.warm_start())

@@ -42,6 +42,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     for (record, offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
         let alone = examine(&from_zero, &options, |causes| progress(&format!("{}: {causes}", record.name)))?;
+        joint.report.complete &= alone.report.complete;
         joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
         each.push(alone);
     }

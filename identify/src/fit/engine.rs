@@ -4,7 +4,8 @@
 //! takes the step only if the likelihood increases. Coordinates stay within their bounds.
 
 use crate::effects::effect::FitContext;
-use crate::effects::model::Model;
+use crate::effects::model::{Block, Model};
+use crate::fit::budget::{Budget, UNLIMITED};
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
 use crate::noise::{Noise, Term};
@@ -43,6 +44,20 @@ impl Fit {
     pub fn cost(&self) -> f64 {
         self.noise.cost(self.residual.len()) + self.initial_state_cost
     }
+}
+
+/// Work for each row, in units of one piece of the voltage through one lag.
+mod work {
+    /// The difference between reading and prediction.
+    pub(super) const RESIDUAL: u64 = 1;
+    /// The estimate of one initial state.
+    pub(super) const INITIAL_STATE: u64 = 6;
+    /// The scale of the noise and the likelihood.
+    pub(super) const SCALE: u64 = 4;
+    /// One column of derivatives, with its products with the others.
+    pub(super) const WHITENING: u64 = 4;
+    /// The law of the noise.
+    pub(super) const LAW: u64 = 60;
 }
 
 /// Largest number of rounds of a fit.
@@ -99,14 +114,21 @@ pub struct Engine<'a> {
     pub baseline_residual: Vec<f64>,
     predicted: Vec<f64>,
     kernels: Vec<Vec<f64>>,
+    /// Work that fits may do, and that was done.
+    budget: &'a Budget,
 }
 
 impl<'a> Engine<'a> {
     /// Prepares fits to one record, of models that extend the plant `base`.
     pub fn new(data: &'a Data, observed: &'a Observed, base: &'a Base) -> Self {
+        Self::within(data, observed, base, &UNLIMITED)
+    }
+
+    /// Prepares the same within a budget of work: once it is over, fits end where they are.
+    pub fn within(data: &'a Data, observed: &'a Observed, base: &'a Base, budget: &'a Budget) -> Self {
         let simulator = Simulator::new(data, base);
         let (predicted, kernels) = (Vec::new(), Vec::new());
-        let mut engine = Self { data, observed, simulator, baseline_residual: Vec::new(), predicted, kernels };
+        let mut engine = Self { data, observed, simulator, baseline_residual: Vec::new(), predicted, kernels, budget };
         engine.baseline_residual = engine.residual(&Model::default());
         engine
     }
@@ -114,6 +136,11 @@ impl<'a> Engine<'a> {
     /// Returns the plant without any effect.
     pub fn base(&self) -> &'a Base {
         self.simulator.base
+    }
+
+    /// Returns the work that fits may do, and that was done.
+    pub fn budget(&self) -> &'a Budget {
+        self.budget
     }
 
     /// Returns reading minus prediction of each row, in V, with the most likely initial state if that is unknown.
@@ -137,13 +164,40 @@ impl<'a> Engine<'a> {
             true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
         };
+        let states = if self.data.initial_state_unknown { self.kernels.len() as u64 } else { 0 };
+        let of_row = work::RESIDUAL + work::INITIAL_STATE * states;
+        self.budget.spend(self.simulator.take_work() + of_row * residual.len() as u64);
         (residual, initial_state_cost)
+    }
+
+    /// Returns reading minus prediction of each row, in V, without an estimate of the initial state.
+    pub fn residual_from_rest(&mut self, model: &Model) -> Vec<f64> {
+        self.simulator.run(model, &mut self.predicted);
+        self.budget.spend(self.simulator.take_work() + work::RESIDUAL * self.predicted.len() as u64);
+        let truncation_v = self.observed.truncation_v;
+        self.data
+            .reading
+            .iter()
+            .zip(&self.predicted)
+            .map(|(reading, predicted)| reading + truncation_v - predicted)
+            .collect()
+    }
+
+    /// Returns the change of the prediction, in V, for each initial state that is 1 V away from rest; empty if the spring was at
+    /// rest.
+    pub fn initial_states(&mut self, model: &Model) -> &[Vec<f64>] {
+        self.kernels.clear();
+        if self.data.initial_state_unknown {
+            self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
+        }
+        &self.kernels
     }
 
     /// Evaluates a model at its present points, with the law of the noise fitted to its residual.
     pub fn evaluate(&mut self, model: Model) -> Fit {
         let (residual, initial_state_cost) = self.residual_and_start(&model);
         let noise = Noise::fitted(&residual, self.observed);
+        self.budget.spend(work::LAW * residual.len() as u64);
         let log_likelihood = self.log(&noise, &residual);
         let white_noise_log_likelihood = self.log(&Noise::robust(&self.observed.errors(&residual)), &residual);
         let fit = Fit { model, residual, noise, log_likelihood, white_noise_log_likelihood, initial_state_cost };
@@ -153,17 +207,34 @@ impl<'a> Engine<'a> {
     /// Fits the points of a model under a given law of the noise, whose scale is fitted as well, then the law to the
     /// residual.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
+        self.fit_across(model, law, |_| true)
+    }
+
+    /// Fits the same, but crosses discontinuities of the prediction by one effect only: when that is added to a model, those of
+    /// the others are where an earlier fit left them.
+    pub fn fit_added(&mut self, model: Model, law: &Noise, effect: usize) -> Fit {
+        self.fit_across(model, law, |block| block.effect == effect)
+    }
+
+    fn fit_across(&mut self, model: Model, law: &Noise, crosses: impl Fn(&Block) -> bool) -> Fit {
         let model = self.refine_searched(model, |_| true);
         let model = self.levenberg_marquardt(model, law);
         let here = self.evaluate(model);
-        self.across_jumps(here, law)
+        self.across_jumps(here, law, crosses)
     }
 
     /// Continues fits beyond discontinuities of the prediction on either side as long as the likelihood increases.
-    fn across_jumps(&mut self, mut here: Fit, law: &Noise) -> Fit {
-        for (index, side) in (0..here.model.blocks.len()).flat_map(|index| [(index, -1.0), (index, 1.0)]) {
+    fn across_jumps(&mut self, mut here: Fit, law: &Noise, crosses: impl Fn(&Block) -> bool) -> Fit {
+        let sides = |index| [(index, -1.0), (index, 1.0)];
+        for (index, side) in (0..here.model.blocks.len()).flat_map(sides) {
+            if !crosses(&here.model.blocks[index].0) {
+                continue;
+            }
             let mut steps = side;
             for _ in 0..MOST_JUMPS {
+                if self.budget.is_over() {
+                    return here;
+                }
                 let (block, point) = &here.model.blocks[index];
                 let Some(point) = block.effect().across_jumps(block.form, point, steps, self.data) else { break };
                 let mut model = here.model.clone();
@@ -238,6 +309,9 @@ impl<'a> Engine<'a> {
         let (mut noise, mut value) = law.rescaled(&residual, self.observed);
         let mut damping = 1e-3;
         for _ in 0..ROUNDS {
+            if self.budget.is_over() {
+                break;
+            }
             let jacobian = self.jacobian(&model, &noise, &residual);
             if jacobian.places.is_empty() {
                 break;
@@ -259,6 +333,7 @@ impl<'a> Engine<'a> {
                 let mut candidate = model.clone();
                 candidate.set_points(&moved);
                 let there = self.residual(&candidate);
+                self.budget.spend(work::SCALE * there.len() as u64);
                 let (noise_there, value_there) = law.rescaled(&there, self.observed);
                 if value_there > value {
                     gained = value_there - value;
@@ -305,6 +380,7 @@ impl<'a> Engine<'a> {
             let column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
             // Rows that stopped at a bound are not whitened.
             let mut white = noise.whitened(&column);
+            self.budget.spend(work::WHITENING * column.len() as u64);
             for (row, kind) in self.observed.kinds.iter().enumerate() {
                 if *kind != Kind::Exact {
                     white[row] = column[row];

@@ -5,8 +5,10 @@
 //! - *Cost*: the reduction of the log-likelihood for fitted numbers (Schwarz's criterion), in nats.
 //! - *Held-out residual*: reading minus prediction by a fit that did not use the reading, in V.
 
+pub mod budget;
 pub mod engine;
 pub mod held_out;
 pub mod interval;
 pub mod normal_equations;
 pub mod simulator;
+pub mod stop;

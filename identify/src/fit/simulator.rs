@@ -1,7 +1,7 @@
 //! Simulation of models on a record; simulations that differ only in later blocks reuse the earlier results.
 
 use crate::effects::effect::Affects;
-use crate::effects::model::Model;
+use crate::effects::model::{Block, Model};
 use crate::plant::base::Base;
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
@@ -27,6 +27,10 @@ pub struct Simulator<'a> {
     kernels: Cached<Vec<Vec<f64>>>,
     /// Simulators of several records, in their order; empty for a single one.
     parts: Vec<Simulator<'a>>,
+    /// Pieces that went through a block since they were counted last.
+    work: u64,
+    /// Work of a piece relative to one as long as the one before it, whose exponentials are known.
+    irregular: f64,
 }
 
 /// A result, and the blocks that it was computed from.
@@ -49,12 +53,32 @@ impl<T> Cached<T> {
     }
 }
 
+/// Smallest response to an initial state of 1 V that is one, in V.
+const LEAST_KERNEL: f64 = 1e-200;
+
+/// Work of one piece in each stage, in units of one lag.
+const AMPLIFIER: u64 = 2;
+const STATIC_RESPONSE: u64 = 3;
+const RELAXATION: u64 = 1;
+const RESPONSE: u64 = 4;
+const INITIAL_STATE: u64 = 3;
+/// Further work of a piece that is not as long as the one before it.
+const IRREGULAR: f64 = 3.0;
+
+/// Returns the work of a block on a response.
+fn response_work(block: Block, signal: &Signal) -> u64 {
+    if block.effect().affects() == Affects::Response { RESPONSE * signal.len() as u64 } else { 0 }
+}
+
 impl<'a> Simulator<'a> {
     /// Prepares simulations of one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
+        let pieces = data.command.len().max(1) as f64;
+        let irregular = 1.0 + IRREGULAR * data.command.changes_of_duration() as f64 / pieces;
         Self {
             data,
             base,
+            irregular,
             signal: Signal::default(),
             levels_v: Vec::new(),
             amplified: Cached::default(),
@@ -63,7 +87,14 @@ impl<'a> Simulator<'a> {
             response: Cached::default(),
             kernels: Cached::default(),
             parts: data.parts.iter().map(|part| Self::new(&part.data, base)).collect(),
+            work: 0,
         }
+    }
+
+    /// Returns the number of pieces that went through a block since the last call.
+    pub fn take_work(&mut self) -> u64 {
+        let own = (self.irregular * std::mem::take(&mut self.work) as f64) as u64;
+        own + self.parts.iter_mut().map(Self::take_work).sum::<u64>()
     }
 
     /// Computes the prediction of a model for each row, in V.
@@ -130,12 +161,15 @@ impl<'a> Simulator<'a> {
                 let mut start = InitialState::off(state);
                 self.signal.clone_from(&self.amplified.value);
                 chain.initial_state_response(&mut self.signal, &mut start, &self.levels_v);
+                self.work +=
+                    RELAXATION * chain.relaxation.work(&self.signal) + INITIAL_STATE * self.signal.len() as u64;
                 for (block, point) in &model.blocks {
                     block.effect().modify_response(block.form, point, &mut self.signal, &mut start);
+                    self.work += response_work(*block, &self.signal);
                 }
                 (state, states) = (state + 1, start.states());
                 // A state that changes no row is not estimated.
-                if self.signal.at_rows().any(|value| value != 0.0) {
+                if self.signal.at_rows().any(|value| value.abs() > LEAST_KERNEL) {
                     let output = self.data.scales().output;
                     self.kernels.value.push(self.signal.at_rows().map(|value| output * value).collect());
                 }
@@ -162,12 +196,15 @@ impl<'a> Simulator<'a> {
                 if !self.amplified.update_key(model, Affects::Amplifier) {
                     self.amplified.value.clone_from(&data.command);
                     chain.amplify(&mut self.amplified.value);
+                    self.work += AMPLIFIER * self.amplified.value.len() as u64;
                 }
                 self.static_response.value.clone_from(&self.amplified.value);
                 chain.static_response(&mut self.static_response.value);
+                self.work += STATIC_RESPONSE * self.static_response.value.len() as u64;
             }
             signal.clone_from(&self.static_response.value);
             chain.relax(signal, &self.amplified.value, &mut self.levels_v);
+            self.work += RELAXATION * chain.relaxation.work(signal);
         }
         if model.blocks.iter().all(|(block, _)| block.effect().affects() != Affects::Response) {
             return signal;
@@ -175,6 +212,7 @@ impl<'a> Simulator<'a> {
         self.signal.clone_from(signal);
         for (block, point) in &model.blocks {
             block.effect().modify_response(block.form, point, &mut self.signal, &mut InitialState::at_rest());
+            self.work += response_work(*block, &self.signal);
         }
         &self.signal
     }
@@ -184,7 +222,6 @@ impl<'a> Simulator<'a> {
 mod tests {
     use super::*;
     use crate::effects::index_of;
-    use crate::effects::model::Block;
     use crate::record::data::Input;
     use simulation::record::Record;
 

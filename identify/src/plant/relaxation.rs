@@ -30,6 +30,11 @@ const STEP: f64 = 0.1;
 /// Largest number of integration steps of one piece, after which the lag has settled.
 const MOST_STEPS: f64 = 200.0;
 
+/// Work of a step whose exponential is computed, relative to one whose exponential is known.
+const EXPONENTIAL: u64 = 4;
+/// Work of an integration step where the spring's state sets the time constant.
+const STEP_BY_STATE: u64 = 16;
+
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation {
@@ -145,12 +150,26 @@ impl Relaxation {
         });
     }
 
+    /// Returns the number of steps of all lags over all pieces of a signal.
+    pub fn work(&self, signal: &Signal) -> u64 {
+        let lags = 1 + self.parts().count();
+        match self.by_state.filter(|_| self.varies()) {
+            Some(_) => signal.durations_s().map(|duration_s| STEP_BY_STATE * self.steps(duration_s) as u64).sum(),
+            None if self.varies() => (lags - 1 + EXPONENTIAL as usize) as u64 * signal.len() as u64,
+            None => (lags * signal.len()) as u64,
+        }
+    }
+
+    /// Returns the number of integration steps of a piece where the spring's state sets the time constant.
+    fn steps(&self, duration_s: f64) -> f64 {
+        (duration_s / (STEP * self.tau_s.min(self.tau_high_s))).ceil().clamp(1.0, MOST_STEPS)
+    }
+
     /// Returns start and end of the first lag over a piece of its input, where the spring's state sets its time
     /// constant. The solution is exact for the time constant in the middle of each integration step.
     fn follow_state(&self, instantaneous: f64, lag: &mut Lag, piece: Piece) -> (f64, f64) {
         let start = lag.value();
-        let fastest_s = self.tau_s.min(self.tau_high_s);
-        let steps = (piece.duration_s / (STEP * fastest_s)).ceil().clamp(1.0, MOST_STEPS);
+        let steps = self.steps(piece.duration_s);
         let duration_s = piece.duration_s / steps;
         let rise = (piece.to - piece.from) / steps;
         let mut from = piece.from;

@@ -49,6 +49,12 @@ pub trait Evaluator {
 
     /// Factor by which prices are multiplied for the residual of a fit, 1 or more.
     fn penalty_factor(&mut self, fit: &Fit) -> f64;
+
+    /// True if the work for the search is nearly done, so that it follows the most promising structures only.
+    fn is_scarce(&self) -> bool;
+
+    /// True once the work for the search is done, or its end was requested: it ends with the best structure so far.
+    fn is_over(&self) -> bool;
 }
 
 impl Evaluator for Engine<'_> {
@@ -82,8 +88,14 @@ impl Evaluator for Engine<'_> {
             extensions
                 .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
-        let extensions = extensions.into_iter();
-        extensions.map(|Extension { block, point, .. }| self.fit(fit.model.with(block, point), &law)).collect()
+        let mut fits = Vec::new();
+        for Extension { block, point, .. } in extensions {
+            if self.is_over() {
+                break;
+            }
+            fits.push(self.fit_added(fit.model.with(block, point), &law, block.effect));
+        }
+        fits
     }
 
     fn price(&self, block: &Block) -> f64 {
@@ -113,7 +125,20 @@ impl Evaluator for Engine<'_> {
     fn penalty_factor(&mut self, fit: &Fit) -> f64 {
         if negligible(&fit.residual) { 1.0 } else { penalty_factor(&self.terms(&fit.noise, &fit.residual)) }
     }
+
+    fn is_scarce(&self) -> bool {
+        self.budget().is_scarce()
+    }
+
+    fn is_over(&self) -> bool {
+        self.budget().is_over()
+    }
 }
+
+/// Starts of each form that are tried while work is scarce.
+const STARTS_IF_SCARCE: usize = 16;
+/// Work of a predicted gain for each row, in units of one piece of the voltage through one lag.
+const PREDICTION: u64 = 5;
 
 /// A block that could be added, at one start.
 struct Extension {
@@ -135,15 +160,23 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
         predictors.push(GainPredictor::new(engine, fit, fit.noise.clone()));
     }
     let sigma = robust_scale(&fit.residual);
+    let scarce = engine.is_scarce();
+    let from_rest = engine.residual_from_rest(&fit.model);
     let mut found: Vec<Extension> = Vec::new();
     for (index, effect) in EFFECTS.iter().enumerate().filter(|(index, _)| wanted(*index)) {
+        if engine.is_over() {
+            return Vec::new();
+        }
         let mut of_effect: Vec<Extension> = Vec::new();
         for form in 0..effect.forms() {
             let block = Block { effect: index, form };
             let scene = FitContext { data: engine.data, residual: &fit.residual, sigma };
-            let starts = effect.initial_points(form, &scene).into_iter().map(|point| {
-                let there = engine.residual(&fit.model.with(block, point.clone()));
-                let change: Vec<f64> = fit.residual.iter().zip(&there).map(|(a, b)| a - b).collect();
+            let points = effect.initial_points(form, &scene);
+            let every = if scarce { points.len().div_ceil(STARTS_IF_SCARCE) } else { 1 };
+            let starts = points.into_iter().step_by(every.max(1)).map(|point| {
+                let there = engine.residual_from_rest(&fit.model.with(block, point.clone()));
+                let change: Vec<f64> = from_rest.iter().zip(&there).map(|(a, b)| a - b).collect();
+                engine.budget().spend(PREDICTION * change.len() as u64);
                 let predicted_gain =
                     predictors.iter().map(|predictor| predictor.predicted_gain(&change)).fold(0.0, f64::max);
                 Extension { block, point, predicted_gain }
@@ -153,6 +186,10 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
             // Two starts where the first may be a local maximum.
             starts.truncate(1 + usize::from(starts.len() > 4 && effect.forms() == 1));
             of_effect.extend(starts);
+        }
+        if scarce {
+            of_effect.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
+            of_effect.truncate(1);
         }
         // Predicted gains rank the forms of an effect poorly: if one form is worth fitting, all are fitted.
         if of_effect.iter().any(|extension| extension.predicted_gain > NATS_TO_FIT.get()) {

@@ -27,6 +27,9 @@ impl<E: Evaluator> Search<'_, E> {
         let first_fits = self.first_fits(&node.fit, None);
         let mut children = self.evaluated_best(&node.fit, first_fits);
         children.sort_by(|a, b| b.score.total_cmp(&a.score));
+        if self.evaluator.is_over() {
+            return children;
+        }
         self.extended.insert(key, children.clone());
         children
     }
@@ -70,16 +73,27 @@ impl<E: Evaluator> Search<'_, E> {
             *count <= FORMS
         });
         // While large errors remain, autocorrelation hides effects that independent noise shows.
-        let rest = fits.split_off(EVALUATED.min(fits.len()));
+        let (evaluated, as_independent) = match self.evaluator.is_scarce() {
+            true => (EVALUATED.div_ceil(2), EVALUATED_AS_INDEPENDENT.div_ceil(2)),
+            false => (EVALUATED, EVALUATED_AS_INDEPENDENT),
+        };
+        let rest = fits.split_off(evaluated.min(fits.len()));
         let mut plain: Vec<(f64, Fit)> = rest
             .into_iter()
             .filter(|(_, fit)| fit.white_noise_log_likelihood > node.white_noise_log_likelihood)
             .collect();
         plain.sort_by(|a, b| b.1.white_noise_log_likelihood.total_cmp(&a.1.white_noise_log_likelihood));
         if self.exhaustive && !node.noise.autocorrelation.is_white() {
-            fits.extend(plain.into_iter().take(EVALUATED_AS_INDEPENDENT));
+            fits.extend(plain.into_iter().take(as_independent));
         }
-        fits.into_iter().map(|(_, fit)| self.evaluated.evaluate_again(self.evaluator, fit)).collect()
+        let mut evaluated = Vec::new();
+        for (_, fit) in fits {
+            if self.evaluator.is_over() {
+                break;
+            }
+            evaluated.push(self.evaluated.evaluate_again(self.evaluator, fit));
+        }
+        evaluated
     }
 }
 

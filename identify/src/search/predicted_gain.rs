@@ -48,6 +48,18 @@ impl GainPredictor {
                 own.push(column);
             }
         }
+        // The initial state follows as well.
+        for state in engine.initial_states(&fit.model) {
+            let mut column: Vec<f64> =
+                noise.whitened(state).iter().zip(&roots).map(|(value, root)| value * root).collect();
+            let size = norm(&column);
+            remove(&mut column, &own);
+            let left = norm(&column);
+            if left > DEPENDENT * size {
+                column.iter_mut().for_each(|value| *value /= left);
+                own.push(column);
+            }
+        }
         Self { noise, residual, roots, own }
     }
 

@@ -69,7 +69,11 @@ impl<'e, E: Evaluator> Search<'e, E> {
         loop {
             let best = self.pass(&mut progress);
             let penalty_factor = self.evaluator.penalty_factor(&best.fit);
-            if penalty_factor <= self.evaluated.penalty_factor || best.fit.model.blocks.is_empty() {
+            if penalty_factor <= self.evaluated.penalty_factor
+                || best.fit.model.blocks.is_empty()
+                || self.evaluator.is_over()
+            {
+                self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
                 return self.repriced(best, &mut progress);
             }
             self.extended.clear();
@@ -88,7 +92,10 @@ impl<'e, E: Evaluator> Search<'e, E> {
         self.keeps_first_fits = false;
         self.evaluated.penalty_factor = penalty_factor;
         self.root();
-        for model in models {
+        for (place, model) in models.into_iter().enumerate() {
+            if place > 0 && self.evaluator.is_over() {
+                break;
+            }
             self.evaluated.evaluate(self.evaluator, model);
         }
         // All rows may show autocorrelation that a part of them, far apart, could not.
@@ -97,7 +104,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
         let best = self.best();
         progress(&best);
         let best = self.extended_greedily(best, &mut progress);
-        if !self.evaluator.doubts(&best.fit) {
+        if self.evaluator.is_over() || !self.evaluator.doubts(&best.fit) {
             return best;
         }
         // An effect too quick for a part of the rows may be hidden by the noise's autocorrelation.
@@ -121,6 +128,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
     /// Adds the best block while that raises the score, then removes blocks while that does.
     fn extended_greedily(&mut self, mut best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
         for _ in 0..MOST_BLOCKS {
+            if self.evaluator.is_over() {
+                return best;
+            }
             let better = self.children(&best).into_iter().next().filter(|child| child.score > best.score);
             let Some(better) = better else { break };
             best = better;
@@ -177,9 +187,16 @@ impl<'e, E: Evaluator> Search<'e, E> {
         let mut beam = vec![best.clone()];
         let mut waited = 0;
         for _ in 0..MOST_BLOCKS {
+            if self.evaluator.is_over() {
+                break;
+            }
             // A structure that leaves nothing but noise is the only one that is extended: no other can be much likelier.
             let doubts = self.evaluator.doubts(&best.fit);
             if !doubts {
+                // What is left of scarce work is for exchanges, which find a simpler block than the first that fits.
+                if self.evaluator.is_scarce() && !best.fit.model.blocks.is_empty() {
+                    break;
+                }
                 beam = vec![best.clone()];
             }
             let mut next = self.next(&beam);
@@ -211,6 +228,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
     fn next(&mut self, beam: &[Scored]) -> Vec<Scored> {
         let mut next: Vec<Scored> = Vec::new();
         for node in beam {
+            if self.evaluator.is_over() {
+                break;
+            }
             // Two blocks may gain only together, so that the first may lose score while the noise is autocorrelated.
             let may_lose = |child: &Scored| {
                 let gain = child.score - node.score;
@@ -224,7 +244,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
         }
         next.sort_by(|a, b| b.score.total_cmp(&a.score));
         distinct(&mut next);
-        let rest = next.split_off(BEAM.min(next.len()));
+        let beam = if self.evaluator.is_scarce() { 1 } else { BEAM };
+        let rest = next.split_off(beam.min(next.len()));
         next.extend(
             rest.into_iter()
                 .max_by(|a, b| a.fit.white_noise_log_likelihood.total_cmp(&b.fit.white_noise_log_likelihood)),
@@ -237,6 +258,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
         for _ in 0..EXCHANGES {
             let before = best.score;
             for effect in effects(&best.fit.model) {
+                if self.evaluator.is_over() {
+                    return best;
+                }
                 let without = self.left_out(&best, effect);
                 let children = self.children(&without).into_iter().next();
                 let other = self.exchanged(&best, effect).into_iter().chain(children);
@@ -269,7 +293,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     fn reformed(&mut self, mut scored: Scored) -> Scored {
         let alone = scored.fit.model.blocks.len() == 1;
         for effect in effects(&scored.fit.model) {
-            if alone && EFFECTS[effect].forms() < 2 {
+            if alone && EFFECTS[effect].forms() < 2 || self.evaluator.is_over() {
                 continue;
             }
             let rest = self.evaluator.at(scored.fit.model.without(effect));
@@ -286,6 +310,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
     /// Removes blocks while that raises the score.
     fn pruned(&mut self, mut scored: Scored) -> Scored {
         loop {
+            if self.evaluator.is_over() {
+                return scored;
+            }
             let effects = effects(&scored.fit.model).into_iter();
             let shorter = effects.map(|effect| self.left_out(&scored, effect));
             match shorter.max_by(|a, b| a.score.total_cmp(&b.score)) {

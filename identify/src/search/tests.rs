@@ -25,6 +25,8 @@ struct Tabulated {
     hidden: Option<usize>,
     /// Number of fits; evaluations at a given point are not counted.
     fits: isize,
+    /// Number of fits at which the search has to end.
+    most_fits: isize,
 }
 
 fn effect(cause: &str) -> usize {
@@ -41,6 +43,7 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         clean: f64::INFINITY,
         hidden: None,
         fits: 0,
+        most_fits: isize::MAX,
     }
 }
 
@@ -98,6 +101,14 @@ impl Evaluator for Tabulated {
     fn penalty_factor(&mut self, _: &Fit) -> f64 {
         self.penalty_factor
     }
+
+    fn is_scarce(&self) -> bool {
+        2 * self.fits >= self.most_fits
+    }
+
+    fn is_over(&self) -> bool {
+        self.fits >= self.most_fits
+    }
 }
 
 fn found(evaluator: &mut Tabulated) -> Vec<&'static str> {
@@ -134,6 +145,24 @@ fn blocks_are_exchanged() {
     let pair: &[&str] = &["amplifier-slew", "charge-leakage"];
     let worth: [(&[&str], f64); 3] = [(&["delay"], 60.0), (&["delay", "charge-leakage"], 100.0), (pair, 150.0)];
     assert_eq!(found(&mut tabulated(&worth)), pair);
+}
+
+#[test]
+fn a_search_that_has_to_end_returns_the_best_so_far() {
+    let worth: [(&[&str], f64); 3] = [(&["delay"], 50.0), (&["hum"], 30.0), (&["delay", "hum"], 80.0)];
+    let whole = {
+        let mut evaluator = tabulated(&worth);
+        assert_eq!(found(&mut evaluator), ["delay", "hum"]);
+        evaluator.fits
+    };
+    let mut of_fits = (0..=whole).map(|most_fits| {
+        let mut evaluator = Tabulated { most_fits, ..tabulated(&worth) };
+        let found = found(&mut evaluator);
+        assert!(evaluator.fits <= most_fits + EFFECTS.len() as isize, "{} {most_fits}", evaluator.fits);
+        found.len()
+    });
+    // More work never gives a worse answer.
+    assert!(of_fits.by_ref().is_sorted() && found(&mut tabulated(&worth)).len() == 2);
 }
 
 #[test]

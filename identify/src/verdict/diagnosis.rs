@@ -1,7 +1,7 @@
 //! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict.
 
 use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
-use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, Verdict};
+use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, SearchReport, Verdict};
 use crate::dimension::Dimension;
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
@@ -107,6 +107,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
     let report = Report {
         schema: SCHEMA,
         rows: data.rows(),
+        complete: true,
+        search: SearchReport::default(),
         verdict,
         nominal: Nominal::default(),
         baseline: before,
@@ -177,6 +179,8 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
     let report = Report {
         schema: SCHEMA,
         rows: data.rows(),
+        complete: true,
+        search: SearchReport::default(),
         verdict: reason.verdict(),
         nominal: Nominal::default(),
         baseline: quality,

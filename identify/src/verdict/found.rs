@@ -53,6 +53,7 @@ pub(crate) fn search(
         None => search.run(progress),
         Some(warm_start) => search.run_from(warm_start, progress),
     };
+    search.evaluator().budget().close();
     let [before, after] = [baseline, &best.fit].map(|fit| root_mean_square(&observed.errors(&fit.residual)));
     if after > LARGEST_ERROR_RATIO.get() * before {
         best = search.root();

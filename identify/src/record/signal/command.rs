@@ -1,23 +1,37 @@
 //! Division of the commanded voltage into pieces.
 //!
-//! The output of a lag over a piece is taken as straight by the next lag. So pieces are short compared with the fastest
-//! time constants just after a change of the voltage, and later short compared with the time since that change, when
-//! only slow transients are left.
+//! The output of a lag over a piece is taken as straight by the next lag. So pieces are short compared with the nominal time
+//! constant just after a change of the voltage, and later short compared with the time since that change, when only slow
+//! transients are left:
+//!
+//! ```text
+//! longest piece = coarseness max(time constant / 55, (time since the last change) / 20),     coarseness = 1, 2, 4, ...
+//! ```
+//!
+//! The coarseness is the smallest that leads to the allowed number of pieces, which grows with the number of rows and not with
+//! the time: where the voltage changes at every row, every row gets one or two pieces, and a pause a few hundred.
 
 use crate::record::signal::piecewise::{Piece, Signal};
+use model::Plant;
 use simulation::schedule::{Schedule, Stretch};
 
-/// Maximum length of a piece just after a change, in s: a transient with a time constant of 1 s departs from its chord
-/// by at most 1/800 of its amplitude.
-const SHORTEST_PIECE_S: f64 = 0.1;
+/// Maximum length of a piece just after a change, in s, for records whose time is scaled to the paper's time constant: a
+/// transient with a fifth of that time constant departs from its chord by at most 1/900 of its amplitude.
+const SHORTEST_PIECE_S: f64 = Plant::PAPER.time_constant_s / 55.0;
 /// Maximum length of a later piece relative to the time since the last change: a transient of any time constant departs
 /// from its chord by at most 1/6000 of its amplitude.
 const GROWTH: f64 = 0.05;
+/// A row that is longer than this number of its first piece's lengths is divided into pieces that grow; a shorter one into
+/// equal pieces, whose exponentials are computed once.
+const MOST_EQUAL_PIECES: f64 = 20.0;
 /// Changes below this fraction of the full scale do not count.
 const STILL_FRACTION: f64 = 1e-4;
-/// Upper limit for the number of pieces that the shortest length may lead to; records with coarse rows keep coarse
-/// pieces.
-const MOST_PIECES: usize = 20_000;
+/// Number of pieces for each row that is allowed.
+const PIECES_PER_ROW: f64 = 2.0;
+/// The same where the voltage changes at most rows: rows of a thirtieth of the time constant are then not divided.
+const PIECES_PER_CHANGE: f64 = 1.5;
+/// Number of pieces that is allowed however few rows there are.
+const FEWEST_PIECES: usize = 3_000;
 
 impl From<&Stretch> for Piece {
     fn from(stretch: &Stretch) -> Self {
@@ -29,34 +43,71 @@ impl Signal {
     /// Returns the voltage of a schedule, in V, with a piece starting at each of `times_s`; `before` is the voltage
     /// before the first.
     pub fn new(schedule: &Schedule, times_s: &[f64], before: f64) -> Self {
-        Self::coarse(schedule, times_s, before, MOST_PIECES, 0.0)
+        let allowed = |per_row: f64| FEWEST_PIECES.max((per_row * times_s.len() as f64) as usize);
+        let signal = Self::divided(schedule, times_s, before, 1.0, 0.0);
+        let at_rows: Vec<f64> = signal.at_rows().collect();
+        let changes = at_rows.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        let first = if 2 * changes > times_s.len() { PIECES_PER_CHANGE } else { PIECES_PER_ROW };
+        if signal.pieces.len() <= allowed(first) {
+            return signal;
+        }
+        Self::coarser(schedule, times_s, before, allowed(PIECES_PER_ROW), 0.0, 2.0)
     }
 
-    /// Returns the same with pieces no shorter than the duration divided by `pieces`, and with neighbouring pieces
-    /// replaced by a chord where that changes the voltage by `blur_v` or less.
+    /// Returns the same with at most `pieces` pieces, as far as changes of the voltage and rows leave a choice, and with
+    /// neighbouring pieces replaced by a chord where that changes the voltage by `blur_v` or less.
     pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize, blur_v: f64) -> Self {
-        let duration = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
-        let shortest = SHORTEST_PIECE_S.max(duration / pieces as f64);
+        Self::coarser(schedule, times_s, before, pieces, blur_v, 1.0)
+    }
+
+    /// Returns the same, with at least a given coarseness.
+    fn coarser(
+        schedule: &Schedule,
+        times_s: &[f64],
+        before: f64,
+        pieces: usize,
+        blur_v: f64,
+        mut coarseness: f64,
+    ) -> Self {
+        let duration_s = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
+        loop {
+            let signal = Self::divided(schedule, times_s, before, coarseness, blur_v);
+            if signal.pieces.len() <= pieces || coarseness * SHORTEST_PIECE_S > duration_s {
+                return signal;
+            }
+            coarseness *= 2.0;
+        }
+    }
+
+    /// Returns the voltage of a schedule in pieces of a given coarseness.
+    fn divided(schedule: &Schedule, times_s: &[f64], before: f64, coarseness: f64, blur_v: f64) -> Self {
         let mut signal = Self { before, ..Self::default() };
         let mut reader = schedule.reader();
         let mut stretches = Vec::new();
         let mut course = LastChange::new(schedule);
+        let longest_s = |since_s: f64| coarseness * SHORTEST_PIECE_S.max(GROWTH * since_s);
         for pair in times_s.windows(2) {
             signal.start_row();
             reader.at(pair[0]);
             let changed_s = course.changed_s(pair[0], reader.clone().stretches(pair[0], pair[1]));
-            let longest = shortest.max(GROWTH * (pair[0] - changed_s));
-            let parts = ((pair[1] - pair[0]) / longest * (1.0 - 1e-9)).ceil().max(1.0);
-            // The last part ends exactly at the row, where the voltage may jump.
-            let start = |part: usize| match part as f64 / parts {
-                1.0 => pair[1],
-                of => pair[0] + (pair[1] - pair[0]) * of,
-            };
-            for part in 0..parts as usize {
-                reader.at(start(part));
+            let first_s = longest_s(pair[0] - changed_s);
+            let parts = ((pair[1] - pair[0]) / first_s * (1.0 - 1e-9)).ceil().max(1.0);
+            let mut start_s = pair[0];
+            for part in 1.. {
+                // The last part ends exactly at the row, where the voltage may jump.
+                let end_s = match parts {
+                    _ if part as f64 == parts => pair[1],
+                    ..=MOST_EQUAL_PIECES => pair[0] + (pair[1] - pair[0]) * part as f64 / parts,
+                    _ => (start_s + longest_s(start_s - changed_s)).min(pair[1]),
+                };
+                reader.at(start_s);
                 stretches.clear();
-                stretches.extend(reader.clone().stretches(start(part), start(part + 1)));
+                stretches.extend(reader.clone().stretches(start_s, end_s));
                 signal.push(&stretches, blur_v);
+                start_s = end_s;
+                if end_s == pair[1] {
+                    break;
+                }
             }
         }
         if let Some(&last) = times_s.last() {
@@ -139,27 +190,68 @@ mod tests {
         (schedule, (0..rows.len()).map(|row| row as f64).collect())
     }
 
-    /// The reference is the same chain with pieces of 1/60 s everywhere.
+    /// Returns the largest difference, in V at rows 1 s apart, between a signal and one with pieces of 1/60 s behind two lags in
+    /// series.
+    fn apart_v(schedule: &Schedule, times: &[f64], taus_s: [f64; 2]) -> f64 {
+        let fine_times: Vec<f64> = (0..60 * times.len() - 59).map(|part| part as f64 / 60.0).collect();
+        let mut fine = Signal::coarse(schedule, &fine_times, 0.0, usize::MAX, 0.0);
+        let mut signal = Signal::new(schedule, times, 0.0);
+        for signal in [&mut signal, &mut fine] {
+            for tau_s in taus_s {
+                let mut lag = Lag::at(tau_s, 0.0);
+                signal.pass(|piece| lag.pass(piece));
+            }
+        }
+        let pairs = signal.at_rows().zip(fine.at_rows().step_by(60));
+        pairs.map(|(signal, fine)| (signal - fine).abs()).fold(0.0, f64::max)
+    }
+
     #[test]
     fn growing_pieces_change_two_lags_in_series_by_less_than_25_mv() {
         let (schedule, times) = every_second((0..600).map(|row| 100.0 * f64::from((row / 60) % 3)));
-        let fine_times: Vec<f64> = (0..60 * times.len() - 59).map(|part| part as f64 / 60.0).collect();
-        let [mut grown, mut fine] = [&times, &fine_times].map(|times| Signal::new(&schedule, times, 0.0));
-        assert!(grown.pieces.len() < 2 * times.len(), "{} pieces", grown.pieces.len());
+        let pieces = Signal::new(&schedule, &times, 0.0).pieces.len();
+        assert!(pieces < 2 * times.len(), "{pieces} pieces");
         for taus_s in [[1.0, 5.5], [20.0, 2.0], [5.5, 60.0]] {
-            for signal in [&mut grown, &mut fine] {
-                for tau_s in taus_s {
-                    let mut lag = Lag::at(tau_s, 0.0);
-                    signal.pass(|piece| lag.pass(piece));
-                }
-            }
-            let pairs = grown.at_rows().zip(fine.at_rows().step_by(60));
-            let apart = pairs.map(|(grown, fine)| (grown - fine).abs()).fold(0.0, f64::max);
+            let apart = apart_v(&schedule, &times, taus_s);
             assert!(apart < 0.025, "{taus_s:?}: {apart} V of 200");
         }
-        // If the voltage never rests, pieces do not grow.
-        let (schedule, times) = every_second((0..600).map(f64::from));
-        assert_eq!(Signal::new(&schedule, &times, 0.0).pieces.len(), 10 * 599 + 1);
+    }
+
+    /// Rows are 0.18 time constants apart, and every one has another voltage.
+    #[test]
+    fn two_pieces_a_row_change_two_lags_under_random_voltages_by_less_than_2_in_1000() {
+        let mut state = 1u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            500.0 * f64::from(state >> 8) / f64::from(1 << 24)
+        };
+        let (schedule, times) = every_second((0..2500).map(|_| random()));
+        let pieces = Signal::new(&schedule, &times, 0.0).pieces.len();
+        assert!(pieces <= 2 * times.len(), "{pieces} pieces");
+        for (taus_s, most_v) in [([5.5, 5.5], 0.1), ([5.5, 60.0], 0.02), ([1.0, 5.5], 0.9)] {
+            let apart = apart_v(&schedule, &times, taus_s);
+            assert!(apart < most_v, "{taus_s:?}: {apart} V of 500");
+        }
+    }
+
+    /// One row is 10 000 s after the one before it.
+    #[test]
+    fn number_of_pieces_grows_with_the_rows_and_not_with_the_time() {
+        let pieces = |pause_s: f64| {
+            let row = |row: i32| {
+                format!("{},{}\n", f64::from(row) + if row > 200 { pause_s } else { 0.0 }, 100 * (row / 50 % 3))
+            };
+            let text = format!("time_s,voltage_v\n{}", (0..400).map(row).collect::<String>());
+            let record = Record::parse("r", &text, "stiffness").unwrap();
+            let times: Vec<f64> = record.rows.iter().map(|row| row.time_s).collect();
+            Signal::new(&Schedule::from_record(&record, Between::Hold), &times, 0.0).pieces.len()
+        };
+        assert!(pieces(1e4) < pieces(0.0) + 300, "{} {}", pieces(0.0), pieces(1e4));
+        // Where the voltage never rests, pieces do not grow, but their number is limited.
+        for rows in [600, 6000] {
+            let (schedule, times) = every_second((0..rows).map(f64::from));
+            assert!(Signal::new(&schedule, &times, 0.0).pieces.len() <= FEWEST_PIECES.max(2 * times.len()));
+        }
     }
 
     /// The voltage rises by 1 V every 10 ms, then drops to 0 V; rows are 0.5 s apart.
@@ -168,7 +260,7 @@ mod tests {
         let row = |row: usize| format!("{},{}\n", 0.01 * row as f64, if row < 130 { row } else { 0 });
         let text = format!("time_s,voltage_v\n{}", (0..200).map(row).collect::<String>());
         let schedule = Schedule::from_record(&Record::parse("r", &text, "stiffness").unwrap(), Between::Hold);
-        let pieces = |blur_v| Signal::coarse(&schedule, &[0.0, 0.5, 1.0, 1.5], 0.0, 3, blur_v).pieces;
+        let pieces = |blur_v| Signal::divided(&schedule, &[0.0, 0.5, 1.0, 1.5], 0.0, 5.0, blur_v).pieces;
         let ramp = Piece { duration_s: 0.5, from: 0.0, to: 49.0 };
         let [fine, coarse] = [0.0, 1.1].map(pieces);
         assert!((ramp.duration_s - coarse[0].duration_s).abs() < 1e-9 && coarse[0].to == ramp.to, "{:?}", coarse[0]);

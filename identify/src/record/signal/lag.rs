@@ -2,6 +2,10 @@
 
 use crate::record::signal::piecewise::Piece;
 
+/// Added to states so that they do not decay to subnormal numbers, with which processors are slow; far below the resolution of
+/// any other value.
+pub const NO_SUBNORMAL: f64 = 1e-290;
+
 /// A first-order low-pass filter of unit gain, `tau dx/dt = u - x`, exact for straight pieces of the input `u`.
 #[derive(Clone, Copy, Debug)]
 pub struct Lag {
@@ -51,7 +55,7 @@ impl Lag {
         }
         if duration_s > 0.0 {
             // Only the first product depends on the previous piece, so the others can be computed ahead.
-            self.value = self.kept * start + (self.held * from + self.ramp * to);
+            self.value = self.kept * start + (self.held * from + self.ramp * to + NO_SUBNORMAL);
         }
         (start, self.value)
     }

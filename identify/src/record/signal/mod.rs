@@ -8,5 +8,5 @@ mod command;
 mod lag;
 mod piecewise;
 
-pub use lag::Lag;
+pub use lag::{Lag, NO_SUBNORMAL};
 pub use piecewise::{Piece, Signal};

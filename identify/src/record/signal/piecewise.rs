@@ -37,6 +37,27 @@ impl Clone for Signal {
 }
 
 impl Signal {
+    /// Returns the number of pieces.
+    pub fn len(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// Returns true if there is no piece.
+    pub fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
+    }
+
+    /// Returns the number of pieces that are not as long as the one before them.
+    pub fn changes_of_duration(&self) -> usize {
+        let differ = |pair: &&[Piece]| (pair[1].duration_s - pair[0].duration_s).abs() > 1e-9 * pair[1].duration_s;
+        self.pieces.windows(2).filter(differ).count()
+    }
+
+    /// Returns the duration of each piece, in s.
+    pub fn durations_s(&self) -> impl Iterator<Item = f64> {
+        self.pieces.iter().map(|piece| piece.duration_s)
+    }
+
     /// Returns the value just after the time of each row.
     pub fn at_rows(&self) -> impl Iterator<Item = f64> {
         self.rows.iter().map(|&piece| self.pieces[piece as usize].from)

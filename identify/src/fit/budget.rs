@@ -1,0 +1,138 @@
+//! The work that a diagnosis may do, counted so that the same record gets the same answer on every machine.
+//!
+//! The unit of work is one piece of the voltage through one lag. Other steps count by their time relative to that.
+//!
+//! ```text
+//! budget = WORK (rows / 2400)^0.55 for more than 2400 rows, WORK for fewer; a quarter if quick, ten times if thorough
+//! ```
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use crate::fit::stop::Stop;
+
+/// How long a diagnosis searches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// A quarter of the normal effort.
+    Quick,
+    /// About 2 s of CPU time for 2400 rows, 20 s for 100 000, if nothing fits.
+    #[default]
+    Normal,
+    /// Ten times the normal effort.
+    Thorough,
+}
+
+impl Effort {
+    /// Returns the name of the effort.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Quick => "quick",
+            Self::Normal => "normal",
+            Self::Thorough => "thorough",
+        }
+    }
+
+    /// Returns the ratio to the normal effort.
+    fn ratio(self) -> f64 {
+        match self {
+            Self::Quick => 0.25,
+            Self::Normal => 1.0,
+            Self::Thorough => 10.0,
+        }
+    }
+}
+
+/// Work for a record of at most [`ROWS`] rows at the normal effort.
+const WORK: f64 = 700e6;
+/// Rows up to which the work is constant.
+const ROWS: f64 = 2400.0;
+/// Exponent of the growth with the rows.
+const GROWTH: f64 = 0.55;
+/// Fraction of a search's budget after which it only follows the most promising extensions.
+const SCARCE: f64 = 0.5;
+
+/// The work that was done and that may be done.
+#[derive(Debug)]
+pub struct Budget {
+    total: u64,
+    spent: AtomicU64,
+    /// Work at which the present search became or becomes scarce of work, and at which it ends.
+    scarce: AtomicU64,
+    limit: AtomicU64,
+    /// True if a search ended because its work was done.
+    cut: AtomicBool,
+    stop: Option<Stop>,
+}
+
+/// No limit.
+pub static UNLIMITED: Budget = Budget::of(u64::MAX, None);
+
+impl Budget {
+    const fn of(total: u64, stop: Option<Stop>) -> Self {
+        Self {
+            total,
+            spent: AtomicU64::new(0),
+            scarce: AtomicU64::new(total),
+            limit: AtomicU64::new(total),
+            cut: AtomicBool::new(false),
+            stop,
+        }
+    }
+
+    /// Returns the budget for a record with a number of rows; `stop` ends it early.
+    pub fn new(effort: Effort, rows: usize, stop: Stop) -> Self {
+        let total = WORK * effort.ratio() * (rows as f64 / ROWS).powf(GROWTH).max(1.0);
+        Self::of(total as u64, Some(stop))
+    }
+
+    /// Counts work.
+    pub fn spend(&self, work: u64) {
+        self.spent.fetch_add(work, Ordering::Relaxed);
+    }
+
+    /// Returns the work that was done.
+    pub fn spent(&self) -> u64 {
+        self.spent.load(Ordering::Relaxed)
+    }
+
+    /// Returns the work that may be done in all.
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// Gives the next search a share of the work that is left, 0 to 1.
+    pub fn grant(&self, share: f64) {
+        let spent = self.spent();
+        let granted = |part: f64| spent.saturating_add((self.total.saturating_sub(spent) as f64 * share * part) as u64);
+        self.scarce.store(granted(SCARCE), Ordering::Relaxed);
+        self.limit.store(granted(1.0), Ordering::Relaxed);
+    }
+
+    /// Returns true if the search has to follow the most promising extensions only.
+    pub fn is_scarce(&self) -> bool {
+        self.spent() >= self.scarce.load(Ordering::Relaxed)
+    }
+
+    /// Returns true if the search has to end.
+    pub fn is_over(&self) -> bool {
+        self.spent() >= self.limit.load(Ordering::Relaxed) || self.is_stopped()
+    }
+
+    /// Returns true if the end was requested.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.as_ref().is_some_and(Stop::requested)
+    }
+
+    /// Ends a search: notes whether its work was cut, and lets the rest of the work be used for its report.
+    pub fn close(&self) {
+        if self.is_over() {
+            self.cut.store(true, Ordering::Relaxed);
+        }
+        self.grant(1.0);
+    }
+
+    /// Returns true if a search ended because its work was done, or because the end was requested.
+    pub fn was_cut(&self) -> bool {
+        self.cut.load(Ordering::Relaxed)
+    }
+}

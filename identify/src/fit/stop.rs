@@ -1,0 +1,41 @@
+//! A request to end a diagnosis early, by time or by another thread.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Ends a diagnosis early with the best answer so far. Clones share the request.
+///
+/// ```
+/// use std::time::Duration;
+/// use identify::Stop;
+///
+/// let stop = Stop::default();
+/// let of_other_thread = stop.clone();
+/// assert!(!stop.requested());
+/// of_other_thread.request();
+/// assert!(stop.requested() && Stop::after(Duration::ZERO).requested());
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Stop {
+    deadline: Option<Instant>,
+    request: Arc<AtomicBool>,
+}
+
+impl Stop {
+    /// Returns a stop after a time that begins now.
+    pub fn after(time: Duration) -> Self {
+        // A time that is too long to be added is none.
+        Self { deadline: Instant::now().checked_add(time), ..Self::default() }
+    }
+
+    /// Requests the end.
+    pub fn request(&self) {
+        self.request.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns true once the time is over or the end was requested.
+    pub fn requested(&self) -> bool {
+        self.request.load(Ordering::Relaxed) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
