@@ -47,6 +47,9 @@ pub struct PlantFile {
     /// Limits of the amplifier with which the record was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub amplifier: Option<Amplifier>,
+    /// Oscillations beside the relaxation; the tick takes them as instantaneous.
+    #[serde(rename = "mode", default, skip_serializing_if = "Vec::is_empty")]
+    pub modes: Vec<Mode>,
     /// Effects that the tick does not simulate, kept unchanged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unmodelled: Option<toml::Table>,
@@ -127,6 +130,30 @@ pub struct Relaxation {
     pub tau_high_at_v: Option<f64>,
 }
 
+/// An oscillation of the settled stiffness `q`, with `f = 2 pi freq_hz`; its contribution is `weight w + rate_weight v`.
+///
+/// ```text
+/// w'' / f^2 + 2 zeta w' / f + w = q        v = w' / f
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mode {
+    /// Undamped frequency, in Hz.
+    pub freq_hz: f64,
+    /// Damping ratio, above 0 and below 1.
+    pub zeta: f64,
+    /// Part of the settled stiffness.
+    pub weight: f64,
+    /// Weight of the rate of change.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rate_weight: f64,
+}
+
+/// Returns true for 0; serde omits such a field.
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 /// The amplifier with which a record was made.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -174,12 +201,16 @@ impl From<Plant> for PlantFile {
             leakage: None,
             relaxation,
             amplifier: None,
+            modes: Vec::new(),
             unmodelled: None,
         }
     }
 }
 
 impl PlantFile {
+    /// Largest number of oscillations.
+    pub const MOST_MODES: usize = 2;
+
     /// The spring in the form that the estimator's extended tick takes.
     pub fn extended(&self) -> ExtendedPlant<'_> {
         ExtendedPlant {
@@ -194,7 +225,7 @@ impl PlantFile {
                 .as_ref()
                 .map(|leakage| extended::Leakage { share: leakage.share, time_constant_s: leakage.tau_s }),
             relaxation: extended::Relaxation {
-                share: self.relaxation.share,
+                share: self.relaxation.share + self.modes.iter().map(|mode| mode.weight).sum::<f64>(),
                 time_constants_s: &self.relaxation.tau_s,
                 weights: &self.relaxation.weights,
                 time_constant_high_s: self.relaxation.tau_at_500_v(),
@@ -263,6 +294,7 @@ impl PlantFile {
         let amplifier = self.amplifier.clone().unwrap_or_default();
         let of_memory = |of: fn(&Memory) -> &Vec<f64>| memory.map(of).cloned().unwrap_or_default();
         let of_law = |of: fn(&Law) -> &Vec<f64>| law.map(of).cloned().unwrap_or_default();
+        let of_modes = |of: fn(&Mode) -> f64| self.modes.iter().map(of).collect::<Vec<f64>>();
         let of_leakage = |of: fn(&Leakage) -> f64| leakage.map(of).into_iter().collect::<Vec<f64>>();
         for (field, values, lowest, highest, unit) in [
             ("relaxation.share", vec![*share], 0.0, 1.0, ""),
@@ -278,6 +310,10 @@ impl PlantFile {
             ("law.stiffness", of_law(|law| &law.stiffness), -ANY, ANY, "V"),
             ("leakage.share", of_leakage(|leakage| leakage.share), 0.0, 1.0, ""),
             ("leakage.tau_s", of_leakage(|leakage| leakage.tau_s), POSITIVE, ANY, "s"),
+            ("mode.freq_hz", of_modes(|mode| mode.freq_hz), POSITIVE, ANY, "Hz"),
+            ("mode.zeta", of_modes(|mode| mode.zeta), POSITIVE, 1.0 - f64::EPSILON, ""),
+            ("mode.weight", of_modes(|mode| mode.weight), -ANY, ANY, ""),
+            ("mode.rate_weight", of_modes(|mode| mode.rate_weight), -ANY, ANY, ""),
             ("amplifier.limit_v", some(&amplifier.limit_v), POSITIVE, ANY, "V"),
             ("amplifier.slew_v_per_s", some(&amplifier.slew_v_per_s), POSITIVE, ANY, "V/s"),
             ("amplifier.delay_s", some(&amplifier.delay_s), 0.0, ANY, "s"),
@@ -293,6 +329,9 @@ impl PlantFile {
             true => Ok(()),
             false => refused(field, found as f64, expected as f64, expected as f64, unit),
         };
+        if self.modes.len() > Self::MOST_MODES {
+            return refused("mode", self.modes.len() as f64, 0.0, Self::MOST_MODES as f64, "oscillations");
+        }
         let most = model::extended::lags::MAX_LAGS;
         if tau_s.is_empty() || tau_s.len() > most {
             return refused("relaxation.tau_s", tau_s.len() as f64, 1.0, most as f64, "time constants");
@@ -333,7 +372,9 @@ impl PlantFile {
         let unmodelled =
             self.unmodelled.iter().flat_map(|table| table.keys().map(|key| key.escape_debug().to_string()));
         let even = self.even.then(|| "even".to_owned());
-        delayed.then(|| "amplifier.delay_s".to_owned()).into_iter().chain(even).chain(unmodelled).collect()
+        let modes = (!self.modes.is_empty()).then(|| "mode".to_owned());
+        let delay = delayed.then(|| "amplifier.delay_s".to_owned());
+        delay.into_iter().chain(even).chain(modes).chain(unmodelled).collect()
     }
 
     /// Formats the file as TOML.

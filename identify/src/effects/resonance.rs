@@ -17,7 +17,7 @@ use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, 
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
-use crate::record::signal::{Lag, NO_SUBNORMAL, Piece, Signal};
+use crate::record::signal::{Lag, Oscillator, Piece, Signal};
 use crate::stats::thresholds::empirical::{LEAST_DAMPED, MOST_DAMPED};
 
 pub(super) struct Resonance;
@@ -101,37 +101,13 @@ impl Effect for Resonance {
         let part = point.get(2).copied().unwrap_or(1.0);
         // Without a high-pass filter the whole response excites the oscillation.
         let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.next_offset_v()));
-        let (mut x, mut v) =
-            (if slow.is_some() { 0.0 } else { signal.before } + start.next_offset_v(), omega * start.next_offset_v());
-        let mut last = f64::NAN;
-        let mut step = [[1.0, 0.0], [0.0, 1.0]];
+        let at_start = if slow.is_some() { 0.0 } else { signal.before } + start.next_offset_v();
+        let mut oscillator = Oscillator::at(omega, zeta, at_start, omega * start.next_offset_v());
         signal.pass(|piece| {
             let (slow_from, slow_to) = slow.as_mut().map_or((0.0, 0.0), |slow| slow.pass(piece));
-            let Piece { duration_s, from, to } = piece;
-            let (from, to) = (from - slow_from, to - slow_to);
-            let start = x;
-            if duration_s > 0.0 {
-                if (duration_s - last).abs() > 1e-9 * duration_s || last.is_nan() {
-                    last = duration_s;
-                    step = transition(omega, zeta, duration_s);
-                }
-                // The oscillation is around the straight line that the oscillator would settle on.
-                let slope = (to - from) / duration_s;
-                let lag = 2.0 * zeta / omega * slope;
-                let (dx, dv) = (x - (from - lag), v - slope);
-                x = to - lag + NO_SUBNORMAL + step[0][0] * dx + step[0][1] * dv;
-                v = slope + NO_SUBNORMAL + step[1][0] * dx + step[1][1] * dv;
-            }
+            let (from, to) = (piece.from - slow_from, piece.to - slow_to);
+            let (start, x) = oscillator.pass(Piece { from, to, ..piece });
             (piece.from + part * (start - from), piece.to + part * (x - to))
         });
     }
-}
-
-/// Returns the state-transition matrix of the free oscillation over a time, in s, for displacement and velocity.
-fn transition(omega: f64, zeta: f64, time_s: f64) -> [[f64; 2]; 2] {
-    let damped = omega * (1.0 - zeta * zeta).sqrt();
-    let decay = (-zeta * omega * time_s).exp();
-    let (sin, cos) = (damped * time_s).sin_cos();
-    let s = sin / damped;
-    [[decay * (cos + zeta * omega * s), decay * s], [-decay * omega * omega * s, decay * (cos - zeta * omega * s)]]
 }

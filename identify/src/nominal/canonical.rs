@@ -15,8 +15,8 @@ pub(super) struct Canonical {
     pub(super) delay: f64,
     /// Time constants with their weights, in the order of the sections.
     pub(super) lags: Vec<(f64, f64)>,
-    /// Frequencies in cycles per unit of time, damping ratios and weights.
-    pub(super) oscillations: Vec<[f64; 3]>,
+    /// Frequencies in cycles per unit of time, damping ratios, weights, and weights of the rate of change.
+    pub(super) oscillations: Vec<[f64; 4]>,
     /// Zero of each record.
     pub(super) zeros: Vec<f64>,
     /// Deviation of each record's first reading from the settled one.
@@ -36,7 +36,7 @@ impl Canonical {
                         lags.extend([(slow, weight(slow, fast)), (fast, weight(fast, slow))]);
                     }
                     // Two equal lags in series are an oscillation with a damping ratio of 1.
-                    _ => oscillations.push([frequency / TAU, damping, w / gain]),
+                    _ => oscillations.push([frequency / TAU, damping, w / gain, v / gain]),
                 },
             }
         }

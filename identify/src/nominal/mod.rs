@@ -193,10 +193,11 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
     let oscillation: Vec<Oscillation> = canonical
         .oscillations
         .iter()
-        .map(|&[frequency, damping, weight]| Oscillation {
+        .map(|&[frequency, damping, weight, rate_weight]| Oscillation {
             freq_hz: positive(quantity(frequency, "Hz")),
             zeta: positive(quantity(damping, "")),
             weight: quantity(weight, ""),
+            rate_weight: quantity(rate_weight, ""),
         })
         .collect();
     let zeros: Vec<Quantity> = canonical.zeros.iter().map(|&zero| quantity(zero, reading)).collect();

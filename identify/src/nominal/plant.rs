@@ -1,12 +1,17 @@
 //! The identified spring as a plant file, as far as the format can hold it.
 
-use simulation::plant_file::{Amplifier, PlantFile, Reading, Relaxation};
+use std::f64::consts::TAU;
+
+use simulation::plant_file::{Amplifier, Mode, PlantFile, Reading, Relaxation};
 use simulation::units::{UnitNames, Units};
 
 use crate::nominal::report::{InputLaw, Nominal, Oscillation};
 
-/// The plant file. An oscillation is written as instantaneous and described under `[unmodelled]`, as is an instantaneous part outside
-/// of 0 to 1. `spacing_s` stands in for the time constant of a spring that has none.
+/// Largest damping ratio of an oscillation in a plant file.
+const MOST_DAMPED: f64 = 1.0 - 1e-6;
+
+/// The plant file. An instantaneous part outside of 0 to 1 is described under `[unmodelled]`. `spacing_s` stands in for the time
+/// constant of a spring that has neither a time constant nor an oscillation.
 pub(super) fn plant_file(
     nominal: &Nominal,
     oscillations: &[Oscillation],
@@ -15,30 +20,34 @@ pub(super) fn plant_file(
     spacing_s: f64,
 ) -> PlantFile {
     let mut unmodelled = toml::Table::new();
-    let quick: f64 = oscillations.iter().map(|oscillation| oscillation.weight.value).sum();
-    let whole = nominal.share.value + quick;
+    let whole = nominal.share.value;
     let share = whole.clamp(0.0, 1.0);
     if share != whole {
         unmodelled.insert("instantaneous_share".into(), whole.into());
     }
-    for (index, Oscillation { freq_hz, zeta, weight }) in oscillations.iter().enumerate() {
-        let mut table = toml::Table::new();
-        for (name, quantity) in [("freq_hz", freq_hz), ("zeta", zeta), ("weight", weight)] {
-            table.insert(name.into(), quantity.value.into());
-        }
-        unmodelled.insert(format!("oscillation_{}", index + 1), table.into());
-    }
     let mut tau_s: Vec<f64> = nominal.tau_s.iter().map(|lag| lag.tau.value).collect();
     let mut weights: Vec<f64> = nominal.tau_s.iter().map(|lag| lag.weight.value).collect();
+    let mode = |of: &Oscillation| Mode {
+        freq_hz: of.freq_hz.value,
+        zeta: of.zeta.value.min(MOST_DAMPED),
+        weight: of.weight.value,
+        rate_weight: of.rate_weight.value,
+    };
+    let mut modes: Vec<Mode> = oscillations.iter().map(mode).collect();
     // The static gain stays what was identified.
-    let lagging: f64 = weights.iter().sum();
-    if share != whole && lagging != 0.0 {
-        weights.iter_mut().for_each(|weight| *weight *= (1.0 - share) / lagging);
+    let slow: f64 = weights.iter().copied().chain(modes.iter().map(|mode| mode.weight)).sum();
+    if slow != 0.0 {
+        let factor = (1.0 - share) / slow;
+        weights.iter_mut().for_each(|weight| *weight *= factor);
+        for mode in &mut modes {
+            (mode.weight, mode.rate_weight) = (factor * mode.weight, factor * mode.rate_weight);
+        }
     }
     if tau_s.is_empty() {
-        (tau_s, weights) = (vec![spacing_s], vec![1.0 - share]);
+        let slowest_s = modes.iter().map(|mode| 1.0 / (TAU * mode.freq_hz)).fold(0.0, f64::max);
+        (tau_s, weights) = (vec![if slowest_s > 0.0 { slowest_s } else { spacing_s }], Vec::new());
     }
-    if tau_s.len() == 1 && (weights[0] - (1.0 - share)).abs() < 1e-9 {
+    if tau_s.len() == 1 {
         weights.clear();
     }
     let delay_s = nominal.delay_s.value;
@@ -52,6 +61,7 @@ pub(super) fn plant_file(
         leakage: None,
         relaxation: Relaxation { share, tau_s, weights, tau_high_s: None, tau_high_at_v: None },
         amplifier: (delay_s > 0.0).then(|| Amplifier { delay_s: Some(delay_s), ..Amplifier::default() }),
+        modes,
         unmodelled: (!unmodelled.is_empty()).then_some(unmodelled),
     }
 }

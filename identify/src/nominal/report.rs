@@ -34,6 +34,8 @@ pub struct Oscillation {
     pub zeta: Quantity,
     /// Its part of the static gain.
     pub weight: Quantity,
+    /// Weight of its rate of change, divided by the angular frequency, relative to the static gain.
+    pub rate_weight: Quantity,
 }
 
 /// The linear spring that a record shows.

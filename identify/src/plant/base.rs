@@ -36,14 +36,14 @@ impl Base {
                 "--plant: [memory] with a decreasing loading curve; expected direct >= 0, also after adding the weights in order"
             );
         }
-        let relaxation = Relaxation::of(&file.relaxation);
+        let relaxation = Relaxation::of(&file);
         Ok(Self { file, relaxation })
     }
 
     /// Returns the same plant in the coordinates of a record.
     pub fn normalised(&self, normalisation: &Normalisation) -> Self {
         let file = normalisation.plant(&self.file);
-        Self { relaxation: Relaxation::of(&file.relaxation), file }
+        Self { relaxation: Relaxation::of(&file), file }
     }
 
     /// Returns, for each optional part that the file has, the part's name and the same plant without it.
@@ -63,7 +63,7 @@ impl Base {
         parts.into_iter().filter_map(|(part, take)| {
             let mut file = self.file.clone();
             let there = take(&mut file);
-            there.then(|| (part, Self { relaxation: Relaxation::of(&file.relaxation), file }))
+            there.then(|| (part, Self { relaxation: Relaxation::of(&file), file }))
         })
     }
 

@@ -1,17 +1,19 @@
 //! The relaxation: feedthrough and first-order lags between settled stiffness and stiffness.
 //!
 //! ```text
-//! y = share q + (1 - share - sum part_i) lag(tau(q); q) + sum part_i lag(tau_i; q)
+//! y = share q + (1 - share - sum part_i - sum weight_j) lag(tau(q); q) + sum part_i lag(tau_i; q) + sum oscillation_j
 //! ```
 //!
 //! `q` is the settled stiffness. The paper's plant has a single lag with a constant `tau`. A variable `tau` depends on
 //! the voltage across the spring, or on the spring's own state, in V as well: `lag + part (q - lag)`, which is the
 //! output of the first lag for a part of 0 and the whole stiffness for a part of `share`.
 
+use std::f64::consts::TAU;
+
 use crate::plant::initial_state::InitialState;
 use crate::record::scales::REFERENCE_VOLTAGE_V;
-use crate::record::signal::{Lag, Piece, Signal};
-use simulation::plant_file::{self, PlantFile};
+use crate::record::signal::{Lag, Oscillator, Piece, Signal};
+use simulation::plant_file::{self, Mode, PlantFile};
 
 /// A further lag and its weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,6 +36,8 @@ const MOST_STEPS: f64 = 200.0;
 const EXPONENTIAL: u64 = 4;
 /// Work of an integration step where the spring's state sets the time constant.
 const STEP_BY_STATE: u64 = 16;
+/// Work of one piece of an oscillation, in units of one lag.
+const WORK_OF_MODE: usize = 3;
 
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +55,12 @@ pub struct Relaxation {
     pub by_state: Option<f64>,
     /// Further lags, which act in parallel with the first.
     pub further: [Part; FURTHER],
+    /// Oscillations, which act in parallel with the lags; unused ones have no weight.
+    pub modes: [Mode; PlantFile::MOST_MODES],
 }
+
+/// No oscillation.
+const NO_MODE: Mode = Mode { freq_hz: 1.0, zeta: 0.5, weight: 0.0, rate_weight: 0.0 };
 
 impl Relaxation {
     /// Voltage at which the time constant is `tau_high_s`, in normalised V.
@@ -59,7 +68,15 @@ impl Relaxation {
 
     /// Returns a relaxation with one feedthrough and one constant time constant, in s.
     pub fn plain(share: f64, tau_s: f64) -> Self {
-        Self { share, tau_s, tau_high_s: tau_s, geometric: false, by_state: None, further: Default::default() }
+        Self {
+            share,
+            tau_s,
+            tau_high_s: tau_s,
+            geometric: false,
+            by_state: None,
+            further: Default::default(),
+            modes: [NO_MODE; PlantFile::MOST_MODES],
+        }
     }
 
     /// Returns the time constant at a voltage, in s.
@@ -80,7 +97,8 @@ impl Relaxation {
 
     /// Returns the weight of the first lag.
     fn first_weight(&self) -> f64 {
-        1.0 - self.share - self.parts().map(|part| part.part).sum::<f64>()
+        let modes: f64 = self.modes.iter().map(|mode| mode.weight).sum();
+        1.0 - self.share - self.parts().map(|part| part.part).sum::<f64>() - modes
     }
 
     /// Writes the relaxation to a plant file.
@@ -96,15 +114,22 @@ impl Relaxation {
         file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s, tau_high_at_v };
     }
 
-    /// Returns the relaxation of a normalised plant file, which must be valid.
-    pub fn of(file: &plant_file::Relaxation) -> Self {
+    /// Returns the relaxation of a normalised plant file, which must be valid, with its oscillations.
+    pub fn of(plant: &PlantFile) -> Self {
+        let file = &plant.relaxation;
         let tau_s = file.tau_s.first().copied().unwrap_or_default();
         let mut relaxation = Self { tau_high_s: file.tau_high_s.unwrap_or(tau_s), ..Self::plain(file.share, tau_s) };
         let parts = file.tau_s.iter().zip(&file.weights).skip(1);
         for (further, (&tau_s, &part)) in relaxation.further.iter_mut().zip(parts) {
             *further = Part { part, tau_s };
         }
+        relaxation.modes.iter_mut().zip(&plant.modes).for_each(|(mode, of_file)| *mode = *of_file);
         relaxation
+    }
+
+    /// Returns the oscillations that contribute.
+    fn oscillations(&self) -> impl Iterator<Item = Mode> {
+        self.modes.into_iter().filter(|mode| mode.weight != 0.0 || mode.rate_weight != 0.0)
     }
 
     /// Returns true if the time constant depends on the voltage.
@@ -120,7 +145,13 @@ impl Relaxation {
         let mut at_first = |tau_s| Lag::at(tau_s, before + start.next_offset_v());
         let mut lag = at_first(self.tau_s);
         let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, at_first(it.tau_s))).collect();
-        if further.is_empty() && !self.varies() {
+        let at_first = |mode: Mode| {
+            let omega = TAU * mode.freq_hz;
+            let (x, rate) = (before + start.next_offset_v(), omega * start.next_offset_v());
+            (mode, Oscillator::at(omega, mode.zeta, x, rate))
+        };
+        let mut modes: Vec<(Mode, Oscillator)> = self.oscillations().map(at_first).collect();
+        if further.is_empty() && modes.is_empty() && !self.varies() {
             return signal.pass(|piece| {
                 let (start, end) = lag.pass(piece);
                 (share * piece.from + main * start, share * piece.to + main * end)
@@ -146,13 +177,19 @@ impl Relaxation {
                 from += *part * start;
                 to += *part * end;
             }
+            for (mode, oscillator) in &mut modes {
+                from += mode.rate_weight * oscillator.scaled_rate();
+                let (start, end) = oscillator.pass(piece);
+                from += mode.weight * start;
+                to += mode.weight * end + mode.rate_weight * oscillator.scaled_rate();
+            }
             (from, to)
         });
     }
 
     /// Returns the number of steps of all lags over all pieces of a signal.
     pub fn work(&self, signal: &Signal) -> u64 {
-        let lags = 1 + self.parts().count();
+        let lags = 1 + self.parts().count() + WORK_OF_MODE * self.oscillations().count();
         match self.by_state.filter(|_| self.varies()) {
             Some(_) => signal.durations_s().map(|duration_s| STEP_BY_STATE * self.steps(duration_s) as u64).sum(),
             None if self.varies() => (lags - 1 + EXPONENTIAL as usize) as u64 * signal.len() as u64,

@@ -9,7 +9,7 @@
 //! The record's own time constant, gain and zero are those of a quick first-order fit. They are also where the search starts if
 //! the nominal spring is far from the record ([`Start`]).
 
-use simulation::plant_file::{Amplifier, Law, Leakage, Memory, PlantFile, Relaxation};
+use simulation::plant_file::{Amplifier, Law, Leakage, Memory, Mode, PlantFile, Relaxation};
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
@@ -198,6 +198,7 @@ fn scaled(file: &PlantFile, time: impl Fn(f64) -> f64, voltage: impl Fn(f64) -> 
             tau_high_s: tau_high_s.map(&time),
             tau_high_at_v: tau_high_at_v.map(&voltage),
         },
+        modes: file.modes.iter().map(|mode| Mode { freq_hz: mode.freq_hz / time(1.0), ..*mode }).collect(),
         amplifier: file.amplifier.as_ref().map(|amplifier| Amplifier {
             limit_v: amplifier.limit_v.map(&voltage),
             slew_v_per_s: amplifier.slew_v_per_s.map(|slew| voltage(slew) / time(1.0)),

@@ -4,7 +4,7 @@ use crate::record::signal::piecewise::Piece;
 
 /// Added to states so that they do not decay to subnormal numbers, with which processors are slow; far below the resolution of
 /// any other value.
-pub const NO_SUBNORMAL: f64 = 1e-290;
+pub(super) const NO_SUBNORMAL: f64 = 1e-290;
 
 /// A first-order low-pass filter of unit gain, `tau dx/dt = u - x`, exact for straight pieces of the input `u`.
 #[derive(Clone, Copy, Debug)]

@@ -6,7 +6,9 @@
 
 mod command;
 mod lag;
+mod oscillator;
 mod piecewise;
 
-pub use lag::{Lag, NO_SUBNORMAL};
+pub use lag::Lag;
+pub use oscillator::Oscillator;
 pub use piecewise::{Piece, Signal};

@@ -1,0 +1,53 @@
+//! The plant file of an identified spring is the spring that was identified: a diagnosis against it starts from the same error.
+
+use identify::plant::base::Base;
+use identify::{Input, Options, examine, identify};
+use simulation::record::{Record, Row};
+use simulation::units::Units;
+
+/// Rates of change of a state under a voltage.
+type Rates = fn(f64, [f64; 2]) -> [f64; 2];
+
+/// A record of random steps, integrated in small Euler steps; `reading` of voltage and state, with uniform noise of +-0.005.
+fn record(rates: Rates, reading: fn(f64, [f64; 2]) -> f64, heights: [f64; 2]) -> Record {
+    let (sample_s, steps) = (0.05, 400);
+    let mut seed = 7u32;
+    let mut random = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / f64::from(1 << 24)
+    };
+    let (mut state, mut voltage_v) = ([0.0; 2], 0.0);
+    let mut row = |index: usize| {
+        if index % 23 == 5 {
+            voltage_v = heights[0] + (heights[1] - heights[0]) * random();
+        }
+        let measured = Some(reading(voltage_v, state) + 0.01 * (random() - 0.5));
+        for _ in 0..steps {
+            let rate = rates(voltage_v, state);
+            state = [0, 1].map(|of| state[of] + rate[of] * sample_s / f64::from(steps));
+        }
+        Row { line: index + 2, time_s: sample_s * index as f64, voltage_v, measured }
+    };
+    Record { name: "steps".into(), rows: (0..600).map(&mut row).collect() }
+}
+
+#[test]
+fn a_diagnosis_starts_from_the_error_of_the_identified_spring() {
+    let lags: Rates = |u, [x, y]| [(u - x) / 0.8, (x - y) / 0.2];
+    let resonator: Rates = |u, [x, v]| [v, 36.0 * (u - x) - 0.2 * 6.0 * v];
+    let even: Rates = |u, [x, _]| [(u.abs() - x) / 0.4, 0.0];
+    for (name, record, order) in [
+        ("two lags", record(lags, |_, [_, y]| 20.0 - 0.5 * y, [-3.0, 5.0]), 2),
+        ("resonator", record(resonator, |_, [x, _]| 1.0 + 2.0 * x, [-1.0, 1.0]), 2),
+        ("even", record(even, |u, [x, _]| 0.3 * u.abs() + 0.7 * x, [-4.0, 4.0]), 1),
+    ] {
+        let identified = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
+        let report = &identified.report;
+        assert_eq!(report.order, order, "{name}: {report:#?}");
+        assert!(report.rmse < 0.0035, "{name}: {}", report.rmse);
+        assert_eq!(identified.plant.even, name == "even");
+        let options = Options { base: Base::new(identified.plant).unwrap(), ..Options::default() };
+        let baseline = examine(&record, &options, |_| ()).unwrap().report.baseline;
+        assert!(baseline.rmse < 1.1 * report.rmse, "{name}: {} instead of {}", baseline.rmse, report.rmse);
+    }
+}
