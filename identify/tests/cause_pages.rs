@@ -10,6 +10,7 @@ use identify::fit::simulator::Simulator;
 use identify::record::data::Data;
 use identify::{Input, Options, diagnose};
 use simulation::record::{Record, Row};
+use simulation::units::Units;
 
 /// Marks around the part of a page that is generated from the code.
 const MARKS: [&str; 2] = ["<!-- facts -->\n\n", "\n<!-- /facts -->\n"];
@@ -37,7 +38,7 @@ fn record(read: impl Fn(usize, f64) -> f64) -> Record {
 
 /// Returns names and units of a cause's parameters, from the effect, or from a finding if a property of the readings
 /// shows it.
-fn parameters(effect: &dyn Effect) -> Vec<(String, &'static str)> {
+fn parameters(effect: &dyn Effect) -> Vec<(String, String)> {
     let shown = match effect.cause() {
         "quantisation" => record(|_, reading| (reading / 12.0).round() * 12.0),
         "outliers" => record(|index, reading| if index % 97 == 41 { reading + 80.0 } else { reading }),
@@ -46,17 +47,18 @@ fn parameters(effect: &dyn Effect) -> Vec<(String, &'static str)> {
             let middle =
                 effect.coordinates(0, &data).iter().map(|it| (it.lowest + it.highest) / 2.0).collect::<Vec<_>>();
             let quantities = effect.quantities(0, &middle, &data);
-            return quantities.into_iter().map(|quantity| (quantity.name, quantity.unit)).collect();
+            let units = Units::default();
+            return quantities.into_iter().map(|quantity| (quantity.name, quantity.dimension.unit(&units))).collect();
         }
     };
     let report = diagnose(&shown, &Options::default()).expect("a report");
     let found = report.findings.iter().find(|finding| finding.cause == effect.cause());
     let parameters = &found.unwrap_or_else(|| panic!("{} is not found", effect.cause())).parameters;
-    parameters.iter().map(|(name, parameter)| (name.clone(), parameter.unit)).collect()
+    parameters.iter().map(|(name, parameter)| (name.clone(), parameter.unit.clone())).collect()
 }
 
-fn list(parameters: &[(String, &str)]) -> String {
-    let with_unit = |(name, unit): &(String, &str)| {
+fn list(parameters: &[(String, String)]) -> String {
+    let with_unit = |(name, unit): &(String, String)| {
         format!("`{name}` {}", if unit.is_empty() { "[-]".into() } else { format!("[{unit}]") })
     };
     parameters.iter().map(with_unit).collect::<Vec<_>>().join(", ")

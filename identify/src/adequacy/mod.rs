@@ -20,6 +20,7 @@ mod excitation;
 mod gain_and_time_constant;
 mod in_step;
 mod localisation;
+mod no_response;
 mod residual_regression;
 mod spikes;
 mod standstill;
@@ -67,13 +68,21 @@ pub struct Entry {
 /// noise of 1 V, half of it independent and half autoregressive; `cargo run -p identify --example check_rates` prints the counts.
 /// The design rates are smaller: `in_step`, `spikes` and `residual_regression` are significant by chance in one of ten thousand
 /// records.
-pub static CHECKS: [Entry; 6] = [
+pub static CHECKS: [Entry; 7] = [
     Entry {
         check: &excitation::Excitation,
         when: When::BeforeSearch,
         looks_for: "a constant voltage, or readings that are all equal",
         false_alarm_rate: 0.015,
         departure: "a reading of 100 V in every row",
+        power: 0.98,
+    },
+    Entry {
+        check: &no_response::NoResponse,
+        when: When::BeforeSearch,
+        looks_for: "readings that depend neither on the command nor on the time, where the simulation does",
+        false_alarm_rate: 0.015,
+        departure: "a constant reading of 100 V with the noise",
         power: 0.98,
     },
     Entry {

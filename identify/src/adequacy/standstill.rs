@@ -42,17 +42,19 @@ pub(crate) fn constant_is_as_likely(engine: &mut Engine, model: &Model, score: f
     let spring =
         ON_ANY_READING.iter().fold(model.clone(), |model, cause| model.without(index_of(cause).expect("an effect")));
     let without_added = engine.residual(&spring);
-    let reading: Vec<f64> = engine
-        .data
-        .reading
-        .iter()
-        .zip(without_added.iter().zip(&left))
-        .map(|(reading, (without, with))| reading - (without - with))
-        .collect();
-    let constant = median(&mut reading.clone()).expect("readings");
+    let added = without_added.iter().zip(&left).map(|(without, with)| without - with);
+    let read = &engine.data.reading;
+    let without_added: Vec<f64> = read.iter().zip(added).map(|(reading, added)| reading - added).collect();
+    // The shift of a run may be what makes a spring constant.
+    [without_added, read.clone()].into_iter().any(|reading| is_as_likely(engine, &left, &reading, score))
+}
+
+/// True if a constant is at least as likely for these readings as a model with this residual and score.
+fn is_as_likely(engine: &Engine, left: &[f64], reading: &[f64], score: f64) -> bool {
+    let constant = median(&mut reading.to_vec()).expect("readings");
     let around: Vec<f64> = reading.iter().map(|reading| reading - constant).collect();
     let noise = Noise::fitted(&around, engine.observed);
     let likelihood = noise.log_likelihood(&around, engine.observed) - noise.cost(around.len());
-    let [error, scatter] = [&left, &around].map(|residual| robust_scale(&engine.observed.errors(residual)));
+    let [error, scatter] = [left, &around].map(|residual| robust_scale(&engine.observed.errors(residual)));
     likelihood >= score && error > SPRING_ERROR_PER_SCATTER.get() * scatter
 }
