@@ -158,6 +158,16 @@ impl Fit {
         influence.values
     }
 
+    /// The orthonormal columns that the parameters span, over all rows.
+    pub fn directions(&self) -> Vec<Vec<f64>> {
+        let whole = |column: &Column| {
+            let mut values = vec![0.0; self.residual.len()];
+            values[column.first..column.first + column.values.len()].copy_from_slice(&column.values);
+            values
+        };
+        self.basis.q.iter().filter(|column| !column.values.is_empty()).map(whole).collect()
+    }
+
     /// Number of independent parameters.
     pub fn degrees(&self) -> usize {
         self.basis.q.iter().filter(|column| !column.values.is_empty()).count()

@@ -26,26 +26,34 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// Fits the autoregression whose order Akaike's criterion chooses to residuals of a fit with `degrees` parameters; several
-    /// records follow each other at `starts`.
-    pub fn of(residual: &[f64], starts: &[usize], degrees: usize) -> Self {
+    /// Fits the autoregression whose order Akaike's criterion chooses to residuals; several records follow each other at `starts`.
+    /// `fitted` holds the orthonormal directions in which the fit has taken the errors away. Slow errors lose most, so that their
+    /// share is put back: `covariance(lag) += sum of variance(q) sum_n q(n) q(n + lag) / rows`, once.
+    pub fn of(residual: &[f64], starts: &[usize], fitted: &[Vec<f64>]) -> Self {
         let rows = residual.len();
-        // The fit has taken `degrees` degrees of freedom out of the errors.
-        let spread = rows as f64 / (rows.saturating_sub(degrees).max(1)) as f64;
         let longest = (ORDER_PER_DECADE * (rows.max(2) as f64).log10()).ceil() as usize;
         let longest = longest.min(rows / ROWS_PER_LAG);
-        let covariance: Vec<f64> = (0..=longest)
-            .map(|lag| {
-                let parts = starts.iter().zip(starts.iter().skip(1).chain([&rows]));
-                let of = |(&start, &end): (&usize, &usize)| {
-                    dot(&residual[start..end], &residual[(start + lag).min(end)..end])
-                };
-                spread * parts.map(of).sum::<f64>() / rows as f64
-            })
-            .collect();
+        let covariance = |values: &[f64], lag: usize| {
+            let parts = starts.iter().zip(starts.iter().skip(1).chain([&rows]));
+            let of = |(&start, &end): (&usize, &usize)| dot(&values[start..end], &values[(start + lag).min(end)..end]);
+            parts.map(of).sum::<f64>() / rows as f64
+        };
+        let mut covariances: Vec<f64> = (0..=longest).map(|lag| covariance(residual, lag)).collect();
+        let first = Self::of_covariances(&covariances, rows);
+        for direction in fitted {
+            let variance = first.deviation(direction).powi(2);
+            for (lag, sum) in covariances.iter_mut().enumerate() {
+                *sum += variance * covariance(direction, lag);
+            }
+        }
+        Self::of_covariances(&covariances, rows)
+    }
+
+    /// Levinson's recursion.
+    fn of_covariances(covariance: &[f64], rows: usize) -> Self {
         let mut error = covariance[0];
         let (mut ar, mut best) = (Vec::new(), (Vec::new(), error, f64::INFINITY));
-        for order in 0..=longest {
+        for order in 0..covariance.len() {
             if order > 0 {
                 let ahead: f64 = ar.iter().enumerate().map(|(lag, phi)| phi * covariance[order - 1 - lag]).sum();
                 let reflection = (covariance[order] - ahead) / error;
@@ -91,8 +99,8 @@ impl Spectrum {
         (self.innovations * sum / (2.0 * half)).sqrt()
     }
 
-    /// Correlation of neighbouring errors, from the autoregression's first partial sums.
-    pub fn neighbours(&self, residual: &[f64]) -> f64 {
+    /// Correlation of neighbouring residuals.
+    pub fn neighbours(residual: &[f64]) -> f64 {
         let power = dot(residual, residual);
         if power > 0.0 { dot(residual, &residual[1.min(residual.len())..]) / power } else { 0.0 }
     }
@@ -111,7 +119,7 @@ mod tests {
             for row in 1..errors.len() {
                 errors[row] += phi * errors[row - 1];
             }
-            let spectrum = Spectrum::of(&errors, &[0], 0);
+            let spectrum = Spectrum::of(&errors, &[0], &[]);
             let expected = 1.0 / (1.0 - phi) / 4000f64.sqrt();
             let found = spectrum.deviation(&vec![1.0 / 4000.0; 4000]);
             assert!((found / expected - 1.0).abs() < 0.2, "{phi}: {found} {expected}");

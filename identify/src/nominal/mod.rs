@@ -31,22 +31,27 @@ use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::sums::dot;
 use crate::stats::thresholds::probability::Z;
 
-/// A larger model is preferred if its held-out error is smaller by this part.
+/// A larger model is preferred if its held-out error is smaller by this part, and its advantage exceeds its standard error over the
+/// segments [`BEYOND_CHANCE`] times, ...
 const WORTHWHILE: f64 = 0.005;
-/// Its advantage must also be this many times the standard error of the advantage over the segments, ...
 const BEYOND_CHANCE: f64 = 2.5;
-/// ... or this many times where its error is smaller by [`CLEAR`]: a record with few changes has few segments that tell.
-const BEYOND_CHANCE_IF_CLEAR: f64 = 1.0;
-/// Part by which a held-out error is clearly smaller.
-const CLEAR: f64 = 0.2;
+/// ... or exceeds it this many times, and the last part of the records, which is an extrapolation, confirms it by an error that is
+/// smaller by [`WORTHWHILE`], ...
+const CONFIRMED: f64 = 1.5;
+/// ... or if the held-out error is smaller by this part.
+const CLEAR: f64 = 0.3;
 /// Fewest readings of a record.
 const FEWEST_READINGS: usize = 8;
 /// Part of a record to which a model is fitted that predicts the rest.
 const FIRST_PART: f64 = 0.6;
 /// Step of a parameter for a difference quotient, in standard deviations of the parameter.
 const DIFFERENCE: f64 = 1e-2;
+/// Records with more readings lose a negligible part of the errors to the fit.
+const LONG: usize = 20_000;
 /// Steps of a refinement from a fit to similar readings, and the relative reduction of the cost below which it ends.
-const REFIT: (usize, f64) = (10, 1e-6);
+const REFIT: (usize, f64) = (10, 1e-5);
+/// Readings times steps that such a refinement may cost.
+const MOST_REFITTED: usize = 300_000;
 
 /// An identified spring.
 #[derive(Clone, Debug)]
@@ -80,37 +85,47 @@ pub struct Course {
 struct Models {
     law: InputLaw,
     problem: Problem,
-    /// Fit and held-out residual by order.
-    fits: Vec<(Fit, Vec<f64>)>,
+    /// The best model of each order.
+    fits: Vec<Model>,
     chosen: usize,
+}
+
+/// The best model of one order.
+struct Model {
+    fit: Fit,
+    /// Reading minus prediction by a fit without the segment.
+    held_out: Vec<f64>,
+    /// Root mean square error on the last part of the records by a fit to the first part.
+    last_part: f64,
 }
 
 impl Models {
     fn of(series: Vec<Series>, law: InputLaw) -> Self {
         let problem = Problem::new(series);
-        let with_error = |fit: Fit| {
+        let with_errors = |fit: Fit| {
             let held_out = held_out_residual(&problem, &fit);
-            (fit, held_out)
+            Model { last_part: last_part(&problem, &fit.poles), held_out, fit }
         };
-        let fits: Vec<(Fit, Vec<f64>)> = best_of_each_order(&problem).into_iter().map(with_error).collect();
-        let beaten =
-            |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large].1, &fits[small].1));
+        let fits: Vec<Model> = best_of_each_order(&problem).into_iter().map(with_errors).collect();
+        let beaten = |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large], &fits[small]));
         let chosen = (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten");
         Self { law, problem, fits, chosen }
     }
 
     fn held_out_rmse(&self) -> f64 {
-        root_mean_square(&self.fits[self.chosen].1)
+        root_mean_square(&self.fits[self.chosen].held_out)
     }
 }
 
-/// True if the residuals of a larger model are smaller by more than is worthwhile and than chance explains.
-fn beats(problem: &Problem, large: &[f64], small: &[f64]) -> bool {
+/// True if the held-out residuals of a larger model are smaller by more than is worthwhile and than chance explains.
+fn beats(problem: &Problem, large: &Model, small: &Model) -> bool {
+    let confirmed = large.last_part < (1.0 - WORTHWHILE) * small.last_part;
+    let (large, small) = (&large.held_out, &small.held_out);
     let ratio = root_mean_square(large) / root_mean_square(small);
     if ratio.is_nan() || ratio > 1.0 - WORTHWHILE {
         return false;
     }
-    let beyond = if ratio < 1.0 - CLEAR { BEYOND_CHANCE_IF_CLEAR } else { BEYOND_CHANCE };
+    let beyond = if ratio < 1.0 - CLEAR || confirmed { CONFIRMED } else { BEYOND_CHANCE };
     let mut gains: Vec<f64> = Vec::new();
     for (series, &first) in problem.series.iter().zip(problem.starts()) {
         let mut row = first;
@@ -170,9 +185,9 @@ fn check(record: &Record) -> Result<()> {
 
 fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
     let Models { law, problem, fits, chosen } = &models;
-    let (fit, held_out) = &fits[*chosen];
+    let Model { fit, held_out, last_part } = &fits[*chosen];
     let rows = problem.rows();
-    let spectrum = Spectrum::of(&fit.residual, problem.starts(), fit.degrees());
+    let spectrum = Spectrum::of(&fit.residual, problem.starts(), &directions(problem, fit));
     let canonical = Canonical::of(problem, fit);
     let mut deviations = deviations(problem, fit, &canonical, &spectrum).into_iter();
     let base = if units.voltage.si == 1.0 { units.voltage.name.as_str() } else { "V" };
@@ -203,7 +218,7 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
     let zeros: Vec<Quantity> = canonical.zeros.iter().map(|&zero| quantity(zero, reading)).collect();
     let offsets: Vec<Quantity> = canonical.starts.iter().map(|&start| quantity(start, reading)).collect();
     tau_s.sort_by(|a, b| b.weight.value.abs().total_cmp(&a.weight.value.abs()));
-    let delay_s = if problem.bounds.whole_rows { whole_rows(problem, fit, &spectrum) } else { not_negative(delay) };
+    let delay_s = if problem.bounds.whole_rows { whole_rows(problem, fit) } else { not_negative(delay) };
     let nominal = Nominal { gain, zero: zeros[0].clone(), share, delay_s, tau_s };
     let start = records
         .iter()
@@ -216,7 +231,7 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
     });
     let noise = Noise {
         sigma: (fit.cost / degrees).sqrt(),
-        autocorrelation: spectrum.neighbours(&fit.residual),
+        autocorrelation: Spectrum::neighbours(&fit.residual),
         scatter: robust_deviation(differences).unwrap_or(0.0),
     };
     let plant = plant::plant_file(&nominal, &oscillation, *law, units, problem.spacing);
@@ -229,10 +244,10 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
         input_law: *law,
         rmse: root_mean_square(&fit.residual),
         held_out_rmse: models.held_out_rmse(),
-        last_40_percent_rmse: last_part(problem, &fit.poles),
-        static_held_out_rmse: root_mean_square(&fits[0].1),
+        last_40_percent_rmse: *last_part,
+        static_held_out_rmse: root_mean_square(&fits[0].held_out),
         linear: (1..fits.len())
-            .map(|order| LinearError { order, held_out_rmse: root_mean_square(&fits[order].1) })
+            .map(|order| LinearError { order, held_out_rmse: root_mean_square(&fits[order].held_out) })
             .collect(),
         start,
         noise,
@@ -255,6 +270,11 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
     };
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
     Identified { report, plant, records }
+}
+
+/// The directions in which a fit has taken errors away; none for a long record, which has lost a small part of them.
+fn directions(problem: &Problem, fit: &Fit) -> Vec<Vec<f64>> {
+    if problem.rows() > LONG { Vec::new() } else { fit.directions() }
 }
 
 /// Standard deviations of the quantities, in the order of [`Canonical::values`].
@@ -301,9 +321,9 @@ fn not_negative(quantity: Quantity) -> Quantity {
 
 /// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row cannot be told from
 /// another numerator, so that the interval reaches one row further down.
-fn whole_rows(problem: &Problem, fit: &Fit, spectrum: &Spectrum) -> Quantity {
+fn whole_rows(problem: &Problem, fit: &Fit) -> Quantity {
     const MOST: usize = 4;
-    let neighbours = spectrum.neighbours(&fit.residual).clamp(0.0, 0.95);
+    let neighbours = Spectrum::neighbours(&fit.residual).clamp(0.0, 0.95);
     let degrees = problem.rows().saturating_sub(fit.degrees()).max(1) as f64;
     let tolerated = Z * Z * fit.cost / degrees * (1.0 + neighbours) / (1.0 - neighbours);
     let rows = (fit.poles.delay / problem.spacing).round();
@@ -311,12 +331,17 @@ fn whole_rows(problem: &Problem, fit: &Fit, spectrum: &Spectrum) -> Quantity {
         let poles = Poles { delay: rows * problem.spacing, ..fit.poles.clone() };
         rows >= 0.0
             && rows * problem.spacing <= problem.bounds.delay.1
-            && problem.refined(poles, REFIT.0, REFIT.1).cost <= fit.cost + tolerated
+            && problem.refined(poles, steps(problem), REFIT.1).cost <= fit.cost + tolerated
     };
     let reach = |sign: f64| (1..=MOST).map(|by| rows + sign * by as f64).take_while(|&rows| fits(rows)).last();
     let low = (reach(-1.0).unwrap_or(rows) - 1.0).max(0.0) * problem.spacing;
     let high = reach(1.0).unwrap_or(rows) * problem.spacing;
     Quantity { value: fit.poles.delay, low, high, unit: "s".into() }
+}
+
+/// Most steps of a refinement from a fit to similar readings.
+fn steps(problem: &Problem) -> usize {
+    (MOST_REFITTED / problem.rows()).clamp(1, REFIT.0)
 }
 
 /// Root mean square error on the last part of each record by a fit to its first part.
@@ -328,7 +353,7 @@ fn last_part(problem: &Problem, poles: &Poles) -> f64 {
         .map(|(start, series)| start + (FIRST_PART * series.rows() as f64).round() as usize)
         .collect();
     let first = |row: usize| row < ends[starts.partition_point(|start| *start <= row) - 1];
-    let residual = problem.residual(&problem.only(first).refined(poles.clone(), REFIT.0, REFIT.1));
+    let residual = problem.residual(&problem.only(first).refined(poles.clone(), steps(problem), REFIT.1));
     let last: Vec<f64> = (0..residual.len()).filter(|&row| !first(row)).map(|row| residual[row]).collect();
     root_mean_square(&last)
 }

@@ -49,6 +49,16 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
             time(nominal.delay_s.high)
         ));
     }
+    if report.last_40_percent_rmse > STRUCTURED * report.held_out_rmse {
+        remarks.push(format!(
+            "A fit to the first 60 % does not predict the rest (error {} {} instead of {} {}): a part of the model may describe a \
+             disturbance of this record, or the record ends in another state than it began.",
+            digits(report.last_40_percent_rmse),
+            report.unit,
+            digits(report.held_out_rmse),
+            report.unit
+        ));
+    }
     if report.rmse > STRUCTURED * report.noise.scatter && report.noise.scatter > 0.0 {
         remarks.push(format!(
             "The errors ({} {}) exceed their scatter from row to row ({} {}): no linear model of order 4 or less describes all of the \
