@@ -1,5 +1,7 @@
 //! Options whose value is one of a few names. Their enums belong to libraries without a dependency on clap.
 
+use std::time::Duration;
+
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use paper::dynamics::report::Model;
 use paper::dynamics::zener::Changes;
@@ -18,6 +20,21 @@ pub(crate) fn one_of<T: Copy + Send + Sync>(choices: Choices<T>) -> impl TypedVa
     })
 }
 
+/// Parses a time in s, with or without its unit: `10`, `10s`, `2min`, `500ms`.
+pub(crate) fn duration(text: &str) -> Result<Duration, String> {
+    let number = text.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
+    let unit_s = match text[number.len()..].trim() {
+        "" | "s" => 1.0,
+        "ms" => 1e-3,
+        "min" => 60.0,
+        "h" => 3600.0,
+        unit => return Err(format!("unit `{unit}`: expected s, ms, min or h")),
+    };
+    let seconds = number.trim().parse::<f64>().ok().filter(|seconds| *seconds > 0.0);
+    let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds * unit_s).ok());
+    time.ok_or_else(|| "expected a positive time like 10, 10s or 2min".to_owned())
+}
+
 /// `--between` of a schedule: the voltage between two rows of its file.
 pub(crate) const BETWEEN: Choices<Between> = &[
     ("hold", "The earlier row's value holds until the next row", Between::Hold),
@@ -29,6 +46,13 @@ pub(crate) const INPUT: Choices<identify::Input> = &[
     ("hold", "The earlier row's voltage held until the next row", identify::Input::Hold),
     ("linear", "Linear interpolation between the rows", identify::Input::Linear),
     ("stair", "The report's stair, with its 0.1 s ramps", identify::Input::Stair),
+];
+
+/// `--effort` of `vsj diagnose`: how long causes are searched for.
+pub(crate) const EFFORT: Choices<identify::Effort> = &[
+    ("quick", "A quarter of the normal effort", identify::Effort::Quick),
+    ("normal", "At most about 2 s of CPU time for 2400 rows, 20 s for 100 000", identify::Effort::Normal),
+    ("thorough", "Ten times the normal effort", identify::Effort::Thorough),
 ];
 
 /// The model of `vsj dynamics`.
@@ -51,3 +75,18 @@ pub(crate) const OUTER_END: Choices<OuterEnd> = &[
     ("supported", "Simply supported: it slides and turns in a slot", OuterEnd::Supported),
     ("clamped", "Clamped: it turns with the ring", OuterEnd::Clamped),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_in_seconds_unless_it_has_a_unit() {
+        for (text, seconds) in [("10", 10.0), ("10s", 10.0), ("2min", 120.0), ("0.5 h", 1800.0), ("500ms", 0.5)] {
+            assert_eq!(duration(text).map(|time| time.as_secs_f64()), Ok(seconds), "{text}");
+        }
+        for text in ["", "s", "-1", "0", "10 days", "nan", "inf", "1e300", "10m"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+    }
+}

@@ -2,20 +2,22 @@
 
 use std::iter;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, wrote};
+use host_sim::output::terminal::{json, print, print_error, wrote};
 use identify::plant::base::Base;
-use identify::{Input, Options, examine_several, identify};
-use indicatif::ProgressBar;
+use identify::{Effort, Input, Options, Several, Stop, examine_several, identify};
+use indicatif::{ProgressBar, ProgressStyle};
 use simulation::plant_file;
 use simulation::record::{MeasuredRecord, Record};
 use simulation::schedule::Schedule;
 
+use super::choice::{EFFORT, duration, one_of};
 use super::record_arguments::RecordArguments;
 
 /// Tolerance in s within which a row of the stair may have the voltage before or after a step.
@@ -38,6 +40,7 @@ Examples:
   vsj stair --plant out/diagnosis/plant.toml   the controller on the result
   vsj diagnose monday.csv tuesday.csv          two records of one spring
   vsj diagnose record.csv --json | jq .findings
+  vsj diagnose record.csv --within 10s         the best answer after 10 s
   vsj diagnose data/table3_stair.csv --column measured --input stair
   vsj diagnose a.csv --time t_ms:ms --voltage u_kV:kV --reading x_mm:mm
   vsj diagnose a.csv --columns instrument.toml --sort
@@ -55,20 +58,30 @@ pub(crate) struct Arguments {
     /// Write report.html, diagnosis.json, residuals.csv, the plots and the extended spring (plant.toml) to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// One JSON object on stdout
+    /// How long causes are searched for; the answer is the same on every machine
+    #[arg(long, default_value = "normal", value_parser = one_of(EFFORT))]
+    effort: Effort,
+    /// Longest time until the best answer so far is given, in s or with a unit (10, 10s, 2min). Ctrl-C gives it at once, a
+    /// second Ctrl-C ends the program
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    within: Option<Duration>,
+    /// A line on stderr for each set of causes that becomes the best, also where stderr is not a terminal
+    #[arg(long)]
+    progress: bool,
+    /// One JSON object on stdout; progress stays on stderr
     #[arg(long)]
     json: bool,
 }
 
 impl Arguments {
     /// The options of the diagnosis: the one place where its nominal spring is made.
-    fn options(&self, measured: &[MeasuredRecord], records: &[Record], input: Input) -> Result<Options> {
+    fn options(&self, measured: &[MeasuredRecord], records: &[Record], input: Input, stop: Stop) -> Result<Options> {
         let units = measured.first().map(|measured| measured.units.clone()).unwrap_or_default();
         let file = match self.plant.as_str() {
             "identify" => identify(records, input, &units)?.plant,
             plant => plant_file::load_for_host(plant)?,
         };
-        Ok(Options { plant: self.plant.clone(), units, input, base: Base::new(file)?, ..Options::default() })
+        Ok(Options { plant: self.plant.clone(), units, input, base: Base::new(file)?, effort: self.effort, stop })
     }
 
     fn origin(measured: &[MeasuredRecord], input: Input) -> Origin {
@@ -98,8 +111,43 @@ fn quoted(word: &str) -> String {
     }
 }
 
+/// Diagnoses records and shows the best causes so far on stderr: as lines, or in one that moves on a terminal.
+fn with_progress(records: &[Record], options: &Options, lines: bool) -> Result<Several> {
+    let started = Instant::now();
+    let said = |causes: &str| match causes {
+        "" => "so far: no cause".to_owned(),
+        causes => format!("so far: {causes}"),
+    };
+    if lines {
+        return examine_several(records, options, |causes| {
+            print_error(&format!("{:6.1} s  {}\n", started.elapsed().as_secs_f64(), said(causes)));
+        });
+    }
+    let bar = ProgressBar::new_spinner();
+    bar.set_style(ProgressStyle::with_template("{spinner} {elapsed} {msg}")?);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let diagnosis = examine_several(records, options, |causes| bar.set_message(said(causes)));
+    bar.finish_and_clear();
+    diagnosis
+}
+
+/// Returns a stop after the time that the user allows, and at Ctrl-C; a second Ctrl-C ends the program.
+fn stop(within: Option<Duration>) -> Result<Stop> {
+    let stop = within.map_or_else(Stop::default, Stop::after);
+    let interrupted = stop.clone();
+    let mut before = false;
+    ctrlc::set_handler(move || {
+        if std::mem::replace(&mut before, true) {
+            std::process::exit(130);
+        }
+        interrupted.request();
+    })?;
+    Ok(stop)
+}
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let stop = stop(arguments.within)?;
     let (measured, input) = arguments.record.open()?;
     let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
     if input == Input::Stair {
@@ -107,14 +155,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
         }
     }
-    let options = arguments.options(&measured, &records, input)?;
+    let options = arguments.options(&measured, &records, input, stop)?;
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
-    let bar = ProgressBar::new_spinner();
-    bar.enable_steady_tick(std::time::Duration::from_millis(200));
-    let several = examine_several(&records, &options, |causes| bar.set_message(format!("so far: {causes}")))?;
-    let mut diagnosis = several.joint;
-    bar.finish_and_clear();
+    let mut diagnosis = with_progress(&records, &options, arguments.progress)?.joint;
     if let Some(folder) = &arguments.out {
         diagnosis.report.extended.model = Some(folder.join(output::PLANT_FILE).display().to_string());
     }

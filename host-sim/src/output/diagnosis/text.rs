@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use identify::answer::{self, Extended, Finding, Margins, Nominal, Quality, Verdict};
+use identify::answer::{self, Extended, Finding, Margins, Nominal, Quality, SearchReport, Verdict};
 use identify::dimension::Dimension;
 use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
@@ -66,6 +66,21 @@ pub fn in_fixed_point(extended: &Extended, scales: &Scales) -> Option<String> {
              {error}, more than {}.",
             scales.with_unit(Dimension::Voltage, small_v, 0)
         )
+    })
+}
+
+/// States that the search was ended before it had tried all causes; `None` if it was not.
+fn unfinished(report: &answer::Report) -> Option<String> {
+    let SearchReport { effort, work, allowed, finished } = report.search;
+    if !report.complete {
+        let percent = 100.0 * work as f64 / allowed.max(1) as f64;
+        return Some(format!(
+            "The search was stopped after {percent:.0} % of the work of `--effort {effort}`: this is the best answer so far."
+        ));
+    }
+    (!finished).then(|| {
+        let more = if effort == "thorough" { "" } else { "; `--effort thorough` searches longer" };
+        format!("The search ended with the work of `--effort {effort}`, before it had tried everything{more}.")
     })
 }
 
@@ -137,7 +152,8 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
     });
     let (one, rows) = (causes.len() == 1, report.rows);
-    let mut sentences: Vec<String> = parts_to_take_out(report, scales).into_iter().collect();
+    let unfinished = unfinished(report).into_iter();
+    let mut sentences: Vec<String> = unfinished.chain(parts_to_take_out(report, scales)).collect();
     sentences.push(match report.verdict {
         Verdict::Explained if causes.is_empty() => {
             format!("Without that, the simulation agrees with {name} within the noise of {rows} readings.")
@@ -249,6 +265,10 @@ mod tests {
 
     /// The first two sentences about causes that do not reduce the error.
     fn said(verdict: Verdict, causes: &[&'static str], alternatives: &[Vec<&'static str>]) -> String {
+        sentences("r.csv", &report(verdict, causes, alternatives), &Scales::default())[..2].join(" ")
+    }
+
+    fn report(verdict: Verdict, causes: &[&'static str], alternatives: &[Vec<&'static str>]) -> answer::Report {
         let quality = Quality { rmse: 7.86, fit_percent: 90.0, held_out_rmse: 7.86, one_step_rmse: 7.86 };
         let finding = |&cause: &&'static str| Finding {
             cause,
@@ -258,9 +278,11 @@ mod tests {
             rmse_after: 7.86,
             evidence: String::new(),
         };
-        let report = answer::Report {
+        answer::Report {
             schema: SCHEMA,
             rows: 600,
+            complete: true,
+            search: SearchReport { effort: "normal", work: 3, allowed: 9, finished: true },
             verdict,
             nominal: Nominal::default(),
             baseline: quality,
@@ -274,8 +296,17 @@ mod tests {
             noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
             residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
             records: Vec::new(),
-        };
-        sentences("r.csv", &report, &Scales::default())[..2].join(" ")
+        }
+    }
+
+    #[test]
+    fn a_search_that_ended_early_is_said_first() {
+        let mut report = report(Verdict::Unexplained, &[], &[]);
+        report.search.finished = false;
+        let first = |report: &answer::Report| sentences("r.csv", report, &Scales::default()).remove(0);
+        assert!(first(&report).ends_with("everything; `--effort thorough` searches longer."));
+        report.complete = false;
+        assert!(first(&report).starts_with("The search was stopped after 33 % of the work"));
     }
 
     #[test]
