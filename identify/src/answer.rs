@@ -38,6 +38,9 @@ pub struct Report {
     pub next_experiment: Option<String>,
     /// The simulation extended by the named causes.
     pub extended: Extended,
+    /// The best linear model of order 1 to 4 on the same held-out segments; `None` if the voltage or the reading never changes, or
+    /// under the report's stair.
+    pub linear: Option<LinearError>,
     /// Structure in the residual that no cause explains, in one sentence.
     pub leftover: Option<String>,
     /// Parameters of the noise of the extended simulation.
@@ -68,6 +71,15 @@ pub struct RecordReport {
     pub findings: Vec<Finding>,
     /// Structure in the residual of this record that no cause explains, in one sentence.
     pub leftover: Option<String>,
+}
+
+/// The held-out error of the best linear model of one order.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LinearError {
+    /// Number of poles.
+    pub order: usize,
+    /// Held-out root mean square error, in the reading's unit.
+    pub held_out_rmse: f64,
 }
 
 /// The conclusion on a record.

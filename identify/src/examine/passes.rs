@@ -22,6 +22,7 @@ use crate::effects::index_of;
 use crate::examine::options::Options;
 use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
+use crate::nominal::best_linear;
 use crate::plant::base::Base;
 use crate::record::data::{Data, Input};
 use crate::record::normalisation::Normalisation;
@@ -79,6 +80,7 @@ pub(super) fn joint(records: &[Record], options: &Options, progress: &mut dyn Fn
     let found = without_unsupported_terms(&examined, &base, found, progress);
     let mut found = found.restored(records, &normalisations);
     found.report.nominal = nominal(options);
+    found.report.linear = best_linear(records, options.input);
     found.report.complete = !budget.is_stopped();
     found.report.search = SearchReport {
         effort: options.effort.name(),

@@ -18,13 +18,11 @@ use simulation::plant_file::PlantFile;
 use simulation::record::Record;
 use simulation::units::Units;
 
-use crate::answer::SCHEMA;
+use crate::answer::{LinearError, SCHEMA};
 use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
-use crate::nominal::report::{
-    InputLaw, LinearError, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant,
-};
+use crate::nominal::report::{InputLaw, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant};
 use crate::record::data::Input;
 use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
@@ -161,6 +159,19 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
         }
     }
     Ok(identified(records, models, units))
+}
+
+/// Returns the best linear model of order 1 to 4 by its held-out error; `None` if there is none.
+pub fn best_linear(records: &[Record], input: Input) -> Option<LinearError> {
+    if input == Input::Stair || records.iter().any(|record| check(record).is_err()) {
+        return None;
+    }
+    let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
+    let models = Models::of(series, InputLaw::Linear);
+    let error =
+        |(order, model): (usize, &Model)| LinearError { order, held_out_rmse: root_mean_square(&model.held_out) };
+    let orders = models.fits.iter().enumerate().skip(1).map(error);
+    orders.min_by(|a, b| a.held_out_rmse.total_cmp(&b.held_out_rmse))
 }
 
 fn check(record: &Record) -> Result<()> {

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::answer::LinearError;
+
 /// A quantity with its 95 % interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Quantity {
@@ -51,15 +53,6 @@ pub struct Nominal {
     pub delay_s: Quantity,
     /// Time constants, the largest part of the static gain first.
     pub tau_s: Vec<TimeConstant>,
-}
-
-/// The held-out error of the best linear model of one order.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct LinearError {
-    /// Number of poles.
-    pub order: usize,
-    /// Held-out root mean square error, in the reading's unit.
-    pub held_out_rmse: f64,
 }
 
 /// What a record's first reading tells.

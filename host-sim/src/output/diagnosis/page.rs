@@ -45,12 +45,14 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 @if is_extended(diagnosis) {
                     h2 { "Held-out improvement" }
                     (tables::quality(diagnosis))
+                    @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
                     @if let Some(sentence) = text::in_fixed_point(&report.extended, scales) { p { (sentence) } }
                     h2 { "Improvement on each held-out segment" }
                     (tables::folds(diagnosis))
                 } @else {
                     h2 { "Accuracy" }
                     (tables::quality(diagnosis))
+                    @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
                 }
                 h2 { "Next experiment" }
                 p {

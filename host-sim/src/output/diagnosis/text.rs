@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use identify::answer::{self, Extended, Finding, Margins, Nominal, Quality, SearchReport, Verdict};
+use identify::answer::{self, Extended, Finding, LinearError, Margins, Nominal, Quality, SearchReport, Verdict};
 use identify::dimension::Dimension;
 use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
@@ -44,10 +44,20 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
         let after = if extends { format!(" {:>12}", number(after)) } else { String::new() };
         let _ = writeln!(text, "{what:22} {:>12}{after}", number(before));
     }
+    if let Some(linear) = linear(report, scales) {
+        let _ = writeln!(text, "{linear}");
+    }
     if extends && let Some(sentence) = in_fixed_point(&report.extended, scales) {
         let _ = writeln!(text, "{sentence}");
     }
     text
+}
+
+/// States the held-out error of the best linear model, with which both simulations compete; `None` if there is none.
+pub fn linear(report: &answer::Report, scales: &Scales) -> Option<String> {
+    let LinearError { order, held_out_rmse } = report.linear?;
+    let rmse = scales.with_unit(Dimension::ReadingSize, held_out_rmse, 3);
+    Some(format!("The best linear model of order 1 to 4, of order {order}, has a held-out error of {rmse}."))
 }
 
 /// States whether the fixed-point tick simulates the extended spring; `None` if that was not tested.
@@ -292,6 +302,7 @@ mod tests {
             alternatives: alternatives.to_vec(),
             next_experiment: None,
             extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+            linear: None,
             leftover: None,
             noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
             residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
