@@ -1,0 +1,115 @@
+//! `vsj identify`: the spring that a record shows.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use end_to_end::vsj::{json, run, text};
+use serde_json::Value;
+use tempfile::tempdir;
+
+fn number(value: &Value, path: &str) -> f64 {
+    value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} of {value}"))
+}
+
+/// Deterministic noise between -0.5 and 0.5.
+fn uniform(state: &mut u32) -> f64 {
+    *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+    f64::from(*state >> 8) / f64::from(1 << 24) - 0.5
+}
+
+/// A record in newtons with a gain of -0.02 N/V, a zero of 7 N, a share of 0.3 and a lag of 50 ms, by its exact recursion.
+fn record(zero: f64) -> String {
+    let (mut lag, mut voltage, mut state) = (0.0, 0.0, 5u32);
+    let mut text = "time_s,voltage_v,force\n".to_owned();
+    for row in 0..600 {
+        if row % 25 == 0 {
+            voltage = 400.0 * (uniform(&mut state) + 0.5);
+        }
+        let force = zero - 0.02 * (0.3 * voltage + 0.7 * lag) + 0.01 * uniform(&mut state);
+        writeln!(text, "{},{voltage},{force}", 0.005 * f64::from(row)).unwrap();
+        lag = voltage + (lag - voltage) * f64::exp(-0.005 / 0.05);
+    }
+    text
+}
+
+#[test]
+fn a_force_in_newtons_is_identified() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("force.csv"), record(7.0)).unwrap();
+    let report = json(folder.path(), &["identify", "force.csv", "--column", "force", "--json", "--out", "made"]);
+    assert_eq!(report["schema"], 1);
+    assert_eq!(report["rows"], 600);
+    assert_eq!(report["order"], 1);
+    assert_eq!(report["model"], "made/plant.toml");
+    for (quantity, expected, near) in [
+        ("gain", -0.02, 1e-5),
+        ("zero", 7.0, 0.01),
+        ("share", 0.3, 0.01),
+        ("delay_s", 0.0, 1e-9),
+        ("tau_s/0", 0.05, 1e-3),
+    ] {
+        let of = |field: &str| number(&report, &format!("/nominal/{quantity}/{field}"));
+        assert!((of("value") - expected).abs() < near, "{quantity}: {report}");
+        assert!(of("low") <= of("value") && of("value") <= of("high"), "{quantity}: {report}");
+    }
+    let held_out = number(&report, "/held_out_rmse");
+    assert!((0.0028..0.0031).contains(&held_out), "{held_out}: uniform noise of 0.01 N");
+    let linear = report["linear"].as_array().unwrap();
+    assert_eq!(linear.iter().map(|linear| linear["order"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2, 3, 4]);
+    assert!(number(&report, "/static_held_out_rmse") > 10.0 * held_out);
+
+    for file in ["report.html", "plant.toml", "identify.json"] {
+        assert!(folder.path().join("made").join(file).is_file(), "{file}");
+    }
+    let page = fs::read_to_string(folder.path().join("made/report.html")).unwrap();
+    assert!(page.contains("600 readings show one time constant.") && page.contains("<svg"));
+    let written: Value = serde_json::from_slice(&fs::read(folder.path().join("made/identify.json")).unwrap()).unwrap();
+    assert_eq!(written, report);
+    let plant = fs::read_to_string(folder.path().join("made/plant.toml")).unwrap();
+    assert!(plant.contains("[reading]\ngain = -0.0") && plant.contains("[units]"), "{plant}");
+}
+
+#[test]
+fn two_records_of_one_spring_have_their_own_zeros() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), record(7.0)).unwrap();
+    fs::write(folder.path().join("b.csv"), record(-4.0)).unwrap();
+    let report = json(folder.path(), &["identify", "a.csv", "b.csv", "--column", "force", "--json"]);
+    assert_eq!(report["rows"], 1200);
+    assert_eq!(report["model"], Value::Null);
+    for (record, zero) in [(0, 7.0), (1, -4.0)] {
+        assert!((number(&report, &format!("/start/{record}/zero/value")) - zero).abs() < 0.01, "{report}");
+    }
+}
+
+#[test]
+fn bad_records_are_named_in_one_line() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("still.csv"), "time_s,voltage_v,stiffness\n".to_owned() + &rows(|_| 5.0)).unwrap();
+    for (arguments, expected) in [
+        (vec!["identify", "still.csv"], "still.csv: the voltage never changes"),
+        (vec!["identify", "still.csv", "--column", "force"], "no column `force`"),
+        (vec!["identify"], "not provided: <RECORD.csv>"),
+        (vec!["identify", "still.csv", "--input", "stair"], "invalid value 'stair'"),
+    ] {
+        let output = run(folder.path(), &arguments);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(expected) && said.lines().count() == 1, "{said}");
+    }
+}
+
+fn rows(voltage: impl Fn(u32) -> f64) -> String {
+    (0..20).map(|row| format!("{row},{},{}\n", voltage(row), row % 3)).collect()
+}
+
+/// The page quotes what the command prints.
+#[test]
+fn documentation_is_up_to_date() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let output = run(&root, &["identify", "data/sample_hysteresis.csv"]);
+    let page = fs::read_to_string(root.join("docs/identify.md")).unwrap();
+    let said = text(&output.stdout);
+    assert!(page.contains(said.trim_end()), "docs/identify.md should quote:\n{said}");
+}
