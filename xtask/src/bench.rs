@@ -143,17 +143,17 @@ fn report(rows: &[Row]) -> Value {
 
 fn cargo_bench() -> Command {
     let mut command = shell::cargo();
-    command.args(["bench", "--profile", "dist", "-p", "host-sim", "--bench", BENCH]);
+    command.args(["bench", "--profile", "dist", "-p", "simulation", "--bench", BENCH]);
     command
 }
 
 /// An error if the Rust bench is missing, before minutes are spent on Python.
 fn find_bench(metadata: &Value) -> Result<()> {
     let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
-    let packages = list(&metadata["packages"]).into_iter().filter(|package| package["name"] == "host-sim");
+    let packages = list(&metadata["packages"]).into_iter().filter(|package| package["name"] == "simulation");
     let is_bench = |target: &Value| target["name"] == BENCH && list(&target["kind"]).contains(&json!("bench"));
     if !packages.flat_map(|package| list(&package["targets"])).any(|target| is_bench(&target)) {
-        bail!("host-sim has no bench `{BENCH}`: expected host-sim/benches/{BENCH}.rs");
+        bail!("simulation has no bench `{BENCH}`: expected simulation/benches/{BENCH}.rs");
     }
     Ok(())
 }

@@ -59,6 +59,8 @@ pub struct Budget {
     /// Work at which the present search became or becomes scarce of work, and at which it ends.
     scarce: AtomicU64,
     limit: AtomicU64,
+    /// Work that was granted to the present search.
+    granted: AtomicU64,
     /// True if a search ended because its work was done.
     cut: AtomicBool,
     stop: Option<Stop>,
@@ -74,6 +76,7 @@ impl Budget {
             spent: AtomicU64::new(0),
             scarce: AtomicU64::new(total),
             limit: AtomicU64::new(total),
+            granted: AtomicU64::new(total),
             cut: AtomicBool::new(false),
             stop,
         }
@@ -106,6 +109,12 @@ impl Budget {
         let granted = |part: f64| spent.saturating_add((self.total.saturating_sub(spent) as f64 * share * part) as u64);
         self.scarce.store(granted(SCARCE), Ordering::Relaxed);
         self.limit.store(granted(1.0), Ordering::Relaxed);
+        self.granted.store(granted(1.0) - spent, Ordering::Relaxed);
+    }
+
+    /// Returns the work that was granted to the present search.
+    pub fn granted(&self) -> u64 {
+        self.granted.load(Ordering::Relaxed)
     }
 
     /// Returns true if the search has to follow the most promising extensions only.

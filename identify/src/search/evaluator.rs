@@ -135,6 +135,8 @@ impl Evaluator for Engine<'_> {
     }
 }
 
+/// Work for each piece of the voltage from which all starts and forms are tried.
+const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.
 const STARTS_IF_SCARCE: usize = 16;
 /// Work of a predicted gain for each row, in units of one piece of the voltage through one lag.
@@ -160,7 +162,9 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
         predictors.push(GainPredictor::new(engine, fit, fit.noise.clone()));
     }
     let sigma = robust_scale(&fit.residual);
-    let scarce = engine.is_scarce();
+    // Where the voltage has many pieces, screening every start would leave no work for fits.
+    let dear = exhaustive && engine.budget().granted() < WORK_PER_PIECE * engine.data.command.len() as u64;
+    let scarce = engine.is_scarce() || dear;
     let from_rest = engine.residual_from_rest(&fit.model);
     let mut found: Vec<Extension> = Vec::new();
     for (index, effect) in EFFECTS.iter().enumerate().filter(|(index, _)| wanted(*index)) {

@@ -30,6 +30,8 @@ const STILL_FRACTION: f64 = 1e-4;
 const PIECES_PER_ROW: f64 = 2.0;
 /// The same where the voltage changes at most rows: rows of a thirtieth of the time constant are then not divided.
 const PIECES_PER_CHANGE: f64 = 1.5;
+/// Largest factor by which the error of a chord grows with the coarseness.
+const MOST_BLUR: f64 = 16.0;
 /// Number of pieces that is allowed however few rows there are.
 const FEWEST_PIECES: usize = 3_000;
 
@@ -55,7 +57,8 @@ impl Signal {
     }
 
     /// Returns the same with at most `pieces` pieces, as far as changes of the voltage and rows leave a choice, and with
-    /// neighbouring pieces replaced by a chord where that changes the voltage by `blur_v` or less.
+    /// neighbouring pieces replaced by a chord where that changes the voltage by `blur_v` or less; up to [`MOST_BLUR`] times
+    /// that where they would be too many.
     pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize, blur_v: f64) -> Self {
         Self::coarser(schedule, times_s, before, pieces, blur_v, 1.0)
     }
@@ -71,7 +74,7 @@ impl Signal {
     ) -> Self {
         let duration_s = times_s.last().unwrap_or(&0.0) - times_s.first().unwrap_or(&0.0);
         loop {
-            let signal = Self::divided(schedule, times_s, before, coarseness, blur_v);
+            let signal = Self::divided(schedule, times_s, before, coarseness, blur_v * coarseness.min(MOST_BLUR));
             if signal.pieces.len() <= pieces || coarseness * SHORTEST_PIECE_S > duration_s {
                 return signal;
             }
