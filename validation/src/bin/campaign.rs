@@ -13,7 +13,7 @@ use validation::campaign::diagnosis::diagnose;
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
-use validation::campaign::{criteria, out_of_model, real, rivals, tables};
+use validation::campaign::{criteria, out_of_model, real, rivals, scales, tables};
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
@@ -50,7 +50,7 @@ struct Cli {
     /// Parts to run
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
-    /// Records per cause (singles, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
+    /// Records per cause (singles, scales, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
     /// long), in total (nulls, triples), or times 53 (thresholds)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
@@ -153,6 +153,8 @@ enum Part {
     /// One effect by laws that the diagnosis does not model: 5 records of each
     #[value(alias = "strangers")]
     OutOfModel,
+    /// One effect in a spring of any time constant, share, full scale and unit: 20 records of each cause
+    Scales,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
     Rivals,
     /// Six other instruments, simulated, in their own units
@@ -303,6 +305,14 @@ impl Cli {
                 bar.finish_and_clear();
                 let (markdown, wrong) = (out_of_model::page(&forms, &answers), out_of_model::wrong(&forms, &answers));
                 Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!(answers) })
+            }
+            Part::Scales => {
+                let jobs = scales::jobs(first, self.count(20));
+                let bar = bar("scales", jobs.len())?;
+                let outcomes = scales::run(&jobs, &bar);
+                bar.finish_and_clear();
+                let (markdown, wrong) = (tables::named("cause", &jobs, &outcomes), tables::wrong(&jobs, &outcomes));
+                Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!({"records": outcomes}) })
             }
             Part::Rivals => {
                 let bar = bar("rivals", rivals::RECORDS)?;

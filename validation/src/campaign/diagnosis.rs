@@ -3,6 +3,7 @@
 use anyhow::Result;
 use identify::Diagnosis;
 use identify::fit::engine::Engine;
+use identify::plant::base::Base;
 use identify::record::data::Data;
 use identify::record::observed::Observed;
 #[cfg(feature = "sensitivity")]
@@ -10,6 +11,7 @@ pub use identify::stats::thresholds::vary;
 pub use identify::stats::thresholds::{Threshold, empirical::ALL as THRESHOLDS};
 use identify::{Options, examine};
 use serde_json::Value;
+use simulation::plant_file::PlantFile;
 use simulation::record::Record;
 
 use crate::ground_truth::LabelledRecord;
@@ -23,6 +25,15 @@ pub type Diagnose<'a> = dyn Fn(&LabelledRecord) -> Result<Value> + Sync + 'a;
 /// The record is rejected.
 pub fn diagnose(hidden: &LabelledRecord) -> Result<Value> {
     Ok(serde_json::to_value(identify::examine::diagnose(&hidden.record(), &Options::default())?)?)
+}
+
+/// Report of `identify` on a record compared with a nominal spring, as JSON.
+///
+/// # Errors
+/// The record or the spring is rejected.
+pub fn compared_with(record: &Record, nominal: PlantFile) -> Result<Value> {
+    let options = Options { base: Base::new(nominal)?, ..Options::default() };
+    Ok(serde_json::to_value(identify::examine::diagnose(record, &options)?)?)
 }
 
 /// Prediction of a whole record, in V, from its voltages alone by the model identified on its first `rows` rows, and

@@ -13,6 +13,7 @@
 //! | [`part`], [`summary`] | the parts of the campaign, and the counts over their records |
 //! | [`sensitivity`] | the smallest effect that is named |
 //! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
+//! | [`scales`] | single effects in springs of any size, in any unit |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
@@ -27,6 +28,7 @@ pub mod out_of_model;
 pub mod part;
 pub mod real;
 pub mod rivals;
+pub mod scales;
 pub mod score;
 pub mod sensitivity;
 pub mod statistics;

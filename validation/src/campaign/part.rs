@@ -39,7 +39,13 @@ pub fn forms(first: u64, count: usize) -> Vec<Job> {
     each_cause(first, 2, count, &causes, |recipe| Recipe { other_forms: true, ..recipe })
 }
 
-fn each_cause(first: u64, part: u64, count: usize, causes: &[Cause], change: impl Fn(Recipe) -> Recipe) -> Vec<Job> {
+pub(super) fn each_cause(
+    first: u64,
+    part: u64,
+    count: usize,
+    causes: &[Cause],
+    change: impl Fn(Recipe) -> Recipe,
+) -> Vec<Job> {
     let job = |(index, (cause, _)): (usize, (&Cause, usize))| Job {
         group: cause.name().to_owned(),
         recipe: change(Recipe::of(&[*cause])),

@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::cause::Cause;
 use super::effect::Effect;
 use super::noise::Noise;
+use super::physics::SHARE;
 use super::schedule::{Kind, Sampling, Schedule};
 use super::sensor::Readings;
 use super::spring::Spring;
@@ -74,12 +75,24 @@ pub struct LabelledRecord {
 impl LabelledRecord {
     /// Simulates the spring and its sensor.
     pub fn new(schedule: Schedule, effects: Vec<Effect>, noise: Noise, seed: u64) -> Self {
+        let spring = Spring::with(&effects);
+        Self::of(&spring, schedule, effects, noise, seed)
+    }
+
+    /// The same schedule, effects and noise with a spring whose instantaneous share is `share`, 0 to 1, unless an effect sets it.
+    pub fn with_share(&self, share: f64) -> Self {
+        let own = Spring::with(&self.effects);
+        let spring = if own.share == SHARE { Spring { share, ..own } } else { own };
+        Self::of(&spring, self.schedule.clone(), self.effects.clone(), self.noise, self.seed)
+    }
+
+    fn of(spring: &Spring, schedule: Schedule, effects: Vec<Effect>, noise: Noise, seed: u64) -> Self {
         // A random stream of its own: the noise does not depend on the effects.
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(1);
         let rows = noise.draw(&mut random, schedule.time_s.len());
         random.set_stream(2);
-        let stiffness = stiffness(&schedule, &effects, STEPS);
+        let stiffness = spring.run(&schedule, STEPS);
         let readings = Readings::of(stiffness, &rows, &schedule, &effects, &mut random);
         Self { schedule, effects, noise, seed, readings }
     }
@@ -97,14 +110,14 @@ impl LabelledRecord {
     }
 }
 
-/// Stiffness of the spring, row by row, in V, without sensor and noise.
-pub(super) fn stiffness(schedule: &Schedule, effects: &[Effect], steps: usize) -> Vec<f64> {
-    Spring::with(effects).run(schedule, steps)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Stiffness of the spring, row by row, in V, without sensor and noise.
+    fn stiffness(schedule: &Schedule, effects: &[Effect], steps: usize) -> Vec<f64> {
+        Spring::with(effects).run(schedule, steps)
+    }
 
     fn every_form() -> Vec<(Cause, bool, LabelledRecord)> {
         let mut records = Vec::new();
