@@ -73,13 +73,15 @@ pub struct RecordReport {
     pub leftover: Option<String>,
 }
 
-/// The held-out error of the best linear model of one order.
+/// Errors of the best linear model of one order.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LinearError {
     /// Number of poles.
     pub order: usize,
     /// Held-out root mean square error, in the reading's unit.
     pub held_out_rmse: f64,
+    /// The same on the last 40 % of each record, by a fit to the first 60 %.
+    pub last_40_percent_rmse: f64,
 }
 
 /// The conclusion on a record.

@@ -27,17 +27,19 @@ use crate::record::data::Input;
 use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::sums::dot;
-use crate::stats::thresholds::probability::Z;
+use crate::stats::thresholds::probability::{RIVAL_ODDS, Z};
 
-/// A larger model is preferred if its held-out error is smaller by this part, and its advantage exceeds its standard error over the
-/// segments [`BEYOND_CHANCE`] times, ...
+/// A larger model is preferred if its held-out error is smaller by this part, ...
 const WORTHWHILE: f64 = 0.005;
-const BEYOND_CHANCE: f64 = 2.5;
-/// ... or exceeds it this many times, and the last part of the records, which is an extrapolation, confirms it by an error that is
-/// smaller by [`WORTHWHILE`], ...
-const CONFIRMED: f64 = 1.5;
-/// ... or if the held-out error is smaller by this part.
-const CLEAR: f64 = 0.3;
+/// ... and its error on the last part of the records, which is an extrapolation, is at most this many times as large: beyond, it
+/// does not hold at all. Below, a remark says what is lost.
+const MOST_SPOILED: f64 = 10.0;
+/// Gain in log-likelihood, in nats, that each further pole has to bring beyond chance, ...
+const PRICE_OF_POLE: f64 = 4.0;
+/// ... and that it has to bring if the last part of the records confirms it by a smaller error.
+const PRICE_IF_CONFIRMED: f64 = 3.0;
+/// Largest order of a nominal model; one more shows in the comparison whether more would help.
+const LARGEST_ORDER: usize = 3;
 /// Fewest readings of a record.
 const FEWEST_READINGS: usize = 8;
 /// Part of a record to which a model is fitted that predicts the rest.
@@ -105,9 +107,20 @@ impl Models {
             Model { last_part: last_part(&problem, &fit.poles), held_out, fit }
         };
         let fits: Vec<Model> = best_of_each_order(&problem).into_iter().map(with_errors).collect();
-        let beaten = |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large], &fits[small]));
-        let chosen = (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten");
+        let candidates = fits.len().min(LARGEST_ORDER + 1);
+        let beaten = |small: usize| (small + 1..candidates).any(|large| beats(&problem, &fits[large], &fits[small]));
+        let chosen = (0..candidates).find(|&order| !beaten(order)).expect("the largest order is never beaten");
         Self { law, problem, fits, chosen }
+    }
+
+    /// Errors of the best model of each order from 1.
+    fn errors(&self) -> Vec<LinearError> {
+        let error = |(order, model): (usize, &Model)| LinearError {
+            order,
+            held_out_rmse: root_mean_square(&model.held_out),
+            last_40_percent_rmse: model.last_part,
+        };
+        self.fits.iter().enumerate().skip(1).map(error).collect()
     }
 
     fn held_out_rmse(&self) -> f64 {
@@ -115,28 +128,25 @@ impl Models {
     }
 }
 
-/// True if the held-out residuals of a larger model are smaller by more than is worthwhile and than chance explains.
+/// True if the held-out error of a larger model is smaller by more than is worthwhile, the gain in log-likelihood is beyond chance,
+/// and the model extrapolates as well. Of autocorrelated errors as many count as have the same information on a mean:
+///
+/// ```text
+/// gain = n_eff ln(error of the smaller / error of the larger),      n_eff = n variance (1 - sum phi)^2 / variance of innovations
+/// ```
 fn beats(problem: &Problem, large: &Model, small: &Model) -> bool {
-    let confirmed = large.last_part < (1.0 - WORTHWHILE) * small.last_part;
-    let (large, small) = (&large.held_out, &small.held_out);
-    let ratio = root_mean_square(large) / root_mean_square(small);
-    if ratio.is_nan() || ratio > 1.0 - WORTHWHILE {
+    let ratio = root_mean_square(&large.held_out) / root_mean_square(&small.held_out);
+    if ratio.is_nan() || ratio > 1.0 - WORTHWHILE || large.last_part > MOST_SPOILED * small.last_part {
         return false;
     }
-    let beyond = if ratio < 1.0 - CLEAR || confirmed { CONFIRMED } else { BEYOND_CHANCE };
-    let mut gains: Vec<f64> = Vec::new();
-    for (series, &first) in problem.series.iter().zip(problem.starts()) {
-        let mut row = first;
-        for segment in series.fold.chunk_by(|a, b| a == b) {
-            let rows = row..row + segment.len();
-            gains.push(dot(&small[rows.clone()], &small[rows.clone()]) - dot(&large[rows.clone()], &large[rows]));
-            row += segment.len();
-        }
-    }
-    let sum: f64 = gains.iter().sum();
-    let count = gains.len() as f64;
-    let spread: f64 = gains.iter().map(|gain| (gain - sum / count).powi(2)).sum();
-    sum > beyond * (spread * count / (count - 1.0).max(1.0)).sqrt()
+    let Spectrum { ar, innovations } = Spectrum::of(&large.held_out, problem.starts(), &[]);
+    let power = dot(&large.held_out, &large.held_out);
+    let rows = large.held_out.len() as f64;
+    let effective = power * (1.0 - ar.iter().sum::<f64>()).powi(2) / innovations;
+    let confirmed = large.last_part < (1.0 - WORTHWHILE) * small.last_part;
+    let price = if confirmed { PRICE_IF_CONFIRMED } else { PRICE_OF_POLE };
+    let more = (large.fit.poles.order() - small.fit.poles.order()) as f64;
+    -effective.min(rows) * ratio.ln() > RIVAL_ODDS + price * more
 }
 
 /// Identifies the spring of one or several records; each has its own zero and start.
@@ -168,9 +178,7 @@ pub fn best_linear(records: &[Record], input: Input) -> Option<LinearError> {
     }
     let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
     let models = Models::of(series, InputLaw::Linear);
-    let error =
-        |(order, model): (usize, &Model)| LinearError { order, held_out_rmse: root_mean_square(&model.held_out) };
-    let orders = models.fits.iter().enumerate().skip(1).map(error);
+    let orders = models.errors().into_iter();
     orders.min_by(|a, b| a.held_out_rmse.total_cmp(&b.held_out_rmse))
 }
 
@@ -257,9 +265,7 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
         held_out_rmse: models.held_out_rmse(),
         last_40_percent_rmse: *last_part,
         static_held_out_rmse: root_mean_square(&fits[0].held_out),
-        linear: (1..fits.len())
-            .map(|order| LinearError { order, held_out_rmse: root_mean_square(&fits[order].held_out) })
-            .collect(),
+        linear: models.errors(),
         start,
         noise,
         remarks: Vec::new(),

@@ -55,7 +55,7 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
 
 /// States the held-out error of the best linear model, with which both simulations compete; `None` if there is none.
 pub fn linear(report: &answer::Report, scales: &Scales) -> Option<String> {
-    let LinearError { order, held_out_rmse } = report.linear?;
+    let LinearError { order, held_out_rmse, .. } = report.linear?;
     let rmse = scales.with_unit(Dimension::ReadingSize, held_out_rmse, 3);
     Some(format!("The best linear model of order 1 to 4, of order {order}, has a held-out error of {rmse}."))
 }
