@@ -43,7 +43,7 @@ impl Other {
             time_s: self.start_s + self.time * row.time_s,
             voltage_v: self.voltage * row.voltage_v,
             measured: row.measured.map(|reading| self.zero + self.reading * reading),
-            ..row.clone()
+            ..*row
         };
         Record { name: record.name.clone(), rows: record.rows.iter().map(row).collect() }
     }

@@ -25,6 +25,10 @@ const FAR_SIZE: f64 = 10.0;
 const FAR_ZERO: f64 = 0.5;
 /// A first-order fit is believed if it leaves less than this fraction of the squared error of the fit that it is compared with.
 const BELIEVED: f64 = 0.5;
+/// A nominal time constant with which a first-order fit leaves less of the squared error is not far off.
+const EXPLAINED: f64 = 0.03;
+/// A first-order fit with a larger instantaneous part falls back after a step: its time constant is that of a leakage.
+const LARGEST_SHARE: f64 = 1.05;
 /// Shortest and longest time constant of the coordinates, in row spacings and lengths of the record relative to the range of the
 /// first-order fit: with one beyond, every step or none would look settled.
 const BEYOND_RANGE: f64 = 20.0;
@@ -83,7 +87,8 @@ impl Normalisation {
         let best = rows.best().filter(|best| best.unexplained < BELIEVED);
         let slower = |best: &FirstOrder| {
             let nominal = rows.at(tau_s).map_or(1.0, |nominal| nominal.unexplained);
-            far(best.tau_s / tau_s, FAR_TIME_CONSTANT) && best.unexplained < BELIEVED * nominal
+            let fits_better = nominal > EXPLAINED && best.unexplained < BELIEVED * nominal;
+            far(best.tau_s / tau_s, FAR_TIME_CONSTANT) && fits_better && best.share <= LARGEST_SHARE
         };
         let far_tau = best.filter(slower);
         let far_gain = best.filter(|best| far(best.gain / reading.gain, FAR_SIZE));

@@ -55,7 +55,7 @@ impl Size {
             time_s: time * row.time_s,
             voltage_v: volts * row.voltage_v,
             measured: row.measured.map(|stiffness| self.zero + self.gain * volts * stiffness),
-            ..row.clone()
+            ..*row
         };
         Record { name: record.name.clone(), rows: record.rows.iter().map(row).collect() }
     }

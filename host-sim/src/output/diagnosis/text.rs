@@ -251,7 +251,9 @@ fn row(text: &mut String, finding: &Finding, scales: &Scales) {
         .parameters
         .iter()
         .map(|(name, it)| {
-            let number = |value| scales.number(it.dimension, value, 4);
+            // Ratios and rates may be small in any unit.
+            let small = it.value.abs() < 0.01 && matches!(it.dimension, Dimension::Ratio | Dimension::Rate);
+            let number = |value| if small { significant(value, 4) } else { scales.number(it.dimension, value, 4) };
             let (name, unit) = (shown_name(name, it.dimension, scales), scales.unit(it.dimension));
             format!("{name} = {} [{}, {}] {unit}", number(it.value), number(it.low), number(it.high)).trim().to_owned()
         })
