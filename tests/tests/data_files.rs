@@ -74,17 +74,6 @@ fn a_diagnosis_does_not_depend_on_the_format_of_the_file() {
 }
 
 #[test]
-fn one_diagnosis_takes_one_record() {
-    let folder = tempdir().expect("a folder");
-    for name in ["a.csv", "b.csv"] {
-        fs::write(folder.path().join(name), "time_s,voltage_v,stiffness\n0,0,0\n1,0,0\n").expect("a file");
-    }
-    let output = run(folder.path(), &["diagnose", "a.csv", "b.csv"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert_eq!(text(&output.stderr), "vsj: 2 records; expected one: a diagnosis is of a single record\n");
-}
-
-#[test]
 fn a_schedule_may_have_other_separators_but_no_missing_voltage() {
     let folder = tempdir().expect("a folder");
     let steps = |csv: &str| {
