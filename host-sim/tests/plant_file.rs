@@ -71,9 +71,9 @@ fn every_table_changes_the_response() {
 fn a_spring_that_the_tick_rejects_is_named_with_its_place() {
     let folder = tempdir().unwrap();
     for (from, to, expected) in [
-        ("[10.0, 25.0]", "[10.0, -25.0]", "plant.toml, line 5, column 23: thresholds_v = -25 is not allowed"),
+        ("[10.0, 25.0]", "[10.0, -25.0]", "plant.toml, line 15, column 23: thresholds_v = -25 is not allowed"),
         ("weights = [0.8, 0.109]\n", "", "weights = 0 is not allowed: expected 2 weights, one per time constant"),
-        ("[leakage]", "[leak]", "plant.toml, line 12, column 2: unknown field `leak`"),
+        ("[leakage]", "[leak]", "plant.toml, line 22, column 2: unknown field `leak`"),
         ("tau_s = 40.0", "tau_s = 0.5", "--plant: leakage.tau_s = 0.5 is not allowed: expected 1 to 100000 s"),
     ] {
         let output = stair(folder.path(), &WHOLE.replace(from, to), &["--rate-hz", "100"]);

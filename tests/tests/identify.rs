@@ -90,8 +90,8 @@ fn bad_records_are_named_in_one_line() {
     for (arguments, expected) in [
         (vec!["identify", "still.csv"], "still.csv: the voltage never changes"),
         (vec!["identify", "still.csv", "--column", "force"], "no column `force`"),
-        (vec!["identify"], "not provided: <RECORD.csv>"),
-        (vec!["identify", "still.csv", "--input", "stair"], "invalid value 'stair'"),
+        (vec!["identify"], "not provided: <DATA.csv>"),
+        (vec!["identify", "still.csv", "--input", "stair"], "--input stair: expected hold or linear"),
     ] {
         let output = run(folder.path(), &arguments);
         let said = text(&output.stderr);

@@ -46,14 +46,19 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
-    joint(std::slice::from_ref(record), options, &mut progress)
+    joint(std::slice::from_ref(record), options, None, &mut progress)
 }
 
-/// Finds out what the simulation gets wrong on all of several records of one spring.
+/// Finds out what the simulation gets wrong on all of several records of one spring; `only` limits the search to some causes.
 ///
 /// # Errors
 /// The errors of [`examine`], for the first record that has one.
-pub(super) fn joint(records: &[Record], options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Diagnosis> {
+pub(super) fn joint(
+    records: &[Record],
+    options: &Options,
+    only: Option<&[&'static str]>,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Diagnosis> {
     let normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
     let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
     let base = options.base.normalised(&normalisations[0]);
@@ -75,7 +80,7 @@ pub(super) fn joint(records: &[Record], options: &Options, progress: &mut dyn Fn
         progress(&causes.join(", "));
     };
     let budget = Budget::new(options.effort, data.rows(), options.stop.clone());
-    let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget };
+    let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget, only };
     let found = of_readings(&examined, &base, progress);
     let found = without_unsupported_terms(&examined, &base, found, progress);
     let mut found = found.restored(records, &normalisations);
@@ -111,6 +116,8 @@ struct ExaminedRecord<'r> {
     input: Input,
     data: &'r Data,
     budget: &'r Budget,
+    /// Causes that are searched; `None` for all.
+    only: Option<&'r [&'static str]>,
 }
 
 /// Receives each structure that becomes the best.
@@ -144,7 +151,7 @@ fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnos
     let shift = index_of("reading-offset").expect("an effect");
     let model = found.extended.model.without(shift);
     let likelihood = |observed| {
-        let mut engine = Engine::within(record.data, observed, base, record.budget);
+        let mut engine = Engine::within(record.data, observed, base, record.budget).limited_to(record.only);
         engine.fit_twice(model.clone()).log_likelihood
     };
     likelihood(cut) > likelihood(&found.observed)
@@ -195,7 +202,7 @@ fn best_score(
     warm_start: WarmStart,
     progress: Progress,
 ) -> (f64, WarmStart) {
-    let mut engine = Engine::within(record.data, observed, base, record.budget);
+    let mut engine = Engine::within(record.data, observed, base, record.budget).limited_to(record.only);
     record.budget.grant(SHARE_WITHOUT_PART);
     let mut search = Search::new(&mut engine);
     let best = search.run_from(warm_start, progress);
@@ -230,7 +237,7 @@ fn search(
     let budget = record.budget;
     let warm_start = warm_start.or_else(|| on_part_of_rows(record, base, observed, progress));
     budget.grant(SHARE_OF_SEARCH);
-    let mut engine = Engine::within(record.data, observed, base, budget);
+    let mut engine = Engine::within(record.data, observed, base, budget).limited_to(record.only);
     diagnosis::diagnose(&mut engine, record.input == Input::Hold, warm_start, progress)
 }
 
@@ -245,7 +252,7 @@ fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, pr
     let part = record.records.iter().map(|of| Data::thinned(of, record.input, every, normalisation));
     let part = Data::joined(part.collect());
     let observed = Observed::new(&part).with_conclusions_of(observed);
-    let mut engine = Engine::within(&part, &observed, base, record.budget);
+    let mut engine = Engine::within(&part, &observed, base, record.budget).limited_to(record.only);
     record.budget.grant(SHARE_OF_PART);
     let mut search = Search::new(&mut engine);
     search.run(progress);

@@ -1,8 +1,12 @@
 //! The diagnosis of several records of one spring.
 //!
-//! Each record has its own initial state, zero offset and noise. Causes that all records share are found first, each record
-//! held out as a whole. Then each record is diagnosed on its own against the spring with the shared causes; what is found there
-//! is in that record only: a fault, not a property of the spring.
+//! Each record has its own initial state, zero offset and noise.
+//!
+//! 1. Each record is diagnosed on its own: a cause that no record shows is not looked for in all of them, where a fault of one record
+//!    would find a cause that explains a part of it.
+//! 2. Of these causes, those that the records share are found in all of them, each record held out as a whole.
+//! 3. Each record is diagnosed on its own against the spring with the shared causes; what is found there is in that record only: a
+//!    fault, not a property of the spring.
 
 use anyhow::Result;
 
@@ -29,11 +33,16 @@ pub struct Several {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine_several(records: &[Record], options: &Options, mut progress: impl FnMut(&str)) -> Result<Several> {
-    let mut joint = joint(records, options, &mut progress)?;
     let mut each = Vec::new();
     if records.len() < 2 {
-        return Ok(Several { joint, each });
+        return Ok(Several { joint: joint(records, options, None, &mut progress)?, each });
     }
+    let mut shown = Vec::new();
+    for record in records {
+        let alone = examine(record, options, |causes| progress(&format!("{}: {causes}", record.name)))?;
+        shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
+    }
+    let mut joint = joint(records, options, Some(&shown), &mut progress)?;
     // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
     let mut spring = joint.plant.clone();
     spring.unmodelled = None;

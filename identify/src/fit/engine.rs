@@ -116,6 +116,8 @@ pub struct Engine<'a> {
     kernels: Vec<Vec<f64>>,
     /// Work that fits may do, and that was done.
     budget: &'a Budget,
+    /// Causes that a search may add; `None` for all.
+    candidates: Option<&'a [&'static str]>,
 }
 
 impl<'a> Engine<'a> {
@@ -128,9 +130,21 @@ impl<'a> Engine<'a> {
     pub fn within(data: &'a Data, observed: &'a Observed, base: &'a Base, budget: &'a Budget) -> Self {
         let simulator = Simulator::new(data, base);
         let (predicted, kernels) = (Vec::new(), Vec::new());
-        let mut engine = Self { data, observed, simulator, baseline_residual: Vec::new(), predicted, kernels, budget };
+        let candidates = None;
+        let baseline_residual = Vec::new();
+        let mut engine = Self { data, observed, simulator, baseline_residual, predicted, kernels, budget, candidates };
         engine.baseline_residual = engine.residual(&Model::default());
         engine
+    }
+
+    /// Limits a search to some causes; `None` for all.
+    pub fn limited_to(self, candidates: Option<&'a [&'static str]>) -> Self {
+        Self { candidates, ..self }
+    }
+
+    /// Returns true if a search may add a cause.
+    pub fn allows(&self, cause: &str) -> bool {
+        self.candidates.is_none_or(|candidates| candidates.contains(&cause))
     }
 
     /// Returns the plant without any effect.

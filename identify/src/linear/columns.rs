@@ -51,11 +51,11 @@ impl Column {
     /// The rows of both, as ranges in each column's values.
     fn common(&self, other: &Self) -> (Range<usize>, Range<usize>) {
         let start = self.first.max(other.first);
-        let end = self.rows().end.min(other.rows().end).max(start);
-        (
-            start - self.first.min(start)..end - self.first.min(end),
-            start - other.first.min(start)..end - other.first.min(end),
-        )
+        let end = self.rows().end.min(other.rows().end);
+        if end <= start {
+            return (0..0, 0..0);
+        }
+        (start - self.first..end - self.first, start - other.first..end - other.first)
     }
 
     fn norm(&self) -> f64 {

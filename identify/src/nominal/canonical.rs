@@ -7,6 +7,9 @@ use std::f64::consts::TAU;
 
 use crate::linear::{Fit, Problem, Section};
 
+/// Ratio from which two time constants are told apart: closer ones would have large weights of opposite sign.
+const DISTINCT: f64 = 1.25;
+
 /// The quantities of a model, in the units of the record; shares and weights are parts of the static gain.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Canonical {
@@ -31,11 +34,11 @@ impl Canonical {
             match section {
                 Section::First { tau } => lags.push((tau, w / gain)),
                 Section::Second { frequency, damping } => match section.time_constants().as_deref() {
-                    Some(&[slow, fast]) if slow > fast => {
+                    Some(&[slow, fast]) if slow > DISTINCT * fast => {
                         let weight = |tau: f64, other: f64| (w - v / (frequency * tau)) * tau / (tau - other) / gain;
                         lags.extend([(slow, weight(slow, fast)), (fast, weight(fast, slow))]);
                     }
-                    // Two equal lags in series are an oscillation with a damping ratio of 1.
+                    // Two nearly equal lags in series are an oscillation with a damping ratio of about 1.
                     _ => oscillations.push([frequency / TAU, damping, w / gain, v / gain]),
                 },
             }

@@ -38,8 +38,6 @@ const MOST_SPOILED: f64 = 10.0;
 const PRICE_OF_POLE: f64 = 4.0;
 /// ... and that it has to bring if the last part of the records confirms it by a smaller error.
 const PRICE_IF_CONFIRMED: f64 = 3.0;
-/// Largest order of a nominal model; one more shows in the comparison whether more would help.
-const LARGEST_ORDER: usize = 3;
 /// Fewest readings of a record.
 const FEWEST_READINGS: usize = 8;
 /// Part of a record to which a model is fitted that predicts the rest.
@@ -107,9 +105,8 @@ impl Models {
             Model { last_part: last_part(&problem, &fit.poles), held_out, fit }
         };
         let fits: Vec<Model> = best_of_each_order(&problem).into_iter().map(with_errors).collect();
-        let candidates = fits.len().min(LARGEST_ORDER + 1);
-        let beaten = |small: usize| (small + 1..candidates).any(|large| beats(&problem, &fits[large], &fits[small]));
-        let chosen = (0..candidates).find(|&order| !beaten(order)).expect("the largest order is never beaten");
+        let beaten = |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large], &fits[small]));
+        let chosen = (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten");
         Self { law, problem, fits, chosen }
     }
 

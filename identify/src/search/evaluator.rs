@@ -2,7 +2,7 @@
 
 use crate::adequacy;
 use crate::effects::EFFECTS;
-use crate::effects::effect::FitContext;
+use crate::effects::effect::{Effect, FitContext};
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
@@ -167,7 +167,9 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
     let scarce = engine.is_scarce() || dear;
     let from_rest = engine.residual_from_rest(&fit.model);
     let mut found: Vec<Extension> = Vec::new();
-    for (index, effect) in EFFECTS.iter().enumerate().filter(|(index, _)| wanted(*index)) {
+    let allowed: Vec<(usize, &&dyn Effect)> =
+        EFFECTS.iter().enumerate().filter(|(index, effect)| wanted(*index) && engine.allows(effect.cause())).collect();
+    for (index, effect) in allowed {
         if engine.is_over() {
             return Vec::new();
         }

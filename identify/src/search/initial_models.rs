@@ -21,7 +21,13 @@ pub(super) fn initial_models(data: &Data, tau_s: f64, share: f64) -> Vec<Model> 
     let model = [
         ("gain-error", 0, gain, differs(gain)),
         ("time-constant", 0, found_s.ln(), differs(found_s / tau_s)),
-        ("reading-offset", ALL_READINGS, offset, offset.abs() > SMALLEST_DIFFERENCE * data.full_scale_v),
+        // Each of several records has a zero of its own anyway.
+        (
+            "reading-offset",
+            ALL_READINGS,
+            offset,
+            !data.is_joined() && offset.abs() > SMALLEST_DIFFERENCE * data.full_scale_v,
+        ),
     ]
     .into_iter()
     .filter(|(.., differs)| *differs)
