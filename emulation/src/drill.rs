@@ -70,7 +70,8 @@ fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
 fn grace(mishap: Mishap) -> usize {
     match mishap {
         // No further code.
-        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow | Mishap::Interlock => 0,
+        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow => 0,
+        Mishap::Interlock | Mishap::TwoFaults => 0,
         // The tick that overruns still ends; the next one detects it.
         Mishap::Overrun => 1,
         // Nothing is written while the control task hangs; the next write is the zero after its detection.
@@ -112,9 +113,12 @@ fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
     // One zero is written before the first tick.
     let (armed, mishap_at) = (1 + ARM_TICK as usize, 1 + MISHAP_TICK as usize);
     let gone = mishap_at + grace(mishap);
-    let rearmed = matches!(mishap, Mishap::Interlock | Mishap::Overrun);
     // An overrun of 8 ms skips ticks but no command.
-    let again = if rearmed { 1 + 1300 } else { dac.len() };
+    let again = match mishap {
+        Mishap::Interlock | Mishap::Overrun => 1 + 1300,
+        Mishap::TwoFaults => 1 + 1450,
+        _ => dac.len(),
+    };
     ensure!(dac.len() > gone + 100, "the wire ends after {} writes", dac.len());
     let zero = |from: usize, to: usize| match dac[from..to].iter().position(|written| *written != SAFE) {
         None => Ok(()),

@@ -73,7 +73,7 @@ fn inject(fault: FaultInjection) {
             cortex_m::interrupt::disable();
             hang()
         }
-        FaultInjection::Overrun => {
+        FaultInjection::Overrun | FaultInjection::TwoFaults => {
             let until = Instant::now().as_micros() + 8_000;
             while Instant::now().as_micros() < until {}
         }

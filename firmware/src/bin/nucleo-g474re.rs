@@ -44,9 +44,9 @@ unsafe fn FMAC() {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     switch_amplifier_off();
-    let (reset, last_fault) = crash_record::reset_cause(Some(reset()));
+    let cause = crash_record::reset_cause(Some(reset()));
     let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
-    log::boot(reset, last_fault.map_or(0, Fault::code), CONTROLLER);
+    log::boot(cause.name, cause.fault.map_or(0, Fault::code), CONTROLLER);
     if let Some(mut core) = Peripherals::take() {
         stack_guard::set(&mut core.MPU);
         hang_guard::start(&mut core.SYST, clocks::CORE_HZ);
@@ -57,7 +57,7 @@ fn main() -> ! {
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
     let mut store = Store::new(flash);
-    match host::open(&FLASHED, &store, last_fault) {
+    match host::open(&FLASHED, &store, &cause) {
         // Impossible: this is the first call.
         Ok(None) => {}
         Ok(Some((control, server))) => {
@@ -72,7 +72,7 @@ fn main() -> ! {
         }
         // Nothing feeds the watchdog, so that the chip resets and logs this again, with its output at zero.
         Err(error) => {
-            crash_record::record(Fault::Config, 0);
+            crash_record::add(Fault::Config);
             log::refused(error.field);
         }
     }

@@ -15,6 +15,7 @@ use firmware::settings::FLASHED;
 use firmware::store::Store;
 use firmware::{crash_record, hang_guard, log, stack_guard, tasks};
 use link::{Controller, Server};
+use model::supervisor::Fault;
 use test_bench::mps2::flash::Flash;
 use test_bench::mps2::instructions::{Counter, Instructions};
 use test_bench::mps2::interrupts::Interrupt;
@@ -58,11 +59,11 @@ enum Mode {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut board = Mps2::init();
-    let (reset, last_fault) = crash_record::reset_cause(None);
+    let cause = crash_record::reset_cause(None);
 
     let mut buffer = [0; 64];
     let name = semihosting::command_line(&mut buffer);
-    let mode = match (last_fault, Script::parse(name)) {
+    let mode = match (cause.fault, Script::parse(name)) {
         _ if name.trim() == LINK => Mode::Link,
         (Some(_), _) => Mode::Play(Script::Aftermath),
         (None, Some(script)) => Mode::Play(script),
@@ -73,12 +74,12 @@ fn main() -> ! {
         Mode::Link => &FLASHED,
     };
     let controller = Controller::of(&settings.compensation);
-    log::boot(reset, last_fault.map_or(0, |fault| fault.code()), controller);
+    log::boot(cause.name, cause.fault.map_or(0, Fault::code), controller);
     if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
     let mut store = Store::new(Flash::init());
-    let (control, server) = match host::open(settings, &store, last_fault) {
+    let (control, server) = match host::open(settings, &store, &cause) {
         Ok(Some(both)) => both,
         Ok(None) => semihosting::exit(1),
         Err(error) => {
