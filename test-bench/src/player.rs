@@ -77,8 +77,8 @@ fn inject(fault: FaultInjection) {
             let until = Instant::now().as_micros() + 8_000;
             while Instant::now().as_micros() < until {}
         }
-        // Expressed by the script's interlock and commands.
-        FaultInjection::Interlock | FaultInjection::Silence => {}
+        // Expressed by the script's interlock and commands, or at the start.
+        FaultInjection::Interlock | FaultInjection::Silence | FaultInjection::Unguarded => {}
     }
 }
 

@@ -7,7 +7,7 @@
 //! | `up-down fast` | `up-down` with the time-optimal controller (feature `fast`). |
 //! | `up-down sensor`, `up-down fast sensor` | These runs with the spring's readings in the loop (feature `feedback`). |
 //! | `random SEED` | 100 000 ticks with random arming, disarming, targets, interlock openings and silences of the host. |
-//! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `two-faults`, `silence` | Drills: one injected fault each (`two-faults`: two), see [`FaultInjection`]. |
+//! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `two-faults`, `silence`, `unguarded` | Drills: one injected fault each (`two-faults`: two), see [`FaultInjection`]. |
 //! | (after a reset by a fault) | The output must stay disabled until the fault is acknowledged. |
 
 #[cfg(feature = "fast")]
@@ -74,11 +74,13 @@ pub enum FaultInjection {
     TwoFaults,
     /// The host falls silent.
     Silence,
+    /// Before the first tick: the guards against stack overflows and hangs cannot be set up.
+    Unguarded,
 }
 
 impl FaultInjection {
     /// Every injected fault.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Panic,
         Self::HardFault,
         Self::StackOverflow,
@@ -90,6 +92,7 @@ impl FaultInjection {
         Self::Interlock,
         Self::TwoFaults,
         Self::Silence,
+        Self::Unguarded,
     ];
 
     /// Name of the drill on the command line.
@@ -106,6 +109,7 @@ impl FaultInjection {
             Self::Interlock => "interlock",
             Self::TwoFaults => "two-faults",
             Self::Silence => "silence",
+            Self::Unguarded => "unguarded",
         }
     }
 }

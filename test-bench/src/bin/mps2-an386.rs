@@ -13,7 +13,7 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::settings::FLASHED;
 use firmware::store::Store;
-use firmware::{crash_record, hang_guard, log, stack_guard, tasks};
+use firmware::{crash_record, guards, log, tasks};
 use link::{Controller, Server};
 use model::supervisor::Fault;
 use test_bench::mps2::flash::Flash;
@@ -24,7 +24,7 @@ use test_bench::mps2::uart::Uart;
 use test_bench::mps2::vectors::{HIGH, LOW};
 use test_bench::mps2::{INTERLOCK_CLOSED, Mps2, semihosting};
 use test_bench::player::{self, Player};
-use test_bench::script::Script;
+use test_bench::script::{FaultInjection, Script};
 
 use core::sync::atomic::Ordering;
 
@@ -51,6 +51,7 @@ struct Done {
 }
 
 /// Source of the commands.
+#[derive(PartialEq)]
 enum Mode {
     Play(Script),
     Link,
@@ -88,19 +89,23 @@ fn main() -> ! {
         }
     };
 
-    if let Some(mut core) = Peripherals::take() {
-        stack_guard::set(&mut core.MPU);
-        hang_guard::start(&mut core.SYST, CLOCK_HZ);
-        // SAFETY: the interrupts are not enabled yet. A smaller number is a higher priority: the alarm wakes the control task,
-        // which preempts everything else.
-        unsafe {
-            core.NVIC.set_priority(Interrupt::Timer0, 0x20);
-            core.NVIC.set_priority(Interrupt::Timer1, 0x20);
-            core.NVIC.set_priority(Interrupt::High, 0x40);
-            core.NVIC.set_priority(Interrupt::Received, 0x80);
-            core.NVIC.set_priority(Interrupt::Sent, 0x80);
-            core.NVIC.set_priority(Interrupt::Low, 0xc0);
+    if mode == Mode::Play(Script::Drill(FaultInjection::Unguarded)) {
+        drop(Peripherals::take());
+    }
+    let Some(mut core) = guards::start(CLOCK_HZ) else {
+        loop {
+            cortex_m::asm::wfi();
         }
+    };
+    // SAFETY: the interrupts are not enabled yet. A smaller number is a higher priority: the alarm wakes the control task,
+    // which preempts everything else.
+    unsafe {
+        core.NVIC.set_priority(Interrupt::Timer0, 0x20);
+        core.NVIC.set_priority(Interrupt::Timer1, 0x20);
+        core.NVIC.set_priority(Interrupt::High, 0x40);
+        core.NVIC.set_priority(Interrupt::Received, 0x80);
+        core.NVIC.set_priority(Interrupt::Sent, 0x80);
+        core.NVIC.set_priority(Interrupt::Low, 0xc0);
     }
     let low = LOW.start(Interrupt::Low);
     let high = HIGH.start(Interrupt::High);
