@@ -67,7 +67,8 @@ Examples:
     /// Let a host talk to the emulated firmware
     ///
     /// Arms it, sets a stiffness, falls silent; then 10 000 damaged, random, late and foreign frames while armed,
-    /// in about a minute. Exits with 1 if one of them is followed or a tick is missed. A part of `test`.
+    /// in about a minute; then a model by `vsj link`. Exits with 1 if a hostile frame is followed, a tick is missed or
+    /// the model is not run. A part of `test`.
     Talk,
     /// End-to-end demonstration: run, diagnose, extend, run again
     ///
