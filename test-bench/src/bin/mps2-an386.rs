@@ -90,7 +90,7 @@ fn main() -> ! {
     };
 
     if mode == Mode::Play(Script::Drill(FaultInjection::Unguarded)) {
-        drop(Peripherals::take());
+        let _taken = Peripherals::take();
     }
     let Some(mut core) = guards::start(CLOCK_HZ) else {
         loop {
