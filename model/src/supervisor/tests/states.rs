@@ -128,6 +128,9 @@ fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
     let mut supervisor = armed();
     tick(&mut supervisor, Inputs { interlock_closed: false, ..disarm() });
     assert_eq!(supervisor.state(), State::Faulted(Fault::Interlock));
+    let mut supervisor = armed();
+    tick(&mut supervisor, Inputs { missed_ticks: 6, ..disarm() });
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Overrun));
     let mut supervisor = Supervisor::new(config(), None);
     tick(&mut supervisor, Inputs { fault: Some(Fault::Config), ..disarm() });
     assert_eq!(supervisor.state(), State::Faulted(Fault::Config));
@@ -136,6 +139,7 @@ fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
 #[test]
 fn the_fault_that_caused_a_reset_is_kept_after_it() {
     let mut supervisor = Supervisor::new(config(), Some(Fault::HardFault));
+    assert_eq!(supervisor.standing(), Faults::NONE.with(Fault::HardFault));
     assert_eq!(tick(&mut supervisor, arm()).1, Drive::SAFE);
     assert_eq!(supervisor.state(), State::Faulted(Fault::HardFault));
 }
