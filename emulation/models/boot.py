@@ -1,7 +1,8 @@
-"""Boots an image and injects faults: boot.py IMAGE TICK PANIC RTT VOLTS HOST prints the events outside as JSON.
+"""Boots an image and injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN VOLTS HOST prints the events outside as JSON.
 
-TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's. VOLTS is the full
-scale of its amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each.
+TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's, MAIN that of the
+program's first function after start-up, TAKEN that of `cortex_m::peripheral::TAKEN`. VOLTS is the full scale of its
+amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each.
 """
 
 import json
@@ -86,8 +87,14 @@ def deaf(board):
     broken(HANG)(board)
 
 
-def play(host, mishap, until_us, torn=()):
-    """After the reset the flash is correct again; the memory keeps its content."""
+def taken(board):
+    """Another owner has the core's peripherals, so that the guards of stack and control task cannot be set up."""
+    board.traps.clear()
+    board.uc.mem_write(TAKEN, b"\x01")
+
+
+def play(host, mishap, until_us, torn=(), first=None):
+    """Injects `first` where the program begins. After the reset the flash is correct again; the memory keeps its content."""
     board = Board(IMAGE, RTT, host, FULL_SCALE)
     for at in torn:
         board.tear(at)
@@ -102,6 +109,8 @@ def play(host, mishap, until_us, torn=()):
             mishap(board)
 
     board.traps[TICK] = tick
+    if first:
+        board.traps[MAIN] = first
     board.reset(POWER_ON)
     while (cause := board.run(until_us)) is not None:
         board.uc.mem_write(FLASH, IMAGE)
@@ -113,9 +122,9 @@ def play(host, mishap, until_us, torn=()):
 if __name__ == "__main__":
     with open(sys.argv[1], "rb") as file:
         IMAGE = file.read()
-    TICK, PANIC, RTT = (int(word, 0) for word in sys.argv[2:5])
-    FULL_SCALE = float(sys.argv[5])
-    HOST = [(us, bytes.fromhex(frame)) for us, frame in json.loads(sys.argv[6])]
+    TICK, PANIC, RTT, MAIN, TAKEN = (int(word, 0) for word in sys.argv[2:7])
+    FULL_SCALE = float(sys.argv[7])
+    HOST = [(us, bytes.fromhex(frame)) for us, frame in json.loads(sys.argv[8])]
     print(json.dumps({
         "quiet": play([], None, 1_200_000),
         "host": play(HOST, stalled, 1_700_000),
@@ -131,4 +140,5 @@ if __name__ == "__main__":
         "current": play(HOST, arcing, 450_000),
         "hang": play(HOST, broken(HANG), 500_000),
         "deaf": play(HOST, deaf, 500_000),
+        "unguarded": play(HOST, None, 400_000, first=taken),
     }))

@@ -70,7 +70,8 @@ fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
 fn grace(mishap: Mishap) -> usize {
     match mishap {
         // No further code.
-        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow | Mishap::Interlock => 0,
+        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow => 0,
+        Mishap::Interlock | Mishap::TwoFaults | Mishap::Unguarded => 0,
         // The tick that overruns still ends; the next one detects it.
         Mishap::Overrun => 1,
         // Nothing is written while the control task hangs; the next write is the zero after its detection.
@@ -107,19 +108,27 @@ fn found_within(log: &[Line], limit_us: u64) -> Result<()> {
 }
 
 /// An error unless the output is zero before arming, carries voltage until the fault, is zero after it, and carries
-/// voltage again only in the drills that arm a second time.
+/// voltage again only in the drills that arm a second time. Without guards it is zero throughout.
 fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
-    // One zero is written before the first tick.
-    let (armed, mishap_at) = (1 + ARM_TICK as usize, 1 + MISHAP_TICK as usize);
-    let gone = mishap_at + grace(mishap);
-    let rearmed = matches!(mishap, Mishap::Interlock | Mishap::Overrun);
-    // An overrun of 8 ms skips ticks but no command.
-    let again = if rearmed { 1 + 1300 } else { dac.len() };
-    ensure!(dac.len() > gone + 100, "the wire ends after {} writes", dac.len());
     let zero = |from: usize, to: usize| match dac[from..to].iter().position(|written| *written != SAFE) {
         None => Ok(()),
         Some(index) => bail!("write {} is {:?} instead of zero", from + index, dac[from + index]),
     };
+    if mishap == Mishap::Unguarded {
+        // The 200 ticks are those after the reset, in which nothing can be armed.
+        ensure!(dac.len() > 200, "the wire ends after {} writes", dac.len());
+        return zero(0, dac.len());
+    }
+    // One zero is written before the first tick.
+    let (armed, mishap_at) = (1 + ARM_TICK as usize, 1 + MISHAP_TICK as usize);
+    let gone = mishap_at + grace(mishap);
+    // An overrun of 8 ms skips ticks but no command.
+    let again = match mishap {
+        Mishap::Interlock | Mishap::Overrun => 1 + 1300,
+        Mishap::TwoFaults => 1 + 1450,
+        _ => dac.len(),
+    };
+    ensure!(dac.len() > gone + 100, "the wire ends after {} writes", dac.len());
     zero(0, armed)?;
     let driven = |from: usize, to: usize| dac[from..to].iter().all(|written| written.enabled && written.code > 0);
     ensure!(driven(armed, mishap_at), "no voltage before the fault, so that the drill shows nothing");
@@ -174,5 +183,7 @@ mod tests {
         dip[700].code = 1;
         assert!(voltage_goes(Mishap::Panic, &dip).is_err());
         assert!(voltage_goes(Mishap::Panic, &vec![SAFE; 1200]).is_err(), "never armed shows nothing");
+        voltage_goes(Mishap::Unguarded, &vec![SAFE; 1200]).unwrap();
+        assert!(voltage_goes(Mishap::Unguarded, &wire(290)).is_err());
     }
 }

@@ -61,13 +61,14 @@ Examples:
     /// Run the fault drills under QEMU
     ///
     /// Panic, hard fault, stack overflow, the same with floats in use, stalled task, hanging control, the same with
-    /// interrupts off, overrun, interlock, silent host. Exits with 1 unless the voltage goes away on the DAC's wire and
+    /// interrupts off, overrun, interlock, both at once, silent host, missing guards. Exits with 1 unless the voltage goes away on the DAC's wire and
     /// the log is the approved one.
     Drill(drill::Args),
     /// Let a host talk to the emulated firmware
     ///
     /// Arms it, sets a stiffness, falls silent; then 10 000 damaged, random, late and foreign frames while armed,
-    /// in about a minute. Exits with 1 if one of them is followed or a tick is missed. A part of `test`.
+    /// in about a minute; then a model by `vsj link`. Exits with 1 if a hostile frame is followed, a tick is missed or
+    /// the model is not run. A part of `test`.
     Talk,
     /// End-to-end demonstration: run, diagnose, extend, run again
     ///

@@ -1,87 +1,59 @@
 //! The crash record: a record in RAM that the start-up code does not initialise, so that it survives a reset.
 //!
 //! After power-on this RAM contains random bits, so the record is valid only with its check word. A reset without a recorded
-//! fault was caused by the watchdog, the reset pin or a dip of the supply.
+//! fault was caused by the watchdog, the reset pin or a dip of the supply. What a record says is in
+//! [`reset_cause`](crate::reset_cause).
 
 #![allow(unsafe_code)]
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
-use model::supervisor::Fault;
+use model::supervisor::{Fault, Faults};
 
-use crate::reset_cause::{self, CrashRecord, Reset};
-
-/// "vsj1"
-const MARK: u32 = 0x7673_6a31;
-/// Code of [`CrashRecord::Running`].
-const RUNNING: u32 = 0;
-/// Code of [`CrashRecord::Restart`].
-const RESTART: u32 = u32::MAX;
-
-#[repr(C)]
-#[derive(Clone, Copy)]
-struct Record {
-    mark: u32,
-    code: u32,
-    tick: u32,
-    check: u32,
-}
+use crate::reset_cause::{self, Cause, Record, Reset};
 
 struct Memory(UnsafeCell<MaybeUninit<Record>>);
 
-// SAFETY: written with interrupts off only, and read before they are on, by volatile accesses.
+// SAFETY: read and written with interrupts off only, by volatile accesses.
 unsafe impl Sync for Memory {}
 
 #[unsafe(link_section = ".uninit.crash_record")]
 static MEMORY: Memory = Memory(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Name of the cause of the last reset, and the fault behind it. Call it once at boot; `flags` is the source that the chip
-/// reports, if it does. The fault stays recorded until [`clear`].
-pub fn reset_cause(flags: Option<Reset>) -> (&'static str, Option<Fault>) {
-    let (name, fault) = reset_cause::reset_cause(flags, take());
-    if let Some(fault) = fault {
-        record(fault, 0);
-    }
-    (name, fault)
+/// The cause of the last reset. Call it once at boot; `flags` is the source that the chip reports, if it does. The standing
+/// faults stay recorded until [`set`].
+pub fn reset_cause(flags: Option<Reset>) -> Cause {
+    let mut cause = None;
+    change(|record| {
+        let found = cause.insert(reset_cause::reset_cause(flags, record.read()));
+        found.fault.map_or(Record::RUNNING, |fault| Record::faulted(fault, found.standing))
+    });
+    // The closure has run.
+    cause.unwrap_or(Cause { name: "other", fault: None, standing: Faults::NONE })
 }
 
-/// Reads the record of the previous run and replaces it by that of a running program.
-fn take() -> CrashRecord {
-    // SAFETY: every bit pattern is a Record; see `Memory`.
-    let record = unsafe { MEMORY.0.get().cast::<Record>().read_volatile() };
-    write(RUNNING, 0);
-    if record.mark != MARK || record.check != check(record.code, record.tick) {
-        return CrashRecord::None;
-    }
-    match u8::try_from(record.code).ok().and_then(Fault::from_code) {
-        Some(fault) => CrashRecord::Faulted(fault, record.tick),
-        None if record.code == RESTART => CrashRecord::Restart,
-        None => CrashRecord::Running,
-    }
+/// Records the fault that is shown, and all that stand, for the next run.
+pub fn set(shown: Option<Fault>, standing: Faults) {
+    change(|_| shown.map_or(Record::RUNNING, |fault| Record::faulted(fault, standing)));
 }
 
-/// Records `fault`, which occurred in `tick`, for the next run.
-pub fn record(fault: Fault, tick: u32) {
-    write(u32::from(fault.code()), tick);
+/// Adds the fault that stops the program.
+pub fn add(fault: Fault) {
+    change(|record| record.with(fault));
 }
 
-/// Clears the record once its fault is acknowledged.
-pub fn clear() {
-    write(RUNNING, 0);
-}
-
-/// Records that the following reset was requested.
+/// Records that the following reset was requested, unless a fault has occurred since.
 pub fn record_restart() {
-    write(RESTART, 0);
+    change(Record::with_restart);
 }
 
-fn write(code: u32, tick: u32) {
-    let record = Record { mark: MARK, code, tick, check: check(code, tick) };
-    // SAFETY: see `Memory`.
-    cortex_m::interrupt::free(|_| unsafe { MEMORY.0.get().cast::<Record>().write_volatile(record) });
-}
-
-fn check(code: u32, tick: u32) -> u32 {
-    !(MARK ^ code.rotate_left(8) ^ tick)
+fn change(to: impl FnOnce(Record) -> Record) {
+    cortex_m::interrupt::free(|_| {
+        let memory = MEMORY.0.get().cast::<Record>();
+        // SAFETY: every bit pattern is a Record; see `Memory`.
+        let record = unsafe { memory.read_volatile() };
+        // SAFETY: see `Memory`.
+        unsafe { memory.write_volatile(to(record)) }
+    });
 }

@@ -19,6 +19,7 @@
 //! | [`store`] | Storage of a model in flash, safe against power cuts. |
 //! | [`task_watchdog`] | Check that every task is alive, before the hardware watchdog is fed. |
 //! | `crash_record` | Memory of the crash record. |
+//! | `guards` | Start of both guards. |
 //! | `hang_guard` | Stop of a control task that hangs. |
 //! | `host` | Communication with the host. |
 //! | `log` | All log lines. |
@@ -47,6 +48,8 @@ pub mod task_watchdog;
 
 #[cfg(feature = "mcu")]
 pub mod crash_record;
+#[cfg(feature = "mcu")]
+pub mod guards;
 #[cfg(feature = "mcu")]
 pub mod hang_guard;
 #[cfg(feature = "mcu")]

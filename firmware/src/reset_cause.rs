@@ -3,7 +3,14 @@
 //! The crash record survives every reset except a loss of its RAM's supply. After a short dip of the supply the program finds
 //! the record of the previous run; after power-on it finds none.
 
-use model::supervisor::Fault;
+use model::supervisor::{Fault, Faults};
+
+/// "vsj2"
+const MARK: u32 = 0x7673_6a32;
+/// Code of [`CrashRecord::Running`].
+const RUNNING: u32 = 0;
+/// Code of [`CrashRecord::Restart`].
+const RESTART: u32 = u32::MAX;
 
 /// Content of the crash record at the start: how the previous run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,8 +21,67 @@ pub enum CrashRecord {
     Running,
     /// The host had requested a restart.
     Restart,
-    /// Fault of the previous run in this tick, or an unacknowledged fault of an earlier run.
-    Faulted(Fault, u32),
+    /// The fault that the previous run showed or that stopped it, and all that stood at its end, this one among them.
+    Faulted(Fault, Faults),
+}
+
+/// The crash record as it is stored. Every bit pattern is valid Rust; one that was not written as a record reads as
+/// [`CrashRecord::None`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    mark: u32,
+    code: u32,
+    standing: u32,
+    check: u32,
+}
+
+impl Record {
+    /// The record of a running program without a fault.
+    pub const RUNNING: Self = Self::new(RUNNING, Faults::NONE);
+
+    /// The record of a program that shows `fault` while the faults `standing` stand.
+    pub const fn faulted(fault: Fault, standing: Faults) -> Self {
+        Self::new(fault.code() as u32, standing.with(fault))
+    }
+
+    /// The record with a further `fault`, which is the one that stopped the program.
+    pub fn with(self, fault: Fault) -> Self {
+        match self.read() {
+            CrashRecord::Faulted(_, standing) => Self::faulted(fault, standing),
+            _ => Self::faulted(fault, Faults::NONE),
+        }
+    }
+
+    /// The record before a reset that the host has requested: a fault that came after the request stays in it.
+    pub fn with_restart(self) -> Self {
+        match self.read() {
+            CrashRecord::Faulted(..) => self,
+            _ => Self::new(RESTART, Faults::NONE),
+        }
+    }
+
+    /// How the program that has left this record ended.
+    pub fn read(self) -> CrashRecord {
+        let Self { mark, code, standing, check } = self;
+        if mark != MARK || check != Self::check(code, standing) {
+            return CrashRecord::None;
+        }
+        match u8::try_from(code).ok().and_then(Fault::from_code) {
+            Some(fault) => CrashRecord::Faulted(fault, Faults::from_bits(standing as u16).with(fault)),
+            None if code == RESTART => CrashRecord::Restart,
+            None => CrashRecord::Running,
+        }
+    }
+
+    const fn new(code: u32, standing: Faults) -> Self {
+        let standing = standing.bits() as u32;
+        Self { mark: MARK, code, standing, check: Self::check(code, standing) }
+    }
+
+    const fn check(code: u32, standing: u32) -> u32 {
+        !(MARK ^ code.rotate_left(8) ^ standing)
+    }
 }
 
 /// Source of a reset according to the chip's flags.
@@ -33,26 +99,37 @@ pub enum Reset {
     Other,
 }
 
-/// Name of the reset's cause for the log, and the fault behind it. Without reset flags (`None`) the source is derived from the
-/// crash record.
-pub fn reset_cause(reset: Option<Reset>, record: CrashRecord) -> (&'static str, Option<Fault>) {
-    let recorded = match record {
-        CrashRecord::Faulted(fault, _) => Some(fault),
-        CrashRecord::None | CrashRecord::Running | CrashRecord::Restart => None,
+/// Why the program was reset, and what stands since.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cause {
+    /// Name of the reset's cause for the log.
+    pub name: &'static str,
+    /// The fault behind it.
+    pub fault: Option<Fault>,
+    /// That fault, and those of earlier that nobody has acknowledged.
+    pub standing: Faults,
+}
+
+/// The cause of a reset. Without reset flags (`None`) the source is derived from the crash record.
+pub fn reset_cause(reset: Option<Reset>, record: CrashRecord) -> Cause {
+    let (recorded, stood) = match record {
+        CrashRecord::Faulted(fault, standing) => (Some(fault), standing),
+        CrashRecord::None | CrashRecord::Running | CrashRecord::Restart => (None, Faults::NONE),
     };
     let derived = match record {
         CrashRecord::None => Reset::Supply,
         CrashRecord::Running | CrashRecord::Faulted(Fault::Watchdog, _) => Reset::Watchdog,
         CrashRecord::Restart | CrashRecord::Faulted(..) => Reset::Software,
     };
-    match (reset.unwrap_or(derived), record) {
+    let (name, fault) = match (reset.unwrap_or(derived), record) {
         (Reset::Supply, CrashRecord::None | CrashRecord::Restart) => ("power-on", None),
         (Reset::Supply, _) => ("brown-out", recorded.or(Some(Fault::Supply))),
         (Reset::Watchdog, _) => ("watchdog", recorded.or(Some(Fault::Watchdog))),
         (Reset::Software, _) => ("software", recorded),
         (Reset::Pin, _) => ("pin", recorded),
         (Reset::Other, _) => ("other", recorded),
-    }
+    };
+    Cause { name, fault, standing: fault.map_or(stood, |fault| stood.with(fault)) }
 }
 
 #[cfg(test)]
@@ -61,7 +138,8 @@ mod tests {
 
     #[test]
     fn a_fault_survives_every_reset_and_a_supply_dip_is_a_fault() {
-        let panic = CrashRecord::Faulted(Fault::Panic, 7);
+        let both = Faults::NONE.with(Fault::Panic).with(Fault::Interlock);
+        let panic = CrashRecord::Faulted(Fault::Panic, both);
         for (reset, record, name, fault) in [
             (Reset::Supply, CrashRecord::None, "power-on", None),
             (Reset::Supply, CrashRecord::Running, "brown-out", Some(Fault::Supply)),
@@ -74,7 +152,8 @@ mod tests {
             (Reset::Pin, panic, "pin", Some(Fault::Panic)),
             (Reset::Other, panic, "other", Some(Fault::Panic)),
         ] {
-            assert_eq!(reset_cause(Some(reset), record), (name, fault), "{reset:?} {record:?}");
+            let standing = if record == panic { both } else { fault.map_or(Faults::NONE, |it| Faults::NONE.with(it)) };
+            assert_eq!(reset_cause(Some(reset), record), Cause { name, fault, standing }, "{reset:?} {record:?}");
         }
     }
 
@@ -84,10 +163,44 @@ mod tests {
             (CrashRecord::None, "power-on", None),
             (CrashRecord::Restart, "software", None),
             (CrashRecord::Running, "watchdog", Some(Fault::Watchdog)),
-            (CrashRecord::Faulted(Fault::Watchdog, 7), "watchdog", Some(Fault::Watchdog)),
-            (CrashRecord::Faulted(Fault::Panic, 7), "software", Some(Fault::Panic)),
+            (CrashRecord::Faulted(Fault::Watchdog, Faults::NONE), "watchdog", Some(Fault::Watchdog)),
+            (CrashRecord::Faulted(Fault::Panic, Faults::NONE), "software", Some(Fault::Panic)),
         ] {
-            assert_eq!(reset_cause(None, record), (name, fault), "{record:?}");
+            let cause = reset_cause(None, record);
+            assert_eq!((cause.name, cause.fault), (name, fault), "{record:?}");
         }
+    }
+
+    #[test]
+    fn a_fault_between_the_request_to_restart_and_the_reset_is_kept() {
+        assert_eq!(Record::RUNNING.with_restart().read(), CrashRecord::Restart);
+        let faulted = Record::faulted(Fault::Interlock, Faults::NONE.with(Fault::Monitor));
+        assert_eq!(faulted.with_restart(), faulted);
+        let cause = reset_cause(Some(Reset::Software), faulted.with_restart().read());
+        assert_eq!((cause.name, cause.fault), ("software", Some(Fault::Interlock)));
+    }
+
+    #[test]
+    fn a_panic_does_not_drop_the_faults_that_stand() {
+        let both = Faults::NONE.with(Fault::Interlock).with(Fault::Panic);
+        let record = Record::faulted(Fault::Interlock, Faults::NONE).with(Fault::Panic);
+        assert_eq!(record.read(), CrashRecord::Faulted(Fault::Panic, both));
+        let alone = CrashRecord::Faulted(Fault::Panic, Faults::NONE.with(Fault::Panic));
+        assert_eq!(Record::RUNNING.with(Fault::Panic).read(), alone);
+        assert_eq!(Record::RUNNING.with_restart().with(Fault::Panic).read(), alone);
+    }
+
+    #[test]
+    fn a_damaged_record_is_none() {
+        let good = Record::faulted(Fault::Interlock, Faults::NONE);
+        for damaged in [
+            Record { mark: !MARK, ..good },
+            Record { code: 5, ..good },
+            Record { standing: 9, ..good },
+            Record { check: 0, ..good },
+        ] {
+            assert_eq!(damaged.read(), CrashRecord::None, "{damaged:?}");
+        }
+        assert_eq!(Record::RUNNING.read(), CrashRecord::Running);
     }
 }

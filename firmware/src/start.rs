@@ -5,6 +5,7 @@ use model::supervisor::Fault;
 use model::{Amplifier, OutOfRange, Settings};
 
 use crate::control::Control;
+use crate::reset_cause::Cause;
 use crate::settings::{FLASHED, SUPERVISION};
 
 /// Result of the start.
@@ -30,12 +31,12 @@ pub struct Start {
 pub fn control<'a>(
     settings: &Settings,
     stored: Option<(ModelId, &[u8])>,
-    last_fault: Option<Fault>,
+    cause: &Cause,
     place: &'a mut Option<Control>,
 ) -> Result<(&'a mut Control, Start), OutOfRange> {
     let control = build(settings, place)?;
     let (builtin, amplifier) = (ModelId::default(), settings.amplifier);
-    let mut start = Start { model: builtin, stored: builtin, amplifier, last_fault, rejected: None };
+    let mut start = Start { model: builtin, stored: builtin, amplifier, last_fault: cause.fault, rejected: None };
     if let Some((stored, payload)) = stored {
         start.stored = stored;
         match use_model(settings, control, payload) {
@@ -43,8 +44,9 @@ pub fn control<'a>(
             Err(field) => start.rejected = Some(field),
         }
     }
-    // The rejection has to be acknowledged. The fault of the last run is reported separately.
-    if let Some(fault) = start.rejected.map_or(last_fault, |_| Some(Fault::Config)) {
+    // Every one of them has to be acknowledged; the state shows the first.
+    let rejected = start.rejected.map(|_| Fault::Config);
+    for fault in rejected.into_iter().chain(cause.fault).chain(cause.standing.iter()) {
         control.fault(fault);
     }
     Ok((control, start))
@@ -78,7 +80,7 @@ fn build<'a>(settings: &Settings, place: &'a mut Option<Control>) -> Result<&'a 
 mod tests {
     use super::*;
     use crate::settings::SETTINGS;
-    use model::supervisor::State;
+    use model::supervisor::{Faults, State};
 
     fn model(share: f64) -> WireModel {
         let time_constants_s = [5.5].into_iter().collect();
@@ -86,11 +88,15 @@ mod tests {
     }
 
     #[test]
-    fn a_rejected_model_is_a_config_fault_whatever_the_last_fault() {
-        let start = |stored: Option<&[u8]>, last_fault| {
+    fn a_rejected_model_is_a_config_fault_and_the_last_fault_stands_as_well() {
+        let start = |stored: Option<&[u8]>, last_fault: Option<Fault>| {
             let mut place = None;
             let stored = stored.map(|payload| (ModelId::of(3, payload), payload));
-            let (control, start) = control(&SETTINGS, stored, last_fault, &mut place).unwrap();
+            let standing = last_fault.map_or(Faults::NONE, |_| Faults::NONE.with(Fault::Panic).with(Fault::Interlock));
+            let cause = Cause { name: "software", fault: last_fault, standing };
+            let (control, start) = control(&SETTINGS, stored, &cause, &mut place).unwrap();
+            let stands = start.rejected.map_or(standing, |_| standing.with(Fault::Config));
+            assert_eq!(control.supervisor().standing(), stands);
             (control.supervisor().state(), start)
         };
         let (valid, invalid) = (model(0.1).payload().unwrap(), model(2.0).payload().unwrap());

@@ -31,7 +31,7 @@ pub fn stop(fault: Fault, panic: Option<&Location<'_>>) -> ! {
     switch_amplifier_off();
     if !STOPPING.swap(true, Ordering::Relaxed) {
         let tick = TICK.load(Ordering::Relaxed);
-        crash_record::record(fault, tick);
+        crash_record::add(fault);
         log::fault(fault, tick);
         if let Some(location) = panic {
             log::panicked(location.file(), location.line());
@@ -40,7 +40,7 @@ pub fn stop(fault: Fault, panic: Option<&Location<'_>>) -> ! {
     SCB::sys_reset()
 }
 
-/// Restarts on the host's request; the output is disabled already.
+/// Restarts on the host's request; the output is disabled already. A fault since the request stays recorded.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
     switch_amplifier_off();

@@ -3,7 +3,7 @@
 use core::sync::atomic::Ordering;
 
 use embassy_time::{Duration, Instant, Timer, with_timeout};
-use model::supervisor::{Fault, State};
+use model::supervisor::{Fault, Faults, State};
 use model::{Limits, Sensor, Volts};
 
 use crate::board::{Amplifier, Board};
@@ -69,7 +69,7 @@ pub async fn control<B: Board>(
 #[derive(Default)]
 struct Report {
     state: &'static str,
-    fault: bool,
+    standing: Faults,
     limits: Limits,
     sensor: Option<Sensor>,
     overruns: u32,
@@ -91,19 +91,18 @@ impl Report {
             queue(Event::State(self.state, state));
             self.state = state;
         }
-        let fault = match supervisor.state() {
-            State::Faulted(fault) => Some(fault),
-            State::Disarmed | State::Armed => None,
-        };
-        match (fault, self.fault) {
-            (Some(fault), false) => {
+        let standing = supervisor.standing();
+        if standing != self.standing {
+            let shown = match supervisor.state() {
+                State::Faulted(fault) => Some(fault),
+                State::Disarmed | State::Armed => None,
+            };
+            crash_record::set(shown, standing);
+            for fault in standing.except(self.standing).iter() {
                 queue(Event::Fault(fault, number));
-                crash_record::record(fault, number);
             }
-            (None, true) => crash_record::clear(),
-            _ => {}
+            self.standing = standing;
         }
-        self.fault = fault.is_some();
         let limits = supervisor.limits(&tick.output);
         if limits != self.limits {
             queue(Event::Limits(limits.bits(), number));

@@ -5,10 +5,11 @@
 //! | `Set` | rejected: not armed | new target, or rejected: out of range | rejected: faulted |
 //! | `Arm` | arm, target 0 V | no change, the target stays | rejected: faulted |
 //! | `Disarm` | disarm | disarm | no change: only `Acknowledge` acknowledges a fault |
-//! | `Acknowledge` | no change | no change | disarm if it names the present fault, else rejected: other fault |
+//! | `Acknowledge` | no change | no change | disarm if it names the shown fault, else rejected: other fault |
 //! | any other | no change | no change | no change |
 //!
-//! The supervisor can still refuse to arm or to acknowledge within its own tick; [`Reason::of_refusal`] translates that.
+//! Of several standing faults the state shows one, and the next one once that is acknowledged. The supervisor can still
+//! refuse to arm or to acknowledge within its own tick; [`Reason::of_refusal`] translates that.
 
 use model::supervisor::{self, Refusal, State};
 use model::{Spring, Volts};
@@ -67,6 +68,7 @@ impl Reason {
             Refusal::InterlockOpen => Self::InterlockOpen,
             Refusal::HostSilent => Self::HostSilent,
             Refusal::Live => Self::Live,
+            Refusal::CausePresent => Self::CausePresent(fault),
         }
     }
 }

@@ -63,6 +63,8 @@ pub enum Reason {
     NotStored,
     /// The monitors show a voltage or a current although the amplifier is switched off.
     Live,
+    /// The cause of the fault to be acknowledged is still there.
+    CausePresent(Fault),
 }
 
 impl Reason {
@@ -86,6 +88,7 @@ impl Reason {
             Self::BadModel { .. } => 14,
             Self::NotStored => 15,
             Self::Live => 16,
+            Self::CausePresent(_) => 17,
         }
     }
 }
@@ -114,6 +117,7 @@ impl fmt::Display for Reason {
             }
             Self::NotStored => f.write_str("the flash could not be written; the previous model stays"),
             Self::Live => f.write_str("the amplifier is off, and its monitors still show a voltage or a current"),
+            Self::CausePresent(fault) => write!(f, "the cause of the fault is still there: {fault}"),
         }
     }
 }

@@ -99,6 +99,7 @@ fn replies() {
         ),
         (Reply::Refused(Reason::NotStored), "010f"),
         (Reply::Refused(Reason::Live), "0110"),
+        (Reply::Refused(Reason::CausePresent(Fault(5))), "011105"),
         (Reply::Status(status), "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
         (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f09"),
         (Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }), "03f0a20401808080ac0201040106ff1f09"),

@@ -17,6 +17,20 @@ fn run(config: &Config, state: &mut State, target_v: f64, ticks: u32) -> Output 
     output
 }
 
+/// The amplifier is off at 0 V: what it put out before must not be where its slew starts from.
+#[test]
+fn after_a_rest_the_voltage_starts_from_zero() {
+    let amplifier = Amplifier { slew_v_per_s: Some(200.0), ..Amplifier::PAPER };
+    let config = Settings { amplifier, ..Settings::PAPER }.validate().unwrap().quantize();
+    let mut state = State::default();
+    assert!(run(&config, &mut state, 300.0, 5000).voltage.to_f64() > 200.0);
+    let rest = config.rest(&mut state, None);
+    assert_eq!((rest.voltage, rest.code.0, rest.applied), (Volts::ZERO, 0, Volts::ZERO));
+    config.bumpless_transfer(&mut state, Volts::ZERO);
+    let first = run(&config, &mut state, 300.0, 1).voltage.to_f64();
+    assert!((0.0..0.201).contains(&first), "{first} V in the first tick, at 0.2 V per tick");
+}
+
 /// Ten million ticks at rest on a voltage between two codes.
 #[test]
 fn the_code_stays_within_one_step_for_ten_million_ticks_at_rest() {

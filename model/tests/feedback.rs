@@ -294,3 +294,25 @@ fn a_transfer_to_other_sensor_settings_or_to_none_is_bumpless() {
         assert!(bench.bump < 0.01, "{feedback:?}: {} V", bench.bump);
     }
 }
+
+/// Arming then starts with the sensor's correction, and with what is known of the sensor's faults.
+#[test]
+fn the_sensor_is_heard_while_the_amplifier_is_off() {
+    let config = with(Feedback::TYPICAL).validate().unwrap().quantize();
+    let mut state = State::default();
+    let mut rest = |read_v: f64| {
+        let mut output = config.rest(&mut state, None);
+        for tick in 0..20_000 {
+            // Noise of 0.5 mV, so that no reading equals the one before.
+            output = config.rest(&mut state, Some(reading(read_v + 0.0005 * f64::from(tick % 2), 0)));
+        }
+        (output, state.correction().to_f64())
+    };
+    let (output, correction_v) = rest(20.0);
+    assert_eq!(output.sensor, Some(Sensor::Trusted));
+    assert!((correction_v - 20.0).abs() < 0.1, "{correction_v} V instead of the sensor's 20 V");
+    assert!((output.stiffness.to_f64() - 20.0).abs() < 0.1);
+    let (output, correction_v) = rest(1900.0);
+    assert!(matches!(output.sensor, Some(Sensor::Failed(_))), "{output:?}");
+    assert!(correction_v.abs() < 0.1, "{correction_v} V from a sensor that has failed");
+}

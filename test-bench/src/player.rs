@@ -73,12 +73,12 @@ fn inject(fault: FaultInjection) {
             cortex_m::interrupt::disable();
             hang()
         }
-        FaultInjection::Overrun => {
+        FaultInjection::Overrun | FaultInjection::TwoFaults => {
             let until = Instant::now().as_micros() + 8_000;
             while Instant::now().as_micros() < until {}
         }
-        // Expressed by the script's interlock and commands.
-        FaultInjection::Interlock | FaultInjection::Silence => {}
+        // Expressed by the script's interlock and commands, or at the start.
+        FaultInjection::Interlock | FaultInjection::Silence | FaultInjection::Unguarded => {}
     }
 }
 

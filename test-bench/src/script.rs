@@ -7,7 +7,7 @@
 //! | `up-down fast` | `up-down` with the time-optimal controller (feature `fast`). |
 //! | `up-down sensor`, `up-down fast sensor` | These runs with the spring's readings in the loop (feature `feedback`). |
 //! | `random SEED` | 100 000 ticks with random arming, disarming, targets, interlock openings and silences of the host. |
-//! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `silence` | Drills: one injected fault each, see [`FaultInjection`]. |
+//! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `two-faults`, `silence`, `unguarded` | Drills: one injected fault each (`two-faults`: two), see [`FaultInjection`]. |
 //! | (after a reset by a fault) | The output must stay disabled until the fault is acknowledged. |
 
 #[cfg(feature = "fast")]
@@ -70,13 +70,17 @@ pub enum FaultInjection {
     Overrun,
     /// The interlock opens for 50 ms.
     Interlock,
+    /// The interlock opens for 950 ms, in a tick before which others were missed.
+    TwoFaults,
     /// The host falls silent.
     Silence,
+    /// Before the first tick: the guards against stack overflows and hangs cannot be set up.
+    Unguarded,
 }
 
 impl FaultInjection {
     /// Every injected fault.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Panic,
         Self::HardFault,
         Self::StackOverflow,
@@ -86,7 +90,9 @@ impl FaultInjection {
         Self::Deaf,
         Self::Overrun,
         Self::Interlock,
+        Self::TwoFaults,
         Self::Silence,
+        Self::Unguarded,
     ];
 
     /// Name of the drill on the command line.
@@ -101,7 +107,9 @@ impl FaultInjection {
             Self::Deaf => "deaf",
             Self::Overrun => "overrun",
             Self::Interlock => "interlock",
+            Self::TwoFaults => "two-faults",
             Self::Silence => "silence",
+            Self::Unguarded => "unguarded",
         }
     }
 }
@@ -216,16 +224,21 @@ fn nominal(arming: Option<supervisor::Command>, target_v: i32) -> Step {
     }
 }
 
-/// Inputs of a drill: armed at 10 ms with 300 V, the fault acknowledged at 1.2 s if possible, armed again at 1.3 s.
+/// Inputs of a drill: armed at 10 ms with 300 V, the fault acknowledged at 1.2 s if possible, armed again at 1.3 s. Of two
+/// faults the first one is acknowledged at 1.26 s, once the interlock is closed, and the second at 1.4 s.
 fn drill(fault: FaultInjection, tick: u32) -> Step {
-    let arming = match tick {
-        ARM_TICK | 1300 => Some(supervisor::Command::Arm),
-        1200 => Some(supervisor::Command::Disarm),
+    let arming = match (tick, fault) {
+        (ARM_TICK | 1300, _) | (1450, FaultInjection::TwoFaults) => Some(supervisor::Command::Arm),
+        (1200, _) | (1260 | 1400, FaultInjection::TwoFaults) => Some(supervisor::Command::Disarm),
         _ => None,
     };
     let mut step = nominal(arming, 300);
     match fault {
         FaultInjection::Interlock => step.interlock_closed = !(FAULT_TICK..FAULT_TICK + 50).contains(&tick),
+        FaultInjection::TwoFaults => {
+            step.interlock_closed = !(FAULT_TICK..FAULT_TICK + 950).contains(&tick);
+            step.fault = (tick + 1 == FAULT_TICK).then_some(fault);
+        }
         FaultInjection::Silence if tick >= FAULT_TICK => step.command = Command::default(),
         _ => step.fault = (tick == FAULT_TICK).then_some(fault),
     }

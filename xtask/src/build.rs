@@ -67,6 +67,12 @@ impl Board {
     }
 }
 
+/// Builds the program `vsj`. Returns its path.
+pub fn vsj() -> Result<PathBuf> {
+    shell::run(shell::cargo().args(["build", "--quiet", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
+    Ok(shell::target_directory()?.join("release/vsj"))
+}
+
 /// Builds the default image of a board, with the paper's controller and the amplifier of 700 V. Returns the path of its
 /// ELF file.
 pub fn image(board: Board, opt: Opt) -> Result<PathBuf> {

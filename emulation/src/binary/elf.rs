@@ -44,10 +44,15 @@ pub(crate) fn functions(elf: &[u8]) -> Result<Vec<Function>> {
     Ok(functions)
 }
 
-/// The address of a symbol. A missing one is an error.
+/// The address of a symbol, named as in the file or demangled, without a suffix of the optimiser. A missing one is an
+/// error.
 pub(crate) fn symbol(elf: &[u8], name: &str) -> Result<u32> {
     let file = object::File::parse(elf)?;
-    let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+    let is = |mangled: &str| {
+        let demangled = format!("{:#}", rustc_demangle::demangle(mangled));
+        mangled == name || demangled.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    let symbol = file.symbols().find(|symbol| symbol.name().is_ok_and(is));
     Ok(symbol.with_context(|| format!("no symbol {name}"))?.address() as u32)
 }
 

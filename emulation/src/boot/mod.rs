@@ -53,13 +53,15 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     let ticks = audit::ticks(&functions)?;
     ensure!(ticks.len() == 1, "{} control ticks in the image", ticks.len());
     let panic = functions.iter().find(|f| f.name == "core::panicking::panic").context("no `panic` in the image")?;
+    let main = functions.iter().find(|f| f.name == "main").context("no `main` in the image")?;
     let rtt = elf::symbol(&bytes, "_SEGGER_RTT")?;
+    let taken = elf::symbol(&bytes, "cortex_m::peripheral::TAKEN")?;
     let python = python::environment(&shell::target_directory()?, "boot", "emulation/models/requirements.txt")?;
     let output = shell::json(
         shell::command(python)
             .args(["-B", "emulation/models/boot.py"])
             .arg(&bin)
-            .args([ticks[0].address, panic.address, rtt].map(|address| format!("{address:#x}")))
+            .args([ticks[0].address, panic.address, rtt, main.address, taken].map(|address| format!("{address:#x}")))
             .arg(amplifier.full_scale_v.to_string())
             .arg(host::frames().to_string()),
     )?;
@@ -93,6 +95,7 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         println!("{name}: {}", runs::cut(&events(name)?, &bytes, cause).context(name)?);
     }
     println!("hang with interrupts off: {}", runs::deaf(&events("deaf")?, &bytes).context("deaf")?);
+    println!("no guards: {}", runs::unguarded(&events("unguarded")?, &bytes).context("unguarded")?);
     println!("{CANNOT_SHOW}");
     Ok(())
 }

@@ -116,6 +116,21 @@ pub(super) fn deaf(events: &Events, image: &[u8]) -> Result<String> {
     Ok(format!("the voltage stays until the watchdog resets the chip {:.0} ms later; `{boot}`", us / 1e3))
 }
 
+/// A start without the guards of stack and control task: no tick runs, the log says so, and the watchdog resets the
+/// chip into a fault.
+pub(super) fn unguarded(events: &Events, image: &[u8]) -> Result<String> {
+    events.safe()?;
+    let log = events.log(image)?;
+    ensure!(log.iter().any(|line| line == "config refused field=guards"), "it does not say so: {log:?}");
+    let (_, start) = events.split("watchdog started")?;
+    let (refused, reborn) = start.split("reset")?;
+    ensure!(refused.times("dac").is_empty(), "it ticks without guards");
+    let us = reborn.0[0].0 - start.0[0].0;
+    ensure!(us <= WATCHDOG_US, "the watchdog waits for {us:.0} us");
+    let boot = reborn_safe(&reborn, image, "reset=watchdog last_fault=7")?;
+    Ok(format!("nothing starts, the log says so, and the watchdog resets the chip after {:.0} ms; `{boot}`", us / 1e3))
+}
+
 /// The events before the injected fault and those from it on. An error if there was no voltage before it.
 fn mishap(events: &Events) -> Result<(Events, Events)> {
     let (before, after) = events.split("mishap")?;

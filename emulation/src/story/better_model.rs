@@ -12,8 +12,8 @@ use serde::Serialize;
 use serde_json::Value;
 use simulation::plant_file;
 use validation::ground_truth::{Block, Cause};
-use xtask::shell;
 use xtask::variant::Controller;
+use xtask::{build, shell};
 
 use super::lock_step::{Moment, NEVER, TICK_S};
 use super::stage::{EVERY, Errors, Stage, name};
@@ -54,8 +54,7 @@ impl Demonstration {
     /// Builds both.
     pub(super) fn new(controller: Controller) -> Result<Self> {
         let stage = Stage::new(controller, &[])?;
-        shell::run(shell::cargo().args(["build", "--quiet", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
-        Ok(Self { stage, vsj: shell::target_directory()?.join("release/vsj") })
+        Ok(Self { stage, vsj: build::vsj()? })
     }
 
     /// Runs the demonstration for one effect, or for a spring without any.

@@ -1,5 +1,5 @@
-//! `cargo xtask talk`: a host commands the emulated firmware. Valid requests are followed, hostile frames are not, and
-//! no tick is missed.
+//! `cargo xtask talk`: a host commands the emulated firmware. Valid requests are followed, hostile frames are not, no
+//! tick is missed, and a model that `vsj link` sends is run after the restart.
 
 mod hostile;
 
@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use host_sim::link::{Client, Failure, Patience, Port};
 use host_sim::log::{Item, Level, Summary};
-use link::{Desired, Fault, Frame, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts};
+use link::{Desired, Fault, Frame, ModelId, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts};
+use simulation::plant_file;
 
 use xtask::build::{self, Board, Opt};
-use xtask::setup;
+use xtask::{setup, shell};
 
 use crate::qemu::emulator::{self, SAFE, Written};
 use hostile::{Dice, HOSTILE, hostile};
@@ -27,6 +28,8 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Time since the last valid frame after which the host's time-out of 0.5 s may have expired on a busy machine. It is
 /// no error of the board then.
 const LATE: Duration = Duration::from_millis(400);
+/// A model for `vsj link`.
+const PLANT: &str = "docs/plant.toml";
 /// The target that hostile frames must not change, in V.
 const TARGET_V: f64 = 300.0;
 
@@ -39,6 +42,7 @@ pub(crate) fn command() -> Result<()> {
 
 /// Starts the board, talks to it and returns the result in one line.
 pub(crate) fn run(elf: &Path) -> Result<String> {
+    let vsj = build::vsj()?;
     let socket = elf.with_file_name(format!("link-{}", std::process::id()));
     let name = format!("unix:{}", socket.display());
     let ((said, armed), run) = emulator::obey(
@@ -48,7 +52,8 @@ pub(crate) fn run(elf: &Path) -> Result<String> {
         || {
             let polite = courtesy(&name)?;
             let (hostile, armed) = hostility(&name)?;
-            Ok((format!("{polite}; {hostile}"), 2 + armed))
+            let kept = model(&vsj, &name)?;
+            Ok((format!("{polite}; {hostile}; {kept}"), 2 + armed))
         },
     )?;
     let mut summary = Summary::default();
@@ -169,6 +174,19 @@ fn hostility(name: &str) -> Result<(String, usize)> {
         after.overruns
     );
     Ok((said, armed))
+}
+
+/// Sends a model with `vsj link`, to a board without a file for its flash, as `cargo xtask emulate --link` starts it.
+fn model(vsj: &Path, name: &str) -> Result<String> {
+    let payload = plant_file::load(&shell::root().join(PLANT).display().to_string())?.wire()?.payload();
+    let sent = ModelId::of(1, &payload.context("a model that does not fit")?);
+    let mut command = shell::command(vsj);
+    let models = shell::json(command.args(["link", name, "model", PLANT, "--timeout", "10", "--json"]))?;
+    let expected = serde_json::to_value(sent)?;
+    for which in ["active", "stored"] {
+        ensure!(models[which] == expected, "the {which} model is {} instead of {expected}", models[which]);
+    }
+    Ok(format!("runs the model that was sent, {sent}"))
 }
 
 /// Opens the serial line to the board. Tries again for two seconds while the emulator is starting.

@@ -5,7 +5,6 @@
 
 use core::future::pending;
 
-use cortex_m::peripheral::Peripherals;
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
 use embassy_stm32::interrupt;
@@ -17,7 +16,7 @@ use firmware::nucleo::{Nucleo, clocks, reset, switch_amplifier_off};
 use firmware::settings::FLASHED;
 use firmware::store::Store;
 use firmware::tasks;
-use firmware::{crash_record, hang_guard, log, stack_guard};
+use firmware::{crash_record, guards, log};
 use link::{Controller, Server};
 use model::supervisor::Fault;
 
@@ -44,12 +43,14 @@ unsafe fn FMAC() {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     switch_amplifier_off();
-    let (reset, last_fault) = crash_record::reset_cause(Some(reset()));
+    let cause = crash_record::reset_cause(Some(reset()));
     let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
-    log::boot(reset, last_fault.map_or(0, Fault::code), CONTROLLER);
-    if let Some(mut core) = Peripherals::take() {
-        stack_guard::set(&mut core.MPU);
-        hang_guard::start(&mut core.SYST, clocks::CORE_HZ);
+    log::boot(cause.name, cause.fault.map_or(0, Fault::code), CONTROLLER);
+    if guards::start(clocks::CORE_HZ).is_none() {
+        // As after rejected settings: the output stays at zero and off until the watchdog resets the chip.
+        loop {
+            cortex_m::asm::wfi();
+        }
     }
     interrupt::CORDIC.set_priority(Priority::P4);
     interrupt::LPUART1.set_priority(Priority::P8);
@@ -57,7 +58,7 @@ fn main() -> ! {
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
     let mut store = Store::new(flash);
-    match host::open(&FLASHED, &store, last_fault) {
+    match host::open(&FLASHED, &store, &cause) {
         // Impossible: this is the first call.
         Ok(None) => {}
         Ok(Some((control, server))) => {
@@ -72,7 +73,7 @@ fn main() -> ! {
         }
         // Nothing feeds the watchdog, so that the chip resets and logs this again, with its output at zero.
         Err(error) => {
-            crash_record::record(Fault::Config, 0);
+            crash_record::add(Fault::Config);
             log::refused(error.field);
         }
     }

@@ -4,11 +4,11 @@ use cortex_m::singleton;
 use link::reply::Firmware;
 use link::{About, Controller, Server};
 use model::stiffness::{Cantilever, YoungsModulus};
-use model::supervisor::Fault;
 use model::{OutOfRange, SampleTime, Settings, Spring};
 
 use crate::control::Control;
 use crate::log;
+use crate::reset_cause::Cause;
 use crate::settings::{RATE_HZ, SUPERVISION};
 use crate::start::{self, Start};
 use crate::store::{Pages, Store};
@@ -20,10 +20,10 @@ use crate::store::{Pages, Store};
 pub fn open<P: Pages>(
     settings: &Settings,
     store: &Store<P>,
-    last_fault: Option<Fault>,
+    cause: &Cause,
 ) -> Result<Option<(&'static mut Control, &'static mut Server)>, OutOfRange> {
     let Some(place) = singleton!(: Option<Control> = None) else { return Ok(None) };
-    let (control, start) = start::control(settings, store.newest(), last_fault, place)?;
+    let (control, start) = start::control(settings, store.newest(), cause, place)?;
     if let Some(field) = start.rejected {
         log::refused(field);
     }

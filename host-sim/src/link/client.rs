@@ -9,7 +9,9 @@ use std::io;
 use std::time::{Duration, Instant, SystemTime};
 
 use link::wire_model::PART;
-use link::{Frame, Models, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry, Unreadable, WireModel};
+use link::{
+    Frame, ModelId, Models, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry, Unreadable, WireModel,
+};
 
 use crate::link::Port;
 
@@ -47,6 +49,13 @@ pub enum Failure {
         /// Number of bytes that arrived nevertheless.
         bytes: u64,
     },
+    /// The MCU has taken a model, but after its restart it does not run it.
+    OtherModel {
+        /// The model that was sent, with the number that it runs as.
+        sent: ModelId,
+        /// The models after the restart.
+        models: Models,
+    },
     /// The port failed.
     Port(io::Error),
 }
@@ -62,6 +71,14 @@ impl fmt::Display for Failure {
             }
             Self::NoAnswer { tries, bytes } => {
                 write!(f, "no valid answer to {tries} requests, but {bytes} bytes; is the baud rate right?")
+            }
+            Self::OtherModel { sent: ModelId { format, length, checksum, .. }, models } => {
+                let Models { active, stored } = models;
+                write!(
+                    f,
+                    "the MCU has restarted and does not run the model that was sent (format {format}, {length} bytes, CRC \
+                     {checksum:08x}): it runs {active}, and has stored {stored}"
+                )
             }
             Self::Port(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                 f.write_str("the other side closed the connection")
@@ -144,10 +161,10 @@ impl Client {
         }
     }
 
-    /// Sends a model to be checked and stored, restarts the MCU, and connects again.
+    /// Sends a model to be checked and stored, restarts the MCU, connects again, and checks that it runs this model.
     ///
     /// # Errors
-    /// [`Failure`]; if the model is rejected, the old one stays.
+    /// [`Failure`]; if the model is rejected, the old one stays. [`Failure::OtherModel`] if another one runs.
     pub fn install(&mut self, model: &WireModel) -> Result<Models, Failure> {
         // An oversized payload is not sent; the MCU then rejects the model as incomplete.
         let payload = model.payload().unwrap_or_default();
@@ -159,7 +176,12 @@ impl Client {
         self.order(Request::ModelEnd { length: payload.len() as u16, checksum: link::frame::checksum(&payload) })?;
         self.order(Request::Restart)?;
         self.status_by(Request::Hello)?;
-        self.models()
+        let models = self.models()?;
+        let sent = ModelId::of(models.active.number, &payload);
+        if models.active == ModelId::default() || models.active != sent {
+            return Err(Failure::OtherModel { sent, models });
+        }
+        Ok(models)
     }
 
     /// Waits for `wait` and returns all telemetry received.

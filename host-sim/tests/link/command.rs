@@ -8,11 +8,12 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use link::{Frame, Reply, State, Status};
+use model::supervisor;
 use serialport::{SerialPort, TTYPort};
 use simulation::record::{MEASURED, Record};
 
 use crate::mcu::{Mcu, Setup};
-use crate::vsj::{bad, good, json, start, stdout, vsj};
+use crate::vsj::{bad, good, json, run, start, stdout, vsj};
 
 #[test]
 fn a_session_over_a_socket() {
@@ -75,11 +76,16 @@ fn an_open_interlock_and_its_fault() {
     assert_eq!(kept.status.code(), Some(1));
     assert!(String::from_utf8(kept.stderr).unwrap().contains("no longer armed: faulted, fault interlock (4)"));
 
-    mcu.with(|shared| shared.interlock_open = false);
+    assert!(bad(1, port, &["acknowledge", "interlock"]).contains("refused: the interlock is open"));
+    mcu.with(|shared| (shared.interlock_open, shared.fault) = (false, Some(supervisor::Fault::Watchdog)));
     assert!(bad(1, port, &["arm"]).contains("faulted: interlock (4)"));
     assert_eq!(json(port, &["disarm"])["state"], "faulted", "a disarm does not acknowledge");
     assert!(bad(1, port, &["acknowledge", "panic"]).contains("a different fault is present: interlock (4)"));
-    assert_eq!(json(port, &["acknowledge", "interlock"])["state"], "disarmed");
+    let output = run(port, &["acknowledge", "interlock"]);
+    assert_eq!((stdout(&output).as_str(), output.status.code()), ("faulted, target 0.000 V\n", Some(0)));
+    let remark = String::from_utf8(output.stderr).unwrap();
+    assert!(remark.contains("interlock (4) is acknowledged; another fault stands: watchdog (5)"), "{remark}");
+    assert_eq!(json(port, &["acknowledge", "watchdog"])["state"], "disarmed");
     assert_eq!(json(port, &["arm"])["state"], "armed");
 }
 

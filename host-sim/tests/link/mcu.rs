@@ -30,12 +30,14 @@ pub(crate) struct Setup {
     pub(crate) hang_up_after: Option<u64>,
     /// Longest allowed silence of the host, in ms.
     pub(crate) silence_ms: u32,
+    /// True if a restart erases the stored models.
+    pub(crate) forgets: bool,
 }
 
 impl Default for Setup {
     fn default() -> Self {
         // Longer than a busy machine needs to start one command after another.
-        Self { damage_one_in: None, sensor: false, hang_up_after: None, silence_ms: 5000 }
+        Self { damage_one_in: None, sensor: false, hang_up_after: None, silence_ms: 5000, forgets: false }
     }
 }
 
@@ -50,6 +52,8 @@ pub(crate) struct Shared {
     pub(crate) counters: Counters,
     /// True if the interlock is open.
     pub(crate) interlock_open: bool,
+    /// Fault that another part of the program finds in the next tick.
+    pub(crate) fault: Option<supervisor::Fault>,
     /// True if the MCU is to restart at the next tick.
     pub(crate) restart: bool,
     /// Memory that survives a restart.
@@ -259,8 +263,11 @@ impl Chip {
 
     fn tick(&mut self, command: Command) {
         let heard = self.server.take_heard();
-        let interlock_closed = !self.shared.lock().unwrap().interlock_open;
-        let sensors = Sensors { interlock_closed, ..Sensors::default() };
+        let (interlock_closed, fault) = {
+            let mut shared = self.shared.lock().unwrap();
+            (!shared.interlock_open, shared.fault.take())
+        };
+        let sensors = Sensors { interlock_closed, fault, ..Sensors::default() };
         let tick = self.control.tick(&Command { heard: heard || command.heard, ..command }, &sensors, &mut Untimed);
         let supervisor = self.control.supervisor();
         let sample = Telemetry {
@@ -296,7 +303,8 @@ impl Chip {
             Some(Step::Restart(bytes)) => {
                 out.extend_from_slice(bytes);
                 let mut shared = self.shared.lock().unwrap();
-                (shared.restart, shared.flash) = (true, self.store.pages().clone());
+                shared.restart = true;
+                shared.flash = if self.setup.forgets { Flash::default() } else { self.store.pages().clone() };
             }
             None => {}
         }

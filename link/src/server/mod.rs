@@ -141,7 +141,10 @@ impl Server {
                 supervisor::State::Disarmed | supervisor::State::Faulted(_),
                 Some(refusal),
             ) => Some(Reason::of_refusal(refusal, fault)),
-            (Some(Request::Acknowledge(_)), supervisor::State::Faulted(_), _) => Some(Reason::OtherFault(fault)),
+            // Another fault than the acknowledged one is the next of several.
+            (Some(Request::Acknowledge(acknowledged)), supervisor::State::Faulted(_), _) if acknowledged == fault => {
+                Some(Reason::OtherFault(fault))
+            }
             // The state has changed since the request was accepted. A target that was set meanwhile is reset by arming.
             (Some(Request::Arm | Request::Set(_)), supervisor::State::Faulted(_), _) => Some(Reason::Faulted(fault)),
             (Some(Request::Arm | Request::Set(_)), supervisor::State::Disarmed, _) => Some(Reason::NotArmed),

@@ -12,6 +12,8 @@ use model::supervisor::Fault as Cause;
 const ARMED: View = view(supervisor::State::Armed, State::Armed);
 const DISARMED: View = view(supervisor::State::Disarmed, State::Disarmed);
 const FAULTED: View = view(supervisor::State::Faulted(Cause::Monitor), State::Faulted);
+/// A second fault that stands once the first one is acknowledged.
+const SECOND: View = view(supervisor::State::Faulted(Cause::Watchdog), State::Faulted);
 /// A stored model that failed its validation.
 const REJECTED: ModelId = ModelId { number: 3, format: 1, length: 9, checksum: 7 };
 const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
@@ -76,7 +78,14 @@ fn the_reply_reports_the_state_after_the_tick() {
         ),
         (Request::Disarm, ARMED, DISARMED, ack(State::Disarmed)),
         (Request::Disarm, ARMED, FAULTED, ack(State::Faulted)),
+        (
+            Request::Acknowledge(monitor),
+            FAULTED,
+            View { refusal: Some(Refusal::CausePresent), ..FAULTED },
+            Reply::Refused(Reason::CausePresent(monitor)),
+        ),
         (Request::Acknowledge(monitor), FAULTED, DISARMED, ack(State::Disarmed)),
+        (Request::Acknowledge(monitor), FAULTED, SECOND, ack(State::Faulted)),
         (Request::Acknowledge(monitor), FAULTED, FAULTED, Reply::Refused(Reason::OtherFault(monitor))),
     ] {
         let (command, answer) = exchange(request, &before, &after);

@@ -66,6 +66,7 @@ fn reason() -> impl Strategy<Value = Reason> {
         }),
         Just(Reason::NotStored),
         Just(Reason::Live),
+        any::<u8>().prop_map(|code| Reason::CausePresent(Fault(code))),
     ]
 }
 

@@ -1,4 +1,4 @@
-//! The faults and their stable numbers.
+//! The faults, their stable numbers, and sets of them.
 
 /// Reason for which the output was disabled. The numbers are used in logs, in frames and after a reset, and never
 /// change.
@@ -17,7 +17,7 @@ pub enum Fault {
     Watchdog = 5,
     /// The amplifier's monitors disagree with the output.
     Monitor = 6,
-    /// The settings were rejected.
+    /// The settings were rejected, or the processor's guards could not be set up.
     Config = 7,
     /// The supply voltage dipped and reset the chip.
     Supply = 8,
@@ -60,9 +60,63 @@ impl Fault {
     }
 }
 
+/// A set of faults: one bit for each, bit 0 for the number 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faults(u16);
+
+impl Faults {
+    /// The empty set.
+    pub const NONE: Self = Self(0);
+
+    /// Returns the set of the faults that have a bit in `bits`; bits without a fault are dropped.
+    pub const fn from_bits(bits: u16) -> Self {
+        Self(bits & ((1 << Fault::ALL.len()) - 1))
+    }
+
+    /// Returns one bit for each fault of the set.
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// Returns the set with `fault` in it.
+    pub const fn with(self, fault: Fault) -> Self {
+        Self(self.0 | Self::bit(fault))
+    }
+
+    /// Returns the set without `fault`.
+    pub const fn without(self, fault: Fault) -> Self {
+        Self(self.0 & !Self::bit(fault))
+    }
+
+    /// Returns the faults of the set that are not in `others`.
+    pub const fn except(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
+    /// Returns the faults of the set in the order of their numbers.
+    pub fn iter(self) -> impl Iterator<Item = Fault> {
+        Fault::ALL.into_iter().filter(move |fault| self.0 & Self::bit(*fault) != 0)
+    }
+
+    const fn bit(fault: Fault) -> u16 {
+        1 << (fault.code() - 1)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_set_holds_what_was_put_into_it() {
+        let both = Faults::NONE.with(Fault::Supply).with(Fault::Panic).with(Fault::Panic);
+        assert!(both.iter().eq([Fault::Panic, Fault::Supply]));
+        assert_eq!(both.bits(), 0x81);
+        assert_eq!(Faults::from_bits(0xff81), both, "bits without a fault are dropped");
+        assert_eq!(both.without(Fault::Panic).without(Fault::Panic), Faults::from_bits(0x80));
+        assert_eq!(both.except(Faults::NONE.with(Fault::Supply)), Faults::from_bits(1));
+        assert_eq!(Fault::ALL.into_iter().fold(Faults::NONE, Faults::with).iter().count(), Fault::ALL.len());
+    }
 
     #[test]
     fn codes_are_stable_and_convert_back_to_their_faults() {

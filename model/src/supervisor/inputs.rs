@@ -9,7 +9,7 @@ use crate::units::Volts;
 pub enum Command {
     /// Enables the output.
     Arm,
-    /// Disables the output, and acknowledges a fault.
+    /// Disables the output; in the faulted state acknowledges the fault that is shown.
     Disarm,
 }
 
@@ -28,7 +28,8 @@ pub struct Inputs {
     pub missed_ticks: u32,
     /// Readings of the amplifier's monitors; `None` if it has none.
     pub monitors: Option<Monitors>,
-    /// Fault that another part of the program found: a task that does not check in, rejected settings.
+    /// Fault that another part of the program finds in this tick, and in each tick until its cause is gone: a task
+    /// that does not check in, rejected settings.
     pub fault: Option<Fault>,
 }
 

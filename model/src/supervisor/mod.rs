@@ -6,7 +6,10 @@
 //!   0 V.
 //! - *arm*, *disarm*: the commands that enable and disable the output ([`Command`]).
 //! - *interlock*: the external safety circuit; the output is enabled only while it is closed.
-//! - *fault*: a reason for which the output was disabled, kept until a disarm acknowledges it ([`Fault`]).
+//! - *fault*: a reason for which the output was disabled ([`Fault`]).
+//! - *cause*: what made it a fault: an open interlock, a task that does not check in, missed ticks, a voltage that
+//!   should not be there. The cause of a reset (a panic, a dip of the supply) is gone with the reset.
+//! - *standing fault*: one whose cause is not gone, or that nobody has acknowledged ([`Faults`]).
 //! - *monitors*: the amplifier's own readings of its voltage and current ([`Monitors`]).
 //! - *silent host*: no valid frame came within the host timeout; the target then ramps down to 0 V.
 //!
@@ -21,12 +24,14 @@
 //!      ^  ^                                       |  |    |
 //!      |  +------------------- disarm ------------+  |<---+ host heard again: its target is pursued again
 //!      |                                             | any fault
-//!      +--- disarm (the acknowledgement) --- Faulted <+
+//!      +--- last one acknowledged ---------- Faulted <+
 //! ```
 //!
-//! The amplifier is off at 0 V in every state but `Armed`. The first fault stays until a disarm acknowledges it; arming
-//! again needs a command of its own. In one tick a fault wins over every command, and disarm over arm. An amplifier
-//! that holds a voltage although it is off is a fault in every state; while it does, nothing is armed or acknowledged.
+//! The amplifier is off at 0 V in every state but `Armed`. A fault stands until its cause is gone *and* a disarm has
+//! acknowledged it; arming again needs a command of its own. The state shows one standing fault, the first that came;
+//! a disarm acknowledges that one alone, and is rejected while its cause is there. In one tick a fault wins over every
+//! command, and disarm over arm. An amplifier that holds a voltage although it is off is a fault in every state; while
+//! it does, nothing is armed or acknowledged.
 //!
 //! No heap, no float, no panic in a tick; times are counted in ticks.
 
@@ -35,7 +40,7 @@ mod inputs;
 mod monitors;
 mod settings;
 
-pub use fault::Fault;
+pub use fault::{Fault, Faults};
 pub use inputs::{Command, Inputs};
 pub use monitors::Monitors;
 pub use settings::{Config, Settings};
@@ -54,7 +59,7 @@ pub enum State {
     Disarmed,
     /// The output is enabled: the controller drives the amplifier.
     Armed,
-    /// The output is disabled until a disarm acknowledges the fault.
+    /// The output is disabled until every standing fault is acknowledged; this is the first of them.
     Faulted(Fault),
 }
 
@@ -70,6 +75,8 @@ pub enum Refusal {
     HostSilent = 3,
     /// The amplifier is off, but its monitors do not read zero.
     Live = 4,
+    /// The cause of the fault to be acknowledged is still there.
+    CausePresent = 5,
 }
 
 /// What the controller has to do in this tick.
@@ -137,11 +144,13 @@ impl Drive {
 pub struct Supervisor {
     config: Config,
     state: State,
+    /// The standing faults; empty unless the state is [`State::Faulted`], whose fault is one of them.
+    standing: Faults,
     /// Target on the ramp down while the host is silent; 64 bits, so that the slowest ramp moves.
     ramp: Option<Accumulator>,
-    /// Target of the last tick.
+    /// Target of the last tick with voltage.
     pursued: Volts,
-    /// Missed ticks that are not forgotten yet, in ticks until they are.
+    /// Missed ticks that are not forgotten yet, in ticks until they are; at most one of them while disabled.
     misses: u32,
     monitors: MonitorCheck,
     refusal: Option<Refusal>,
@@ -151,16 +160,22 @@ impl Supervisor {
     /// Returns a disarmed supervisor, or a faulted one if `last_fault` caused the last reset, so that it has to be
     /// acknowledged.
     pub const fn new(config: Config, last_fault: Option<Fault>) -> Self {
-        let state = match last_fault {
-            None => State::Disarmed,
-            Some(fault) => State::Faulted(fault),
+        let (state, standing) = match last_fault {
+            None => (State::Disarmed, Faults::NONE),
+            Some(fault) => (State::Faulted(fault), Faults::NONE.with(fault)),
         };
-        Self { config, state, ramp: None, pursued: Volts::ZERO, misses: 0, monitors: MonitorCheck::NEW, refusal: None }
+        let (ramp, monitors) = (None, MonitorCheck::NEW);
+        Self { config, state, standing, ramp, pursued: Volts::ZERO, misses: 0, monitors, refusal: None }
     }
 
     /// Returns the state after the last tick.
     pub const fn state(&self) -> State {
         self.state
+    }
+
+    /// Returns the standing faults after the last tick.
+    pub const fn standing(&self) -> Faults {
+        self.standing
     }
 
     /// Returns true while the target ramps down because the host is silent.
@@ -178,34 +193,31 @@ impl Supervisor {
     pub fn decide(&mut self, inputs: &Inputs) -> Decision {
         self.refusal = None;
         let was_armed = self.state == State::Armed;
-        // Missed ticks are counted and forgotten in every state, so that those of a disarmed time are gone after a
-        // while.
         let overrun = self.overrun(inputs.missed_ticks);
         let disagreement = self.monitors.update(&self.config, inputs.monitors);
         if let Some(fault) = inputs.fault {
             self.fail(fault);
         }
-        if self.state == State::Armed && !inputs.interlock_closed {
+        if was_armed && !inputs.interlock_closed {
             self.fail(Fault::Interlock);
         }
         if disagreement {
             self.fail(Fault::Monitor);
         }
-        if self.state == State::Armed && overrun {
+        if overrun {
             self.fail(Fault::Overrun);
         }
-        // A command cannot acknowledge a fault of its own tick: it was given before the fault was known.
+        // A command cannot acknowledge the fault that has just disabled the output: it was given before.
         if self.state == State::Armed || !was_armed {
             match inputs.command {
-                Some(Command::Disarm) if inputs.fault.is_none() => self.disarm(),
+                Some(Command::Disarm) => self.disarm(inputs),
                 Some(Command::Arm) => self.arm(inputs),
-                _ => {}
+                None => {}
             }
         }
         let target = if self.state == State::Armed { self.pursue(inputs) } else { None };
         let Some(target) = target else {
             self.ramp = None;
-            self.pursued = Volts::ZERO;
             return Decision::Rest;
         };
         self.pursued = target;
@@ -228,8 +240,9 @@ impl Supervisor {
         if self.state == State::Armed { output.limits } else { Limits::NONE }
     }
 
-    /// Disables the output because of `fault`; the first fault is kept.
+    /// Disables the output because of `fault`, which stands from here on; the state shows the first fault.
     pub fn fail(&mut self, fault: Fault) {
+        self.standing = self.standing.with(fault);
         if !matches!(self.state, State::Faulted(_)) {
             self.state = State::Faulted(fault);
         }
@@ -250,11 +263,30 @@ impl Supervisor {
         };
     }
 
-    fn disarm(&mut self) {
-        match self.state {
-            State::Faulted(_) if self.monitors.disagree() => self.refusal = Some(Refusal::Live),
-            _ => self.state = State::Disarmed,
+    /// Disables the output, or acknowledges the fault that is shown if its cause is gone.
+    fn disarm(&mut self, inputs: &Inputs) {
+        let State::Faulted(fault) = self.state else {
+            self.state = State::Disarmed;
+            return;
+        };
+        self.refusal = self.cause(fault, inputs);
+        if self.refusal.is_none() {
+            self.standing = self.standing.without(fault);
+            self.state = self.standing.iter().next().map_or(State::Disarmed, State::Faulted);
         }
+    }
+
+    /// Returns what speaks against acknowledging `fault`; `None` if its cause is gone.
+    fn cause(&self, fault: Fault, inputs: &Inputs) -> Option<Refusal> {
+        if self.monitors.disagree() {
+            return Some(Refusal::Live);
+        }
+        let present = match fault {
+            Fault::Interlock if !inputs.interlock_closed => return Some(Refusal::InterlockOpen),
+            Fault::Overrun => self.misses > 0,
+            _ => false,
+        };
+        (present || inputs.fault == Some(fault)).then_some(Refusal::CausePresent)
     }
 
     /// Returns true if no frame came from the host within the host timeout.
@@ -278,10 +310,18 @@ impl Supervisor {
         Some(Volts(upper(next)))
     }
 
-    /// Counts the missed ticks, and returns true if there are too many.
+    /// Counts the missed ticks, and returns true if there are too many while armed; the fault uses them up. In the other
+    /// states only the last missed tick is remembered, until it is forgotten.
     fn overrun(&mut self, missed: u32) -> bool {
-        self.misses = self.misses.saturating_sub(1).saturating_add(missed.saturating_mul(self.config.miss_cost));
-        self.misses > self.config.miss_limit
+        let misses = self.misses.saturating_sub(1).saturating_add(missed.saturating_mul(self.config.miss_cost));
+        let armed = self.state == State::Armed;
+        let overrun = armed && misses > self.config.miss_limit;
+        self.misses = match (armed, overrun) {
+            (true, false) => misses,
+            (true, true) => 0,
+            (false, _) => misses.min(self.config.miss_cost),
+        };
+        overrun
     }
 }
 

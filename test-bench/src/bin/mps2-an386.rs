@@ -13,8 +13,9 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::settings::FLASHED;
 use firmware::store::Store;
-use firmware::{crash_record, hang_guard, log, stack_guard, tasks};
+use firmware::{crash_record, guards, log, tasks};
 use link::{Controller, Server};
+use model::supervisor::Fault;
 use test_bench::mps2::flash::Flash;
 use test_bench::mps2::instructions::{Counter, Instructions};
 use test_bench::mps2::interrupts::Interrupt;
@@ -23,7 +24,7 @@ use test_bench::mps2::uart::Uart;
 use test_bench::mps2::vectors::{HIGH, LOW};
 use test_bench::mps2::{INTERLOCK_CLOSED, Mps2, semihosting};
 use test_bench::player::{self, Player};
-use test_bench::script::Script;
+use test_bench::script::{FaultInjection, Script};
 
 use core::sync::atomic::Ordering;
 
@@ -50,6 +51,7 @@ struct Done {
 }
 
 /// Source of the commands.
+#[derive(PartialEq)]
 enum Mode {
     Play(Script),
     Link,
@@ -58,11 +60,11 @@ enum Mode {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut board = Mps2::init();
-    let (reset, last_fault) = crash_record::reset_cause(None);
+    let cause = crash_record::reset_cause(None);
 
     let mut buffer = [0; 64];
     let name = semihosting::command_line(&mut buffer);
-    let mode = match (last_fault, Script::parse(name)) {
+    let mode = match (cause.fault, Script::parse(name)) {
         _ if name.trim() == LINK => Mode::Link,
         (Some(_), _) => Mode::Play(Script::Aftermath),
         (None, Some(script)) => Mode::Play(script),
@@ -73,12 +75,12 @@ fn main() -> ! {
         Mode::Link => &FLASHED,
     };
     let controller = Controller::of(&settings.compensation);
-    log::boot(reset, last_fault.map_or(0, |fault| fault.code()), controller);
+    log::boot(cause.name, cause.fault.map_or(0, Fault::code), controller);
     if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
     let mut store = Store::new(Flash::init());
-    let (control, server) = match host::open(settings, &store, last_fault) {
+    let (control, server) = match host::open(settings, &store, &cause) {
         Ok(Some(both)) => both,
         Ok(None) => semihosting::exit(1),
         Err(error) => {
@@ -87,19 +89,23 @@ fn main() -> ! {
         }
     };
 
-    if let Some(mut core) = Peripherals::take() {
-        stack_guard::set(&mut core.MPU);
-        hang_guard::start(&mut core.SYST, CLOCK_HZ);
-        // SAFETY: the interrupts are not enabled yet. A smaller number is a higher priority: the alarm wakes the control task,
-        // which preempts everything else.
-        unsafe {
-            core.NVIC.set_priority(Interrupt::Timer0, 0x20);
-            core.NVIC.set_priority(Interrupt::Timer1, 0x20);
-            core.NVIC.set_priority(Interrupt::High, 0x40);
-            core.NVIC.set_priority(Interrupt::Received, 0x80);
-            core.NVIC.set_priority(Interrupt::Sent, 0x80);
-            core.NVIC.set_priority(Interrupt::Low, 0xc0);
+    if mode == Mode::Play(Script::Drill(FaultInjection::Unguarded)) {
+        let _taken = Peripherals::take();
+    }
+    let Some(mut core) = guards::start(CLOCK_HZ) else {
+        loop {
+            cortex_m::asm::wfi();
         }
+    };
+    // SAFETY: the interrupts are not enabled yet. A smaller number is a higher priority: the alarm wakes the control task,
+    // which preempts everything else.
+    unsafe {
+        core.NVIC.set_priority(Interrupt::Timer0, 0x20);
+        core.NVIC.set_priority(Interrupt::Timer1, 0x20);
+        core.NVIC.set_priority(Interrupt::High, 0x40);
+        core.NVIC.set_priority(Interrupt::Received, 0x80);
+        core.NVIC.set_priority(Interrupt::Sent, 0x80);
+        core.NVIC.set_priority(Interrupt::Low, 0xc0);
     }
     let low = LOW.start(Interrupt::Low);
     let high = HIGH.start(Interrupt::High);

@@ -1,5 +1,5 @@
-//! Two pages for the model store. The board has no flash: the pages are in its PSRAM, which keeps its content during a reset,
-//! and in the file `model.flash` of the emulator's folder if it exists, which keeps it beyond the emulator's end.
+//! Two pages for the model store. The board has no flash: the pages are in its PSRAM, which keeps its content during a reset
+//! until the emulator ends, and in the file `model.flash` of the emulator's folder if it exists, which keeps it beyond that.
 
 use firmware::store::{FlashError, PAGE, Pages, Side, WORD};
 
@@ -8,6 +8,11 @@ use super::semihosting::{File, Mode};
 /// Address of the PSRAM; nothing else uses it.
 const ADDRESS: u32 = 0x2100_0000;
 
+/// Address of the word that says that the pages have been erased since the emulator's start; behind the pages.
+const USED: *mut u32 = (ADDRESS + 2 * PAGE as u32) as *mut u32;
+/// "vsjf", the value of that word.
+const MARK: u32 = 0x7673_6a66;
+
 /// The pages.
 #[derive(Debug)]
 pub struct Flash {
@@ -15,9 +20,15 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// Reads the pages from the file, or erases them. Call it once at boot.
+    /// Reads the pages from the file; without one, erases them at the first boot and keeps them at every other. Call it once
+    /// at boot.
     pub fn init() -> Self {
         let mut flash = Self { file: File::open(c"model.flash", Mode::Update) };
+        // SAFETY: nothing else refers to this word of the PSRAM.
+        let used = unsafe { USED.read_volatile() == MARK };
+        if flash.file.is_none() && used {
+            return flash;
+        }
         for side in [Side::A, Side::B] {
             let page = flash.page(side);
             let read = flash.file.as_mut().is_some_and(|file| file.seek(side as usize * PAGE) && file.read(page));
@@ -25,6 +36,8 @@ impl Flash {
                 page.fill(0xff);
             }
         }
+        // SAFETY: as above.
+        unsafe { USED.write_volatile(MARK) };
         flash
     }
 

@@ -8,6 +8,7 @@ mod watch;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
 use host_sim::link::{Client, Patience, Port};
+use host_sim::output::terminal::remark;
 use link::{Desired, Fault, Request};
 use session::{Session, seconds};
 use simulation::bad_input;
@@ -63,7 +64,7 @@ enum Command {
     },
     /// Disable the output immediately
     Disarm,
-    /// Acknowledge a fault by the name or number that `status` shows; the MCU is then disarmed
+    /// Acknowledge a fault by the name or number that `status` shows; after the last one the MCU is disarmed
     Acknowledge {
         /// Name or number of the fault
         fault: String,
@@ -158,6 +159,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         }
         Command::Acknowledge { .. } => {
             let done = session.order(Request::Acknowledge(fault))?;
+            if done.0 == link::State::Faulted {
+                let next = session.refresh()?.fault;
+                remark(&format!("{}: {fault} is acknowledged; another fault stands: {next}", arguments.port));
+            }
             session.show(done)
         }
         Command::Watch(arguments) => watch::run(&mut session, arguments),

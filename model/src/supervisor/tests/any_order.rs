@@ -25,13 +25,13 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
 
 proptest! {
     /// The output is enabled only in `Armed`, never with the interlock open or a fault reported; `Armed` is entered
-    /// only from `Disarmed` by an arm command; and while the amplifier holds a voltage nothing is armed or
-    /// acknowledged.
+    /// only from `Disarmed` by an arm command; while the amplifier holds a voltage nothing is armed or acknowledged;
+    /// and a standing fault goes alone, by a disarm, while the state shows it and its cause is gone.
     #[test]
     fn no_order_of_events_enables_the_output_outside_armed(events in prop::collection::vec(any_inputs(), 1..400)) {
         let mut supervisor = Supervisor::new(config(), None);
         for inputs in events {
-            let before = supervisor.state();
+            let (before, stood) = (supervisor.state(), supervisor.standing());
             let (decision, drive) = tick(&mut supervisor, inputs);
             let armed = supervisor.state() == State::Armed;
             let live = inputs.monitors.is_some_and(|it| it.voltage > volts(35.0) || it.current_ua.abs() > 2000);
@@ -42,10 +42,19 @@ proptest! {
             if armed && before != State::Armed {
                 prop_assert_eq!((before, inputs.command, live), (State::Disarmed, Some(Command::Arm), false));
             }
-            if let State::Faulted(fault) = before {
-                let after = supervisor.state();
-                let acknowledged = inputs.command == Some(Command::Disarm) && !live;
-                prop_assert!(after == State::Faulted(fault) || (acknowledged && after == State::Disarmed));
+            let standing = supervisor.standing();
+            match supervisor.state() {
+                State::Faulted(shown) => prop_assert_ne!(standing, standing.without(shown)),
+                _ => prop_assert_eq!(standing, Faults::NONE),
+            }
+            for gone in stood.except(standing).iter() {
+                let cause = inputs.fault == Some(gone) || (gone == Fault::Interlock && !inputs.interlock_closed);
+                prop_assert!(before == State::Faulted(gone) && !cause && !live);
+                prop_assert_eq!(inputs.command, Some(Command::Disarm));
+                prop_assert_eq!(stood.without(gone).except(standing), Faults::NONE, "no other goes with it");
+            }
+            if let Some(fault) = inputs.fault {
+                prop_assert_eq!(standing, standing.with(fault), "it stands");
             }
         }
     }

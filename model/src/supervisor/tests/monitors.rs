@@ -64,9 +64,12 @@ fn an_acknowledgement_is_rejected_while_the_amplifier_holds_a_voltage() {
         assert_eq!(
             ticks(&mut supervisor, 2000, reading(500.0, 0, disarm())),
             State::Faulted(fault),
-            "the first fault is kept"
+            "the first fault is shown"
         );
         assert_eq!(supervisor.refusal(), Some(Refusal::Live));
+        if fault != Fault::Monitor {
+            assert_eq!(ticks(&mut supervisor, 1, reading(0.0, 0, disarm())), State::Faulted(Fault::Monitor));
+        }
         assert_eq!(ticks(&mut supervisor, 1, reading(0.0, 0, disarm())), State::Disarmed);
         assert_eq!(supervisor.refusal(), None);
     }
@@ -76,4 +79,12 @@ fn an_acknowledgement_is_rejected_while_the_amplifier_holds_a_voltage() {
         State::Disarmed,
         "disarming is never rejected while armed"
     );
+}
+
+#[test]
+fn readings_at_the_tolerance_agree() {
+    let mut supervisor = armed();
+    for (voltage_v, current_ua) in [(335.0, 2000), (265.0, -2000)] {
+        assert_eq!(ticks(&mut supervisor, 100, reading(voltage_v, current_ua, good())), State::Armed);
+    }
 }

@@ -70,3 +70,15 @@ fn a_negative_target_ends_its_ramp_in_one_tick() {
     tick(&mut supervisor, Inputs { ticks_since_host: 501, target: volts(-10.0), ..good() });
     assert_eq!(supervisor.state(), State::Disarmed);
 }
+
+#[test]
+fn a_ramp_that_reaches_exactly_zero_disarms_in_that_tick() {
+    let settings = Settings { ramp_v_per_s: 1000.0, ..Settings::DEFAULT };
+    let config = settings.validate(SampleTime::from_rate(RATE_HZ).unwrap()).unwrap().quantize();
+    let mut supervisor = Supervisor::new(config, None);
+    tick(&mut supervisor, Inputs { target: volts(3.0), ..arm() });
+    let silent = Inputs { ticks_since_host: 501, ..good() };
+    let targets = [2.0, 1.0].map(|left_v| (supervisor.decide(&silent), Decision::Pursue(volts(left_v))));
+    assert!(targets.iter().all(|(is, expected)| is == expected), "{targets:?}");
+    assert_eq!((supervisor.decide(&silent), supervisor.state()), (Decision::Rest, State::Disarmed));
+}

@@ -71,11 +71,56 @@ fn a_fault_stays_until_it_is_acknowledged_and_arming_needs_another_command() {
 }
 
 #[test]
-fn the_first_fault_is_kept() {
+fn a_second_fault_is_neither_lost_nor_cleared_by_one_acknowledgement() {
+    let both = Faults::NONE.with(Fault::Interlock).with(Fault::Panic);
     let mut supervisor = armed();
     tick(&mut supervisor, Inputs { interlock_closed: false, ..good() });
-    tick(&mut supervisor, Inputs { fault: Some(Fault::Watchdog), ..good() });
-    assert_eq!(supervisor.state(), State::Faulted(Fault::Interlock));
+    tick(&mut supervisor, Inputs { fault: Some(Fault::Panic), ..good() });
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Interlock), "the first one is shown");
+    assert_eq!(supervisor.standing(), both);
+    tick(&mut supervisor, disarm());
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Panic));
+    assert_eq!((tick(&mut supervisor, arm()).1, supervisor.refusal()), (Drive::SAFE, Some(Refusal::Faulted)));
+    tick(&mut supervisor, disarm());
+    assert_eq!((supervisor.state(), supervisor.standing()), (State::Disarmed, Faults::NONE));
+    assert!(tick(&mut supervisor, arm()).1.enabled());
+}
+
+#[test]
+fn faults_of_the_same_tick_all_stand() {
+    let mut supervisor = armed();
+    let both = Inputs { interlock_closed: false, missed_ticks: 6, fault: Some(Fault::Watchdog), ..good() };
+    tick(&mut supervisor, both);
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Watchdog));
+    assert!(supervisor.standing().iter().eq([Fault::Overrun, Fault::Interlock, Fault::Watchdog]));
+}
+
+#[test]
+fn a_fault_is_not_acknowledged_while_its_cause_is_there() {
+    for (fault, refusal) in [
+        (Fault::Interlock, Refusal::InterlockOpen),
+        (Fault::Watchdog, Refusal::CausePresent),
+        (Fault::Overrun, Refusal::CausePresent),
+    ] {
+        let with_cause = |inputs| match fault {
+            Fault::Interlock => Inputs { interlock_closed: false, ..inputs },
+            Fault::Overrun => Inputs { missed_ticks: 6, ..inputs },
+            _ => Inputs { fault: Some(fault), ..inputs },
+        };
+        let mut supervisor = armed();
+        tick(&mut supervisor, with_cause(good()));
+        for _ in 0..100 {
+            tick(&mut supervisor, with_cause(disarm()));
+            assert_eq!((supervisor.state(), supervisor.refusal()), (State::Faulted(fault), Some(refusal)));
+        }
+        // A missed tick is forgotten after a second.
+        for _ in 0..999 {
+            tick(&mut supervisor, good());
+        }
+        assert_eq!(supervisor.state(), State::Faulted(fault), "that the cause is gone is not enough");
+        tick(&mut supervisor, disarm());
+        assert_eq!((supervisor.state(), supervisor.refusal()), (State::Disarmed, None), "{fault:?}");
+    }
 }
 
 #[test]
@@ -83,6 +128,9 @@ fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
     let mut supervisor = armed();
     tick(&mut supervisor, Inputs { interlock_closed: false, ..disarm() });
     assert_eq!(supervisor.state(), State::Faulted(Fault::Interlock));
+    let mut supervisor = armed();
+    tick(&mut supervisor, Inputs { missed_ticks: 6, ..disarm() });
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Overrun));
     let mut supervisor = Supervisor::new(config(), None);
     tick(&mut supervisor, Inputs { fault: Some(Fault::Config), ..disarm() });
     assert_eq!(supervisor.state(), State::Faulted(Fault::Config));
@@ -91,6 +139,31 @@ fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
 #[test]
 fn the_fault_that_caused_a_reset_is_kept_after_it() {
     let mut supervisor = Supervisor::new(config(), Some(Fault::HardFault));
+    assert_eq!(supervisor.standing(), Faults::NONE.with(Fault::HardFault));
     assert_eq!(tick(&mut supervisor, arm()).1, Drive::SAFE);
     assert_eq!(supervisor.state(), State::Faulted(Fault::HardFault));
+}
+
+/// Code that forgets to read the interlock must not be able to arm.
+#[test]
+fn inputs_that_nobody_has_filled_in_cannot_enable_the_output() {
+    let arm = Some(Command::Arm);
+    for (inputs, refusal) in [
+        (Inputs { command: arm, ticks_since_host: 0, ..Inputs::default() }, Refusal::InterlockOpen),
+        (Inputs { command: arm, interlock_closed: true, ..Inputs::default() }, Refusal::HostSilent),
+    ] {
+        let mut supervisor = Supervisor::new(config(), None);
+        assert_eq!((tick(&mut supervisor, inputs).1, supervisor.refusal()), (Drive::SAFE, Some(refusal)));
+    }
+}
+
+#[test]
+fn limits_are_reported_only_while_armed() {
+    let limited = Output { limits: Limits::UPPER, ..output(300.0) };
+    let mut supervisor = armed();
+    assert_eq!(supervisor.limits(&limited), Limits::UPPER);
+    tick(&mut supervisor, disarm());
+    assert_eq!(supervisor.limits(&limited), Limits::NONE);
+    let faulted = Supervisor::new(config(), Some(Fault::Panic));
+    assert_eq!(faulted.limits(&limited), Limits::NONE);
 }
