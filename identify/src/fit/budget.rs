@@ -49,7 +49,10 @@ const ROWS: f64 = 2400.0;
 /// Exponent of the growth with the rows.
 const GROWTH: f64 = 0.55;
 /// Fraction of a search's budget after which it only follows the most promising extensions.
-const SCARCE: f64 = 0.5;
+const SCARCE: f64 = 0.75;
+
+/// Ratio of the work that a diagnosis may do once a model leaves nothing but noise to the work that it may do if nothing fits.
+const EXTENSION: f64 = 2.0;
 
 /// The work that was done and that may be done.
 #[derive(Debug)]
@@ -63,6 +66,8 @@ pub struct Budget {
     granted: AtomicU64,
     /// True if a search ended because its work was done.
     cut: AtomicBool,
+    /// True if a search has found a model that leaves nothing but noise, and may do more work.
+    extended: AtomicBool,
     stop: Option<Stop>,
 }
 
@@ -78,6 +83,7 @@ impl Budget {
             limit: AtomicU64::new(total),
             granted: AtomicU64::new(total),
             cut: AtomicBool::new(false),
+            extended: AtomicBool::new(false),
             stop,
         }
     }
@@ -100,16 +106,32 @@ impl Budget {
 
     /// Returns the work that may be done in all.
     pub fn total(&self) -> u64 {
-        self.total
+        match self.extended.load(Ordering::Relaxed) {
+            true => (EXTENSION * self.total as f64) as u64,
+            false => self.total,
+        }
     }
 
     /// Gives the next search a share of the work that is left, 0 to 1.
     pub fn grant(&self, share: f64) {
         let spent = self.spent();
-        let granted = |part: f64| spent.saturating_add((self.total.saturating_sub(spent) as f64 * share * part) as u64);
+        let granted =
+            |part: f64| spent.saturating_add((self.total().saturating_sub(spent) as f64 * share * part) as u64);
         self.scarce.store(granted(SCARCE), Ordering::Relaxed);
         self.limit.store(granted(1.0), Ordering::Relaxed);
         self.granted.store(granted(1.0) - spent, Ordering::Relaxed);
+    }
+
+    /// Allows the present search more work, once: it has found a model that leaves nothing but noise, so that the work left is for
+    /// simpler models of the same record.
+    pub fn extend(&self) {
+        if self.extended.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let more = ((EXTENSION - 1.0) * self.total as f64) as u64;
+        for limit in [&self.scarce, &self.limit, &self.granted] {
+            limit.fetch_add(more, Ordering::Relaxed);
+        }
     }
 
     /// Returns the work that was granted to the present search.

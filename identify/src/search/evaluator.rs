@@ -50,6 +50,9 @@ pub trait Evaluator {
     /// Factor by which prices are multiplied for the residual of a fit, 1 or more.
     fn penalty_factor(&mut self, fit: &Fit) -> f64;
 
+    /// Takes note that a structure with effects leaves nothing but noise, for which more work is allowed.
+    fn found_adequate(&mut self);
+
     /// True if the work for the search is nearly done, so that it follows the most promising structures only.
     fn is_scarce(&self) -> bool;
 
@@ -124,6 +127,10 @@ impl Evaluator for Engine<'_> {
 
     fn penalty_factor(&mut self, fit: &Fit) -> f64 {
         if negligible(&fit.residual) { 1.0 } else { penalty_factor(&self.terms(&fit.noise, &fit.residual)) }
+    }
+
+    fn found_adequate(&mut self) {
+        self.budget().extend();
     }
 
     fn is_scarce(&self) -> bool {

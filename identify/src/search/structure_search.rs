@@ -193,6 +193,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
             // A structure that leaves nothing but noise is the only one that is extended: no other can be much likelier.
             let doubts = self.evaluator.doubts(&best.fit);
             if !doubts {
+                if !best.fit.model.blocks.is_empty() {
+                    self.evaluator.found_adequate();
+                }
                 // What is left of scarce work is for exchanges, which find a simpler block than the first that fits.
                 if self.evaluator.is_scarce() && !best.fit.model.blocks.is_empty() {
                     break;

@@ -102,6 +102,8 @@ impl Evaluator for Tabulated {
         self.penalty_factor
     }
 
+    fn found_adequate(&mut self) {}
+
     fn is_scarce(&self) -> bool {
         2 * self.fits >= self.most_fits
     }
