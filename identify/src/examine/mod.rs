@@ -1,7 +1,7 @@
 //! The diagnosis of a record from beginning to end.
 //!
 //! In comes a record with [`Options`], out comes a [`Diagnosis`](crate::verdict::diagnosis::Diagnosis). [`passes`] holds the
-//! passes over the record, in the order in which they run; [`several`] diagnoses several records of one spring.
+//! passes over the record, in the order in which they run; `several` diagnoses several records of one spring.
 
 mod options;
 pub mod passes;

@@ -28,7 +28,7 @@ use crate::record::data::{Data, Input};
 use crate::record::normalisation::Normalisation;
 use crate::record::observed::Observed;
 use crate::search::{Scored, Search, WarmStart};
-use crate::stats::thresholds::empirical::{LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
+use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::diagnosis::{self, Diagnosis};
 
@@ -191,6 +191,11 @@ fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagno
         return found;
     }
     let without = of_readings(record, &base, progress);
+    // Autocorrelated noise may make a spring likelier that predicts worse.
+    let held_out = |diagnosis: &Diagnosis| diagnosis.report.extended.quality.held_out_rmse;
+    if held_out(&without) > LARGEST_ERROR_RATIO.get() * held_out(&found) {
+        return found;
+    }
     compared_with(found, without, unsupported_terms)
 }
 

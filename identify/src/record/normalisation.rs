@@ -2,9 +2,9 @@
 //!
 //! | scale | from the nominal spring | from the record, where that is off by more |
 //! | --- | --- | --- |
-//! | time | its first time constant | than a factor of [`FAR_TIME_CONSTANT`] |
-//! | voltage | the voltage of its `tau_high_at_v` | than a factor of [`FAR_SIZE`] |
-//! | reading | its gain | than a factor of [`FAR_SIZE`], or in sign |
+//! | time | its first time constant | than a factor of `FAR_TIME_CONSTANT` |
+//! | voltage | the voltage of its `tau_high_at_v` | than a factor of `FAR_SIZE` |
+//! | reading | its gain | than a factor of `FAR_SIZE`, or in sign |
 //!
 //! The record's own time constant, gain and zero are those of a quick first-order fit. They are also where the search starts if
 //! the nominal spring is far from the record ([`Start`]).

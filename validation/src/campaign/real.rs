@@ -1,7 +1,7 @@
 //! Measured records of any instrument: what is identified, what is diagnosed, and how well each model predicts.
 //!
 //! In: a folder of CSV files, each with an optional description beside it, or the simulated instruments of
-//! [`other_plants`](crate::ground_truth::other_plants). Out: for each record the verdict and causes, the held-out error and the
+//! [`other_plants`]. Out: for each record the verdict and causes, the held-out error and the
 //! error on the last 40 % by a fit to the first 60 %, of the nominal spring that `vsj identify` finds, of the spring that
 //! `vsj diagnose --plant identify` extends, of the best linear model, of PySINDy and of SysIdentPy, and the CPU time.
 //!

@@ -57,7 +57,7 @@ impl Signal {
     }
 
     /// Returns the same with at most `pieces` pieces, as far as changes of the voltage and rows leave a choice, and with
-    /// neighbouring pieces replaced by a chord where that changes the voltage by `blur_v` or less; up to [`MOST_BLUR`] times
+    /// neighbouring pieces replaced by a chord where that changes the voltage by `blur_v` or less; up to `MOST_BLUR` times
     /// that where they would be too many.
     pub fn coarse(schedule: &Schedule, times_s: &[f64], before: f64, pieces: usize, blur_v: f64) -> Self {
         Self::coarser(schedule, times_s, before, pieces, blur_v, 1.0)
