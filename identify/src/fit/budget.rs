@@ -49,7 +49,7 @@ const ROWS: f64 = 2400.0;
 /// Exponent of the growth with the rows.
 const GROWTH: f64 = 0.55;
 /// Fraction of a search's budget after which it only follows the most promising extensions.
-const SCARCE: f64 = 0.75;
+const SCARCE: f64 = 0.5;
 
 /// Ratio of the work that a diagnosis may do once a model leaves nothing but noise to the work that it may do if nothing fits.
 const EXTENSION: f64 = 2.0;
