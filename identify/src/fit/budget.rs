@@ -15,7 +15,7 @@ use crate::fit::stop::Stop;
 pub enum Effort {
     /// A quarter of the normal effort.
     Quick,
-    /// About 2 s of CPU time for 2400 rows, 20 s for 100 000, if nothing fits.
+    /// Up to 3 s of CPU time for 2400 rows, 20 s for 100 000, if nothing fits.
     #[default]
     Normal,
     /// Ten times the normal effort.
