@@ -2,6 +2,7 @@
 
 use simulation::units::Units;
 
+use crate::dimension::significant;
 use crate::linear::{Fit, Problem};
 use crate::nominal::report::Report;
 
@@ -14,7 +15,7 @@ const HARDLY_KNOWN: f64 = 4.0;
 pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {
     let nominal = &report.nominal;
     let mut remarks = Vec::new();
-    let time = |seconds: f64| format!("{} {}", digits(seconds / units.time.si), units.time.name);
+    let time = |seconds: f64| format!("{} {}", significant(seconds / units.time.si, 4), units.time.name);
     if nominal.gain.low <= 0.0 && nominal.gain.high >= 0.0 {
         remarks.push("The records show no static response: the interval of the gain contains 0.".into());
     }
@@ -25,7 +26,7 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
     if !(0.0..=1.0).contains(&nominal.share.value) && report.order > 0 {
         remarks.push(format!(
             "The instantaneous share {} is outside of 0 to 1: the first response goes {}.",
-            digits(nominal.share.value),
+            significant(nominal.share.value, 4),
             if nominal.share.value < 0.0 { "the other way" } else { "beyond the settled one" }
         ));
     }
@@ -53,9 +54,9 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
         remarks.push(format!(
             "A fit to the first 60 % does not predict the rest (error {} {} instead of {} {}): a part of the model may describe a \
              disturbance of this record, or the record ends in another state than it began.",
-            digits(report.last_40_percent_rmse),
+            significant(report.last_40_percent_rmse, 4),
             report.unit,
-            digits(report.held_out_rmse),
+            significant(report.held_out_rmse, 4),
             report.unit
         ));
     }
@@ -63,23 +64,11 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
         remarks.push(format!(
             "The errors ({} {}) exceed their scatter from row to row ({} {}): no linear model of order 4 or less describes all of the \
              response; `vsj diagnose` names what else is in it.",
-            digits(report.rmse),
+            significant(report.rmse, 4),
             report.unit,
-            digits(report.noise.scatter),
+            significant(report.noise.scatter, 4),
             report.unit
         ));
     }
     remarks
-}
-
-/// A number with four significant digits.
-pub fn digits(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let exponent = value.abs().log10().floor() as i32;
-    if !(-4..7).contains(&exponent) {
-        return format!("{value:.3e}");
-    }
-    format!("{value:.*}", (3 - exponent).max(0) as usize)
 }

@@ -10,7 +10,7 @@ use identify::Diagnosis;
 
 mod extension;
 pub(super) mod figures;
-mod number;
+pub(super) mod number;
 mod origin;
 pub(super) mod page;
 pub mod panels;

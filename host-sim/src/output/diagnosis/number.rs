@@ -1,35 +1,24 @@
-//! Numbers with significant digits.
+//! Numbers and parameters as texts and pages show them.
 
-/// Formats a number with a number of significant digits, and with an exponent where it is very small or large.
-pub(super) fn significant(value: f64, digits: i32) -> String {
-    let size = value.abs();
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    if !(1e-4..1e7).contains(&size) {
-        return format!("{value:.*e}", (digits - 1) as usize);
-    }
-    let decimals = (digits - 1 - size.log10().floor() as i32).clamp(0, 7) as usize;
-    format!("{value:.decimals$}")
+use identify::answer::Parameter;
+use identify::dimension::{Dimension, significant};
+use identify::record::scales::Scales;
+
+/// Formats a parameter with its interval and unit.
+pub(super) fn interval(&Parameter { value, low, high, dimension, .. }: &Parameter, scales: &Scales) -> String {
+    let shown = |value: f64| number(value / dimension.size_of_shown_unit(&scales.units));
+    format!("{} [{}, {}] {}", shown(value), shown(low), shown(high), scales.unit(dimension)).trim_end().to_owned()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Formats a number with four significant digits.
+pub(in crate::output) fn number(value: f64) -> String {
+    significant(value, 4)
+}
 
-    #[test]
-    fn numbers_have_four_digits_at_any_size() {
-        for (value, text) in [
-            (0.0, "0"),
-            (0.000_404_2, "0.0004042"),
-            (1.0, "1.000"),
-            (-47.921_3, "-47.92"),
-            (499.96, "500.0"),
-            (12_345.6, "12346"),
-            (1.3e-9, "1.300e-9"),
-            (f64::INFINITY, "inf"),
-        ] {
-            assert_eq!(significant(value, 4), text);
-        }
+/// Name of a parameter without the suffix for its unit where the user's unit is another.
+pub(super) fn shown_name<'n>(name: &'n str, dimension: Dimension, scales: &Scales) -> &'n str {
+    if dimension.size_of_shown_unit(&scales.units) == 1.0 {
+        return name;
     }
+    ["_v_per_s", "_s", "_v", "_hz"].into_iter().find_map(|suffix| name.strip_suffix(suffix)).unwrap_or(name)
 }

@@ -6,7 +6,7 @@ use identify::answer::{Finding, RecordReport};
 use identify::record::scales::Scales;
 use maud::{Markup, html};
 
-use crate::output::diagnosis::tables::{interval, number};
+use crate::output::diagnosis::number::{interval, number};
 
 /// The table for the terminal; empty for a single record.
 pub(super) fn text(records: &[RecordReport], scales: &Scales) -> String {

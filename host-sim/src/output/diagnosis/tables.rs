@@ -3,9 +3,8 @@
 use maud::{Markup, html};
 
 use crate::output::diagnosis::extension::is_extended;
-use crate::output::diagnosis::number::significant;
-use crate::output::diagnosis::text::shown_name;
-use identify::answer::{Finding, Parameter};
+use crate::output::diagnosis::number::{interval, number, shown_name};
+use identify::answer::Finding;
 use identify::dimension::Dimension;
 use identify::record::scales::Scales;
 use identify::stats::scale::root_mean_square;
@@ -193,17 +192,6 @@ pub(super) fn noise(diagnosis: &Diagnosis) -> Markup {
         format!(" {} % of the readings are outliers with a scale of {} {unit}.", number(100.0 * fraction), number(wide))
     });
     html! { p { "Scale " (number(noise.sigma)) " " (unit) ", " (tail) ", " (autocorrelation) "." (wide.unwrap_or_default()) } }
-}
-
-/// Formats a parameter with its interval and unit.
-pub(super) fn interval(&Parameter { value, low, high, dimension, .. }: &Parameter, scales: &Scales) -> String {
-    let shown = |value: f64| number(value / dimension.size_of_shown_unit(&scales.units));
-    format!("{} [{}, {}] {}", shown(value), shown(low), shown(high), scales.unit(dimension)).trim_end().to_owned()
-}
-
-/// Formats a number with four significant digits.
-pub(super) fn number(value: f64) -> String {
-    significant(value, 4)
 }
 
 #[cfg(test)]

@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use identify::answer::{self, Extended, Finding, LinearError, Margins, Nominal, Quality, SearchReport, Verdict};
-use identify::dimension::Dimension;
+use identify::dimension::{Dimension, significant};
 use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
 use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
-use crate::output::diagnosis::number::significant;
+use crate::output::diagnosis::number::shown_name;
 use crate::output::diagnosis::records;
 
 /// Smallest held-out improvement that is reported as one.
@@ -260,14 +260,6 @@ fn row(text: &mut String, finding: &Finding, scales: &Scales) {
         .collect();
     let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
     let _ = writeln!(text, "  {}", finding.evidence);
-}
-
-/// Name of a parameter without the suffix for its unit where the user's unit is another.
-pub(super) fn shown_name<'n>(name: &'n str, dimension: Dimension, scales: &Scales) -> &'n str {
-    if dimension.size_of_shown_unit(&scales.units) == 1.0 {
-        return name;
-    }
-    ["_v_per_s", "_s", "_v", "_hz"].into_iter().find_map(|suffix| name.strip_suffix(suffix)).unwrap_or(name)
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! The report page: one self-contained HTML file.
 
 use identify::Identified;
-use identify::nominal::remarks::digits;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use simulation::units::Units;
 
 use crate::output::diagnosis::figures::Figure;
+use crate::output::diagnosis::number::number;
 use crate::output::diagnosis::{page::drawn, style};
 use crate::output::identify::table::{self, Line};
 use crate::output::identify::{Origin, PLANT_FILE};
@@ -37,7 +37,7 @@ pub(super) fn page(identified: &Identified, units: &Units, origin: &Origin, figu
                 h2 { "Linear models" }
                 p.small {
                     "The best model of each order, in free run on segments that its fit did not use. On the last 40 %, by a fit to the "
-                    "first 60 %, the nominal model's error is " (digits(report.last_40_percent_rmse)) " " (report.unit) "."
+                    "first 60 %, the nominal model's error is " (number(report.last_40_percent_rmse)) " " (report.unit) "."
                 }
                 (lines(["order", &format!("held-out RMSE [{}]", report.unit), ""], &table::orders(report)))
                 h2 { "Plant file" }

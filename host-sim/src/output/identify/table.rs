@@ -1,8 +1,9 @@
 //! The rows of the table of quantities, for the terminal and for the page.
 
-use identify::nominal::remarks::digits;
 use identify::nominal::report::{InputLaw, Quantity, Report};
 use simulation::units::Units;
+
+use crate::output::diagnosis::number::number;
 
 /// A quantity as it is shown: name, value with unit, interval.
 pub(super) type Line = [String; 3];
@@ -10,7 +11,7 @@ pub(super) type Line = [String; 3];
 /// All quantities in the user's units.
 pub(super) fn quantities(report: &Report, units: &Units) -> Vec<Line> {
     let line = |name: String, quantity: &Quantity, size: f64, unit: &str| {
-        let [value, low, high] = [quantity.value, quantity.low, quantity.high].map(|value| digits(value / size));
+        let [value, low, high] = [quantity.value, quantity.low, quantity.high].map(|value| number(value / size));
         [name, format!("{value} {unit}").trim_end().to_owned(), format!("[{low}, {high}]")]
     };
     let (nominal, reading, time) = (&report.nominal, report.unit.as_str(), &units.time);
@@ -44,7 +45,7 @@ pub(super) fn quantities(report: &Report, units: &Units) -> Vec<Line> {
     let noise = &report.noise;
     lines.push([
         "noise, standard deviation".into(),
-        format!("{} {reading}", digits(noise.sigma)),
+        format!("{} {reading}", number(noise.sigma)),
         format!("correlation of neighbours {:.2}", noise.autocorrelation),
     ]);
     lines
@@ -55,7 +56,7 @@ pub(super) fn orders(report: &Report) -> Vec<Line> {
     let with_static = std::iter::once((0, report.static_held_out_rmse));
     let others = report.linear.iter().map(|linear| (linear.order, linear.held_out_rmse));
     let mark = |order| if order == report.order { "nominal" } else { "" };
-    with_static.chain(others).map(|(order, error)| [order.to_string(), digits(error), mark(order).into()]).collect()
+    with_static.chain(others).map(|(order, error)| [order.to_string(), number(error), mark(order).into()]).collect()
 }
 
 /// What was identified, in one sentence.

@@ -1,10 +1,10 @@
 //! An identification as text for the terminal.
 
 use identify::Identified;
-use identify::nominal::remarks::digits;
 use simulation::units::Units;
 
 use crate::output::cells::line;
+use crate::output::diagnosis::number::number;
 use crate::output::identify::table;
 
 /// The whole answer.
@@ -25,7 +25,7 @@ pub fn text(identified: &Identified, units: &Units) -> String {
     for [order, error, mark] in table::orders(report) {
         line(&mut text, &format!("{order:>26}  {error:<12}  {mark}"));
     }
-    let last = digits(report.last_40_percent_rmse);
+    let last = number(report.last_40_percent_rmse);
     line(&mut text, &format!("On the last 40 %, by a fit to the first 60 %: {last} {}.", report.unit));
     for remark in &report.remarks {
         line(&mut text, remark);
