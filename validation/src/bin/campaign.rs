@@ -14,7 +14,7 @@ use validation::campaign::diagnosis::{self, diagnose};
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
-use validation::campaign::{answer_table, criteria, out_of_model, real, rivals, scales, shared, tables};
+use validation::campaign::{answer_table, criteria, out_of_model, real, rivals, scales, shared, steps, tables};
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
@@ -143,6 +143,8 @@ enum Part {
     Triples,
     /// Two effects of one block, or that mimic each other: 3 records of every pair at full size and at half of it
     Shared,
+    /// Plain steps of one to three levels, with each cause that they can show: 3 records of each
+    Steps,
     /// Two effects in records of 20 000 rows, white and coloured noise: 1 record of every pair
     Long,
     /// One effect in few rows, uneven rows, coloured, heavy-tailed or strong noise: 5 records of each cause
@@ -293,6 +295,7 @@ impl Cli {
             Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), criteria::triples),
             Part::Long => self.jobs(part, &part::long(first, self.count(1)), criteria::pairs),
             Part::Shared => self.answers(part, ["causes", "size"], &shared::cases(first, self.count(3))),
+            Part::Steps => self.answers(part, ["causes", "experiment"], &steps::cases(first, self.count(3))),
             Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
             Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.sensitivities(part, &[0.2]),

@@ -13,6 +13,7 @@
 //! | [`part`], [`summary`] | the parts of the campaign, and the counts over their records |
 //! | [`answer`], [`answer_table`] | diagnoses graded by the names that are true of a record; their tables |
 //! | [`shared`] | pairs of causes that share a stage or mimic each other |
+//! | [`steps`] | plain steps of one to three levels |
 //! | [`sensitivity`] | the smallest effect that is named |
 //! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
 //! | [`scales`] | single effects in springs of any size, in any unit |
@@ -37,6 +38,7 @@ pub mod score;
 pub mod sensitivity;
 pub mod shared;
 pub mod statistics;
+pub mod steps;
 pub mod summary;
 pub mod tables;
 pub mod thresholds;

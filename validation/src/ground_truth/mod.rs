@@ -17,6 +17,7 @@
 //! | [`spring`], [`integrator`] | spring and amplifier as differential equations; their integration over time |
 //! | [`sensor`] | from stiffness to reading |
 //! | [`live`] | spring and sensor step by step, for a controller in closed loop |
+//! | [`plain_steps`] | records of one to three levels |
 //! | [`record`], [`truth`] | the finished record and the true values of its parameters |
 //! | [`export`] | the record as CSV, as JSON and as the host tools' record type |
 //! | [`out_of_model`] | other laws for the same causes, by a simulator of their own |
@@ -33,6 +34,7 @@ pub mod noise;
 pub mod other_plants;
 pub mod out_of_model;
 pub mod physics;
+pub mod plain_steps;
 pub mod record;
 pub mod schedule;
 pub mod sensor;
