@@ -14,7 +14,9 @@ use validation::campaign::diagnosis::{self, diagnose};
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
-use validation::campaign::{answer_table, criteria, out_of_model, real, rivals, scales, shared, steps, tables};
+use validation::campaign::{
+    answer_table, criteria, out_of_model, real, rivals, scales, shared, steps, tables, unforeseen,
+};
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
@@ -158,6 +160,8 @@ enum Part {
     /// One effect by laws that the diagnosis does not model: 5 records of each
     #[value(alias = "strangers")]
     OutOfModel,
+    /// Laws from the literature that nobody looked at while the diagnosis was made: 3 records of each
+    Unforeseen,
     /// One effect in a spring of any time constant, share, full scale and unit: 20 records of each cause
     Scales,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
@@ -296,6 +300,7 @@ impl Cli {
             Part::Long => self.jobs(part, &part::long(first, self.count(1)), criteria::pairs),
             Part::Shared => self.answers(part, ["causes", "size"], &shared::cases(first, self.count(3))),
             Part::Steps => self.answers(part, ["causes", "experiment"], &steps::cases(first, self.count(3))),
+            Part::Unforeseen => self.answers(part, ["", ""], &unforeseen::cases(first, self.count(3))),
             Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
             Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.sensitivities(part, &[0.2]),
@@ -385,7 +390,10 @@ impl Cli {
         let bar = bar(&part.name(), cases.len())?;
         let answers = answer::run(cases, &diagnosis::answer, &bar);
         bar.finish_and_clear();
-        let markdown = format!("{}\n{}", answer_table::legend(), answer_table::page(heads[0], heads[1], &answers));
+        let markdown = match part {
+            Part::Unforeseen => unforeseen::page(&answers),
+            _ => format!("{}\n{}", answer_table::legend(), answer_table::page(heads[0], heads[1], &answers)),
+        };
         let wrong = answer_table::wrong(&answers);
         Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!({"records": answers}) })
     }

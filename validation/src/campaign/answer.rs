@@ -27,12 +27,14 @@ pub struct Expected {
     pub also: Vec<&'static str>,
     /// True if all codes of `first` must be named, false if one of them is enough.
     pub all: bool,
+    /// True if `consistent` without a finding is correct too.
+    pub or_none: bool,
 }
 
 impl Expected {
     /// Exactly these causes, in any order.
     pub fn exactly(causes: &[Cause]) -> Self {
-        Self { first: causes.iter().map(|cause| cause.name()).collect(), also: Vec::new(), all: true }
+        Self { first: causes.iter().map(|cause| cause.name()).collect(), also: Vec::new(), all: true, or_none: false }
     }
 
     /// True if the code is true of the record.
@@ -116,6 +118,8 @@ pub struct Answer {
     pub truth_is_mentioned: bool,
     /// True if the record has no effect.
     pub null: bool,
+    /// True if `consistent` without a finding is correct.
+    pub or_none: bool,
     /// Parameters of the correct findings, if the record is in the simulator's units.
     pub parameters: Vec<Estimate>,
     /// Error message if there was no report.
@@ -137,6 +141,7 @@ impl Answer {
             first_is_right: false,
             truth_is_mentioned: false,
             null: expected.first.is_empty(),
+            or_none: expected.or_none || expected.first.is_empty(),
             parameters: Vec::new(),
             failure: None,
         };
@@ -175,8 +180,8 @@ impl Answer {
 
     /// True if the findings are correct: the first one right, nothing missing, nothing untrue; `consistent` without an effect.
     pub fn is_right(&self) -> bool {
-        let named = if self.null { self.verdict == "consistent" } else { self.first_is_right };
-        named && self.missing.is_empty() && self.nothing_untrue()
+        let none = self.or_none && self.verdict == "consistent" && self.found.is_empty();
+        none || !self.null && self.first_is_right && self.missing.is_empty() && self.nothing_untrue()
     }
 
     /// True if the answer is not right but leaves room for the truth: `ambiguous`, `insufficient` or `unexplained`, with the truth
@@ -259,7 +264,8 @@ pub(super) mod tests {
 
     #[test]
     fn one_of_several_first_names_is_enough() {
-        let law = || Expected { first: vec!["delay", "series-lag"], also: vec!["time-constant"], all: false };
+        let law =
+            || Expected { first: vec!["delay", "series-lag"], also: vec!["time-constant"], all: false, or_none: false };
         let right = graded(law(), report("explained", &[("series-lag", 1.0), ("time-constant", 0.8)], &[]));
         assert!(right.is_right() && right.missing.is_empty());
         let second = graded(law(), report("explained", &[("time-constant", 1.0)], &[]));

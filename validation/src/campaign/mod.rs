@@ -18,6 +18,7 @@
 //! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
 //! | [`scales`] | single effects in springs of any size, in any unit |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
+//! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
 
@@ -42,3 +43,4 @@ pub mod steps;
 pub mod summary;
 pub mod tables;
 pub mod thresholds;
+pub mod unforeseen;

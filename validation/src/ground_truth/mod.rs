@@ -21,6 +21,7 @@
 //! | [`record`], [`truth`] | the finished record and the true values of its parameters |
 //! | [`export`] | the record as CSV, as JSON and as the host tools' record type |
 //! | [`out_of_model`] | other laws for the same causes, by a simulator of their own |
+//! | [`unforeseen`] | laws of a second such set, which nobody looked at while the diagnosis was made |
 //! | [`other_plants`] | records of other instruments, in their own units |
 
 pub mod cause;
@@ -40,6 +41,7 @@ pub mod schedule;
 pub mod sensor;
 pub mod spring;
 pub mod truth;
+pub mod unforeseen;
 
 pub use cause::{Block, Cause};
 pub use effect::Effect;
