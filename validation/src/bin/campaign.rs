@@ -9,11 +9,14 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use validation::campaign::diagnosis::diagnose;
+use validation::campaign::answer::{self, Case};
+use validation::campaign::diagnosis::{self, diagnose};
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
-use validation::campaign::{criteria, out_of_model, real, rivals, scales, tables};
+use validation::campaign::{
+    answer_table, criteria, out_of_model, real, rivals, scales, shared, steps, tables, unforeseen,
+};
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
@@ -51,7 +54,7 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, scales, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
-    /// long), in total (nulls, triples), or times 53 (thresholds)
+    /// shared, long), in total (nulls, triples), or times 53 (thresholds)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -140,6 +143,10 @@ enum Part {
     Pairs,
     /// Three effects of different blocks: 100 records
     Triples,
+    /// Two effects of one block, or that mimic each other: 3 records of every pair at full size and at half of it
+    Shared,
+    /// Plain steps of one to three levels, with each cause that they can show: 3 records of each
+    Steps,
     /// Two effects in records of 20 000 rows, white and coloured noise: 1 record of every pair
     Long,
     /// One effect in few rows, uneven rows, coloured, heavy-tailed or strong noise: 5 records of each cause
@@ -153,6 +160,8 @@ enum Part {
     /// One effect by laws that the diagnosis does not model: 5 records of each
     #[value(alias = "strangers")]
     OutOfModel,
+    /// Laws from the literature that nobody looked at while the diagnosis was made: 3 records of each
+    Unforeseen,
     /// One effect in a spring of any time constant, share, full scale and unit: 20 records of each cause
     Scales,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
@@ -289,6 +298,9 @@ impl Cli {
             Part::Pairs => self.jobs(part, &part::pairs(first, self.count(3)), criteria::pairs),
             Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), criteria::triples),
             Part::Long => self.jobs(part, &part::long(first, self.count(1)), criteria::pairs),
+            Part::Shared => self.answers(part, ["causes", "size"], &shared::cases(first, self.count(3))),
+            Part::Steps => self.answers(part, ["causes", "experiment"], &steps::cases(first, self.count(3))),
+            Part::Unforeseen => self.answers(part, ["", ""], &unforeseen::cases(first, self.count(3))),
             Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
             Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.sensitivities(part, &[0.2]),
@@ -330,7 +342,7 @@ impl Cli {
             Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),
             #[cfg(feature = "sensitivity")]
             Part::Thresholds => {
-                use validation::campaign::{diagnosis, thresholds};
+                use validation::campaign::thresholds;
 
                 let cases = thresholds::cases(first, self.count(1));
                 let bar = bar("thresholds", thresholds::diagnoses(&cases))?;
@@ -371,6 +383,19 @@ impl Cli {
         let criteria = criteria(&outcomes);
         let json = json!({"aims": criteria, "records": outcomes});
         Ok(Done { part, markdown, wrong, criteria, json })
+    }
+
+    /// Diagnoses cases and grades the answers; `heads` are those of the tables' first columns.
+    fn answers(&self, part: Part, heads: [&str; 2], cases: &[Case]) -> Result<Done> {
+        let bar = bar(&part.name(), cases.len())?;
+        let answers = answer::run(cases, &diagnosis::answer, &bar);
+        bar.finish_and_clear();
+        let markdown = match part {
+            Part::Unforeseen => unforeseen::page(&answers),
+            _ => format!("{}\n{}", answer_table::legend(), answer_table::page(heads[0], heads[1], &answers)),
+        };
+        let wrong = answer_table::wrong(&answers);
+        Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!({"records": answers}) })
     }
 
     fn sensitivities(&self, part: Part, levels: &[f64]) -> Result<Done> {

@@ -42,7 +42,7 @@ impl Sampling {
         Self { rows, every_s: 0.02 * 10f64.powf(random.random_range(0.0..1.0)), uneven }
     }
 
-    fn times(&self, random: &mut ChaCha8Rng) -> Vec<f64> {
+    pub(super) fn times(&self, random: &mut ChaCha8Rng) -> Vec<f64> {
         let mut at = 0.0;
         (0..self.rows)
             .map(|_| {
