@@ -94,7 +94,7 @@ pub enum Verdict {
     Explained,
     /// Another set of causes explains the errors equally well.
     Ambiguous,
-    /// The residual holds structure that no known cause explains.
+    /// The residual holds structure that no known cause explains, or a linear model predicts better, or a cause does not extrapolate.
     Unexplained,
     /// The record does not identify gain and time constant.
     Insufficient,
@@ -149,7 +149,7 @@ pub struct Extended {
 pub struct Finding {
     /// Its cause code.
     pub cause: &'static str,
-    /// Probability of the cause against the best explanation without it, 0 to 1.
+    /// Probability of the cause, 0 to 1: against the best explanation without it, and against a law that no cause describes.
     pub probability: f64,
     /// Its parameters with their names, in the order of the cause's page in the manual.
     #[serde(serialize_with = "by_name")]

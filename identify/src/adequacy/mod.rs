@@ -17,6 +17,7 @@ mod absorbed_by_noise;
 mod check;
 mod comparison;
 mod excitation;
+mod free_run;
 mod gain_and_time_constant;
 mod in_step;
 mod localisation;
@@ -25,6 +26,7 @@ mod residual_regression;
 mod spikes;
 mod standstill;
 mod unidentifiable;
+mod voltage_history;
 
 pub use check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 pub(crate) use gain_and_time_constant::{gain_and_time_constant, model_of_both};
@@ -68,7 +70,7 @@ pub struct Entry {
 /// noise of 1 V, half of it independent and half autoregressive; `cargo run -p identify --example check_rates` prints the counts.
 /// The design rates are smaller: `in_step`, `spikes` and `residual_regression` are significant by chance in one of ten thousand
 /// records.
-pub static CHECKS: [Entry; 7] = [
+pub static CHECKS: [Entry; 8] = [
     Entry {
         check: &excitation::Excitation,
         when: When::BeforeSearch,
@@ -115,6 +117,14 @@ pub static CHECKS: [Entry; 7] = [
         looks_for: "far readings just after changes of the command, or in runs of one sign",
         false_alarm_rate: 0.015,
         departure: "an error of 30 V in the first two rows of every other step",
+        power: 0.98,
+    },
+    Entry {
+        check: &free_run::FreeRun,
+        when: When::ForReport,
+        looks_for: "a free-running error that earlier voltages predict",
+        false_alarm_rate: 0.015,
+        departure: "a time constant of 8 s instead of 5.5 s",
         power: 0.98,
     },
     Entry {

@@ -33,6 +33,7 @@ use crate::search::{Scored, Search, WarmStart};
 use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::diagnosis::{self, Diagnosis};
+use crate::verdict::linear_rival::compare;
 
 /// Finds out what the simulation gets wrong on a record.
 ///
@@ -48,7 +49,10 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
-    joint(std::slice::from_ref(record), options, None, &mut progress)
+    let records = std::slice::from_ref(record);
+    let mut found = joint(records, options, None, &mut progress)?;
+    compare(&mut found, best_linear(records, options.input));
+    Ok(found)
 }
 
 /// Finds out what the simulation gets wrong on all of several records of one spring; `only` limits the search to some causes.
@@ -87,7 +91,6 @@ pub(super) fn joint(
     let found = without_unsupported_terms(&examined, &base, found, progress);
     let mut found = found.restored(records, &normalisations);
     found.report.nominal = nominal(options);
-    found.report.linear = best_linear(records, options.input);
     found.report.complete = !budget.is_stopped();
     found.report.search = SearchReport {
         effort: options.effort.name(),

@@ -15,8 +15,11 @@ use simulation::record::Record;
 use crate::answer::{RecordReport, Verdict};
 use crate::examine::options::Options;
 use crate::examine::passes::{examine, joint};
+use crate::nominal::best_linear;
 use crate::plant::base::Base;
+use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
+use crate::verdict::linear_rival::compare;
 
 /// Causes that are looked for in each record alone: a hum has a phase of its own in each, and each has a zero of its own.
 const OF_ONE_RECORD: [&str; 2] = ["hum", "reading-offset"];
@@ -31,9 +34,10 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     if let [record] = records {
         return examine(record, options, progress);
     }
-    let mut shown = Vec::new();
+    let (input, mut shown) = (options.input, Vec::new());
     for record in records {
-        let alone = examine(record, options, |causes| progress(&format!("{}: {causes}", record.name)))?;
+        let record = std::slice::from_ref(record);
+        let alone = joint(record, options, None, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
         shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
@@ -45,13 +49,19 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let options = Options { plant, base: Base::new(spring)?, ..options.clone() };
     for (record, offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-        let alone = examine(&from_zero, &options, |causes| progress(&format!("{}: {causes}", record.name)))?;
+        let from_zero = [from_zero];
+        let alone = self::joint(&from_zero, &options, None, &mut |of| progress(&format!("{}: {of}", record.name)))?;
         joint.report.complete &= alone.report.complete;
         joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
     }
-    joint.report.verdict = verdict(&joint);
+    let verdict = verdict(&joint);
+    if verdict == Verdict::Unexplained && joint.report.verdict != verdict {
+        credibility::in_unexplained(&mut joint.report.findings, 0.0);
+    }
+    joint.report.verdict = verdict;
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
+    compare(&mut joint, best_linear(records, input));
     Ok(joint)
 }
 

@@ -168,15 +168,29 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     Ok(identified(records, models, units))
 }
 
+/// The best linear model of some records.
+#[derive(Clone, Debug)]
+pub struct BestLinear {
+    /// Its order and errors.
+    pub error: LinearError,
+    /// Readings less predictions by fits without the segment, in the reading's unit.
+    pub held_out: Vec<f64>,
+}
+
 /// Returns the best linear model of order 1 to 4 by its held-out error; `None` if there is none.
-pub fn best_linear(records: &[Record], input: Input) -> Option<LinearError> {
+pub fn best_linear(records: &[Record], input: Input) -> Option<BestLinear> {
     if input == Input::Stair || records.iter().any(|record| check(record).is_err()) {
         return None;
     }
-    let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
-    let models = Models::of(series, InputLaw::Linear);
-    let orders = models.errors().into_iter();
-    orders.min_by(|a, b| a.held_out_rmse.total_cmp(&b.held_out_rmse))
+    let problem = Problem::new(records.iter().map(|record| Series::new(record, input)).collect());
+    let fits = best_of_each_order(&problem).into_iter().enumerate().skip(1);
+    let with_error = |(order, fit): (usize, Fit)| {
+        let held_out = held_out_residual(&problem, &fit);
+        (order, root_mean_square(&held_out), held_out, fit)
+    };
+    let (order, held_out_rmse, held_out, fit) = fits.map(with_error).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let last_40_percent_rmse = last_part(&problem, &fit.poles);
+    Some(BestLinear { error: LinearError { order, held_out_rmse, last_40_percent_rmse }, held_out })
 }
 
 fn check(record: &Record) -> Result<()> {

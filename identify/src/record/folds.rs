@@ -23,6 +23,11 @@ pub(crate) fn folds(voltage_v: &[f64]) -> Vec<u8> {
             return stairs.iter().enumerate().flat_map(of_stair).collect();
         }
     }
+    folds_of_segments(rows)
+}
+
+/// Returns the fold of each of `rows` rows: segments of equal length in turn.
+pub(crate) fn folds_of_segments(rows: usize) -> Vec<u8> {
     let length = rows.div_ceil(SEGMENTS).max(SHORTEST_SEGMENT.count());
     // Each round begins with another fold; otherwise one fold would hold out all steps of a stair whose period is one
     // round.

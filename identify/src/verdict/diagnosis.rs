@@ -12,7 +12,9 @@ use crate::search::{Scored, WarmStart};
 
 use crate::stats::thresholds::empirical::{FINEST_V, SHARE_UNEXPLAINED, STEPS_BEYOND_BOUND};
 use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
+use crate::verdict::credibility;
 use crate::verdict::export::{export, restored};
+use crate::verdict::extrapolation::spoiling;
 use crate::verdict::finding::{explained, finding};
 use crate::verdict::found::{self, Found};
 use crate::verdict::margins;
@@ -43,6 +45,8 @@ pub struct Diagnosis {
     pub(crate) zero_offsets: Vec<f64>,
     /// How each reading was taken: exact or at a bound, on a quantisation grid, cut off.
     pub(crate) observed: Observed,
+    /// Readings less predictions of `extended` on held-out segments with searched places known, in the reading's unit.
+    pub(crate) held_out_in_place: Vec<f64>,
     /// Held-out log-likelihood of the extended simulation less the price of its causes, in nats.
     pub(crate) score: f64,
     /// From which a search under another reading of the same rows starts; `None` if no search was run.
@@ -89,14 +93,25 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
     for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
         *left -= observed.truncation_v;
     }
+    let held_out_in_place = engine.held_out_residual_in_place(extended);
     let unmodelled = adequacy::first_significant(engine, extended).filter(|found| found.rms > FINEST_V.get());
+    let left = || unmodelled.as_ref().map(|found| sentence(found, data.scales()));
+    let spoiling = spoiling(engine, &found);
+    let unfinished = engine.budget().was_cut() && adequacy::doubts(engine, extended);
     let before = quality(engine, &baseline, &held_out[0], false);
     let after = quality(engine, extended, &held_out[1], true);
 
-    let findings = findings(engine, &found);
+    let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
+    let unexplained = structured || !spoiling.is_empty() || unfinished;
+    let mut findings = findings(engine, &found);
+    credibility::with_unknown_laws(&mut findings);
+    credibility::of_spoiling(&mut findings, &spoiling);
+    if unexplained {
+        let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
+        credibility::in_unexplained(&mut findings, share * after.rmse.powi(2));
+    }
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
     let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).collect();
-    let unexplained = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let would_show = (findings.is_empty() && !unexplained)
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));
@@ -125,7 +140,12 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         would_show,
         alternatives,
         linear: None,
-        leftover: unmodelled.as_ref().map(|found| sentence(found, data.scales())),
+        leftover: match spoiling.first() {
+            _ if structured => left(),
+            Some(spoils) => Some(spoils.sentence(data.scales())),
+            None if unfinished => Some(UNFINISHED.to_owned()),
+            None => left(),
+        },
         noise: noise_report(&extended.noise),
         residual: residual_report(data, extended),
         records: Vec::new(),
@@ -139,6 +159,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         ranking,
         zero_offsets: engine.zero_offsets(extended),
         observed: observed.clone(),
+        held_out_in_place,
         score: found.best.score,
         warm_start: Some(found.warm_start),
         extended: found.best.fit,
@@ -165,6 +186,9 @@ fn verdict(unexplained: bool, alternatives: &[Vec<&'static str>], insufficient: 
         () => Verdict::Explained,
     }
 }
+
+/// The report's sentence on a search that its budget ended.
+const UNFINISHED: &str = "The search ended before it had tried all that it would, and the residual may hold structure: a larger effort may find more";
 
 /// The report's sentence on unmodelled dynamics.
 fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics, scales: &Scales) -> String {
@@ -204,6 +228,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         extended: baseline.clone(),
         baseline,
         plant: restored(engine, engine.base().file()),
+        held_out_in_place: held_out.clone(),
         held_out: [held_out.clone(), held_out],
         ranking: Vec::new(),
         zero_offsets: vec![0.0; data.parts.len()],

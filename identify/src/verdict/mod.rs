@@ -5,6 +5,8 @@
 //! | finding | a named cause with its parameters, its probability and the evidence for it |
 //! | rival, alternative | another set of causes that the record cannot reject |
 //! | odds | difference of two scores, in nats |
+//! | credibility | how much of what a finding removes an unknown law would not |
+//! | linear rival, extrapolation | what the extended simulation has to predict as well as: the best linear model, the model without a cause |
 //! | margins | smallest errors of gain and time constant that a record without findings would have shown |
 //! | export | the extended simulation as a plant file |
 //! | ranking | the best sets of causes compared by score and held-out error |
@@ -13,10 +15,13 @@
 //! [`diagnosis`] puts the parts together.
 
 pub mod alternatives;
+pub(crate) mod credibility;
 pub mod diagnosis;
 pub mod export;
+mod extrapolation;
 pub mod finding;
 pub(crate) mod found;
+pub(crate) mod linear_rival;
 pub mod margins;
 pub mod quality;
 pub mod ranking;

@@ -24,6 +24,7 @@ impl Diagnosis {
         for residual in [&mut self.baseline, &mut self.extended].map(|fit: &mut Fit| &mut fit.residual) {
             differences(residual, scales);
         }
+        differences(&mut self.held_out_in_place, scales);
         self.held_out.iter_mut().for_each(|residual| differences(residual, scales));
         for ranked in &mut self.ranking {
             ranked.rmse = scales.restored(Dimension::ReadingSize, ranked.rmse);

@@ -146,6 +146,12 @@ thresholds! {
     SHARE_AFTER_CHANGES = 0.5, "of the far readings", set by "cargo campaign out-of-model";
     /// Far readings come in runs if more of them are next to another of equal sign.
     SHARE_IN_RUNS = 0.2, "of the far readings";
+    /// Fewest blocks of rows whose means are regressed on earlier voltages.
+    FEWEST_BLOCKS = 200.0, "blocks";
+    /// Largest difference between the two finest octaves of white noise.
+    COLOUR_OF_WHITE = 4.0, "standard errors";
+    /// If earlier voltages predict more of an error that is not white, it is not noise: of 1/f noise they predict up to 0.2.
+    SHARE_OF_COLOURED_NOISE = 0.35, "of the error's mean square", set by "cargo campaign nulls";
     /// Fewest rows in each of the eight parts whose means are compared with the error's scale.
     ROWS_PER_SWING = 10.0, "rows";
     /// An error with more of its mean square in the parts' means is not stationary noise.
@@ -191,6 +197,18 @@ thresholds! {
     STEP_TO_REPORT = 0.5, "root mean square errors";
     /// The verdict is `unexplained` if unmodelled dynamics are more of the residual.
     SHARE_UNEXPLAINED = 0.1, "of the residual's mean square";
+    /// The verdict is `unexplained` if the held-out error is this many times that of the best linear model.
+    WORSE_THAN_LINEAR = 1.05, "errors of the linear model";
+    /// The verdict is `unexplained` if the last 40 % of the record are predicted with this many times the error without a cause.
+    WORSE_THAN_WITHOUT = 1.05, "errors without the cause";
+    /// Mean square error that a law of unknown form may leave for a further cause.
+    UNKNOWN_FORM = 0.01, "of the mean square that the largest other cause removes", set by "cargo campaign out-of-model";
+    /// Mean square error that an unknown law may remove from the rest.
+    UNKNOWN_NOISE = 0.1, "of the mean square that is left", set by "cargo campaign out-of-model";
+    /// Largest probability of a cause in a record with the verdict `unexplained`.
+    IF_UNEXPLAINED = 0.9, "probability", set by "cargo campaign out-of-model";
+    /// Largest probability of a cause with which the last 40 % of the record are predicted worse than without it.
+    IF_SPOILING = 0.5, "probability";
     /// Readings at a bound have saturated if the stiffness exceeds the bound by more in the mean.
     STEPS_BEYOND_BOUND = 0.5, "steps of the readings";
     /// A record is insufficient if an error of the gain as large as this could have been missed.

@@ -30,6 +30,9 @@ limits! {
     Z_LONG_MEMORY = 3.090_232_306_167_813, OneSided(1e-3);
     /// Standard normal quantile of 95 %: the power with which an error as large as a margin is found.
     Z_POWER = 1.644_853_626_951_473, OneSided(0.05);
+    /// Standard normal quantile of the difference of two errors over segments, which equally good models exceed in one of 100
+    /// records; beyond it, one predicts worse.
+    Z_WORSE = 2.326_347_874_040_841, OneSided(0.01);
     /// Number of standard errors beyond which the sensor's zero is wrong: one of 370 correct sensors exceeds it.
     Z_ZERO = 2.999_976_992_703_393, TwoSided(0.0027);
     /// Quantile of the correlation of Savage scores, multiplied by the square root of its degrees of freedom, that independent

@@ -1,0 +1,109 @@
+//! The probability of a finding, so that of all findings with a probability `p` the part `p` is true, whatever the spring's law.
+//!
+//! The odds against the best rival presume that one of the sets of causes that were compared is right. A spring may also follow a
+//! law that no cause describes; a second cause then corrects the form of the first, or follows what looks like noise. The more
+//! error a finding removes, compared with what such a law may leave, the less likely that is:
+//!
+//! ```text
+//! probability = 1 / (1 + exp(-odds)) * removed / (removed + UNKNOWN_FORM other + UNKNOWN_NOISE left)
+//! ```
+//!
+//! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
+//! which do not respond to the voltage and correct no law), and that is left. Where
+//! another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
+//!
+//! ```text
+//! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
+//! ```
+
+use crate::answer::Finding;
+use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
+use crate::verdict::extrapolation::Spoils;
+use crate::verdict::finding::explained;
+
+/// Causes that exact equality of readings proves.
+const EXACT: [&str; 2] = ["quantisation", "sensor-saturation"];
+
+/// Causes that do not respond to the voltage, so that they correct no law.
+const APART: [&str; 2] = ["hum", "outliers"];
+
+/// Lowers probabilities by the chance that a law which no cause describes is behind a finding.
+pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
+    let removed: Vec<f64> = findings.iter().map(|finding| explained(finding).max(0.0)).collect();
+    let largest_but = |index: usize| {
+        let others = removed.iter().enumerate().filter(|(other, _)| *other != index);
+        others.map(|(_, removed)| *removed).fold(0.0, f64::max)
+    };
+    let own = |(index, finding): (usize, &Finding)| {
+        let form = if APART.contains(&finding.cause) { 0.0 } else { UNKNOWN_FORM.get() * largest_but(index) };
+        let unknown = form + UNKNOWN_NOISE.get() * finding.rmse_after.powi(2);
+        if EXACT.contains(&finding.cause) { 1.0 } else { part(removed[index], unknown) }
+    };
+    let own: Vec<f64> = findings.iter().enumerate().map(own).collect();
+    for (index, finding) in findings.iter_mut().enumerate() {
+        let others_known: f64 =
+            own.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, own)| own).product();
+        lower(finding, own[index] * (1.0 - (1.0 - IF_UNEXPLAINED.get()) * (1.0 - others_known)));
+    }
+}
+
+/// Lowers probabilities in a record with the verdict `unexplained`, in which `structure` is the mean square error beyond noise, in
+/// the squared unit of the findings' errors.
+pub(crate) fn in_unexplained(findings: &mut [Finding], structure: f64) {
+    for finding in findings {
+        let factor = IF_UNEXPLAINED.get() * part(explained(finding).max(0.0), structure.max(0.0));
+        lower(finding, factor);
+    }
+}
+
+/// Lowers probabilities of causes that spoil an extrapolation.
+pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
+    let spoils = |finding: &&mut Finding| spoiling.iter().any(|spoils| spoils.is(finding));
+    findings.iter_mut().filter(spoils).for_each(|finding| lower(finding, IF_SPOILING.get()));
+}
+
+/// Part of the sum that is `removed`; 1 if both are 0.
+fn part(removed: f64, unknown: f64) -> f64 {
+    if unknown > 0.0 { removed / (removed + unknown) } else { 1.0 }
+}
+
+fn lower(finding: &mut Finding, factor: f64) {
+    if !EXACT.contains(&finding.cause) {
+        finding.probability *= factor;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A finding that removes errors down to 1 V.
+    fn finding(cause: &'static str, before: f64) -> Finding {
+        let (parameters, evidence) = (Vec::new(), String::new());
+        Finding { cause, probability: 1.0, parameters, rmse_before: before, rmse_after: 1.0, evidence }
+    }
+
+    fn probabilities(findings: &[Finding]) -> Vec<f64> {
+        findings.iter().map(|finding| finding.probability).collect()
+    }
+
+    #[test]
+    fn small_corrections_of_a_large_cause_are_less_likely_than_causes_of_their_own() {
+        let mut findings = [finding("hysteresis", 20.0), finding("resonance", 1.3), finding("quantisation", 1.0)];
+        with_unknown_laws(&mut findings);
+        let [large, small, exact] = probabilities(&findings)[..] else { panic!() };
+        // Some law is then unknown.
+        assert!((0.9..0.95).contains(&large) && small < 0.3 && exact == 1.0, "{large} {small} {exact}");
+        let mut findings = [finding("hysteresis", 20.0), finding("resonance", 15.0), finding("hum", 4.0)];
+        with_unknown_laws(&mut findings);
+        assert!(probabilities(&findings).iter().all(|probability| *probability > 0.97), "{findings:?}");
+    }
+
+    #[test]
+    fn causes_that_leave_structure_are_at_most_as_likely_as_what_they_remove_of_it() {
+        let mut findings = [finding("hysteresis", 20.0), finding("drift", 1.2)];
+        in_unexplained(&mut findings, 0.5);
+        let [large, small] = probabilities(&findings)[..] else { panic!() };
+        assert!((0.89..0.9).contains(&large) && small < 0.5, "{large} {small}");
+    }
+}

@@ -1,0 +1,129 @@
+//! Whether a linear model predicts held-out segments better than the extended simulation.
+//!
+//! A linear model has its own zero and free responses, which follow slow noise that no simulation knows. So a cubic of the time is
+//! removed from both errors before they are compared, segment by segment:
+//!
+//! ```text
+//! z = sum_k d_k / sqrt(sum_k d_k^2)        d_k: sum of squares of the extension less that of the linear model in segment k
+//! ```
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::answer::Verdict;
+use crate::dimension::Dimension;
+use crate::nominal::BestLinear;
+use crate::record::observed::Kind;
+use crate::stats::scale::root_mean_square;
+use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::WORSE_THAN_LINEAR;
+use crate::stats::thresholds::probability::Z_WORSE;
+use crate::verdict::alternatives::next_experiment;
+use crate::verdict::credibility;
+use crate::verdict::diagnosis::Diagnosis;
+
+/// Number of segments that are compared.
+const SEGMENTS: usize = 40;
+/// Coefficients of the cubic.
+const COEFFICIENTS: usize = 4;
+
+/// Adds the best linear model to a diagnosis, which explains nothing if that predicts better.
+pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<BestLinear>) {
+    let Some(linear) = linear else { return };
+    let report = &mut diagnosis.report;
+    report.linear = Some(linear.error);
+    let judged = matches!(report.verdict, Verdict::Explained | Verdict::Consistent | Verdict::Ambiguous);
+    let (ours, theirs) = (&diagnosis.held_out_in_place, &linear.held_out);
+    if !judged || ours.len() != theirs.len() || ours.len() < SEGMENTS {
+        return;
+    }
+    // A reading at a bound of the sensor says little about either.
+    let exact = |errors: &[f64]| -> Vec<f64> {
+        let rows = errors.iter().zip(&diagnosis.observed.kinds);
+        rows.map(|(error, kind)| if *kind == Kind::Exact { *error } else { 0.0 }).collect()
+    };
+    let [ours, theirs] = [ours, theirs].map(|errors| exact(errors));
+    let [ours_less, theirs_less] = [&ours, &theirs].map(|errors| without_cubic(errors, &diagnosis.data.time_s));
+    if !is_worse(&ours_less, &theirs_less, WORSE_THAN_LINEAR.get()) {
+        return;
+    }
+    let shown = |errors: &[f64]| {
+        diagnosis.data.normalisation.scales.with_unit(Dimension::ReadingSize, root_mean_square(errors), 3)
+    };
+    if report.verdict != Verdict::Unexplained {
+        let beyond = root_mean_square(&ours).powi(2) - root_mean_square(&theirs).powi(2);
+        credibility::in_unexplained(&mut report.findings, beyond);
+    }
+    report.verdict = Verdict::Unexplained;
+    report.next_experiment = next_experiment(report.verdict, &report.findings, &report.alternatives, false);
+    report.leftover = Some(format!(
+        "A linear model of order {} predicts held-out segments better than this simulation, with an error of {} instead of {}",
+        linear.error.order,
+        shown(&theirs),
+        shown(&ours)
+    ));
+}
+
+/// True if the errors `ours` are larger than `theirs` by more than a `factor` in root mean square, and beyond chance.
+pub(crate) fn is_worse(ours: &[f64], theirs: &[f64], factor: f64) -> bool {
+    if root_mean_square(ours) <= factor * root_mean_square(theirs) {
+        return false;
+    }
+    let length = ours.len().div_ceil(SEGMENTS).max(1);
+    let more = |(ours, theirs): (&[f64], &[f64])| dot(ours, ours) - dot(theirs, theirs);
+    let more: Vec<f64> = ours.chunks(length).zip(theirs.chunks(length)).map(more).collect();
+    more.iter().sum::<f64>() > Z_WORSE * dot(&more, &more).sqrt()
+}
+
+/// Errors less their best cubic of the time.
+fn without_cubic(errors: &[f64], time_s: &[f64]) -> Vec<f64> {
+    let (first, last) = (time_s[0], time_s[time_s.len() - 1]);
+    let scale = (last - first).max(f64::MIN_POSITIVE);
+    let powers = DMatrix::from_fn(errors.len(), COEFFICIENTS, |row, power| {
+        (2.0 * (time_s[row] - first) / scale - 1.0).powi(power as i32)
+    });
+    let errors = DVector::from_row_slice(errors);
+    let Some(factor) = powers.tr_mul(&powers).cholesky() else { return errors.as_slice().to_vec() };
+    let cubic = &powers * factor.solve(&powers.tr_mul(&errors));
+    (errors - cubic).as_slice().to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::scale::normals;
+
+    const ROWS: usize = 2000;
+
+    fn time_s() -> Vec<f64> {
+        (0..ROWS).map(|row| 0.1 * row as f64).collect()
+    }
+
+    /// True if errors of `times` the noise, with a sine of an amplitude over the whole record, are worse than the noise.
+    fn worse(times: f64, slow: f64) -> bool {
+        let noise = normals(2 * ROWS);
+        let swing = |row: usize| slow * (2.0 * row as f64 / ROWS as f64).sin();
+        let ours: Vec<f64> = (0..ROWS).map(|row| times * noise[row] + swing(row)).collect();
+        let [ours, theirs] = [&ours, &noise[ROWS..].to_vec()].map(|errors| without_cubic(errors, &time_s()));
+        is_worse(&ours, &theirs, WORSE_THAN_LINEAR.get())
+    }
+
+    #[test]
+    fn a_larger_error_is_worse_beyond_chance_and_margin() {
+        assert!(worse(1.2, 0.0) && !worse(1.0, 0.0) && !worse(1.03, 0.0));
+    }
+
+    /// The free responses of a linear model follow slow noise.
+    #[test]
+    fn slow_noise_does_not_make_a_linear_model_better() {
+        assert!(!worse(1.0, 2.0));
+    }
+
+    /// One segment with a large error tells nothing about the others.
+    #[test]
+    fn one_bad_segment_is_not_beyond_chance() {
+        let theirs = normals(ROWS);
+        let mut ours = theirs.clone();
+        ours[200..250].iter_mut().for_each(|error| *error += 10.0);
+        assert!(!is_worse(&ours, &theirs, WORSE_THAN_LINEAR.get()));
+    }
+}

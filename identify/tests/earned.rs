@@ -1,0 +1,80 @@
+//! The verdict `explained`, and a high probability, have to be earned: on records of laws that no cause describes, of two lags in
+//! series that only a linear model knows, and of a change that ends.
+
+use identify::{Effort, Options, Report, Stop, Verdict, diagnose};
+use simulation::record::{Record, Row};
+
+const ROWS: usize = 2400;
+const SAMPLE_S: f64 = 0.1;
+
+/// Independent noise of variance 1: sums of twelve uniform numbers.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        (0..12).map(|_| uniform()).sum()
+    }
+}
+
+/// A record under 48 levels of 5 s each; `step` moves the relaxed part, and `read` is the stiffness, of voltage, state and time.
+fn record(step: impl Fn(f64, f64, f64) -> f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
+    let (mut state, mut noise) = (0.0, noise(11));
+    let row = |row: usize| {
+        let (time_s, voltage_v) =
+            (SAMPLE_S * row as f64, if row < 50 { 0.0 } else { 50.0 * (row / 50 * 7 % 11) as f64 });
+        let measured = Some(read(voltage_v, state, time_s) + noise());
+        state = step(voltage_v, state, time_s);
+        Row { line: row + 2, time_s, voltage_v, measured }
+    };
+    Record { name: "record".into(), rows: (0..ROWS).map(row).collect() }
+}
+
+fn lag(voltage_v: f64, state: f64, tau_s: f64) -> f64 {
+    voltage_v + (state - voltage_v) * f64::exp(-SAMPLE_S / tau_s)
+}
+
+fn plain(voltage_v: f64, state: f64) -> f64 {
+    voltage_v / 11.0 + state / 1.1
+}
+
+fn report(record: &Record) -> Report {
+    diagnose(record, &Options::default()).unwrap()
+}
+
+/// The time constant grows by a tenth in the first half of the record. The residual of the best causes, 2.3 times the noise, passes
+/// for autocorrelated noise with innovations of 1.09 V.
+#[test]
+fn a_law_that_no_cause_describes_is_not_explained() {
+    let found = report(&record(
+        |voltage_v, state, time_s| lag(voltage_v, state, 5.5 * (1.0 + 0.1 * (time_s / 120.0).min(1.0))),
+        |voltage_v, state, _| plain(voltage_v, state),
+    ));
+    assert_eq!(found.verdict, Verdict::Unexplained, "{found:?}");
+    assert!(found.findings.iter().all(|finding| finding.probability <= 0.9), "{:?}", found.findings);
+}
+
+/// A search that was stopped has nothing to say on what it has not tried.
+#[test]
+fn a_search_that_was_cut_is_not_explained_while_errors_are_left() {
+    let record =
+        record(|voltage_v, state, _| lag(voltage_v, state, 5.7), |voltage_v, state, _| plain(voltage_v, state));
+    let stop = Stop::after(std::time::Duration::ZERO);
+    let found = diagnose(&record, &Options { effort: Effort::Quick, stop, ..Options::default() }).unwrap();
+    assert_eq!(found.verdict, Verdict::Unexplained, "{found:?}");
+    assert!(found.leftover.is_some());
+    assert_eq!(report(&record).verdict, Verdict::Explained);
+}
+
+/// A gain error is as certain as before; the best linear model knows it as well.
+#[test]
+fn a_cause_that_leaves_nothing_but_noise_is_explained_and_sure() {
+    let found = report(&record(
+        |voltage_v, state, _| lag(voltage_v, state, 5.5),
+        |voltage_v, state, _| 1.1 * plain(voltage_v, state),
+    ));
+    assert_eq!((found.verdict, found.findings[0].cause), (Verdict::Explained, "gain-error"), "{found:?}");
+    assert!(found.findings[0].probability > 0.99, "{:?}", found.findings[0]);
+}
