@@ -12,7 +12,9 @@ use serde_json::Value;
 use simulation::plant_file::PlantFile;
 use simulation::record::Record;
 
+use super::part::Job;
 use super::score::{Estimate, Report, estimates};
+use crate::ground_truth::out_of_model::form::Form;
 use crate::ground_truth::{Cause, LabelledRecord};
 
 /// A probability above which a wrong name counts as confidently wrong.
@@ -70,8 +72,8 @@ impl From<LabelledRecord> for Subject {
 pub struct Case {
     /// Row of the first table in which the record counts.
     pub group: String,
-    /// Row of the second table in which the record counts.
-    pub kind: String,
+    /// Rows of the further tables in which the record counts.
+    pub kinds: Vec<String>,
     /// Seed of the record.
     pub seed: u64,
     /// True names.
@@ -82,7 +84,7 @@ pub struct Case {
 
 impl Debug for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, {}, seed {}", self.group, self.kind, self.seed)
+        write!(f, "{}, {}, seed {}", self.group, self.kinds.join(", "), self.seed)
     }
 }
 
@@ -102,8 +104,8 @@ pub struct Named {
 pub struct Answer {
     /// Row of the first table.
     pub group: String,
-    /// Row of the second table.
-    pub kind: String,
+    /// Rows of the further tables.
+    pub kinds: Vec<String>,
     /// Seed of the record.
     pub seed: u64,
     /// Verdict of the report; `failed` if there was no report.
@@ -130,10 +132,10 @@ impl Answer {
     /// Grades the JSON of a diagnosis.
     pub fn of(case: &Case, subject: &Subject, report: Result<Value>) -> Self {
         let report = report.and_then(|json| serde_json::from_value::<Report>(json).context("expected a report"));
-        let Case { group, kind, seed, expected, .. } = case;
+        let Case { group, kinds, seed, expected, .. } = case;
         let mut answer = Self {
             group: group.clone(),
-            kind: kind.clone(),
+            kinds: kinds.clone(),
             seed: *seed,
             verdict: "failed".to_owned(),
             found: Vec::new(),
@@ -207,6 +209,25 @@ impl Answer {
     }
 }
 
+impl From<Job> for Case {
+    /// A record of a part of the campaign, in which exactly its causes are true.
+    fn from(Job { group, recipe, seed }: Job) -> Self {
+        let expected = Expected::exactly(&recipe.causes);
+        Self { group, kinds: Vec::new(), seed, expected, draw: Box::new(move |seed| recipe.draw(seed).into()) }
+    }
+}
+
+impl From<(Form, u64)> for Case {
+    /// A record of the out-of-model set.
+    fn from((form, seed): (Form, u64)) -> Self {
+        let names = |causes: &[Cause]| causes.iter().map(|cause| cause.name()).collect::<Vec<_>>();
+        let first = [&[form.cause], form.or].concat();
+        let expected = Expected { first: names(&first), also: names(form.also), ..Expected::default() };
+        let draw = Box::new(move |seed| form.draw(seed).into());
+        Self { group: form.name.to_owned(), kinds: Vec::new(), seed, expected, draw }
+    }
+}
+
 /// Draws and diagnoses the records on all cores; the answers are in the order of the cases.
 pub fn run(
     cases: &[Case],
@@ -232,7 +253,7 @@ pub(super) mod tests {
     /// A case of the causes, whose answers are graded without a diagnosis.
     pub(in crate::campaign) fn case(expected: Expected) -> Case {
         let draw = Box::new(|seed| Recipe { rows: 20, ..Recipe::of(&[]) }.draw(seed).into());
-        Case { group: "a".into(), kind: "b".into(), seed: 1, expected, draw }
+        Case { group: "a".into(), kinds: vec!["b".into()], seed: 1, expected, draw }
     }
 
     fn graded(expected: Expected, report: Value) -> Answer {

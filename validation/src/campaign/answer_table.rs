@@ -18,10 +18,12 @@ wrong*: `explained` with an untrue finding. *Sure, wrong*: an untrue finding wit
     )
 }
 
-/// Both tables of the answers; the column of the first one is headed `what`, that of the second one `kind`.
-pub fn page(what: &str, kind: &str, answers: &[Answer]) -> String {
+/// All tables of the answers; the first column of the first one is headed `what`, those of the others `kinds`.
+pub fn page(what: &str, kinds: &[&str], answers: &[Answer]) -> String {
     let mut text = named(what, answers, |answer| &answer.group);
-    write!(text, "\n{}", named(kind, answers, |answer| &answer.kind)).expect("a string");
+    for (index, kind) in kinds.iter().enumerate() {
+        write!(text, "\n{}", named(kind, answers, |answer| &answer.kinds[index])).expect("a string");
+    }
     text
 }
 
@@ -86,11 +88,11 @@ fn tally<'a>(names: impl Iterator<Item = &'a str>) -> String {
 pub fn wrong(answers: &[Answer]) -> String {
     let mut text = String::new();
     for answer in answers.iter().filter(|answer| !answer.is_right() && !answer.is_honest()) {
-        let Answer { group, kind, seed, verdict, found, missing, failure, .. } = answer;
+        let Answer { group, kinds, seed, verdict, found, missing, failure, .. } = answer;
         let found: Vec<_> = found.iter().map(|named| format!("{} {:.3}", named.cause, named.probability)).collect();
         let found = failure.clone().unwrap_or_else(|| found.join(", "));
         let missing = if missing.is_empty() { String::new() } else { format!(", missing {}", missing.join(", ")) };
-        writeln!(text, "{group}, {kind}, seed {seed}: {verdict} [{found}]{missing}").expect("a string");
+        writeln!(text, "{group}, {}, seed {seed}: {verdict} [{found}]{missing}", kinds.join(", ")).expect("a string");
     }
     text
 }
@@ -114,7 +116,7 @@ mod tests {
             json!({"verdict": "consistent", "findings": []}),
         ];
         let answers: Vec<_> = reports.map(|report| Answer::of(&case, &subject, Ok(report))).into();
-        let page = page("group", "kind", &answers);
+        let page = page("group", &["kind"], &answers);
         let row =
             "4 | 25 % | 50 % | 25 % | 25 % | 25 % | 25 % | explained 2, ambiguous 1, consistent 1 | hum 2 | drift 3 |";
         assert_eq!(page.matches(row).count(), 4, "{page}");

@@ -17,8 +17,10 @@
 //! | [`sensitivity`] | the smallest effect that is named |
 //! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
 //! | [`scales`] | single effects in springs of any size, in any unit |
+//! | [`plants`] | single effects in springs of several time constants, other schedules and noise |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
 //! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made |
+//! | [`reliability`] | stated probabilities compared with frequencies, over all sets |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
 
@@ -32,7 +34,9 @@ pub mod isolable;
 pub mod mixture;
 pub mod out_of_model;
 pub mod part;
+pub mod plants;
 pub mod real;
+pub mod reliability;
 pub mod rivals;
 pub mod scales;
 pub mod score;

@@ -20,7 +20,7 @@ fn of(causes: Vec<Cause>, plain: PlainSteps, seed: u64) -> Case {
     let names: Vec<_> = causes.iter().map(|cause| cause.name()).collect();
     Case {
         group: if names.is_empty() { "no effect".to_owned() } else { names.join(" + ") },
-        kind: plain.name(),
+        kinds: vec![plain.name()],
         seed,
         expected: Expected::exactly(&causes),
         draw: Box::new(move |seed| plain.draw(&causes, seed).into()),
