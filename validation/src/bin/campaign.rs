@@ -9,7 +9,8 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use validation::campaign::answer::{self, Case};
+use validation::campaign::answer;
+use validation::campaign::case::Case;
 use validation::campaign::diagnosis::{self, diagnose};
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
@@ -53,8 +54,9 @@ struct Cli {
     /// Parts to run
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
-    /// Records per cause (singles, scales, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
-    /// shared, long), in total (nulls, triples), or times 53 (thresholds)
+    /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
+    /// unforeseen), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in total (nulls,
+    /// triples), or times 53 (thresholds) or 570 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -151,7 +153,7 @@ enum Part {
     Long,
     /// One effect in few rows, uneven rows, coloured, heavy-tailed or strong noise: 5 records of each cause
     Stress,
-    /// Stated probabilities compared with frequencies, over all other sets: 1 record of each case, 4 of each cause
+    /// Stated probabilities compared with frequencies, over all sets: 1 record of each case, 3 of each cause
     Reliability,
     /// Smallest effect that is named: 20 records of each cause and size
     Small,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::answer::{Answer, SURE};
+use super::answer::{Answer, CERTAIN, SURE};
 use super::tables::percent;
 use crate::markdown::table;
 
@@ -13,7 +13,8 @@ pub fn legend() -> String {
         "\
 *Right*: the first finding is a true cause, every true cause is named, nothing untrue is; `consistent` without an effect. *Honest*:
 not right, but `ambiguous`, `insufficient` or `unexplained` with the truth among findings, alternatives or suspects. *Explained,
-wrong*: `explained` with an untrue finding. *Sure, wrong*: an untrue finding with a probability above {SURE}.
+wrong*: `explained` with an untrue finding. *Sure, wrong*: an untrue finding with a probability above {SURE}. *True at {CERTAIN}*: findings
+of this probability or more that are true.
 "
     )
 }
@@ -46,6 +47,7 @@ pub fn named(what: &str, answers: &[Answer], key: impl Fn(&Answer) -> &str) -> S
         "honest",
         "explained, wrong",
         "sure, wrong",
+        "true at 0.99",
         "verdicts",
         "untrue names",
         "missing names",
@@ -59,6 +61,8 @@ fn row(group: &str, answers: &[&Answer]) -> Vec<String> {
     };
     let with_effect: Vec<_> = answers.iter().filter(|answer| !answer.null).collect();
     let first = with_effect.iter().filter(|answer| answer.first_is_right).count() as f64 / with_effect.len() as f64;
+    let certain: Vec<_> =
+        answers.iter().flat_map(|answer| &answer.found).filter(|named| named.probability >= CERTAIN).collect();
     let untrue = answers.iter().flat_map(|answer| &answer.found).filter(|named| !named.is_true);
     vec![
         group.to_owned(),
@@ -69,6 +73,7 @@ fn row(group: &str, answers: &[&Answer]) -> Vec<String> {
         share(&Answer::is_honest),
         share(&Answer::explains_wrongly),
         share(&Answer::is_sure_and_wrong),
+        format!("{} of {}", certain.iter().filter(|named| named.is_true).count(), certain.len()),
         tally(answers.iter().map(|answer| answer.verdict.as_str())),
         tally(untrue.map(|named| named.cause.as_str())),
         tally(answers.iter().flat_map(|answer| &answer.missing).copied()),
@@ -102,7 +107,8 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::campaign::answer::{Expected, tests::case};
+    use crate::campaign::answer::tests::case;
+    use crate::campaign::case::Expected;
     use crate::ground_truth::Cause;
 
     #[test]
@@ -117,8 +123,7 @@ mod tests {
         ];
         let answers: Vec<_> = reports.map(|report| Answer::of(&case, &subject, Ok(report))).into();
         let page = page("group", &["kind"], &answers);
-        let row =
-            "4 | 25 % | 50 % | 25 % | 25 % | 25 % | 25 % | explained 2, ambiguous 1, consistent 1 | hum 2 | drift 3 |";
+        let row = "4 | 25 % | 50 % | 25 % | 25 % | 25 % | 25 % | 1 of 1 | explained 2, ambiguous 1, consistent 1 | hum 2 | drift 3 |";
         assert_eq!(page.matches(row).count(), 4, "{page}");
         assert_eq!(wrong(&answers).lines().count(), 2, "{}", wrong(&answers));
     }

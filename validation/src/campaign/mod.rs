@@ -11,7 +11,8 @@
 //! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
 //! | [`score`] | the diagnosis of one record compared with the truth |
 //! | [`part`], [`summary`] | the parts of the campaign, and the counts over their records |
-//! | [`answer`], [`answer_table`] | diagnoses graded by the names that are true of a record; their tables |
+//! | [`case`] | records that can be drawn, with the names that are true of them |
+//! | [`answer`], [`answer_table`] | diagnoses graded by these names; their tables |
 //! | [`shared`] | pairs of causes that share a stage or mimic each other |
 //! | [`steps`] | plain steps of one to three levels |
 //! | [`sensitivity`] | the smallest effect that is named |
@@ -26,6 +27,7 @@
 
 pub mod answer;
 pub mod answer_table;
+pub mod case;
 pub mod cramer_rao;
 pub mod criteria;
 pub mod detectable;

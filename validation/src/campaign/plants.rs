@@ -8,7 +8,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::answer::{Case, Expected, Subject};
+use super::case::{Case, Expected, Subject};
 use super::part::seed;
 use super::scales;
 use super::{detectable, isolable};

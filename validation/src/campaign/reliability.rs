@@ -3,7 +3,8 @@
 
 use std::fmt::Write;
 
-use super::answer::{Answer, Case, Named};
+use super::answer::{Answer, CERTAIN, Named};
+use super::case::Case;
 use super::statistics::wilson;
 use super::tables::percent;
 use super::{out_of_model, part, plants, shared, steps, unforeseen};
@@ -18,18 +19,19 @@ const LAWS: [&str; 2] = ["out-of-model", "unforeseen"];
 /// A set's name with its graded diagnoses.
 pub type Graded = (&'static str, Vec<Answer>);
 
-/// The sets with their records: `count` of each case, 4 times as many of each single cause, 60 times as many nulls.
+/// The sets with their records: `count` of each case, 3 times as many of each single cause, twice as many in other plants, and 30
+/// times as many nulls.
 pub fn sets(first: u64, count: usize) -> Vec<(&'static str, Vec<Case>)> {
     let jobs = |jobs: Vec<part::Job>| jobs.into_iter().map(Case::from).collect();
     // Seeds of their own, so that these are not the records of the other pages.
     let first = first + 1_000;
     vec![
-        ("singles", jobs(part::singles(first, 4 * count))),
-        ("nulls", jobs(part::nulls(first, 60 * count))),
+        ("singles", jobs(part::singles(first, 3 * count))),
+        ("nulls", jobs(part::nulls(first, 30 * count))),
         ("pairs", jobs(part::pairs(first, count))),
         ("shared", shared::cases(first, count)),
         ("steps", steps::cases(first, count)),
-        ("plants", plants::cases(first, 3 * count)),
+        ("plants", plants::cases(first, count)),
         (
             LAWS[0],
             out_of_model::jobs(&ground_truth::out_of_model::all(), first, 2 * count)
@@ -37,12 +39,12 @@ pub fn sets(first: u64, count: usize) -> Vec<(&'static str, Vec<Case>)> {
                 .map(Case::from)
                 .collect(),
         ),
-        (LAWS[1], unforeseen::cases(first, 2 * count)),
+        (LAWS[1], unforeseen::cases(first, count)),
     ]
 }
 
 /// Findings of the sets that `which` selects.
-fn findings<'a>(sets: &'a [Graded], which: impl Fn(&str) -> bool) -> Vec<&'a Named> {
+fn findings(sets: &[Graded], which: impl Fn(&str) -> bool) -> Vec<&Named> {
     sets.iter()
         .filter(|(name, _)| which(name))
         .flat_map(|(_, answers)| answers)
@@ -110,7 +112,7 @@ Own causes: {}. Other laws: {}.
     );
     let row = |(set, answers): &Graded| {
         let findings: Vec<&Named> = answers.iter().flat_map(|answer| &answer.found).collect();
-        let sure: Vec<_> = findings.iter().filter(|named| named.probability >= 0.99).collect();
+        let sure: Vec<_> = findings.iter().filter(|named| named.probability >= CERTAIN).collect();
         let intervals: Vec<bool> =
             answers.iter().flat_map(|a| &a.parameters).map(|estimate| estimate.covered).collect();
         let count = |is: &dyn Fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
@@ -204,7 +206,8 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::campaign::answer::{Expected, tests::case};
+    use crate::campaign::answer::tests::case;
+    use crate::campaign::case::Expected;
     use crate::ground_truth::Cause;
 
     fn answers(probability: f64, right: usize, wrong: usize) -> Vec<Answer> {

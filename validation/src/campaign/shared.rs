@@ -1,7 +1,7 @@
 //! Pairs of causes that [`part::pairs`](super::part::pairs) leaves out because they share a stage of the chain, and pairs that can
 //! mimic each other across stages.
 
-use super::answer::{Case, Expected};
+use super::case::{Case, Expected};
 use super::part::seed;
 use crate::ground_truth::Cause::{self, *};
 use crate::ground_truth::record::Recipe;

@@ -1,6 +1,6 @@
 //! Plain step experiments: each cause that such a record can show, gain and time constant off together, and no effect.
 
-use super::answer::{Case, Expected};
+use super::case::{Case, Expected};
 use super::part::seed;
 use crate::ground_truth::Cause;
 use crate::ground_truth::plain_steps::PlainSteps;

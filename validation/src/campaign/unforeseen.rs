@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use super::answer::{Answer, Case, Expected, Subject};
+use super::answer::Answer;
 use super::answer_table::{legend, page as tables};
+use super::case::{Case, Expected, Subject};
 use super::part::seed;
 use crate::ground_truth::unforeseen::all;
 use crate::ground_truth::unforeseen::law::Law;
