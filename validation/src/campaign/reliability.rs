@@ -31,13 +31,10 @@ pub fn sets(first: u64, count: usize) -> Vec<(&'static str, Vec<Case>)> {
         ("pairs", jobs(part::pairs(first, count))),
         ("shared", shared::cases(first, count)),
         ("steps", steps::cases(first, count)),
-        ("plants", plants::cases(first, count)),
+        ("plants", plants::cases(first, 2 * count)),
         (
             LAWS[0],
-            out_of_model::jobs(&ground_truth::out_of_model::all(), first, 2 * count)
-                .into_iter()
-                .map(Case::from)
-                .collect(),
+            out_of_model::jobs(&ground_truth::out_of_model::all(), first, count).into_iter().map(Case::from).collect(),
         ),
         (LAWS[1], unforeseen::cases(first, count)),
     ]
