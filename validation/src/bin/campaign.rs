@@ -56,7 +56,7 @@ struct Cli {
     parts: Vec<Part>,
     /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
     /// unforeseen), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in total (nulls,
-    /// triples), or times 53 (thresholds) or 570 (reliability)
+    /// triples), or times 53 (thresholds) or 455 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -168,7 +168,7 @@ enum Part {
     Unforeseen,
     /// One effect in a spring of any time constant, share, full scale and unit: 20 records of each cause
     Scales,
-    /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 12 records of each cause
+    /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 8 records of each cause
     Plants,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
     Rivals,
@@ -309,7 +309,7 @@ impl Cli {
             Part::Shared => self.answers(part, &["causes", "size"], &shared::cases(first, self.count(3))),
             Part::Steps => self.answers(part, &["causes", "experiment"], &steps::cases(first, self.count(3))),
             Part::Plants => {
-                let cases = plants::cases(first, self.count(12));
+                let cases = plants::cases(first, self.count(8));
                 self.answers(part, &["cause", "schedule", "noise", "time constants"], &cases)
             }
             Part::Reliability => {

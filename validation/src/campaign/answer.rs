@@ -108,10 +108,12 @@ impl Answer {
         self.failure.is_none() && self.found.iter().all(|named| named.is_true)
     }
 
-    /// True if the findings are correct: the first one right, nothing missing, nothing untrue; `consistent` without an effect.
+    /// True if the findings are correct: the first one right, nothing missing, nothing untrue. Without an effect: `consistent`, or
+    /// only what is true in addition.
     pub fn is_right(&self) -> bool {
         let none = self.or_none && self.verdict == "consistent" && self.found.is_empty();
-        none || !self.null && self.first_is_right && self.missing.is_empty() && self.nothing_untrue()
+        let named = if self.null { !self.found.is_empty() } else { self.first_is_right && self.missing.is_empty() };
+        none || named && self.nothing_untrue()
     }
 
     /// True if the answer is not right but leaves room for the truth: `ambiguous`, `insufficient` or `unexplained`, with the truth
@@ -205,12 +207,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_record_without_an_effect_is_right_only_if_it_is_called_consistent() {
+    fn a_record_without_an_effect_is_right_if_it_is_called_consistent() {
         assert!(graded(Expected::default(), report("consistent", &[], &[])).is_right());
         let insufficient = graded(Expected::default(), report("insufficient", &[], &[]));
         assert!(!insufficient.is_right() && insufficient.is_honest());
         let found = graded(Expected::default(), report("unexplained", &[("hum", 0.5)], &[]));
         assert!(!found.is_right() && !found.is_honest());
+        let rounded = Expected { also: vec!["quantisation"], or_none: true, ..Expected::default() };
+        assert!(graded(rounded, report("explained", &[("quantisation", 1.0)], &[])).is_right());
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Single effects in other springs: nominal time constants from 1 ms to 1 h, one to three of them, shares from 0 to 0.8, full scales
 //! from 1 mV to 10 kV; stairs, random levels, multisines, chirps and ramps; white, coloured and rounded noise.
 //!
-//! As in [`scales`], the record is simulated in the paper's units and written in others. An effect is in the set if an oracle
-//! detector could isolate it in the paper's spring with the same schedule and noise.
+//! As in [`scales`], the record is simulated in the paper's units and written in others. A record is drawn until an oracle
+//! detector could isolate its effect in the paper's spring with the same schedule and noise, at most 8 times.
 
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -27,8 +27,10 @@ const NOISES: [(&str, NoiseKind, [f64; 2], f64); 5] = [
 ];
 /// Size relative to the smallest one that can be isolated in white noise.
 const MARGIN: f64 = 1.5;
-/// The same in coloured noise, whose neighbouring readings say the same: up to sqrt((1 + 0.95)/(1 - 0.95)) times as large.
-const COLOURED_MARGIN: f64 = 6.0;
+/// The same in coloured noise, in which neighbouring readings are less than two.
+const COLOURED_MARGIN: f64 = 2.5;
+/// Largest number of draws until an effect can be isolated; the strength of the noise shrinks from draw to draw.
+const DRAWS: i32 = 8;
 
 /// `count` records of each cause, and three times as many without an effect.
 pub fn cases(first: u64, count: usize) -> Vec<Case> {
@@ -74,7 +76,9 @@ fn draw(cause: Option<Cause>, kind: Kind, noise: usize, lags: usize, seed: u64) 
         *lag = Further { part: random.random_range(0.1..0.3), tau_s: TAU_S * ratio };
     }
     let mut hidden = paper.with_relaxation(size.share, further);
-    let rounding = NOISES[noise].3 * hidden.noise.sigma_v;
+    // Rounding would destroy the lattice of a quantisation.
+    let rounded = cause != Some(Cause::Quantisation);
+    let rounding = if rounded { NOISES[noise].3 * hidden.noise.sigma_v } else { 0.0 };
     if rounding > 0.0 {
         hidden.readings.read.iter_mut().for_each(|y| *y = (*y / rounding).round() * rounding);
         // A converter without a zero of its own keeps its lattice only if the sensor's zero is on it.
@@ -93,7 +97,7 @@ fn draw(cause: Option<Cause>, kind: Kind, noise: usize, lags: usize, seed: u64) 
     Subject { hidden, record, nominal: Some(nominal) }
 }
 
-/// A record of the paper's spring whose effect, if it has one, an oracle detector could isolate.
+/// A record of the paper's spring whose effect, if it has one, an oracle detector could isolate; or the last draw.
 fn isolable_record(
     random: &mut ChaCha8Rng,
     cause: Option<Cause>,
@@ -102,11 +106,14 @@ fn isolable_record(
     seed: u64,
 ) -> LabelledRecord {
     let (_, colour, [low, high], _) = NOISES[noise];
+    let mut draw = 0;
     loop {
+        let most = low + (high - low) * 0.7f64.powi(draw);
+        draw += 1;
         let rows = *[1001, 1601, 2401].choose(random).expect("three numbers");
         let sampling = Sampling::draw(random, rows, false);
         let schedule = Schedule::draw(random, kind, sampling, 500.0);
-        let noise = Noise::white(random.random_range(low..high)).of(colour);
+        let noise = Noise::white(random.random_range(low..most)).of(colour);
         let effects: Vec<Effect> =
             cause.iter().map(|&cause| Effect::draw(random, cause, 0, &schedule, noise.sigma_v)).collect();
         let record = LabelledRecord::new(schedule, effects, noise, seed);
@@ -114,7 +121,7 @@ fn isolable_record(
         let isolated = |record: &LabelledRecord| {
             detectable::size(record).is_some_and(|size| margin * size * isolable::factor(record, size) < 1.0)
         };
-        if cause.is_none() || isolated(&record) {
+        if cause.is_none() || draw == DRAWS || isolated(&record) {
             return record;
         }
     }

@@ -19,8 +19,8 @@ const LAWS: [&str; 2] = ["out-of-model", "unforeseen"];
 /// A set's name with its graded diagnoses.
 pub type Graded = (&'static str, Vec<Answer>);
 
-/// The sets with their records: `count` of each case, 3 times as many of each single cause, twice as many in other plants, and 30
-/// times as many nulls.
+/// The sets with their records: `count` of each case, 3 times as many of each single cause, twice as many in other plants, 30 times
+/// as many nulls; every second pair, and pairs that share a stage at full size.
 pub fn sets(first: u64, count: usize) -> Vec<(&'static str, Vec<Case>)> {
     let jobs = |jobs: Vec<part::Job>| jobs.into_iter().map(Case::from).collect();
     // Seeds of their own, so that these are not the records of the other pages.
@@ -28,8 +28,8 @@ pub fn sets(first: u64, count: usize) -> Vec<(&'static str, Vec<Case>)> {
     vec![
         ("singles", jobs(part::singles(first, 3 * count))),
         ("nulls", jobs(part::nulls(first, 30 * count))),
-        ("pairs", jobs(part::pairs(first, count))),
-        ("shared", shared::cases(first, count)),
+        ("pairs", jobs(part::pairs(first, count).into_iter().step_by(2).collect())),
+        ("shared", shared::cases(first, count).into_iter().filter(|case| case.kinds == ["full size"]).collect()),
         ("steps", steps::cases(first, count)),
         ("plants", plants::cases(first, 2 * count)),
         (
