@@ -86,14 +86,15 @@ fn effects_of_1_5_times_the_isolable_size_are_named() {
     assert!(named >= 56, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
 }
 
-/// 54 records, one of every pair at full size. Today 94 % are free of untrue names and 99 % begin with a true one.
+/// 27 records, every second pair at full size. Today all begin with a true cause and none has an untrue name.
 #[test]
 fn pairs_that_share_a_stage_begin_with_a_true_cause() {
-    let cases: Vec<_> = shared::cases(FIRST, 1).into_iter().filter(|case| case.kinds == ["full size"]).collect();
+    let full_size = shared::cases(FIRST, 1).into_iter().filter(|case| case.kinds == ["full size"]);
+    let cases: Vec<_> = full_size.step_by(2).collect();
     let answers = graded(&cases);
     let count = |is: fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
-    assert!(count(|answer| answer.first_is_right) >= 49, "{}", answer_table::wrong(&answers));
-    assert!(count(Answer::is_sure_and_wrong) <= 6, "{}", answer_table::wrong(&answers));
+    assert!(count(|answer| answer.first_is_right) >= 24, "{}", answer_table::wrong(&answers));
+    assert!(count(Answer::is_sure_and_wrong) <= 3, "{}", answer_table::wrong(&answers));
 }
 
 /// 44 records, every third of the plain steps.
