@@ -2,89 +2,19 @@
 //!
 //! In: a [`Case`], which draws a record and knows its true causes, and the JSON of a diagnosis. Out: an [`Answer`].
 
-use std::fmt::{self, Debug};
-
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
-use simulation::plant_file::PlantFile;
-use simulation::record::Record;
 
+use super::case::{Case, Subject};
 use super::score::{Estimate, Report, estimates};
-use crate::ground_truth::{Cause, LabelledRecord};
 
 /// A probability above which a wrong name counts as confidently wrong.
 pub const SURE: f64 = 0.9;
-
-/// Cause codes that are true of a record; without one the record has no effect.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Expected {
-    /// Codes that are correct as the first finding.
-    pub first: Vec<&'static str>,
-    /// Codes that are true in addition to a correct first finding.
-    pub also: Vec<&'static str>,
-    /// True if all codes of `first` must be named, false if one of them is enough.
-    pub all: bool,
-    /// True if `consistent` without a finding is correct too.
-    pub or_none: bool,
-}
-
-impl Expected {
-    /// Exactly these causes, in any order.
-    pub fn exactly(causes: &[Cause]) -> Self {
-        Self { first: causes.iter().map(|cause| cause.name()).collect(), also: Vec::new(), all: true, or_none: false }
-    }
-
-    /// True if the code is true of the record.
-    pub fn is_true(&self, name: &str) -> bool {
-        self.first.contains(&name) || self.also.contains(&name)
-    }
-
-    /// True if `names` contains what must be named.
-    fn is_named(&self, mut names: impl FnMut(&str) -> bool) -> bool {
-        let mut codes = self.first.iter();
-        if self.all { codes.all(|code| names(code)) } else { codes.any(|code| names(code)) }
-    }
-}
-
-/// A record to diagnose, and the nominal spring that it is compared with.
-#[derive(Clone, Debug)]
-pub struct Subject {
-    /// Simulated record with its true effects, in s and V.
-    pub hidden: LabelledRecord,
-    /// The record that is diagnosed, which may be in other units.
-    pub record: Record,
-    /// Nominal spring; `None` for the paper's.
-    pub nominal: Option<PlantFile>,
-}
-
-impl From<LabelledRecord> for Subject {
-    fn from(hidden: LabelledRecord) -> Self {
-        Self { record: hidden.record(), hidden, nominal: None }
-    }
-}
-
-/// A record that can be drawn, with the true names.
-pub struct Case {
-    /// Row of the first table in which the record counts.
-    pub group: String,
-    /// Row of the second table in which the record counts.
-    pub kind: String,
-    /// Seed of the record.
-    pub seed: u64,
-    /// True names.
-    pub expected: Expected,
-    /// Draws the record of a seed.
-    pub draw: Box<dyn Fn(u64) -> Subject + Send + Sync>,
-}
-
-impl Debug for Case {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, {}, seed {}", self.group, self.kind, self.seed)
-    }
-}
+/// A probability from which a finding is called certain.
+pub const CERTAIN: f64 = 0.99;
 
 /// A finding, and whether it is true.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -102,8 +32,8 @@ pub struct Named {
 pub struct Answer {
     /// Row of the first table.
     pub group: String,
-    /// Row of the second table.
-    pub kind: String,
+    /// Rows of the further tables.
+    pub kinds: Vec<String>,
     /// Seed of the record.
     pub seed: u64,
     /// Verdict of the report; `failed` if there was no report.
@@ -130,10 +60,10 @@ impl Answer {
     /// Grades the JSON of a diagnosis.
     pub fn of(case: &Case, subject: &Subject, report: Result<Value>) -> Self {
         let report = report.and_then(|json| serde_json::from_value::<Report>(json).context("expected a report"));
-        let Case { group, kind, seed, expected, .. } = case;
+        let Case { group, kinds, seed, expected, .. } = case;
         let mut answer = Self {
             group: group.clone(),
-            kind: kind.clone(),
+            kinds: kinds.clone(),
             seed: *seed,
             verdict: "failed".to_owned(),
             found: Vec::new(),
@@ -178,10 +108,12 @@ impl Answer {
         self.failure.is_none() && self.found.iter().all(|named| named.is_true)
     }
 
-    /// True if the findings are correct: the first one right, nothing missing, nothing untrue; `consistent` without an effect.
+    /// True if the findings are correct: the first one right, nothing missing, nothing untrue. Without an effect: `consistent`, or
+    /// only what is true in addition.
     pub fn is_right(&self) -> bool {
         let none = self.or_none && self.verdict == "consistent" && self.found.is_empty();
-        none || !self.null && self.first_is_right && self.missing.is_empty() && self.nothing_untrue()
+        let named = if self.null { !self.found.is_empty() } else { self.first_is_right && self.missing.is_empty() };
+        none || named && self.nothing_untrue()
     }
 
     /// True if the answer is not right but leaves room for the truth: `ambiguous`, `insufficient` or `unexplained`, with the truth
@@ -227,12 +159,14 @@ pub(super) mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::campaign::case::Expected;
+    use crate::ground_truth::Cause;
     use crate::ground_truth::record::Recipe;
 
     /// A case of the causes, whose answers are graded without a diagnosis.
     pub(in crate::campaign) fn case(expected: Expected) -> Case {
         let draw = Box::new(|seed| Recipe { rows: 20, ..Recipe::of(&[]) }.draw(seed).into());
-        Case { group: "a".into(), kind: "b".into(), seed: 1, expected, draw }
+        Case { group: "a".into(), kinds: vec!["b".into()], seed: 1, expected, draw }
     }
 
     fn graded(expected: Expected, report: Value) -> Answer {
@@ -273,12 +207,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_record_without_an_effect_is_right_only_if_it_is_called_consistent() {
+    fn a_record_without_an_effect_is_right_if_it_is_called_consistent() {
         assert!(graded(Expected::default(), report("consistent", &[], &[])).is_right());
         let insufficient = graded(Expected::default(), report("insufficient", &[], &[]));
         assert!(!insufficient.is_right() && insufficient.is_honest());
         let found = graded(Expected::default(), report("unexplained", &[("hum", 0.5)], &[]));
         assert!(!found.is_right() && !found.is_honest());
+        let rounded = Expected { also: vec!["quantisation"], or_none: true, ..Expected::default() };
+        assert!(graded(rounded, report("explained", &[("quantisation", 1.0)], &[])).is_right());
     }
 
     #[test]

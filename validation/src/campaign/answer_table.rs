@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::answer::{Answer, SURE};
+use super::answer::{Answer, CERTAIN, SURE};
 use super::tables::percent;
 use crate::markdown::table;
 
@@ -13,15 +13,18 @@ pub fn legend() -> String {
         "\
 *Right*: the first finding is a true cause, every true cause is named, nothing untrue is; `consistent` without an effect. *Honest*:
 not right, but `ambiguous`, `insufficient` or `unexplained` with the truth among findings, alternatives or suspects. *Explained,
-wrong*: `explained` with an untrue finding. *Sure, wrong*: an untrue finding with a probability above {SURE}.
+wrong*: `explained` with an untrue finding. *Sure, wrong*: an untrue finding with a probability above {SURE}. *True at {CERTAIN}*: findings
+of this probability or more that are true.
 "
     )
 }
 
-/// Both tables of the answers; the column of the first one is headed `what`, that of the second one `kind`.
-pub fn page(what: &str, kind: &str, answers: &[Answer]) -> String {
+/// All tables of the answers; the first column of the first one is headed `what`, those of the others `kinds`.
+pub fn page(what: &str, kinds: &[&str], answers: &[Answer]) -> String {
     let mut text = named(what, answers, |answer| &answer.group);
-    write!(text, "\n{}", named(kind, answers, |answer| &answer.kind)).expect("a string");
+    for (index, kind) in kinds.iter().enumerate() {
+        write!(text, "\n{}", named(kind, answers, |answer| &answer.kinds[index])).expect("a string");
+    }
     text
 }
 
@@ -44,6 +47,7 @@ pub fn named(what: &str, answers: &[Answer], key: impl Fn(&Answer) -> &str) -> S
         "honest",
         "explained, wrong",
         "sure, wrong",
+        "true at 0.99",
         "verdicts",
         "untrue names",
         "missing names",
@@ -57,6 +61,8 @@ fn row(group: &str, answers: &[&Answer]) -> Vec<String> {
     };
     let with_effect: Vec<_> = answers.iter().filter(|answer| !answer.null).collect();
     let first = with_effect.iter().filter(|answer| answer.first_is_right).count() as f64 / with_effect.len() as f64;
+    let certain: Vec<_> =
+        answers.iter().flat_map(|answer| &answer.found).filter(|named| named.probability >= CERTAIN).collect();
     let untrue = answers.iter().flat_map(|answer| &answer.found).filter(|named| !named.is_true);
     vec![
         group.to_owned(),
@@ -67,6 +73,7 @@ fn row(group: &str, answers: &[&Answer]) -> Vec<String> {
         share(&Answer::is_honest),
         share(&Answer::explains_wrongly),
         share(&Answer::is_sure_and_wrong),
+        format!("{} of {}", certain.iter().filter(|named| named.is_true).count(), certain.len()),
         tally(answers.iter().map(|answer| answer.verdict.as_str())),
         tally(untrue.map(|named| named.cause.as_str())),
         tally(answers.iter().flat_map(|answer| &answer.missing).copied()),
@@ -86,11 +93,11 @@ fn tally<'a>(names: impl Iterator<Item = &'a str>) -> String {
 pub fn wrong(answers: &[Answer]) -> String {
     let mut text = String::new();
     for answer in answers.iter().filter(|answer| !answer.is_right() && !answer.is_honest()) {
-        let Answer { group, kind, seed, verdict, found, missing, failure, .. } = answer;
+        let Answer { group, kinds, seed, verdict, found, missing, failure, .. } = answer;
         let found: Vec<_> = found.iter().map(|named| format!("{} {:.3}", named.cause, named.probability)).collect();
         let found = failure.clone().unwrap_or_else(|| found.join(", "));
         let missing = if missing.is_empty() { String::new() } else { format!(", missing {}", missing.join(", ")) };
-        writeln!(text, "{group}, {kind}, seed {seed}: {verdict} [{found}]{missing}").expect("a string");
+        writeln!(text, "{group}, {}, seed {seed}: {verdict} [{found}]{missing}", kinds.join(", ")).expect("a string");
     }
     text
 }
@@ -100,7 +107,8 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::campaign::answer::{Expected, tests::case};
+    use crate::campaign::answer::tests::case;
+    use crate::campaign::case::Expected;
     use crate::ground_truth::Cause;
 
     #[test]
@@ -114,9 +122,8 @@ mod tests {
             json!({"verdict": "consistent", "findings": []}),
         ];
         let answers: Vec<_> = reports.map(|report| Answer::of(&case, &subject, Ok(report))).into();
-        let page = page("group", "kind", &answers);
-        let row =
-            "4 | 25 % | 50 % | 25 % | 25 % | 25 % | 25 % | explained 2, ambiguous 1, consistent 1 | hum 2 | drift 3 |";
+        let page = page("group", &["kind"], &answers);
+        let row = "4 | 25 % | 50 % | 25 % | 25 % | 25 % | 25 % | 1 of 1 | explained 2, ambiguous 1, consistent 1 | hum 2 | drift 3 |";
         assert_eq!(page.matches(row).count(), 4, "{page}");
         assert_eq!(wrong(&answers).lines().count(), 2, "{}", wrong(&answers));
     }

@@ -1,7 +1,7 @@
 //! Pairs of causes that [`part::pairs`](super::part::pairs) leaves out because they share a stage of the chain, and pairs that can
 //! mimic each other across stages.
 
-use super::answer::{Case, Expected};
+use super::case::{Case, Expected};
 use super::part::seed;
 use crate::ground_truth::Cause::{self, *};
 use crate::ground_truth::record::Recipe;
@@ -51,7 +51,7 @@ pub fn cases(first: u64, count: usize) -> Vec<Case> {
 fn of(pair: [Cause; 2], kind: &str, size: f64, seed: u64) -> Case {
     Case {
         group: pair.map(Cause::name).join(" + "),
-        kind: kind.to_owned(),
+        kinds: vec![kind.to_owned()],
         seed,
         expected: Expected::exactly(&pair),
         draw: Box::new(move |seed| Recipe::of(&pair).draw(seed).at(size).into()),
@@ -78,7 +78,7 @@ mod tests {
     fn both_effects_of_every_pair_are_in_its_record() {
         for case in cases(3, 1) {
             let hidden = (case.draw)(case.seed).hidden;
-            let size = if case.kind == "full size" { 1.0 } else { 0.5 };
+            let size = if case.kinds == ["full size"] { 1.0 } else { 0.5 };
             assert!(hidden.effects.len() == 2 && hidden.effects.iter().all(|effect| effect.size == size), "{case:?}");
             for effect in &hidden.effects {
                 let kept: Vec<_> = hidden.effects.iter().filter(|other| *other != effect).cloned().collect();

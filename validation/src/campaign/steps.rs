@@ -1,6 +1,6 @@
 //! Plain step experiments: each cause that such a record can show, gain and time constant off together, and no effect.
 
-use super::answer::{Case, Expected};
+use super::case::{Case, Expected};
 use super::part::seed;
 use crate::ground_truth::Cause;
 use crate::ground_truth::plain_steps::PlainSteps;
@@ -20,7 +20,7 @@ fn of(causes: Vec<Cause>, plain: PlainSteps, seed: u64) -> Case {
     let names: Vec<_> = causes.iter().map(|cause| cause.name()).collect();
     Case {
         group: if names.is_empty() { "no effect".to_owned() } else { names.join(" + ") },
-        kind: plain.name(),
+        kinds: vec![plain.name()],
         seed,
         expected: Expected::exactly(&causes),
         draw: Box::new(move |seed| plain.draw(&causes, seed).into()),

@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use super::answer::{Answer, Case, Expected, Subject};
+use super::answer::Answer;
 use super::answer_table::{legend, page as tables};
+use super::case::{Case, Expected, Subject};
 use super::part::seed;
 use crate::ground_truth::unforeseen::all;
 use crate::ground_truth::unforeseen::law::Law;
@@ -18,7 +19,7 @@ pub fn cases(first: u64, count: usize) -> Vec<Case> {
 fn of(family: &str, law: Law, seed: u64) -> Case {
     Case {
         group: law.name.to_owned(),
-        kind: family.to_owned(),
+        kinds: vec![family.to_owned()],
         seed,
         expected: Expected {
             first: law.first.to_vec(),
@@ -44,7 +45,7 @@ the diagnosis was made. `unexplained` with a right first finding and nothing unt
 {}
 ",
         legend(),
-        tables("law", "family", answers)
+        tables("law", &["family"], answers)
     );
     let row = |(_, law): (_, Law)| {
         let none = if law.or_none || law.first.is_empty() { vec!["none"] } else { Vec::new() };

@@ -137,7 +137,8 @@ mod tests {
                 assert!(levels.len() == held && levels[0] == 0.0, "{plain:?}: {levels:?}");
                 assert_eq!(levels.is_sorted(), matches!(plain.shape, Shape::Step | Shape::TwoLevels));
                 let taus = hidden.schedule.duration_s() / TAU_S;
-                assert!(if plain.long { (9.99..30.01) } else { (3.99..10.01) }.contains(&taus), "{taus}");
+                let range = if plain.long { 9.99..30.01 } else { 3.99..10.01 };
+                assert!(range.contains(&taus), "{taus}");
                 let paper = Spring::default().run(&hidden.schedule, 20);
                 assert_eq!(hidden.readings.expected, paper);
             }

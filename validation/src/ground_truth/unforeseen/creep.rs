@@ -206,9 +206,9 @@ mod tests {
 
     #[test]
     fn an_eyring_flow_agrees_with_small_euler_steps() {
-        let (volts, mut w) = (150.0, 0.0);
+        let (volts, mut w) = (150.0f64, 0.0);
         for _ in 0..30_000 {
-            w += 1e-4 * volts / TAU_S * ((500.0 - w) / volts as f64).sinh();
+            w += 1e-4 * volts / TAU_S * ((500.0 - w) / volts).sinh();
         }
         let left = 2.0 * volts * ((500.0 / (2.0 * volts)).tanh() * (-3.0f64 / TAU_S).exp()).atanh();
         assert!((500.0 - left - w).abs() < 0.1, "{w} {left}");

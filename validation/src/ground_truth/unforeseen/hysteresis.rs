@@ -1,11 +1,11 @@
-//! Hysteresis, friction and backlash by other laws; before the relaxation or after it.
+//! Hysteresis of the voltage by other laws, before the relaxation.
 
 use super::law::{Draw, Law, PLAIN};
-use crate::ground_truth::out_of_model::chain::{Chain, Stage};
+use crate::ground_truth::out_of_model::chain::Chain;
 use crate::ground_truth::physics::FULL_V;
 
 /// Laws of hysteresis.
-pub const LAWS: [Law; 10] = [
+pub const LAWS: [Law; 6] = [
     Law {
         name: "Preisach with a Gaussian density",
         first: &["hysteresis"],
@@ -58,45 +58,10 @@ pub const LAWS: [Law; 10] = [
         build: maxwell_slip,
         ..PLAIN
     },
-    Law {
-        name: "stick-slip",
-        first: &["hysteresis"],
-        also: &["quantisation"],
-        law: "the relaxed response y sticks until it is a from its place, then slips to b from it; a 15 to 35 V, b 0.2 a to 0.5 a",
-        source: "Armstrong-Helouvry, Dupont, Canudas de Wit, Friction in servo machines, Automatica 30, 1994",
-        build: stick_slip,
-        ..PLAIN
-    },
-    Law {
-        name: "backlash of the sensor",
-        first: &["hysteresis"],
-        law: "the relaxed response y through a play of 16 to 50 V",
-        source: "Nordin, Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002",
-        build: backlash,
-        ..PLAIN
-    },
-    Law {
-        name: "play that widens with the rate",
-        first: &["hysteresis"],
-        also: &["time-constant", "series-lag"],
-        law: "the relaxed response y through a play of radius r + k |dy/dt|, r 8 to 18 V, k 0.1 to 0.3 s, at most 3 r",
-        source: "Ang, Khosla, Riviere, Feedforward with inverse rate-dependent model, IEEE/ASME Trans. Mechatronics 12, 2007",
-        build: rate_dependent,
-        ..PLAIN
-    },
-    Law {
-        name: "gain by direction",
-        first: &["hysteresis"],
-        also: &["gain-error"],
-        law: "v = (1 + a) u after a command up, (1 - a) u after one down, a 0.03 to 0.08, either sign",
-        source: "Godfrey, Briggs, Identification of processes with direction-dependent dynamic responses, Proc. IEE 119, 1972",
-        build: by_direction,
-        ..PLAIN
-    },
 ];
 
 /// The paper's spring behind a law `f` of the voltage u, mixed as u + size (f(u) - u).
-fn mixed(draw: &Draw, mut f: impl FnMut(f64) -> f64 + 'static) -> Chain {
+pub(super) fn mixed(draw: &Draw, mut f: impl FnMut(f64) -> f64 + 'static) -> Chain {
     let (size, mut last) = (draw.size, (0.0, 0.0));
     Chain::before(Box::new(move |u: f64, _| {
         if u != last.0 {
@@ -205,88 +170,4 @@ fn maxwell_slip(draw: &mut Draw) -> Chain {
         last = u;
         u - force
     })
-}
-
-/// The paper's spring followed by a law `f` of the response y and its rate, mixed as y + size (f(y) - y).
-fn after(draw: &Draw, mut f: impl FnMut(f64, f64) -> f64 + 'static) -> Chain {
-    let (size, mut last, mut rate) = (draw.size, 0.0, 0.0);
-    let stage: Stage = Box::new(move |y, now| {
-        if now.dt > 0.0 {
-            rate = (y - last) / now.dt;
-        }
-        last = y;
-        y + size * (f(y, rate) - y)
-    });
-    Chain::after(stage)
-}
-
-fn stick_slip(draw: &mut Draw) -> Chain {
-    let breakaway = draw.between(15.0, 35.0);
-    let (kept, mut place) = (breakaway * draw.between(0.2, 0.5), 0.0f64);
-    after(draw, move |y, _| {
-        let off = y - place;
-        if off.abs() > breakaway {
-            place = y - kept * off.signum();
-        }
-        place
-    })
-}
-
-fn backlash(draw: &mut Draw) -> Chain {
-    let (radius, mut place) = (draw.between(8.0, 25.0), 0.0f64);
-    after(draw, move |y, _| {
-        place = place.clamp(y - radius, y + radius);
-        place
-    })
-}
-
-fn rate_dependent(draw: &mut Draw) -> Chain {
-    let (least, per_rate, mut place) = (draw.between(8.0, 18.0), draw.between(0.1, 0.3), 0.0f64);
-    after(draw, move |y, rate| {
-        let radius = (least + per_rate * rate.abs()).min(3.0 * least);
-        place = place.clamp(y - radius, y + radius);
-        place
-    })
-}
-
-fn by_direction(draw: &mut Draw) -> Chain {
-    let a = draw.sign() * draw.between(0.03, 0.08);
-    let mut last = 0.0;
-    mixed(draw, move |u| {
-        let sign = if u > last { 1.0 } else { -1.0 };
-        last = u;
-        u * (1.0 + sign * a)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ground_truth::unforeseen::tests::draw;
-
-    /// Settled stiffness at 250 V on the way up and down a slow loop from 0 to 500 V, by the law alone.
-    fn branches(build: fn(&mut Draw) -> Chain, seed: u64) -> [f64; 2] {
-        let mut source = draw(1.0);
-        source.random = rand::SeedableRng::seed_from_u64(seed);
-        let mut chain = build(&mut source);
-        let up = (0..=500).map(f64::from);
-        let course: Vec<f64> = up.clone().chain(up.clone().rev()).chain(up).collect();
-        // 1000 s from row to row: relaxed.
-        let schedule = crate::ground_truth::Schedule {
-            time_s: (0..course.len()).map(|k| 1000.0 * k as f64).collect(),
-            voltage_v: course,
-        };
-        let y = chain.stiffness(&schedule, 1);
-        [1000 + 2 + 250, 500 + 250 + 1].map(|row| y[row])
-    }
-
-    #[test]
-    fn every_law_has_a_loop_whose_branches_differ() {
-        for law in LAWS {
-            for seed in 0..3 {
-                let [up, down] = branches(law.build, seed);
-                assert!((up - down).abs() > 8.0, "{law:?}: {up} {down}");
-            }
-        }
-    }
 }

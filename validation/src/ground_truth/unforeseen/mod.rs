@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | [`law`] | one law with its names, and how a record of it is drawn |
 //! | [`creep`] | relaxation, creep, leakage, a tank |
-//! | [`hysteresis`] | hysteresis, friction, backlash |
+//! | [`hysteresis`], [`friction`] | hysteresis; friction, backlash, a gain by direction |
 //! | [`curves`] | static curves, limits, heating |
 //! | [`slow`] | changes over the record, clocks |
 //! | [`sensor`] | lags, filters and modes of the sensor |
@@ -16,6 +16,7 @@
 
 pub mod creep;
 pub mod curves;
+pub mod friction;
 pub mod hysteresis;
 pub mod law;
 pub mod readings;
@@ -26,9 +27,10 @@ use self::law::Law;
 
 /// All laws with the name of their family.
 pub fn all() -> Vec<(&'static str, Law)> {
-    let families: [(&str, &[Law]); 6] = [
+    let families: [(&str, &[Law]); 7] = [
         ("creep and leakage", &creep::LAWS),
         ("hysteresis", &hysteresis::LAWS),
+        ("hysteresis", &friction::LAWS),
         ("curves and limits", &curves::LAWS),
         ("changes over the record", &slow::LAWS),
         ("dynamics of the sensor", &sensor::LAWS),
@@ -44,6 +46,8 @@ pub(in crate::ground_truth) mod tests {
 
     use super::law::{Draw, STEPS};
     use super::*;
+    use crate::ground_truth::Schedule;
+    use crate::ground_truth::out_of_model::chain::Chain;
     use crate::ground_truth::spring::Spring;
 
     /// A random source of laws of the given size for a record of 2000 rows in 200 s up to 500 V.
@@ -107,5 +111,28 @@ pub(in crate::ground_truth) mod tests {
     fn cause_codes_are_those_of_the_contract() {
         let known = |name: &str| crate::ground_truth::Cause::named(name).is_some() || name == "series-lag";
         assert!(all().iter().all(|(_, law)| law.first.iter().chain(law.also).all(|name| known(name))));
+    }
+
+    /// Settled stiffness at 250 V on the way up and down a slow loop from 0 to 500 V, by the law alone.
+    fn branches(build: fn(&mut Draw) -> Chain, seed: u64) -> [f64; 2] {
+        let mut source = draw(1.0);
+        source.random = ChaCha8Rng::seed_from_u64(seed);
+        let mut chain = build(&mut source);
+        let up = (0..=500).map(f64::from);
+        let course: Vec<f64> = up.clone().chain(up.clone().rev()).chain(up).collect();
+        // 1000 s from row to row: relaxed.
+        let schedule = Schedule { time_s: (0..course.len()).map(|k| 1000.0 * k as f64).collect(), voltage_v: course };
+        let y = chain.stiffness(&schedule, 1);
+        [1000 + 2 + 250, 500 + 250 + 1].map(|row| y[row])
+    }
+
+    #[test]
+    fn every_hysteresis_has_a_loop_whose_branches_differ() {
+        for law in hysteresis::LAWS.into_iter().chain(friction::LAWS) {
+            for seed in 0..3 {
+                let [up, down] = branches(law.build, seed);
+                assert!((up - down).abs() > 8.0, "{law:?}: {up} {down}");
+            }
+        }
     }
 }
