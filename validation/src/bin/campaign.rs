@@ -13,7 +13,7 @@ use validation::campaign::diagnosis::diagnose;
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
-use validation::campaign::{criteria, out_of_model, real, rivals, scales, tables};
+use validation::campaign::{criteria, out_of_model, plan, real, rivals, scales, tables};
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
@@ -51,7 +51,7 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, scales, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
-    /// long), in total (nulls, triples), or times 53 (thresholds)
+    /// long), in each of two sets (plan), in total (nulls, triples), or times 53 (thresholds)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -159,6 +159,8 @@ enum Part {
     Rivals,
     /// Six other instruments, simulated, in their own units
     Instruments,
+    /// Minutes of the next experiment until the diagnosis is right, planned, fixed and random: 30 springs of each of two sets
+    Plan,
     /// Every empirical threshold at half and twice its value: 53 records at each value. Run it as `cargo thresholds`
     Thresholds,
 }
@@ -325,6 +327,14 @@ impl Cli {
                 let rows = measured("instruments", &real::twins(first), true)?;
                 let markdown = real::table(&rows);
                 Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows) })
+            }
+            Part::Plan => {
+                let cases = plan::cases(&ground_truth::out_of_model::all(), first, self.count(30));
+                let bar = bar("plan", cases.len())?;
+                let outcomes = plan::run(&cases, &bar)?;
+                bar.finish_and_clear();
+                let markdown = plan::page(&outcomes);
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(outcomes) })
             }
             #[cfg(not(feature = "sensitivity"))]
             Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),

@@ -15,6 +15,7 @@
 //! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
 //! | [`scales`] | single effects in springs of any size, in any unit |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
+//! | [`plan`] | minutes of the next experiment until the diagnosis is right, by schedule |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
 
@@ -26,6 +27,7 @@ pub mod isolable;
 pub mod mixture;
 pub mod out_of_model;
 pub mod part;
+pub mod plan;
 pub mod real;
 pub mod rivals;
 pub mod scales;
