@@ -23,7 +23,7 @@ use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_re
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::report::{InputLaw, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant};
-use crate::record::data::Input;
+use crate::record::input::Input;
 use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::sums::dot;
@@ -333,8 +333,8 @@ fn not_negative(quantity: Quantity) -> Quantity {
     Quantity { low: quantity.low.max(0.0), ..quantity }
 }
 
-/// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row cannot be told from
-/// another numerator, so that the interval reaches one row further down.
+/// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row is
+/// equivalent to another numerator, so that the interval reaches one row further down.
 fn whole_rows(problem: &Problem, fit: &Fit) -> Quantity {
     const MOST: usize = 4;
     let neighbours = Spectrum::neighbours(&fit.residual).clamp(0.0, 0.95);
