@@ -4,7 +4,8 @@ use simulation::record::{Record, Row};
 
 use crate::hypotheses::Coordinates;
 use crate::plan::candidate::{Commands, Frame};
-use crate::record::data::{Data, Input};
+use crate::record::data::Data;
+use crate::record::input::Input;
 use crate::record::normalisation::{Normalisation, Start};
 use crate::record::scales::Scales;
 

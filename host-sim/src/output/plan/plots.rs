@@ -3,8 +3,8 @@
 use identify::plan::Plan;
 use kuva::prelude::*;
 
-use crate::output::diagnosis::style::COMMAND;
 use crate::output::draw::{Axes, line, svg};
+use crate::output::style::COMMAND;
 
 /// Colours of the sets of causes, which colour-blind readers can distinguish.
 const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
