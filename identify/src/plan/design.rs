@@ -20,7 +20,7 @@ const BENT_BY: f64 = 0.5;
 /// decides on its own.
 const POSTERIOR_WIDTHS: f64 = 10.0;
 /// Draws from each posterior, on both sides of its mean; the mean itself is one more.
-const DRAWS: usize = 1;
+const DRAWS: usize = 2;
 
 /// An explanation that the plan is to confirm or reject.
 #[derive(Clone, Debug)]
@@ -29,6 +29,8 @@ pub(super) struct Hypothesis {
     pub(super) causes: Vec<String>,
     /// Score less that of the best set, in nats.
     pub(super) nats: f64,
+    /// True if the diagnosis names the set; false for a set with one cause more than such a set, which is not far behind.
+    pub(super) named: bool,
     /// The model, without causes of one record's readings.
     pub(super) model: Model,
     /// Covariance of its fitted coordinates, normalised; `None` if the record does not determine it.
@@ -72,7 +74,7 @@ impl Hypothesis {
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] for a cause, form or list of numbers that this version does not have.
-    pub(super) fn of(rival: &Rival, data: &Data, name: &str) -> Result<Self> {
+    pub(super) fn of(rival: &Rival, named: bool, data: &Data, name: &str) -> Result<Self> {
         let mut model = Model::default();
         let (mut kept, mut fitted) = (Vec::new(), 0);
         for FittedBlock { cause, form, point } in &rival.blocks {
@@ -94,12 +96,17 @@ impl Hypothesis {
         let square = rival.covariance.len() == fitted && rival.covariance.iter().all(|row| row.len() == fitted);
         let entry = |row: usize, column: usize| rival.covariance[kept[row]][kept[column]];
         let covariance = (square && !kept.is_empty()).then(|| DMatrix::from_fn(kept.len(), kept.len(), entry));
-        Ok(Self { causes: rival.causes.clone(), nats: rival.nats, model, covariance })
+        Ok(Self { causes: rival.causes.clone(), nats: rival.nats, named, model, covariance })
     }
 
     /// Returns true if another hypothesis predicts the same whatever the voltage is.
     pub(super) fn same_model(&self, other: &Self) -> bool {
         self.model == other.model
+    }
+
+    /// Returns true if the hypothesis has all causes of another one, so that it can always imitate that.
+    pub(super) fn contains(&self, other: &Self) -> bool {
+        other.model.blocks.iter().all(|(block, _)| self.model.has(block.effect))
     }
 
     /// Returns the indices of the fitted coordinates.

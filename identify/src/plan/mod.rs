@@ -13,8 +13,8 @@
 //!   to what the truth predicts: the T-optimality of Hunter and Reiner and of Atkinson and Fedorov (*Biometrika* 62, 1975), averaged
 //!   over the posterior of the true parameters. For normal noise it is four times the Bhattacharyya distance of both predictions,
 //!   the criterion of auxiliary inputs for active fault diagnosis (Blackmore and Williams, *ACC* 2006).
-//! - *Breadth*: mean information on every catalogue cause that a voltage can show, in nats, with all others unknown: what the
-//!   schedule would tell if none of the rivals is true.
+//! - *Breadth*: information on the catalogue causes that a voltage can show, in nats, each with all others unknown, between the mean and
+//!   the least: what the schedule would tell if none of the rivals is true.
 //!
 //! | file | what it holds |
 //! | --- | --- |

@@ -31,14 +31,14 @@ pub(super) fn of_pair(pair: &Pair, nats: &[f64]) -> f64 {
     pair.nats.iter().map(|&separation| decides(separation, behind)).sum::<f64>() / pair.nats.len() as f64
 }
 
-/// Returns the probability that the true hypothesis wins against every other one, by the hardest rival of each.
-pub(super) fn of_all(pairs: &[Pair], nats: &[f64]) -> f64 {
-    let weights = weights(nats);
+/// Returns the probability that the true one of the named hypotheses wins against every other one of them, by the hardest rival of each.
+pub(super) fn of_all(pairs: &[Pair], nats: &[f64], named: &[usize]) -> f64 {
+    let weights = weights(&named.iter().map(|&index| nats[index]).collect::<Vec<_>>());
     let of_truth = |truth: usize| {
-        let own = pairs.iter().filter(|pair| pair.truth == truth);
+        let own = pairs.iter().filter(|pair| pair.truth == truth && named.contains(&pair.rival));
         own.map(|pair| of_pair(pair, nats)).fold(1.0, f64::min)
     };
-    weights.iter().enumerate().map(|(truth, weight)| weight * of_truth(truth)).sum()
+    named.iter().zip(weights).map(|(&truth, weight)| weight * of_truth(truth)).sum()
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use simulation::plant_file::parse_for_host;
 use crate::dimension::Dimension;
 use crate::effects::model::Model;
 use crate::fit::engine::Engine;
+use crate::hypotheses::Rival;
 use crate::noise::Noise;
 use crate::plan::answer::{Command, Part, Plan, Response, Separation};
 use crate::plan::candidate::{Candidate, Commands};
@@ -20,7 +21,10 @@ use crate::plan::search;
 use crate::plan::separation::{Design, Evaluation};
 use crate::plant::base::Base;
 use crate::record::observed::{Kind, Observed};
+use crate::stats::thresholds::probability::RIVAL_ODDS;
 
+/// Sets that the diagnosis does not name count if they are behind by less than this number of times the odds against a rival.
+const TIMES_RIVAL_ODDS: f64 = 2.0;
 /// First number of the pseudo-random sequence.
 const SEED: u64 = 20_261_123;
 /// Contribution of a part to a separation below which it is not named.
@@ -69,24 +73,29 @@ fn design(basis: &Basis, request: &Request, name: &str, random: &mut Random) -> 
     };
     let (data, _) = design.record(&Candidate { segments: Vec::new(), tail: 1.0 }.commands(&frame), false);
     let mut remarks = Vec::new();
-    let named = |causes: &[String]| basis.alternatives.iter().any(|set| same(set, causes));
-    for (place, rival) in basis.rivals.iter().enumerate() {
-        if place > 0 && basis.verdict != "unexplained" && !named(&rival.causes) {
-            continue;
-        }
-        let hypothesis = Hypothesis::of(rival, &data, name)?;
+    let undecided = |rival: &Rival| {
+        rival.nats == 0.0
+            || basis.verdict == "unexplained"
+            || basis.alternatives.iter().any(|set| same(set, &rival.causes))
+    };
+    let near = |rival: &Rival| basis.verdict == "ambiguous" && rival.nats > -TIMES_RIVAL_ODDS * RIVAL_ODDS;
+    for rival in basis.rivals.iter().filter(|rival| undecided(rival) || near(rival)) {
+        let hypothesis = Hypothesis::of(rival, undecided(rival), &data, name)?;
         if let Some(other) = design.hypotheses.iter().find(|other| other.same_model(&hypothesis)) {
-            remarks.push(format!(
-                "{} and {} differ in one record's readings alone: run the same schedule again",
-                set(&other.causes),
-                set(&hypothesis.causes)
-            ));
+            remarks.extend(hypothesis.named.then(|| {
+                format!(
+                    "{} and {} differ in one record's readings alone: run the same schedule again",
+                    set(&other.causes),
+                    set(&hypothesis.causes)
+                )
+            }));
             continue;
         }
         design.hypotheses.push(hypothesis);
     }
     if design.hypotheses.is_empty() {
-        let nothing = Hypothesis { causes: Vec::new(), nats: 0.0, model: Model::default(), covariance: None };
+        let (causes, model) = (Vec::new(), Model::default());
+        let nothing = Hypothesis { causes, nats: 0.0, named: true, model, covariance: None };
         design.hypotheses.push(nothing);
     }
     for hypothesis in &design.hypotheses {
@@ -179,7 +188,8 @@ fn finished(
         nats: pair.nats.iter().copied().fold(f64::INFINITY, f64::min),
         probability: odds::of_pair(pair, &nats),
     });
-    let undecided = design.hypotheses.len() > 1;
+    let named: Vec<usize> = (0..nats.len()).filter(|&index| design.hypotheses[index].named).collect();
+    let undecided = named.len() > 1;
     let volts = |normalised: f64| {
         let step = (frame.high_v - frame.low_v) * coordinates.volt_v / STEPS_OF_RANGE;
         let rounded = (normalised * coordinates.volt_v / step).round() * step;
@@ -194,8 +204,8 @@ fn finished(
     let end = Command { time_s: time(frame.rows), voltage_v: 0.0 };
     Plan {
         schedule: None,
-        decides: if undecided { (0..nats.len()).map(causes).collect() } else { Vec::new() },
-        probability: undecided.then(|| odds::of_all(&evaluation.pairs, &nats)),
+        decides: if undecided { named.iter().map(|&index| causes(index)).collect() } else { Vec::new() },
+        probability: undecided.then(|| odds::of_all(&evaluation.pairs, &nats, &named)),
         minutes: time(frame.rows) / 60.0,
         range_v: [volts(frame.low_v), volts(frame.high_v)],
         separations: separations.collect(),
@@ -217,11 +227,12 @@ fn parts(
     time: &impl Fn(usize) -> f64,
     volts: &impl Fn(f64) -> f64,
 ) -> Vec<Part> {
+    let place = |index: usize| design.hypotheses[..index].iter().filter(|hypothesis| hypothesis.named).count();
     let of_pairs: Vec<([usize; 2], Vec<f64>)> = evaluation
         .pairs
         .iter()
-        .filter(|pair| pair.truth < pair.rival)
-        .map(|pair| ([pair.truth, pair.rival], design.contributions(commands, pair.truth, pair.rival)))
+        .filter(|pair| [pair.truth, pair.rival].iter().all(|&index| design.hypotheses[index].named))
+        .map(|pair| ([pair.truth, pair.rival].map(place), design.contributions(commands, pair.truth, pair.rival)))
         .collect();
     let ramps = |level: f64| {
         let of_level = |segment: &&crate::plan::candidate::Segment| {

@@ -11,9 +11,9 @@ const BEYOND: f64 = 0.1;
 const MEAN: f64 = 0.2;
 const BREADTH: f64 = 0.3;
 /// Candidates of the library that are changed, the changes of each, and those of the best of them.
-const STARTS: usize = 3;
-const CHANGES_OF_EACH: usize = 40;
-const CHANGES_OF_BEST: usize = 80;
+const STARTS: usize = 4;
+const CHANGES_OF_EACH: usize = 100;
+const CHANGES_OF_BEST: usize = 200;
 
 /// Returns the value of an evaluation; the larger, the better.
 pub(super) fn objective(evaluation: &Evaluation) -> f64 {

@@ -68,9 +68,9 @@ pub(super) struct Pair {
 /// What a candidate would show.
 #[derive(Clone, Debug)]
 pub(super) struct Evaluation {
-    /// All ordered pairs of hypotheses.
+    /// All ordered pairs of hypotheses in which the rival lacks a cause of the truth.
     pub(super) pairs: Vec<Pair>,
-    /// Mean information on every cause with all others unknown, in nats.
+    /// Information on the causes with all others unknown, in nats: between the mean and the least of all.
     pub(super) breadth: f64,
 }
 
@@ -120,7 +120,8 @@ impl Design {
             self.bends.iter().zip(&predicted).map(|(bends, at)| sensitivities(&mut predictor, bends, &at[0])).collect();
         let mut pairs = Vec::new();
         for (truth, of_truth) in predicted.iter().enumerate() {
-            for rival in (0..predicted.len()).filter(|&rival| rival != truth) {
+            let imitates = |rival: usize| self.hypotheses[rival].contains(&self.hypotheses[truth]);
+            for rival in (0..predicted.len()).filter(|&rival| !imitates(rival)) {
                 let allowed = self.allowed(truth, rival);
                 let of_rival = &sensitivities[rival];
                 let nats = of_truth.iter().map(|readings| {
@@ -149,7 +150,7 @@ impl Design {
         1.0 / (1.0 + 2.0 * self.frame.tau_rows * rest * self.whitening.at_corner())
     }
 
-    /// Returns the mean information on the coordinates and probes of the likeliest hypothesis, in nats.
+    /// Returns the information on the coordinates and probes of the likeliest hypothesis, in nats: between the mean and the least.
     fn breadth(&self, predictor: &mut Predictor, here: &[f64], own: &Sensitivities) -> f64 {
         let probes = self.probes.iter().map(|model| {
             let there = predictor.readings(model);
@@ -159,7 +160,9 @@ impl Design {
         let Some(covariance) = posterior(&products(&columns), self.part(0.0)) else { return 0.0 };
         // Without the shift of all readings.
         let count = columns.len() - 1;
-        (0..count).map(|index| -0.5 * covariance[(index, index)].ln()).sum::<f64>() / count.max(1) as f64
+        let known: Vec<f64> = (0..count).map(|index| -0.5 * covariance[(index, index)].ln()).collect();
+        let mean = known.iter().sum::<f64>() / count.max(1) as f64;
+        0.5 * (mean + known.into_iter().fold(mean, f64::min))
     }
 
     /// Returns the part of a pair's separation that each of the commands' parts contributes, on all rows.
