@@ -182,7 +182,7 @@ fn finished(
     let sample_s = frame.sample_s * coordinates.second_s;
     let nats: Vec<f64> = design.hypotheses.iter().map(|hypothesis| hypothesis.nats).collect();
     let causes = |index: usize| design.hypotheses[index].causes.clone();
-    let separations = evaluation.pairs.iter().map(|pair| Separation {
+    let separations = evaluation.pairs.iter().filter(|pair| pair.named).map(|pair| Separation {
         truth: causes(pair.truth),
         rival: causes(pair.rival),
         nats: pair.nats.iter().copied().fold(f64::INFINITY, f64::min),
@@ -231,7 +231,7 @@ fn parts(
     let of_pairs: Vec<([usize; 2], Vec<f64>)> = evaluation
         .pairs
         .iter()
-        .filter(|pair| [pair.truth, pair.rival].iter().all(|&index| design.hypotheses[index].named))
+        .filter(|pair| pair.named)
         .map(|pair| ([pair.truth, pair.rival].map(place), design.contributions(commands, pair.truth, pair.rival)))
         .collect();
     let ramps = |level: f64| {

@@ -30,7 +30,9 @@ pub(super) fn objective(evaluation: &Evaluation) -> f64 {
     if of_pair.is_empty() {
         return breadth;
     }
-    let least = of_pair.iter().copied().fold(f64::INFINITY, f64::min);
+    // A set that the diagnosis does not name may differ from a named one by a cause of no size, which nothing shows.
+    let named = evaluation.pairs.iter().zip(&of_pair).filter(|(pair, _)| pair.named);
+    let least = named.map(|(_, value)| *value).min_by(f64::total_cmp).unwrap_or(0.0);
     least + MEAN * of_pair.iter().sum::<f64>() / of_pair.len() as f64 + breadth
 }
 

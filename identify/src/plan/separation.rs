@@ -61,6 +61,8 @@ pub(super) struct Pair {
     pub(super) truth: usize,
     /// Index of its rival.
     pub(super) rival: usize,
+    /// True if the diagnosis names both.
+    pub(super) named: bool,
     /// Separation for each draw of the truth, in nats.
     pub(super) nats: Vec<f64>,
 }
@@ -129,7 +131,8 @@ impl Design {
                     let part = self.part(predictor.mean_square(readings, &nominal));
                     projected(&difference, of_rival, &allowed, part).0
                 });
-                pairs.push(Pair { truth, rival, nats: nats.collect() });
+                let named = [truth, rival].iter().all(|&index| self.hypotheses[index].named);
+                pairs.push(Pair { truth, rival, named, nats: nats.collect() });
             }
         }
         let breadth = self.breadth(&mut predictor, &predicted[0][0], &sensitivities[0]);
