@@ -282,7 +282,7 @@ experiment that is not right at {} minutes counts as {NOT_DECIDED}.
         let of: Vec<&Outcome> = outcomes.iter().filter(|it| it.set == *set && !it.first_right).collect();
         Kind::ALL.into_iter().enumerate().map(move |(place, kind)| row(set, kind, &of, place)).collect::<Vec<_>>()
     });
-    let header = ["springs", "schedule", "of", "0.5 min", "1", "2", "4", "mean minutes", "of the planned"];
+    let header = ["springs", "schedule", "of", "0.5 min", "1", "2", "4", "mean minutes", "planned, relative"];
     text += &table(&header, rows);
     for set in &sets {
         let (all, right): (Vec<&Outcome>, Vec<&Outcome>) = (
