@@ -57,7 +57,8 @@ fn planned_experiment_decides_between_hysteresis_and_a_static_law() {
         assert_eq!(plan["schedule"], "next/schedule.csv");
         let decides = plan["decides"].as_array().unwrap();
         assert!(decides.iter().any(|set| *set == serde_json::json!([cause.name()])) && decides.len() > 1, "{plan}");
-        assert!(plan["probability"].as_f64().unwrap() > 0.9 && plan["minutes"] == 2.0, "{plan}");
+        let minutes = plan["minutes"].as_f64().unwrap();
+        assert!(plan["probability"].as_f64().unwrap() > 0.9 && (minutes - 2.0).abs() < 0.01, "{plan}");
 
         let schedule = played(&folder.path().join("next/schedule.csv"));
         let volts = &schedule.voltage_v;
@@ -82,7 +83,7 @@ fn schedule_keeps_limit_slew_and_time_and_is_played_by_the_stair() {
     assert!(schedule.time_s.last().is_some_and(|end| (89.0..=90.0).contains(end)));
     assert!(schedule.voltage_v.iter().all(|volts| (0.0..=300.0).contains(volts)));
     let steepest = schedule.voltage_v.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-    assert!(steepest <= 50.0 * 0.1 + 1e-9 && steepest > 4.0, "{steepest} V in 0.1 s");
+    assert!(steepest <= 50.0 * 0.1 + 1e-6 && steepest > 4.0, "{steepest} V in 0.1 s");
     assert!(schedule.voltage_v.iter().any(|volts| *volts > 150.0), "the limit is hardly used");
     let stair = json(folder.path(), &["stair", "--input", "next/schedule.csv", "--controller", "none", "--json"]);
     assert!(stair["max_fixed_point_error"].is_number(), "{stair}");
@@ -108,7 +109,7 @@ fn a_decided_diagnosis_gets_the_tightest_intervals() {
     fs::write(folder.path().join("d.json"), report.to_string()).unwrap();
     let plan = json(folder.path(), &["plan", "d.json", "--json"]);
     assert!(plan["decides"].as_array().unwrap().is_empty() && plan["probability"].is_null(), "{plan}");
-    assert!(plan["schedule"].is_null() && plan["minutes"] == 4.0, "{plan}");
+    assert!(plan["schedule"].is_null() && (plan["minutes"].as_f64().unwrap() - 4.0).abs() < 0.01, "{plan}");
     let width = plan["intervals"].as_array().unwrap().iter().find(|it| it["parameter"] == "width_v").unwrap();
     let [now, planned] = ["now", "planned"].map(|name| width[name].as_f64().unwrap());
     assert!(planned > 0.0 && planned < 1.5 * now, "{width}");

@@ -192,7 +192,9 @@ fn finished(
     let undecided = named.len() > 1;
     let volts = |normalised: f64| {
         let step = (frame.high_v - frame.low_v) * coordinates.volt_v / STEPS_OF_RANGE;
-        let rounded = (normalised * coordinates.volt_v / step).round() * step;
+        let exact = normalised * coordinates.volt_v;
+        // Rounding would exceed a slew rate.
+        let rounded = if frame.slew_v_per_row.is_finite() { exact } else { (exact / step).round() * step };
         let digits = format!("{rounded:.9e}").parse().unwrap_or(rounded);
         f64::clamp(digits, frame.low_v * coordinates.volt_v, frame.high_v * coordinates.volt_v)
     };
