@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use crate::dimension::Dimension;
+use crate::hypotheses::{Experiment, Rival};
 
 /// Version of the JSON format.
 pub const SCHEMA: u32 = 1;
@@ -50,6 +51,10 @@ pub struct Report {
     /// What each of several records shows beyond the causes that they share; empty for a single record.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<RecordReport>,
+    /// The best sets of causes with their fits, the best first: what `vsj plan` decides between.
+    pub rivals: Vec<Rival>,
+    /// The experiment that they were fitted to; `None` until the diagnosis is finished.
+    pub experiment: Option<Experiment>,
 }
 
 /// What one of several records shows beyond the causes that they share.

@@ -44,6 +44,7 @@
 //! | --- | --- | --- |
 //! | [`stats`] | numbers | medians, sums, scales, a periodogram; the thresholds of all decisions |
 //! | [`dimension`] | | dimensions of reported numbers, and their units |
+//! | [`hypotheses`] | | the data types of what a diagnosis leaves to decide |
 //! | [`answer`] | | the data types of a report |
 //! | [`record`] | a record's rows | the command as a signal, the readings, the grid that they lie on |
 //! | [`linear`] | a record | the best linear models of order 0 to 4 |
@@ -56,6 +57,7 @@
 //! | [`search`] | a record | which effects |
 //! | [`verdict`] | a search | what is reported |
 //! | [`examine`](mod@examine) | a record, options | the diagnosis: all passes in order |
+//! | [`plan`](mod@plan) | what a diagnosis leaves to decide | the schedule of the experiment that decides it |
 
 pub mod adequacy;
 pub mod answer;
@@ -63,9 +65,12 @@ pub mod dimension;
 pub mod effects;
 pub mod examine;
 pub mod fit;
+pub mod hypotheses;
 pub mod linear;
 pub mod noise;
 pub mod nominal;
+pub mod plan;
+
 pub mod plant;
 pub mod record;
 pub mod search;

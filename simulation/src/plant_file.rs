@@ -439,6 +439,14 @@ pub fn parse(name: &str, text: &str) -> Result<PlantFile> {
     parse_checked(name, text, PlantFile::check)
 }
 
+/// Parses like [`parse`], for a simulation in double precision, as [`load_for_host`] loads.
+///
+/// # Errors
+/// The errors of [`load_for_host`].
+pub fn parse_for_host(name: &str, text: &str) -> Result<PlantFile> {
+    parse_checked(name, text, PlantFile::check_for_host)
+}
+
 fn parse_checked(name: &str, text: &str, check: Check) -> Result<PlantFile> {
     let file: PlantFile = toml::from_str(text).map_err(|error| {
         let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));

@@ -10,6 +10,7 @@ pub(crate) mod joint;
 pub(crate) mod link;
 pub(crate) mod log;
 mod option_names;
+pub(crate) mod plan;
 mod record_arguments;
 pub(crate) mod reproduce;
 pub(crate) mod stair;

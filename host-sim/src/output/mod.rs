@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`terminal`], [`screen`] | stdout and stderr; a status that is refreshed in place |
 //! | [`files`] | the files of one run: all of them or none |
-//! | [`beam`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`joint`], [`log`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
+//! | [`beam`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`recording`] | telemetry as CSV while it arrives |
 //! | [`figure`], [`plots`] | plots as SVG |
 
@@ -20,6 +20,7 @@ pub mod files;
 pub mod identify;
 pub mod joint;
 pub mod log;
+pub mod plan;
 pub mod plots;
 pub mod recording;
 pub mod reproduce;

@@ -33,6 +33,7 @@ use crate::search::{Scored, Search, WarmStart};
 use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::diagnosis::{self, Diagnosis};
+use crate::verdict::hypotheses::hypotheses;
 use crate::verdict::linear_rival::compare;
 
 /// Finds out what the simulation gets wrong on a record.
@@ -89,7 +90,9 @@ pub(super) fn joint(
     let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget, only };
     let found = of_readings(&examined, &base, progress);
     let found = without_unsupported_terms(&examined, &base, found, progress);
+    let (rivals, experiment) = hypotheses(&found, records, &options.units.reading);
     let mut found = found.restored(records, &normalisations);
+    (found.report.rivals, found.report.experiment) = (rivals, Some(experiment));
     found.report.nominal = nominal(options);
     found.report.complete = !budget.is_stopped();
     found.report.search = SearchReport {

@@ -42,6 +42,12 @@ const BLOCK: usize = 1024;
 const SPECTRUM_ERROR: f64 = 10.0;
 
 impl Autocorrelation {
+    /// Returns the filter of an autoregression behind a fractional difference, for a number of rows.
+    pub fn new(ar: Vec<f64>, power: f64, rows: usize) -> Self {
+        let sections = if power > 0.0 { sections(power, rows) } else { Vec::new() };
+        Self { ar, power, sections }
+    }
+
     /// Fits the filter to a residual with the given robust scale, in V.
     pub fn fitted(residual: &[f64], scale: f64) -> Self {
         if residual.len() < FEWEST_ROWS_FOR_AUTOCORRELATION.count() {

@@ -2,12 +2,15 @@
 
 use crate::adequacy::Unidentifiable;
 use crate::answer::{Finding, Verdict};
+use crate::effects::effect::Location;
 use crate::effects::{EFFECTS, contains, index_of};
 use crate::record::data::Data;
 use crate::search::{Evaluator, Scored, Search, effects};
 use crate::stats::thresholds::empirical::REVERSAL_OF_FULL_SCALE;
 use crate::stats::thresholds::probability::RIVAL_ODDS;
 
+/// Words that follow an experiment which can be computed.
+const PLAN: &str = "; `vsj plan DIAGNOSIS.json` computes the schedule that shows most";
 /// Largest number of rivals that are listed.
 const MOST_RIVALS: usize = 3;
 
@@ -68,15 +71,17 @@ pub(crate) fn next_experiment(
             let rival = alternatives.iter().flatten().find(|cause| !named.contains(cause));
             let ours = named.iter().find(|cause| !alternatives.iter().all(|set| set.contains(cause)));
             let cause = rival.or(ours)?;
-            let experiment = EFFECTS[index_of(cause)?].isolating_experiment();
-            Some(format!("run {experiment}"))
+            let effect = EFFECTS[index_of(cause)?];
+            // No voltage decides on a cause of the readings alone.
+            let computed = if effect.location() == Location::Reading { "" } else { PLAN };
+            Some(format!("run {}{computed}", effect.isolating_experiment()))
         }
         Verdict::Consistent if !wanders => None,
         Verdict::Unexplained | Verdict::Consistent => Some(
             "run the same schedule again: errors that repeat belong to the spring, the others to the readings"
                 .to_owned(),
         ),
-        Verdict::Insufficient => Some(Unidentifiable::Excitation.next_experiment().to_owned()),
+        Verdict::Insufficient => Some(format!("{}{PLAN}", Unidentifiable::Excitation.next_experiment())),
         Verdict::Explained => None,
     }
 }

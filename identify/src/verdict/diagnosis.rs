@@ -5,6 +5,7 @@ use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, SearchReport, Ve
 use crate::dimension::Dimension;
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
+use crate::plant::base::Base;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::record::scales::Scales;
@@ -49,6 +50,12 @@ pub struct Diagnosis {
     pub(crate) held_out_in_place: Vec<f64>,
     /// Held-out log-likelihood of the extended simulation less the price of its causes, in nats.
     pub(crate) score: f64,
+    /// The plant that was extended.
+    pub(crate) base: Base,
+    /// The best structures, one for each set of causes, the best first; empty if no search was run.
+    pub(crate) contenders: Vec<Scored>,
+    /// Root mean square of the structure that no cause explains, in normalised V.
+    pub(crate) unexplained_v: f64,
     /// From which a search under another reading of the same rows starts; `None` if no search was run.
     pub(crate) warm_start: Option<WarmStart>,
 }
@@ -149,6 +156,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         noise: noise_report(&extended.noise),
         residual: residual_report(data, extended),
         records: Vec::new(),
+        rivals: Vec::new(),
+        experiment: None,
     };
     Diagnosis {
         report,
@@ -161,6 +170,9 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         observed: observed.clone(),
         held_out_in_place,
         score: found.best.score,
+        base: engine.base().clone(),
+        contenders: found.contenders,
+        unexplained_v: unmodelled.map_or(0.0, |found| found.rms),
         warm_start: Some(found.warm_start),
         extended: found.best.fit,
     }
@@ -220,6 +232,8 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         noise: noise_report(&baseline.noise),
         residual: residual_report(data, &baseline),
         records: Vec::new(),
+        rivals: Vec::new(),
+        experiment: None,
     };
     Diagnosis {
         report,
@@ -233,6 +247,9 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         ranking: Vec::new(),
         zero_offsets: vec![0.0; data.parts.len()],
         observed: engine.observed.clone(),
+        base: engine.base().clone(),
+        contenders: Vec::new(),
+        unexplained_v: 0.0,
         warm_start: None,
     }
 }

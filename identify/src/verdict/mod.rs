@@ -10,6 +10,7 @@
 //! | margins | smallest errors of gain and time constant that a record without findings would have shown |
 //! | export | the extended simulation as a plant file |
 //! | ranking | the best sets of causes compared by score and held-out error |
+//! | hypotheses | the best sets with their fits, and the experiment: what the next experiment is computed from |
 //! | restored | converted from the coordinates of the search to the file's units |
 //!
 //! [`diagnosis`] puts the parts together.
@@ -21,6 +22,7 @@ pub mod export;
 mod extrapolation;
 pub mod finding;
 pub(crate) mod found;
+pub(crate) mod hypotheses;
 pub(crate) mod linear_rival;
 pub mod margins;
 pub mod quality;

@@ -54,7 +54,8 @@ fn report(report: &mut Report, scales: &Scales) {
     }
 }
 
-fn parameter(Parameter { value, low, high, unit, dimension, .. }: &mut Parameter, scales: &Scales) {
+/// Converts a parameter to the file's units.
+pub(crate) fn parameter(Parameter { value, low, high, unit, dimension, .. }: &mut Parameter, scales: &Scales) {
     let ends = [*low, *high].map(|end| scales.restored(*dimension, end));
     *value = scales.restored(*dimension, *value);
     (*low, *high) = if scales.size(*dimension) < 0.0 { (ends[1], ends[0]) } else { (ends[0], ends[1]) };

@@ -16,7 +16,8 @@ use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
 use validation::campaign::{
-    answer_table, criteria, out_of_model, plants, real, reliability, rivals, scales, shared, steps, tables, unforeseen,
+    answer_table, criteria, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps, tables,
+    unforeseen,
 };
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
@@ -55,8 +56,8 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
-    /// unforeseen), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in total (nulls,
-    /// triples), or times 53 (thresholds) or 455 (reliability)
+    /// unforeseen), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each of two sets
+    /// (plan), in total (nulls, triples), or times 53 (thresholds) or 455 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -174,6 +175,8 @@ enum Part {
     Rivals,
     /// Six other instruments, simulated, in their own units
     Instruments,
+    /// Minutes of the next experiment until the diagnosis is right, planned, fixed and random: 30 springs of each of two sets
+    Plan,
     /// Every empirical threshold at half and twice its value: 53 records at each value. Run it as `cargo thresholds`
     Thresholds,
 }
@@ -367,6 +370,21 @@ impl Cli {
                 let rows = measured("instruments", &real::twins(first), true)?;
                 let markdown = real::table(&rows);
                 Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
+            }
+            Part::Plan => {
+                let cases = plan::cases(&ground_truth::out_of_model::all(), first, self.count(30));
+                let bar = bar("plan", cases.len())?;
+                let outcomes = plan::run(&cases, &bar)?;
+                bar.finish_and_clear();
+                let markdown = plan::page(&outcomes);
+                Ok(Done {
+                    part,
+                    markdown,
+                    wrong: String::new(),
+                    criteria: Vec::new(),
+                    json: json!(outcomes),
+                    figure: None,
+                })
             }
             #[cfg(not(feature = "sensitivity"))]
             Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),

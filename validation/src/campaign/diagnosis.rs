@@ -3,6 +3,7 @@
 use anyhow::Result;
 use identify::Diagnosis;
 use identify::fit::engine::Engine;
+use identify::plan::{Basis, Request, plan};
 use identify::plant::base::Base;
 use identify::record::data::Data;
 use identify::record::observed::Observed;
@@ -26,6 +27,16 @@ pub type Diagnose<'a> = dyn Fn(&LabelledRecord) -> Result<Value> + Sync + 'a;
 /// The record is rejected.
 pub fn diagnose(hidden: &LabelledRecord) -> Result<Value> {
     Ok(serde_json::to_value(identify::examine::diagnose(&hidden.record(), &Options::default())?)?)
+}
+
+/// Times in s and voltages in V of the schedule that `vsj plan` computes from a report, and the probability that it predicts.
+///
+/// # Errors
+/// The report or the duration is rejected.
+pub fn planned(report: &Value, minutes: f64) -> Result<(Vec<(f64, f64)>, Option<f64>)> {
+    let basis: Basis = serde_json::from_value(report.clone())?;
+    let plan = plan(&basis, &Request { minutes: Some(minutes), ..Request::default() }, "the report")?;
+    Ok((plan.commands.iter().map(|command| (command.time_s, command.voltage_v)).collect(), plan.probability))
 }
 
 /// Report of `identify` on a record compared with a nominal spring, as JSON.

@@ -22,6 +22,7 @@
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
 //! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made |
 //! | [`reliability`] | stated probabilities compared with frequencies, over all sets |
+//! | [`plan`] | minutes of the next experiment until the diagnosis is right, by schedule |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
 
@@ -36,6 +37,7 @@ pub mod isolable;
 pub mod mixture;
 pub mod out_of_model;
 pub mod part;
+pub mod plan;
 pub mod plants;
 pub mod real;
 pub mod reliability;

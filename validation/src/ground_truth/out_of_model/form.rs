@@ -90,6 +90,21 @@ impl Form {
         self.record(seed, Some(self.build), STEPS)
     }
 
+    /// A record of the spring of `seed`, whose values are drawn for the schedule `first`, under another schedule, with 0.2 % white
+    /// noise of its own seed.
+    pub fn under(&self, seed: u64, first: &Schedule, schedule: &Schedule, noise_seed: u64) -> LabelledRecord {
+        let mut chain = (self.build)(&mut Draw::new(first, ChaCha8Rng::seed_from_u64(seed)));
+        let noise = Noise::white(0.2);
+        let mut of_noise = ChaCha8Rng::seed_from_u64(noise_seed);
+        of_noise.set_stream(1);
+        let rows = noise.draw(&mut of_noise, schedule.time_s.len());
+        let expected = chain.stiffness(schedule, STEPS);
+        let noisy = expected.iter().zip(&rows).map(|(y, noise)| y + noise);
+        let read = chain.read(schedule, noisy);
+        let readings = Readings { read, expected, limit: None, outliers: 0 };
+        LabelledRecord { schedule: schedule.clone(), effects: Vec::new(), noise, seed: noise_seed, readings }
+    }
+
     /// The record with the law `build`; `None` gives the paper's spring on the same schedule with the same noise.
     pub(super) fn record(&self, seed: u64, build: Option<fn(&mut Draw) -> Chain>, steps: usize) -> LabelledRecord {
         let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -1,0 +1,94 @@
+//! `vsj plan`: the next experiment after a diagnosis.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::output::files::Files;
+use host_sim::output::plan::{self as output, SCHEDULE_FILE, text};
+use host_sim::output::terminal::{json, print, wrote};
+use identify::plan::{Basis, Request, plan};
+use simulation::bad_input;
+
+use super::diagnose::command_line;
+
+/// Compute the next experiment: the schedule that decides between the causes that a diagnosis leaves undecided
+///
+/// From all schedules within range, slew rate and time, the one whose readings differ most between the sets of causes, after each
+/// has bent its parameters to imitate the others. The voltage starts and ends at 0 V, and has no other signs than in the record. If
+/// nothing is undecided, the schedule gives the tightest intervals and shows as many causes as possible.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj diagnose record.csv --json > diagnosis.json
+  vsj plan diagnosis.json                       the schedule as a table
+  vsj plan diagnosis.json --out out/plan        with schedule.csv and plots
+  vsj plan diagnosis.json --minutes 10 --limit-v 700 --slew-v-per-s 200
+  vsj plan diagnosis.json --json | jq .probability
+  vsj stair --input out/plan/schedule.csv --controller none
+  vsj link /dev/ttyACM0 record next.csv --input out/plan/schedule.csv --arm
+  vsj diagnose next.csv                         the decision")]
+pub(crate) struct Arguments {
+    /// The diagnosis: what `vsj diagnose --json` prints, or diagnosis.json of its --out
+    #[arg(value_name = "DIAGNOSIS.json")]
+    diagnosis: PathBuf,
+    /// Duration of the experiment, in minutes; default: 4 for the report's spring, as many time constants for another
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    minutes: Option<f64>,
+    /// Largest magnitude of the voltage, in V; default: that of the record
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    limit_v: Option<f64>,
+    /// Largest rate of change of the voltage, in V/s; default: steps
+    #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
+    slew_v_per_s: Option<f64>,
+    /// Write schedule.csv, plan.json and plots of the schedule and of the predicted readings to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads the parts of a diagnosis that a plan needs.
+fn read(path: &Path) -> Result<Basis> {
+    let name = path.display();
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) => bad_input!("{name}: cannot be read: {error}; expected the JSON of `vsj diagnose`"),
+    };
+    match serde_json::from_str(&text) {
+        Ok(basis) => Ok(basis),
+        Err(error) => {
+            let what = error.to_string();
+            // The position is at the front of the message.
+            let what = what.rsplit_once(" at line ").map_or(what.as_str(), |(what, _)| what);
+            let (line, column) = (error.line(), error.column());
+            bad_input!("{name}, line {line}, column {column}: {what}; expected the JSON of `vsj diagnose`")
+        }
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let Arguments { minutes, limit_v, slew_v_per_s, .. } = *arguments;
+    for (option, value) in [("--minutes", minutes), ("--limit-v", limit_v), ("--slew-v-per-s", slew_v_per_s)] {
+        if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+            bad_input!("{option} {value}: expected a number above 0");
+        }
+    }
+    let basis = read(&arguments.diagnosis)?;
+    // A folder that cannot be created is reported before the search starts.
+    let files = arguments.out.as_deref().map(Files::new).transpose()?;
+    let request = Request { minutes, limit_v, slew_v_per_s };
+    let mut plan = plan(&basis, &request, &arguments.diagnosis.display().to_string())?;
+    plan.schedule = arguments.out.as_deref().map(|folder| folder.join(SCHEDULE_FILE).display().to_string());
+    let paths = match files {
+        Some(files) => output::write(files, &plan, &command_line())?,
+        None => Vec::new(),
+    };
+    print(&if arguments.json {
+        json(&plan)?
+    } else {
+        text::text(&plan) + "\n" + &text::how_to_play(&plan) + &wrote(&paths)
+    })
+}

@@ -1,0 +1,97 @@
+//! A plan as text for the terminal.
+
+use identify::plan::Plan;
+use identify::plan::answer::{Part, Sharper};
+use simulation::bad_input::number as exact;
+
+use crate::output::cells::line;
+use crate::output::diagnosis::number::number;
+
+/// Largest number of parts that are listed.
+const MOST_PARTS: usize = 45;
+
+/// The whole answer, but for the files that were written.
+pub fn text(plan: &Plan) -> String {
+    let mut text = String::new();
+    line(&mut text, &sentence(plan));
+    for (index, set) in (1..).zip(&plan.decides) {
+        line(&mut text, &format!("  [{index}] {}", causes(set)));
+    }
+    for remark in &plan.remarks {
+        line(&mut text, &format!("{}.", capitalised(remark)));
+    }
+    line(&mut text, "");
+    line(&mut text, &format!("{:>10} {:>10} {:>10}        separates", "from s", "to s", "to V"));
+    for part in plan.parts.iter().take(MOST_PARTS) {
+        line(&mut text, &of_part(part));
+    }
+    if !plan.separations.is_empty() {
+        line(&mut text, "");
+        line(&mut text, &format!("{:>10} {:>12}  if true, against", "nats", "probability"));
+        for it in &plan.separations {
+            let pair = format!("{}, against {}", causes(&it.truth), causes(&it.rival));
+            line(&mut text, &format!("{:>10} {:>12.3}  {pair}", number(it.nats), it.probability));
+        }
+    }
+    if !plan.intervals.is_empty() {
+        line(&mut text, "");
+        line(&mut text, "95 % interval of the likeliest set, +-  now           planned");
+        for it in &plan.intervals {
+            line(&mut text, &of_interval(it));
+        }
+    }
+    text
+}
+
+/// The command lines that play the schedule, then diagnose both records.
+pub fn how_to_play(plan: &Plan) -> String {
+    let Some(schedule) = &plan.schedule else {
+        return "With --out DIR the schedule is written for `vsj stair --input` and `vsj link PORT record --input`.\n"
+            .into();
+    };
+    let [low_v, high_v] = plan.range_v;
+    let most = if high_v > 700.0 { format!(" --limit-v {}", exact(high_v)) } else { String::new() };
+    let least = if low_v < 0.0 { format!(" --min-v {}", exact(low_v)) } else { String::new() };
+    format!(
+        "Simulated: vsj stair --input {schedule} --controller none{most}{least}\n\
+         Measured:  vsj link PORT record next.csv --input {schedule} --arm\n\
+         Then:      vsj diagnose next.csv\n"
+    )
+}
+
+fn sentence(plan: &Plan) -> String {
+    let [low, high] = plan.range_v.map(number);
+    let schedule = format!("{} minutes between {low} and {high} V", number(plan.minutes));
+    match plan.probability {
+        Some(probability) => format!(
+            "{schedule} decide between {} sets of causes with a predicted probability of {probability:.3}:",
+            plan.decides.len()
+        ),
+        None => format!("Nothing is undecided; {schedule} for the tightest intervals:"),
+    }
+}
+
+/// Names of a set.
+fn causes(set: &[String]) -> String {
+    if set.is_empty() { "no cause".to_owned() } else { set.join(" + ") }
+}
+
+fn capitalised(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn of_part(part: &Part) -> String {
+    let way = if part.ramp { "ramp" } else { "hold" };
+    let separates = part.separates.map_or_else(String::new, |[one, other]| {
+        format!("[{}] from [{}], {:.0} %", one + 1, other + 1, 100.0 * part.contribution)
+    });
+    let [from, to] = [part.from_s, part.to_s].map(number);
+    format!("{from:>10} {to:>10} {:>10}  {way}  {separates}", number(part.voltage_v))
+}
+
+fn of_interval(it: &Sharper) -> String {
+    let name = format!("{} {}", it.cause, it.parameter);
+    let now = it.now.map_or_else(|| "-".to_owned(), number);
+    format!("{name:<38}  {now:<12}  {} {}", number(it.planned), it.unit)
+}
