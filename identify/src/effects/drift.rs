@@ -24,7 +24,7 @@ impl Effect for Drift {
         Location::Relaxation
     }
 
-    fn affects(&self) -> Affects {
+    fn affects(&self, _: usize) -> Affects {
         Affects::Readings
     }
 

@@ -1,8 +1,8 @@
 //! The chain from command to stiffness, in the order of [`model::extended`]:
 //!
 //! ```text
-//! command -> limit -> slew -> output lag -> delay -> (magnitude) -> hysteresis -> law -> leakage -> relaxation -> output law ->
-//! stiffness
+//! command -> limit -> slew -> output lag -> delay -> (magnitude) -> hysteresis -> law -> leakage -> relaxation -> lags in
+//! series -> output law -> stiffness
 //! ```
 //!
 //! A plant file cannot hold a law behind the relaxation; it is written in front of it, where it settles at the same
@@ -48,6 +48,8 @@ pub struct Chain<'a> {
     pub losses: Vec<Loss>,
     /// Feedthrough and lags from settled stiffness to stiffness.
     pub relaxation: Relaxation,
+    /// Time constants of lags in series with the relaxation, in s.
+    pub series_s: Vec<f64>,
 }
 
 /// Fraction by which a delay is shortened, so that a jump that falls on the time of a row is before that row however
@@ -77,6 +79,7 @@ impl<'a> Chain<'a> {
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
             relaxation,
+            series_s: Vec::new(),
         }
     }
 
@@ -93,6 +96,7 @@ impl<'a> Chain<'a> {
             file.memory = self.memory.table();
         }
         let (gain, relaxation, leakage) = self.as_plant_file_tables();
+        let relaxation = relaxation.in_series_with(&self.series_s).unwrap_or(relaxation);
         file.law = self.law.table(gain, &self.law_behind, full_scale_v);
         file.leakage = leakage;
         relaxation.extend(file);
@@ -107,6 +111,26 @@ impl<'a> Chain<'a> {
             },
             loss => (1.0, self.relaxation, loss.map(|loss| Leakage { share: loss.share, tau_s: loss.tau_s })),
         }
+    }
+
+    /// Returns true if a plant file can hold the lags in series.
+    pub fn series_lags_fit_plant_file(&self) -> bool {
+        self.as_plant_file_tables().1.in_series_with(&self.series_s).is_some()
+    }
+
+    /// Returns the work of the linear part on a signal, in units of one lag.
+    pub fn work(&self, signal: &Signal) -> u64 {
+        match self.exact_series() {
+            Some(relaxation) => relaxation.work(signal),
+            None => self.relaxation.work(signal) + (self.series_s.len() * signal.len()) as u64,
+        }
+    }
+
+    /// Returns a relaxation that is the chain's with all lags in series, which is exact where the output of one as the input of
+    /// the next is not; `None` if there is none, also where a part of a loss bypasses the relaxation.
+    fn exact_series(&self) -> Option<Relaxation> {
+        let passes = self.losses.iter().all(|loss| loss.instantaneous == 0.0);
+        self.relaxation.in_series_with(&self.series_s).filter(|_| passes || self.series_s.is_empty())
     }
 
     /// Maps the commanded voltage to the voltage on the spring's electrodes, or to its magnitude where that alone counts.
@@ -153,13 +177,18 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Applies the linear part of the chain: leakage and relaxation.
+    /// Applies the linear part of the chain: leakage, relaxation and lags in series.
     fn follow(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
         let mut lost = InstantaneousLoss::default();
         self.losses.iter().for_each(|loss| loss.apply(signal, start, &mut lost));
-        self.relaxation.pass(signal, start, levels_v);
+        let exact = self.exact_series();
+        exact.as_ref().unwrap_or(&self.relaxation).pass(signal, start, levels_v);
         if !lost.is_none() {
             lost.subtract_from(signal);
+        }
+        for &tau_s in self.series_s.iter().filter(|_| exact.is_none()) {
+            let mut lag = Lag::at(tau_s, signal.before + start.next_offset_v());
+            signal.pass(|piece| lag.pass(piece));
         }
     }
 

@@ -29,6 +29,10 @@ pub const FURTHER: usize = 3;
 
 /// Longest integration step where the lag's state sets its time constant, relative to the shortest time constant.
 const STEP: f64 = 0.1;
+/// Relative difference of two time constants in series that are closer to each other: equal ones have no partial fractions.
+const CLOSE: f64 = 1e-7;
+/// Largest weight of a partial fraction; a larger one, of three equal time constants, would amplify rounding errors.
+const LARGEST_WEIGHT: f64 = 1e9;
 /// Largest number of integration steps of one piece, after which the lag has settled.
 const MOST_STEPS: f64 = 200.0;
 
@@ -125,6 +129,37 @@ impl Relaxation {
         }
         relaxation.modes.iter_mut().zip(&plant.modes).for_each(|(mode, of_file)| *mode = *of_file);
         relaxation
+    }
+
+    /// Returns the relaxation that is this one in series with further lags, whose time constants are in s, by partial fractions:
+    ///
+    /// ```text
+    /// lag(tau_i) lag(tau) = (tau_i lag(tau_i) - tau lag(tau)) / (tau_i - tau)
+    /// ```
+    ///
+    /// `None` if the time constant varies, if there are oscillations, if there is no place for as many lags, or if three time
+    /// constants are equal.
+    pub fn in_series_with(&self, series_s: &[f64]) -> Option<Self> {
+        let mut whole = *self;
+        for &tau_s in series_s {
+            if self.varies() || self.oscillations().next().is_some() {
+                return None;
+            }
+            let free = whole.further.iter().position(|further| further.part == 0.0)?;
+            let close = |other: f64| (other / tau_s - 1.0).abs() < CLOSE;
+            let twin = std::iter::once(whole.tau_s).chain(whole.parts().map(|it| it.tau_s)).find(|&it| close(it));
+            let tau_s = twin.map_or(tau_s, |twin| twin * (1.0 + CLOSE));
+            let factor = |of_s: f64| of_s / (of_s - tau_s);
+            let first = whole.first_weight() * factor(whole.tau_s);
+            whole.further.iter_mut().for_each(|further| further.part *= factor(further.tau_s));
+            let others = first + whole.parts().map(|it| it.part).sum::<f64>();
+            whole.further[free] = Part { part: 1.0 - others, tau_s };
+            whole.share = 0.0;
+            if whole.parts().any(|it| it.part.abs() > LARGEST_WEIGHT) {
+                return None;
+            }
+        }
+        Some(whole)
     }
 
     /// Returns the oscillations that contribute.

@@ -51,7 +51,7 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, scales, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
-    /// long), in total (nulls, triples), or times 53 (thresholds)
+    /// long), in total (nulls, triples), or times 55 (thresholds)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -159,7 +159,7 @@ enum Part {
     Rivals,
     /// Six other instruments, simulated, in their own units
     Instruments,
-    /// Every empirical threshold at half and twice its value: 53 records at each value. Run it as `cargo thresholds`
+    /// Every empirical threshold at half and twice its value: 55 records at each value. Run it as `cargo thresholds`
     Thresholds,
 }
 
