@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! command -> limit -> slew -> output lag -> delay -> (magnitude) -> hysteresis -> law -> leakage -> relaxation -> lags in
-//! series -> output law -> stiffness
+//! series -> play -> output law -> stiffness
 //! ```
 //!
 //! A plant file cannot hold a law behind the relaxation; it is written in front of it, where it settles at the same
@@ -42,6 +42,8 @@ pub struct Chain<'a> {
     pub memory: PlayBank,
     /// Static law from voltage to settled stiffness.
     pub law: Law<'a>,
+    /// A second bank of play operators, behind the relaxation.
+    pub memory_behind: PlayBank,
     /// A second static law, behind the relaxation.
     pub law_behind: Law<'a>,
     /// Charge losses; a plant file can hold the first one only.
@@ -76,6 +78,7 @@ impl<'a> Chain<'a> {
             even: file.even,
             memory: PlayBank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
+            memory_behind: PlayBank::of(None),
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
             relaxation,
@@ -172,6 +175,10 @@ impl<'a> Chain<'a> {
             applied.middles(levels_v);
         }
         self.follow(signal, &mut InitialState::at_rest(), levels_v);
+        if self.memory_behind.table().is_some() {
+            let mut memory = self.memory_behind.clone();
+            signal.map(|stiffness| memory.at(stiffness));
+        }
         if !self.law_behind.is_identity() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }

@@ -57,6 +57,8 @@ pub struct Relaxation {
     /// Set if the time constant depends on the spring's state instead of the voltage: the fraction of the remaining
     /// change that the state includes.
     pub by_state: Option<f64>,
+    /// Time constant of the first lag while its output falls, in s; `None` if it is that while it rises.
+    pub falling_tau_s: Option<f64>,
     /// Further lags, which act in parallel with the first.
     pub further: [Part; FURTHER],
     /// Oscillations, which act in parallel with the lags; unused ones have no weight.
@@ -78,6 +80,7 @@ impl Relaxation {
             tau_high_s: tau_s,
             geometric: false,
             by_state: None,
+            falling_tau_s: None,
             further: Default::default(),
             modes: [NO_MODE; PlantFile::MOST_MODES],
         }
@@ -107,7 +110,8 @@ impl Relaxation {
 
     /// Writes the relaxation to a plant file.
     pub fn extend(&self, file: &mut PlantFile) {
-        let mut tau_s = vec![self.tau_s];
+        // A file holds one time constant for both directions.
+        let mut tau_s = vec![self.falling_tau_s.map_or(self.tau_s, |falling_s| (self.tau_s * falling_s).sqrt())];
         tau_s.extend(self.parts().map(|part| part.tau_s));
         let weights = match tau_s.len() {
             1 => Vec::new(),
@@ -142,7 +146,7 @@ impl Relaxation {
     pub fn in_series_with(&self, series_s: &[f64]) -> Option<Self> {
         let mut whole = *self;
         for &tau_s in series_s {
-            if self.varies() || self.oscillations().next().is_some() {
+            if !self.is_linear() || self.oscillations().next().is_some() {
                 return None;
             }
             let free = whole.further.iter().position(|further| further.part == 0.0)?;
@@ -172,6 +176,11 @@ impl Relaxation {
         self.tau_high_s != self.tau_s
     }
 
+    /// Returns true if the first lag has the same time constant at all times.
+    pub fn is_linear(&self) -> bool {
+        !self.varies() && self.falling_tau_s.is_none()
+    }
+
     /// Maps the settled stiffness to the stiffness. `levels_v` is the voltage across the spring in the middle of each
     /// piece, in V; it is needed only if the time constant depends on it.
     pub fn pass(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
@@ -186,7 +195,7 @@ impl Relaxation {
             (mode, Oscillator::at(omega, mode.zeta, x, rate))
         };
         let mut modes: Vec<(Mode, Oscillator)> = self.oscillations().map(at_first).collect();
-        if further.is_empty() && modes.is_empty() && !self.varies() {
+        if further.is_empty() && modes.is_empty() && self.is_linear() {
             return signal.pass(|piece| {
                 let (start, end) = lag.pass(piece);
                 (share * piece.from + main * start, share * piece.to + main * end)
@@ -201,6 +210,10 @@ impl Relaxation {
             {
                 level = next;
                 lag = lag.with_tau(self.tau_at(level));
+            }
+            if let Some(falling_s) = self.falling_tau_s {
+                let tau_s = if piece.from + piece.to < 2.0 * lag.value() { falling_s } else { self.tau_s };
+                lag = if tau_s == lag.tau_s() { lag } else { lag.with_tau(tau_s) };
             }
             let (start, end) = match by_state {
                 Some(instantaneous) => self.follow_state(instantaneous, &mut lag, piece),

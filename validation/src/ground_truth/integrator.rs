@@ -75,8 +75,8 @@ impl Integrator {
         if self.spring.slew_v_per_s.is_infinite() {
             self.apply(self.target);
         }
-        let lags = self.spring.series_s.iter().zip(self.series).filter(|(tau_s, _)| **tau_s > 0.0);
-        let y = lags.last().map_or_else(|| self.unlagged(), |(_, output)| output);
+        let mut lags = self.spring.series_s.iter().zip(self.series).rev().filter(|(tau_s, _)| **tau_s > 0.0);
+        let y = lags.next().map_or_else(|| self.unlagged(), |(_, output)| output);
         self.spring.drift.map_or(y, |drift| drift.of(y, self.now_s - self.start_s))
     }
 
