@@ -40,7 +40,7 @@ impl Integrator {
             hysteresis,
             u: 0.0,
             v: 0.0,
-            state: [0.0; 5],
+            state: [0.0; 7],
             series: [0.0; 2],
         }
     }
