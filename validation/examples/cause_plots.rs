@@ -34,6 +34,7 @@ fn shown(cause: Cause) -> (Vec<f64>, Schedule) {
         Cause::Quantisation => (vec![15.0], slow()),
         Cause::Hum => (vec![6.0, 1.5, 0.0], fast()),
         Cause::ReadingOffset => (vec![52.0, 71.0, 15.0], slow()),
+        Cause::SeriesLag => (vec![0.3], fast()),
         Cause::Outliers => (vec![0.01, 40.0], slow()),
     }
 }

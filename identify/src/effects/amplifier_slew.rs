@@ -4,23 +4,19 @@
 //! | --- | --- |
 //! | both ways | `-slew <= du/dt <= slew` |
 //! | two rates | `-falling <= du/dt <= slew` |
-//! | output resistance | `tau du/dt = command - u`: a full stroke starts at `slew = full / tau` |
 //!
-//! If the record may not begin at rest, the voltage of a rate-limited amplifier before the first row is a further
+//! The exponential approach of an output resistance is a `series-lag`. If the record may not begin at rest, the voltage of a rate-limited amplifier before the first row is a further
 //! coordinate.
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
-use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
-use crate::stats::thresholds::empirical::SLOWEST_OUTPUT;
 
 pub(super) struct AmplifierSlew;
 
 const BOTH_WAYS: usize = 0;
 const TWO_RATES: usize = 1;
-const RESISTANCE: usize = 2;
 /// Number of rates of a form.
 const RATES: [usize; 2] = [1, 2];
 /// Ratio of the two rates at initial points.
@@ -35,11 +31,6 @@ fn stroke(data: &Data) -> f64 {
 /// Returns the rates, in V/s, at which a change by the full scale takes the whole record, and a tenth of a sample.
 fn range(data: &Data) -> (f64, f64) {
     (stroke(data) / data.duration_s().max(1e-6), 10.0 * stroke(data) / data.sample_s)
-}
-
-/// Returns the bounds of the output's time constant, in s; a shorter one looks like a delay.
-fn taus(data: &Data) -> (f64, f64) {
-    (data.sample_s, (SLOWEST_OUTPUT.get() * REFERENCE_TIME_CONSTANT_S).max(2.0 * data.sample_s))
 }
 
 impl Effect for AmplifierSlew {
@@ -60,14 +51,10 @@ impl Effect for AmplifierSlew {
     }
 
     fn forms(&self) -> usize {
-        3
+        2
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
-        if form == RESISTANCE {
-            let (shortest, longest) = taus(data);
-            return vec![Coordinate::log(shortest, longest)];
-        }
         let (slowest, fastest) = range(data);
         let mut coordinates = vec![Coordinate::log(slowest, fastest); RATES[form]];
         coordinates.extend(data.initial_state_unknown.then_some(Coordinate::new(-stroke(data), stroke(data))));
@@ -79,7 +66,6 @@ impl Effect for AmplifierSlew {
         let rates = (2.0 * slowest, 0.8 * fastest);
         let starts: Vec<Vec<f64>> = match form {
             BOTH_WAYS => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
-            RESISTANCE => return logarithms(taus(data), 10).map(|tau| vec![tau]).collect(),
             _ => logarithms(rates, 10)
                 .flat_map(|rate| [INITIAL_RATIO.ln(), -INITIAL_RATIO.ln()].map(|apart| vec![rate, rate + apart]))
                 .collect(),
@@ -89,13 +75,9 @@ impl Effect for AmplifierSlew {
         starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
     }
 
-    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+    fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         let value = point[0].exp();
         match form {
-            RESISTANCE => vec![
-                Quantity::new("slew_v_per_s", Dimension::VoltageRate, stroke(data) / value),
-                Quantity::new("output_tau_s", Dimension::Time, value),
-            ],
             TWO_RATES => vec![
                 Quantity::new("slew_v_per_s", Dimension::VoltageRate, value),
                 Quantity::new("falling_v_per_s", Dimension::VoltageRate, point[1].exp()),
@@ -110,10 +92,6 @@ impl Effect for AmplifierSlew {
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         let value = point[0].exp();
-        if form == RESISTANCE {
-            chain.output_tau_s = value;
-            return;
-        }
         let falling = point[RATES[form] - 1].exp();
         chain.initial_v = point.get(RATES[form]).copied();
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);

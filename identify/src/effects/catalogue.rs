@@ -3,8 +3,8 @@
 use crate::effects::effect::Effect;
 use crate::effects::{
     amplifier_limit, amplifier_slew, charge_leakage, delay, drift, gain_error, hum, hysteresis, instantaneous_share,
-    outliers, quantisation, reading_offset, resonance, second_relaxation, sensor_saturation, static_nonlinearity,
-    time_constant, voltage_dependent_time_constant,
+    outliers, quantisation, reading_offset, resonance, second_relaxation, sensor_saturation, series_lag,
+    static_nonlinearity, time_constant, voltage_dependent_time_constant,
 };
 
 /// Every effect, in the order of the chain: each acts on the result of those before it.
@@ -21,6 +21,7 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &second_relaxation::SecondRelaxation,
     &voltage_dependent_time_constant::VoltageDependentTimeConstant,
     &resonance::Resonance,
+    &series_lag::SeriesLag,
     &drift::Drift,
     &hum::Hum,
     &reading_offset::ReadingOffset,

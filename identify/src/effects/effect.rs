@@ -114,8 +114,8 @@ pub trait Effect: Sync {
     /// Returns the location in the chain.
     fn location(&self) -> Location;
 
-    /// Returns the first intermediate result of a simulation that the effect changes.
-    fn affects(&self) -> Affects {
+    /// Returns the first intermediate result of a simulation that a form of the effect changes.
+    fn affects(&self, _form: usize) -> Affects {
         match self.location() {
             Location::Amplifier => Affects::Amplifier,
             Location::Static => Affects::StaticResponse,

@@ -8,12 +8,13 @@
 //! | whole | one, weight 1 | r |
 //! | part | one | r, weight |
 //! | bank | five, at r / 5 to r | r, weights |
+//! | behind | one, weight 1, behind the relaxation: the sensor's backlash | r |
 //! | cycled part, cycled bank | the same, with the initial condition on the descending branch | the same |
 //!
 //! The initial condition belongs to the record, not to the spring.
 
 use crate::dimension::Dimension;
-use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
 use crate::plant::play_bank::PlayBank;
 use crate::record::data::Data;
@@ -21,9 +22,10 @@ use crate::record::data::Data;
 pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
+const BEHIND: usize = 5;
 
 /// Number of plays, and initial condition on the descending branch, for each form.
-const FORMS: [(usize, bool); 5] = [(1, false), (1, false), (5, false), (1, true), (5, true)];
+const FORMS: [(usize, bool); 6] = [(1, false), (1, false), (5, false), (1, true), (5, true), (1, false)];
 /// Thresholds of a bank relative to `r`.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
@@ -32,7 +34,7 @@ fn bank(form: usize, point: &[f64]) -> PlayBank {
     let (count, cycled) = FORMS[form];
     let threshold = point[0].exp();
     let plays: Vec<(f64, f64)> = match (form, count) {
-        (WHOLE, _) => vec![(threshold, 1.0)],
+        (WHOLE | BEHIND, _) => vec![(threshold, 1.0)],
         (_, 1) => vec![(threshold, point[1])],
         _ => PARTS.iter().zip(&point[1..]).map(|(part, &weight)| (threshold * part, weight)).collect(),
     };
@@ -50,6 +52,10 @@ impl Effect for Hysteresis {
         Location::Static
     }
 
+    fn affects(&self, form: usize) -> Affects {
+        if form == BEHIND { Affects::Relaxation } else { Affects::StaticResponse }
+    }
+
     fn description(&self) -> &'static str {
         "the rising and falling branches differ, however slowly the voltage changes"
     }
@@ -65,17 +71,21 @@ impl Effect for Hysteresis {
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (count, _) = FORMS[form];
         let mut coordinates = vec![Coordinate::log(1e-4 * data.full_scale_v, 0.5 * data.full_scale_v)];
-        if form != WHOLE {
+        if !matches!(form, WHOLE | BEHIND) {
             coordinates.resize(1 + count, Coordinate::new(0.0, 2.0));
         }
         coordinates
     }
 
+    /// The play behind the relaxation is not tried with an unknown initial state, in which its prediction is not linear.
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
+        if form == BEHIND && data.initial_state_unknown {
+            return Vec::new();
+        }
         let (count, _) = FORMS[form];
         let start = |part: f64, weight: f64| {
             let mut point = vec![(part * data.full_scale_v).ln()];
-            if form != WHOLE {
+            if !matches!(form, WHOLE | BEHIND) {
                 point.resize(1 + count, weight / count as f64);
             }
             point
@@ -88,12 +98,16 @@ impl Effect for Hysteresis {
         vec![Quantity::new("width_v", Dimension::Voltage, bank(form, point).width(data.full_scale_v))]
     }
 
-    /// A plant file holds a limited number of plays.
+    /// A plant file holds a limited number of plays, before the relaxation.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
-        (!chain.memory.fits_plant_file()).then(|| table(self, form, point, data))
+        (form == BEHIND || !chain.memory.fits_plant_file()).then(|| table(self, form, point, data))
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        if form == BEHIND {
+            chain.memory_behind = bank(form, point);
+            return;
+        }
         chain.memory = bank(form, point).composed_with(&chain.memory);
     }
 }

@@ -24,6 +24,7 @@ mod reading_offset;
 mod resonance;
 mod second_relaxation;
 mod sensor_saturation;
+mod series_lag;
 mod static_nonlinearity;
 mod time_constant;
 mod voltage_dependent_time_constant;

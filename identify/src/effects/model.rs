@@ -1,7 +1,7 @@
 //! A model: the chain of a plant file with effects applied to it.
 
 use crate::effects::catalogue::EFFECTS;
-use crate::effects::effect::{Coordinate, Effect};
+use crate::effects::effect::{Affects, Coordinate, Effect};
 use crate::plant::base::Base;
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
@@ -20,6 +20,11 @@ impl Block {
     /// Returns the effect.
     pub fn effect(&self) -> &'static dyn Effect {
         EFFECTS[self.effect]
+    }
+
+    /// Returns the first intermediate result of a simulation that the block changes.
+    pub fn affects(&self) -> Affects {
+        self.effect().affects(self.form)
     }
 
     /// Returns the name of the cause.

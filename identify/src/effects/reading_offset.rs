@@ -112,7 +112,7 @@ impl Effect for ReadingOffset {
         Location::Reading
     }
 
-    fn affects(&self) -> Affects {
+    fn affects(&self, _: usize) -> Affects {
         Affects::Readings
     }
 

@@ -41,7 +41,7 @@ impl Effect for Resonance {
         Location::Relaxation
     }
 
-    fn affects(&self) -> Affects {
+    fn affects(&self, _: usize) -> Affects {
         Affects::Response
     }
 

@@ -20,7 +20,7 @@ impl Effect for SensorSaturation {
         Location::Reading
     }
 
-    fn affects(&self) -> Affects {
+    fn affects(&self, _: usize) -> Affects {
         Affects::Readings
     }
 

@@ -1,10 +1,11 @@
-//! The time constant of the relaxation depends on the voltage: linearly or geometrically from `tau_low` at 0 V to
+//! The time constant of the relaxation depends on the voltage or on its direction: linearly or geometrically from `tau_low` at 0 V to
 //! `tau_high` at the nominal spring's reference voltage: 500 V, or its file's `tau_high_at_v`.
 //!
 //! | form | interpolation | depends on |
 //! | --- | --- | --- |
 //! | 0, 1 | linear, geometric | the voltage across the spring |
 //! | 2, 3 | linear, geometric | the spring's own state: the relaxed part, and a fraction of the remaining change |
+//! | 4 | one value each | whether the relaxed part rises or falls |
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
@@ -17,8 +18,15 @@ pub(super) struct VoltageDependentTimeConstant;
 const INITIAL_TIME_CONSTANTS_S: [(f64, f64); 8] =
     [(5.5, 6.5), (5.5, 4.5), (6.5, 4.5), (4.5, 6.5), (4.5, 5.5), (6.5, 5.5), (9.0, 3.0), (3.0, 9.0)];
 
-/// Each form: geometric interpolation, and dependence on the spring's own state.
+/// Each form that interpolates: geometric interpolation, and dependence on the spring's own state.
 const FORMS: [(bool, bool); 4] = [(false, false), (true, false), (false, true), (true, true)];
+/// The form with a time constant for each direction.
+const BY_DIRECTION: usize = 4;
+
+/// Returns true if a form depends on the spring's own state.
+fn by_state(form: usize) -> bool {
+    FORMS.get(form).is_some_and(|(_, by_state)| *by_state)
+}
 
 impl Effect for VoltageDependentTimeConstant {
     fn cause(&self) -> &'static str {
@@ -38,39 +46,40 @@ impl Effect for VoltageDependentTimeConstant {
     }
 
     fn forms(&self) -> usize {
-        FORMS.len()
+        FORMS.len() + 1
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let coordinate = Coordinate::log(0.2 * data.sample_s, 10.0 * data.duration_s());
         let mut coordinates = vec![coordinate, coordinate];
-        coordinates.extend(FORMS[form].1.then(|| Coordinate::new(0.0, 1.0)));
+        coordinates.extend(by_state(form).then(|| Coordinate::new(0.0, 1.0)));
         coordinates
     }
 
-    /// Forms that depend on the state are not tried with an unknown initial state, in which their prediction is not
+    /// Forms that depend on the state or the direction are not tried with an unknown initial state, in which their prediction is not
     /// linear.
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
-        if FORMS[form].1 && context.data.initial_state_unknown {
+        if (form == BY_DIRECTION || by_state(form)) && context.data.initial_state_unknown {
             return Vec::new();
         }
         let start = |(low, high): (f64, f64)| {
             let mut point = vec![low.ln(), high.ln()];
-            point.extend(FORMS[form].1.then_some(context.data.normalisation.share));
+            point.extend(by_state(form).then_some(context.data.normalisation.share));
             point
         };
         INITIAL_TIME_CONSTANTS_S.map(start).to_vec()
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![
-            Quantity::new("tau_low_s", Dimension::Time, point[0].exp()),
-            Quantity::new("tau_high_s", Dimension::Time, point[1].exp()),
-        ]
+    fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        let names = if form == BY_DIRECTION { ["tau_rising_s", "tau_falling_s"] } else { ["tau_low_s", "tau_high_s"] };
+        names.into_iter().zip(point).map(|(name, tau)| Quantity::new(name, Dimension::Time, tau.exp())).collect()
     }
 
     /// In the fixed-point tick the time constant is linear in the voltage.
     fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
+        if form == BY_DIRECTION {
+            return Some("fitted with a time constant for each direction, written with their geometric mean".into());
+        }
         match FORMS[form] {
             (false, false) => None,
             (true, false) => Some("fitted as geometric between its ends, written as straight".into()),
@@ -84,6 +93,11 @@ impl Effect for VoltageDependentTimeConstant {
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         chain.relaxation.tau_s = point[0].exp();
+        if form == BY_DIRECTION {
+            chain.relaxation.tau_high_s = chain.relaxation.tau_s;
+            chain.relaxation.falling_tau_s = Some(point[1].exp());
+            return;
+        }
         chain.relaxation.tau_high_s = point[1].exp();
         chain.relaxation.geometric = FORMS[form].0;
         chain.relaxation.by_state = FORMS[form].1.then(|| point[2]);

@@ -44,7 +44,7 @@ impl<T> Cached<T> {
     /// Returns true if the result was computed from the same blocks up to `last`; otherwise sets the key to the blocks
     /// of the model.
     fn update_key(&mut self, model: &Model, last: Affects) -> bool {
-        let blocks = || model.blocks.iter().filter(|(block, _)| block.effect().affects() <= last);
+        let blocks = || model.blocks.iter().filter(|(block, _)| block.affects() <= last);
         if self.key.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks())) {
             return true;
         }
@@ -67,7 +67,7 @@ const IRREGULAR: f64 = 3.0;
 
 /// Returns the work of a block on a response.
 fn response_work(block: Block, signal: &Signal) -> u64 {
-    if block.effect().affects() == Affects::Response { RESPONSE * signal.len() as u64 } else { 0 }
+    if block.affects() == Affects::Response { RESPONSE * signal.len() as u64 } else { 0 }
 }
 
 impl<'a> Simulator<'a> {
@@ -161,8 +161,7 @@ impl<'a> Simulator<'a> {
                 let mut start = InitialState::off(state);
                 self.signal.clone_from(&self.amplified.value);
                 chain.initial_state_response(&mut self.signal, &mut start, &self.levels_v);
-                self.work +=
-                    RELAXATION * chain.relaxation.work(&self.signal) + INITIAL_STATE * self.signal.len() as u64;
+                self.work += RELAXATION * chain.work(&self.signal) + INITIAL_STATE * self.signal.len() as u64;
                 for (block, point) in &model.blocks {
                     block.effect().modify_response(block.form, point, &mut self.signal, &mut start);
                     self.work += response_work(*block, &self.signal);
@@ -176,7 +175,7 @@ impl<'a> Simulator<'a> {
             }
         }
         kernels.clone_from(&self.kernels.value);
-        if model.blocks.iter().any(|(block, _)| block.effect().affects() == Affects::Readings) {
+        if model.blocks.iter().any(|(block, _)| block.affects() == Affects::Readings) {
             for kernel in kernels {
                 kernel.iter_mut().zip(&self.response.value).for_each(|(moved, stiffness)| *moved += stiffness);
                 self.modify_readings(model, kernel);
@@ -204,9 +203,9 @@ impl<'a> Simulator<'a> {
             }
             signal.clone_from(&self.static_response.value);
             chain.relax(signal, &self.amplified.value, &mut self.levels_v);
-            self.work += RELAXATION * chain.relaxation.work(signal);
+            self.work += RELAXATION * chain.work(signal);
         }
-        if model.blocks.iter().all(|(block, _)| block.effect().affects() != Affects::Response) {
+        if model.blocks.iter().all(|(block, _)| block.affects() != Affects::Response) {
             return signal;
         }
         self.signal.clone_from(signal);

@@ -1,8 +1,8 @@
 //! The chain from command to stiffness, in the order of [`model::extended`]:
 //!
 //! ```text
-//! command -> limit -> slew -> output lag -> delay -> (magnitude) -> hysteresis -> law -> leakage -> relaxation -> output law ->
-//! stiffness
+//! command -> limit -> slew -> output lag -> delay -> (magnitude) -> hysteresis -> law -> leakage -> relaxation -> lags in
+//! series -> play -> output law -> stiffness
 //! ```
 //!
 //! A plant file cannot hold a law behind the relaxation; it is written in front of it, where it settles at the same
@@ -42,12 +42,16 @@ pub struct Chain<'a> {
     pub memory: PlayBank,
     /// Static law from voltage to settled stiffness.
     pub law: Law<'a>,
+    /// A second bank of play operators, behind the relaxation.
+    pub memory_behind: PlayBank,
     /// A second static law, behind the relaxation.
     pub law_behind: Law<'a>,
     /// Charge losses; a plant file can hold the first one only.
     pub losses: Vec<Loss>,
     /// Feedthrough and lags from settled stiffness to stiffness.
     pub relaxation: Relaxation,
+    /// Time constants of lags in series with the relaxation, in s.
+    pub series_s: Vec<f64>,
 }
 
 /// Fraction by which a delay is shortened, so that a jump that falls on the time of a row is before that row however
@@ -74,9 +78,11 @@ impl<'a> Chain<'a> {
             even: file.even,
             memory: PlayBank::of(file.memory.as_ref()),
             law: Law::of(file.law.as_ref()),
+            memory_behind: PlayBank::of(None),
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
             relaxation,
+            series_s: Vec::new(),
         }
     }
 
@@ -93,6 +99,7 @@ impl<'a> Chain<'a> {
             file.memory = self.memory.table();
         }
         let (gain, relaxation, leakage) = self.as_plant_file_tables();
+        let relaxation = relaxation.in_series_with(&self.series_s).unwrap_or(relaxation);
         file.law = self.law.table(gain, &self.law_behind, full_scale_v);
         file.leakage = leakage;
         relaxation.extend(file);
@@ -107,6 +114,26 @@ impl<'a> Chain<'a> {
             },
             loss => (1.0, self.relaxation, loss.map(|loss| Leakage { share: loss.share, tau_s: loss.tau_s })),
         }
+    }
+
+    /// Returns true if a plant file can hold the lags in series.
+    pub fn series_lags_fit_plant_file(&self) -> bool {
+        self.as_plant_file_tables().1.in_series_with(&self.series_s).is_some()
+    }
+
+    /// Returns the work of the linear part on a signal, in units of one lag.
+    pub fn work(&self, signal: &Signal) -> u64 {
+        match self.exact_series() {
+            Some(relaxation) => relaxation.work(signal),
+            None => self.relaxation.work(signal) + (self.series_s.len() * signal.len()) as u64,
+        }
+    }
+
+    /// Returns a relaxation that is the chain's with all lags in series, which is exact where the output of one as the input of
+    /// the next is not; `None` if there is none, also where a part of a loss bypasses the relaxation.
+    fn exact_series(&self) -> Option<Relaxation> {
+        let passes = self.losses.iter().all(|loss| loss.instantaneous == 0.0);
+        self.relaxation.in_series_with(&self.series_s).filter(|_| passes || self.series_s.is_empty())
     }
 
     /// Maps the commanded voltage to the voltage on the spring's electrodes, or to its magnitude where that alone counts.
@@ -148,18 +175,27 @@ impl<'a> Chain<'a> {
             applied.middles(levels_v);
         }
         self.follow(signal, &mut InitialState::at_rest(), levels_v);
+        if self.memory_behind.table().is_some() {
+            let mut memory = self.memory_behind.clone();
+            signal.map(|stiffness| memory.at(stiffness));
+        }
         if !self.law_behind.is_identity() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }
     }
 
-    /// Applies the linear part of the chain: leakage and relaxation.
+    /// Applies the linear part of the chain: leakage, relaxation and lags in series.
     fn follow(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
         let mut lost = InstantaneousLoss::default();
         self.losses.iter().for_each(|loss| loss.apply(signal, start, &mut lost));
-        self.relaxation.pass(signal, start, levels_v);
+        let exact = self.exact_series();
+        exact.as_ref().unwrap_or(&self.relaxation).pass(signal, start, levels_v);
         if !lost.is_none() {
             lost.subtract_from(signal);
+        }
+        for &tau_s in self.series_s.iter().filter(|_| exact.is_none()) {
+            let mut lag = Lag::at(tau_s, signal.before + start.next_offset_v());
+            signal.pass(|piece| lag.pass(piece));
         }
     }
 

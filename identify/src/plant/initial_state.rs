@@ -125,12 +125,14 @@ mod tests {
     /// The readings of a spring from any row on are explained without residual by the model of that spring.
     #[test]
     fn initial_state_explains_a_record_cut_from_a_longer_one() {
-        let springs: [&[(&str, usize, &[f64])]; 6] = [
+        let springs: [&[(&str, usize, &[f64])]; 8] = [
             &[("time-constant", 0, &[2.0])],
             &[("charge-leakage", 1, &[0.2, 3.0, 0.4]), ("second-relaxation", 1, &[0.2, 3.6])],
             &[("voltage-dependent-time-constant", 0, &[1.2, 2.0]), ("resonance", 2, &[-0.5, -3.0, 0.8, 0.0])],
             &[("delay", 0, &[0.3, 0.1]), ("gain-error", 0, &[1.1])],
-            &[("amplifier-slew", 2, &[-0.5])],
+            &[("series-lag", 2, &[-0.5])],
+            &[("series-lag", 1, &[0.5, 0.2])],
+            &[("series-lag", 0, &[0.5]), ("voltage-dependent-time-constant", 0, &[1.2, 2.0])],
             &[("hysteresis", 0, &[3.0]), ("static-nonlinearity", 0, &[0.2])],
         ];
         for blocks in springs {

@@ -67,7 +67,7 @@ impl Loss {
     /// gain share' = a      h (1 + loss k) = b      loss (a + h (1 + k)) = c      k = tau_r / (tau - tau_r),  h = gain (1 - share')
     /// ```
     pub fn equivalent_leakage(&self, relaxation: &Relaxation) -> Option<(f64, f64, Leakage)> {
-        if relaxation.parts().next().is_some() || relaxation.varies() {
+        if relaxation.parts().next().is_some() || !relaxation.is_linear() {
             return None;
         }
         let (share, passes) = (relaxation.share, self.share * (1.0 - self.instantaneous));

@@ -29,6 +29,10 @@ pub const FURTHER: usize = 3;
 
 /// Longest integration step where the lag's state sets its time constant, relative to the shortest time constant.
 const STEP: f64 = 0.1;
+/// Relative difference of two time constants in series that are closer to each other: equal ones have no partial fractions.
+const CLOSE: f64 = 1e-7;
+/// Largest weight of a partial fraction; a larger one, of three equal time constants, would amplify rounding errors.
+const LARGEST_WEIGHT: f64 = 1e9;
 /// Largest number of integration steps of one piece, after which the lag has settled.
 const MOST_STEPS: f64 = 200.0;
 
@@ -53,6 +57,8 @@ pub struct Relaxation {
     /// Set if the time constant depends on the spring's state instead of the voltage: the fraction of the remaining
     /// change that the state includes.
     pub by_state: Option<f64>,
+    /// Time constant of the first lag while its output falls, in s; `None` if it is that while it rises.
+    pub falling_tau_s: Option<f64>,
     /// Further lags, which act in parallel with the first.
     pub further: [Part; FURTHER],
     /// Oscillations, which act in parallel with the lags; unused ones have no weight.
@@ -74,6 +80,7 @@ impl Relaxation {
             tau_high_s: tau_s,
             geometric: false,
             by_state: None,
+            falling_tau_s: None,
             further: Default::default(),
             modes: [NO_MODE; PlantFile::MOST_MODES],
         }
@@ -103,7 +110,8 @@ impl Relaxation {
 
     /// Writes the relaxation to a plant file.
     pub fn extend(&self, file: &mut PlantFile) {
-        let mut tau_s = vec![self.tau_s];
+        // A file holds one time constant for both directions.
+        let mut tau_s = vec![self.falling_tau_s.map_or(self.tau_s, |falling_s| (self.tau_s * falling_s).sqrt())];
         tau_s.extend(self.parts().map(|part| part.tau_s));
         let weights = match tau_s.len() {
             1 => Vec::new(),
@@ -127,6 +135,37 @@ impl Relaxation {
         relaxation
     }
 
+    /// Returns the relaxation that is this one in series with further lags, whose time constants are in s, by partial fractions:
+    ///
+    /// ```text
+    /// lag(tau_i) lag(tau) = (tau_i lag(tau_i) - tau lag(tau)) / (tau_i - tau)
+    /// ```
+    ///
+    /// `None` if the time constant varies, if there are oscillations, if there is no place for as many lags, or if three time
+    /// constants are equal.
+    pub fn in_series_with(&self, series_s: &[f64]) -> Option<Self> {
+        let mut whole = *self;
+        for &tau_s in series_s {
+            if !self.is_linear() || self.oscillations().next().is_some() {
+                return None;
+            }
+            let free = whole.further.iter().position(|further| further.part == 0.0)?;
+            let close = |other: f64| (other / tau_s - 1.0).abs() < CLOSE;
+            let twin = std::iter::once(whole.tau_s).chain(whole.parts().map(|it| it.tau_s)).find(|&it| close(it));
+            let tau_s = twin.map_or(tau_s, |twin| twin * (1.0 + CLOSE));
+            let factor = |of_s: f64| of_s / (of_s - tau_s);
+            let first = whole.first_weight() * factor(whole.tau_s);
+            whole.further.iter_mut().for_each(|further| further.part *= factor(further.tau_s));
+            let others = first + whole.parts().map(|it| it.part).sum::<f64>();
+            whole.further[free] = Part { part: 1.0 - others, tau_s };
+            whole.share = 0.0;
+            if whole.parts().any(|it| it.part.abs() > LARGEST_WEIGHT) {
+                return None;
+            }
+        }
+        Some(whole)
+    }
+
     /// Returns the oscillations that contribute.
     fn oscillations(&self) -> impl Iterator<Item = Mode> {
         self.modes.into_iter().filter(|mode| mode.weight != 0.0 || mode.rate_weight != 0.0)
@@ -135,6 +174,11 @@ impl Relaxation {
     /// Returns true if the time constant depends on the voltage.
     pub fn varies(&self) -> bool {
         self.tau_high_s != self.tau_s
+    }
+
+    /// Returns true if the first lag has the same time constant at all times.
+    pub fn is_linear(&self) -> bool {
+        !self.varies() && self.falling_tau_s.is_none()
     }
 
     /// Maps the settled stiffness to the stiffness. `levels_v` is the voltage across the spring in the middle of each
@@ -151,7 +195,7 @@ impl Relaxation {
             (mode, Oscillator::at(omega, mode.zeta, x, rate))
         };
         let mut modes: Vec<(Mode, Oscillator)> = self.oscillations().map(at_first).collect();
-        if further.is_empty() && modes.is_empty() && !self.varies() {
+        if further.is_empty() && modes.is_empty() && self.is_linear() {
             return signal.pass(|piece| {
                 let (start, end) = lag.pass(piece);
                 (share * piece.from + main * start, share * piece.to + main * end)
@@ -166,6 +210,10 @@ impl Relaxation {
             {
                 level = next;
                 lag = lag.with_tau(self.tau_at(level));
+            }
+            if let Some(falling_s) = self.falling_tau_s {
+                let tau_s = if piece.from + piece.to < 2.0 * lag.value() { falling_s } else { self.tau_s };
+                lag = if tau_s == lag.tau_s() { lag } else { lag.with_tau(tau_s) };
             }
             let (start, end) = match by_state {
                 Some(instantaneous) => self.follow_state(instantaneous, &mut lag, piece),

@@ -57,7 +57,7 @@ struct Cli {
     parts: Vec<Part>,
     /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
     /// unforeseen), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each of two sets
-    /// (plan), in total (nulls, triples), or times 53 (thresholds) or 455 (reliability)
+    /// (plan), in total (nulls, triples), or times 55 (thresholds) or 455 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -177,7 +177,7 @@ enum Part {
     Instruments,
     /// Minutes of the next experiment until the diagnosis is right, planned, fixed and random: 30 springs of each of two sets
     Plan,
-    /// Every empirical threshold at half and twice its value: 53 records at each value. Run it as `cargo thresholds`
+    /// Every empirical threshold at half and twice its value: 55 records at each value. Run it as `cargo thresholds`
     Thresholds,
 }
 

@@ -103,9 +103,9 @@ be true in addition to a correct one. `unexplained` with a correct first finding
 
 In the first run 107 of 245 records were correct, 69 had an extra finding, 7 were missed, 62 were wrong. The results led to
 three rules (the damping ratio of a resonance is at most 0.5, spikes synchronous with the command are not outliers, a second
-cause in the same stage of the chain needs stronger evidence), to two forms of amplifier-slew (two rates, output resistance)
-and to two of second-relaxation (by decades, spread). The laws are therefore no longer unseen, and those two amplifiers are
-no longer out of model.
+cause in the same stage of the chain needs stronger evidence), to a form of amplifier-slew (two rates) and of series-lag (in
+front, for an output resistance), and to two of second-relaxation (by decades, spread). The laws are therefore no longer unseen,
+and those two amplifiers are no longer out of model.
 
 ",
         Noise::white(0.2).sigma_v

@@ -1,4 +1,4 @@
-//! The 18 causes that `vsj diagnose` distinguishes: name, block, parameters, forms and how their size is measured.
+//! The 19 causes that `vsj diagnose` distinguishes: name, block, parameters, forms and how their size is measured.
 
 use std::fmt::{self, Display};
 
@@ -39,6 +39,7 @@ pub enum Cause {
     Hum,
     ReadingOffset,
     Outliers,
+    SeriesLag,
 }
 
 /// Properties of a cause that are independent of any record.
@@ -81,7 +82,7 @@ macro_rules! facts {
 }
 
 /// Facts of every cause, in the order of [`Cause::ALL`].
-static FACTS: [Facts; 18] = facts! {
+static FACTS: [Facts; 19] = facts! {
     "gain-error" Static ["gain"], ["gain"], 0 * 1.0 "of 1", false, 1;
     "instantaneous-share" Relaxation ["share"], ["share"], 0 * 1.0 "from 1/11", true, 1;
     "time-constant" Relaxation ["tau_s"], ["tau"], 0 * 1.0 "s from 5.5 s", false, 1;
@@ -104,11 +105,12 @@ static FACTS: [Facts; 18] = facts! {
     "hum" Reading ["amplitude", "freq_hz"], ["sine"], 0 * 1.0 "V", false, 3;
     "reading-offset" Reading ["from_s", "to_s", "offset"], ["constant"], 2 * 1.0 "V", false, 3;
     "outliers" Reading ["fraction"], ["either side", "one side"], 1 * 1.0 "V", false, 1;
+    "series-lag" Relaxation ["tau_s"], ["one lag", "two equal lags"], 0 * 1.0 "s", true, 1;
 };
 
 impl Cause {
     /// All causes, in the order of the table of `vsj diagnose`.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::GainError,
         Self::InstantaneousShare,
         Self::TimeConstant,
@@ -127,6 +129,7 @@ impl Cause {
         Self::Hum,
         Self::ReadingOffset,
         Self::Outliers,
+        Self::SeriesLag,
     ];
 
     /// Properties of the cause.

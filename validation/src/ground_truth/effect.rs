@@ -25,10 +25,10 @@ impl Effect {
         Self { size, ..self.clone() }
     }
 
-    /// Limit of the size towards no effect: 0, but 1e-6 for delay and slew. A row is read just after its voltage is
-    /// commanded, so that even the smallest delay or slew removes a step's instantaneous part from the step's own row.
+    /// Limit of the size towards no effect: 0, but 1e-6 for delay, slew and lag. A row is read just after its voltage is
+    /// commanded, so that even the smallest of these removes a step's instantaneous part from the step's own row.
     pub fn least(&self) -> f64 {
-        if matches!(self.cause, Cause::Delay | Cause::AmplifierSlew) { 1e-6 } else { 0.0 }
+        if matches!(self.cause, Cause::Delay | Cause::AmplifierSlew | Cause::SeriesLag) { 1e-6 } else { 0.0 }
     }
 
     /// The cause's parameters and what else its form needs, at this size.

@@ -20,6 +20,7 @@
 //! | hum | 3.5 to 10 V, 0.3 Hz to 0.4 of the sampling rate |
 //! | reading offset | 5 to 20 V over 5 to 25 % of the record |
 //! | outliers | 0.5 to 3 % of the readings, 15 to 60 standard deviations of the noise off |
+//! | series lag | 2 rows, at least 0.15 s, to 3 s |
 //!
 //! Frequencies stay below half of the sampling rate and time constants below the record's length, so that each can be
 //! identified.
@@ -91,6 +92,10 @@ impl Effect {
             Cause::Outliers => {
                 shrinking = vec![(1, 0.0)];
                 vec![between(0.005, 0.03), sigma_v * between(15.0, 60.0)]
+            }
+            Cause::SeriesLag => {
+                let shortest = (2.0 * every).max(0.15);
+                vec![shortest * (3.0 / shortest).powf(between(0.0, 1.0))]
             }
         };
         let mut at_rest = full_size.clone();

@@ -22,6 +22,8 @@ pub struct Integrator {
     /// Settled response to `u`: after hysteresis, law and gain, in V.
     v: f64,
     state: State,
+    /// Outputs of the lags in series, in V.
+    series: [f64; 2],
 }
 
 impl Integrator {
@@ -29,7 +31,18 @@ impl Integrator {
     pub fn new(spring: Spring, start_s: f64) -> Self {
         let hysteresis = spring.hysteresis.clone();
         let (now_s, on_the_way) = (start_s, VecDeque::new());
-        Self { spring, start_s, now_s, on_the_way, target: 0.0, hysteresis, u: 0.0, v: 0.0, state: [0.0; 7] }
+        Self {
+            spring,
+            start_s,
+            now_s,
+            on_the_way,
+            target: 0.0,
+            hysteresis,
+            u: 0.0,
+            v: 0.0,
+            state: [0.0; 7],
+            series: [0.0; 2],
+        }
     }
 
     /// Current time, in s.
@@ -62,9 +75,26 @@ impl Integrator {
         if self.spring.slew_v_per_s.is_infinite() {
             self.apply(self.target);
         }
-        let (y, excites) = self.spring.response(self.v, self.state);
-        let y = self.spring.resonance.map_or(y, |mode| y + mode.participation * (self.state[3] - excites));
+        let mut lags = self.spring.series_s.iter().zip(self.series).rev().filter(|(tau_s, _)| **tau_s > 0.0);
+        let y = lags.next().map_or_else(|| self.unlagged(), |(_, output)| output);
         self.spring.drift.map_or(y, |drift| drift.of(y, self.now_s - self.start_s))
+    }
+
+    /// Stiffness before the lags in series and the drift, in V.
+    fn unlagged(&self) -> f64 {
+        let (y, excites) = self.spring.response(self.v, self.state);
+        self.spring.resonance.map_or(y, |mode| y + mode.participation * (self.state[3] - excites))
+    }
+
+    /// Advances the lags in series by `h` s, in which the stiffness before them changes linearly from `from` to `to`, in V.
+    fn lag(&mut self, h: f64, mut from: f64, mut to: f64) {
+        let lags = self.spring.series_s.iter().zip(&mut self.series);
+        for (tau_s, output) in lags.filter(|(tau_s, _)| **tau_s > 0.0) {
+            let (slope, start) = ((to - from) / h, *output);
+            // A ramp is followed late by the time constant, which the distance at the start decays to.
+            *output = to - slope * tau_s + (start - from + slope * tau_s) * (-h / tau_s).exp();
+            (from, to) = (start, *output);
+        }
     }
 
     fn arrive(&mut self) {
@@ -84,9 +114,10 @@ impl Integrator {
             if reach.is_infinite() {
                 self.apply(self.target);
             }
-            let (u, v) = (self.u, self.v);
+            let (u, v, from) = (self.u, self.v, self.unlagged());
             self.apply(self.target.clamp(u - reach, u + reach));
             self.integrate((u, v), h);
+            self.lag(h, from, self.unlagged());
         }
     }
 
@@ -172,6 +203,15 @@ mod tests {
         let top = spring.run(&step(), 20).into_iter().fold(0.0, f64::max);
         // exp(-pi zeta/sqrt(1 - zeta^2)) = 72.9 %; the rows sample the peak to a fraction of a percent.
         assert!((top / 500.0 - 1.729).abs() < 0.02, "{top}");
+    }
+
+    #[test]
+    fn lag_in_series_makes_the_step_response_a_sum_of_two_exponentials() {
+        let lagged = Spring { share: 0.0, series_s: [1.5, 0.0], ..Spring::default() }.run(&step(), 20);
+        for (t, y) in step().time_s.iter().zip(lagged) {
+            let exact = 1.0 - (TAU_S * (-t / TAU_S).exp() - 1.5 * (-t / 1.5).exp()) / (TAU_S - 1.5);
+            assert!((y - 500.0 * exact).abs() < 1e-3, "{t}: {y}");
+        }
     }
 
     #[test]

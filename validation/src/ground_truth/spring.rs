@@ -1,8 +1,8 @@
 //! The spring and its amplifier as differential equations.
 //!
 //! Command, delay, limit, slew -> voltage u -> hysteresis, law, gain -> v -> relaxation (w, w3, w4, creep w2) -> leakage L ->
-//! resonance p -> drift -> stiffness. A row's voltage is held until the next row; its stiffness is read just after the
-//! command. [`integrator`](super::integrator) integrates the equations over time.
+//! resonance p -> lags in series -> drift -> stiffness. A row's voltage is held until the next row; its stiffness is read just
+//! after the command. [`integrator`](super::integrator) integrates the equations over time.
 
 use super::cause::Cause;
 use super::effect::Effect;
@@ -28,6 +28,8 @@ pub struct Spring {
     pub creep: Option<Creep>,
     pub leakage: Option<Leakage>,
     pub resonance: Option<Resonance>,
+    /// Time constants of lags in series behind the spring, in s; 0 for none.
+    pub series_s: [f64; 2],
     pub drift: Option<Drift>,
 }
 
@@ -46,6 +48,7 @@ impl Default for Spring {
             creep: None,
             leakage: None,
             resonance: None,
+            series_s: [0.0; 2],
             drift: None,
         }
     }
@@ -87,6 +90,7 @@ impl Spring {
             (Cause::Resonance, &[freq_hz, zeta, participation]) => {
                 self.resonance = Some(Resonance { freq_hz, zeta, participation, immediate: form == 1 });
             }
+            (Cause::SeriesLag, &[tau_s]) => self.series_s = [tau_s, if form == 1 { tau_s } else { 0.0 }],
             (Cause::Delay, &[delay_s]) => self.delay_s = delay_s,
             (Cause::AmplifierLimit, &[limit_v]) => self.limit_v = limit_v,
             (Cause::AmplifierSlew, &[s_per_v]) => self.slew_v_per_s = 1.0 / s_per_v,

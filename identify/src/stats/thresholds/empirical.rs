@@ -96,8 +96,8 @@ thresholds! {
     LEAST_OUTLIER_SCALE = 4.0, "scales of the noise";
 
     // effects
-    /// Largest time constant of an amplifier's output; a larger one could not be distinguished from the spring's.
-    SLOWEST_OUTPUT = 0.181_818_181_818_181_82, "reference time constants";
+    /// Smallest time constant of a lag in series; a shorter one looks like a delay of less than a row.
+    FASTEST_SERIES_LAG = 0.3, "row spacings";
     /// Smallest damping ratio of a resonance; an oscillation that a polymer damps less is a periodicity of the schedule.
     LEAST_DAMPED = 0.005, "damping ratio";
     /// Largest damping ratio of a resonance; with an overshoot below a sixth, an oscillation cannot be distinguished from a lag.

@@ -76,7 +76,7 @@ pub const FORMS: [Form; 9] = [
     Form {
         cause: Cause::AmplifierSlew,
         name: "output resistance",
-        or: &[Cause::Delay],
+        or: &[Cause::Delay, Cause::SeriesLag],
         also: &[],
         law: "du/dt = (command - u)/(R C): first order, no bound of its own",
         source: "Fleming, Moheimani, Design, Modeling and Control of Nanopositioning Systems, 2014: R C of a piezo load",
