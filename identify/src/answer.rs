@@ -26,6 +26,8 @@ pub struct Report {
     pub baseline: Quality,
     /// Named causes, the one that explains the largest mean square error first.
     pub findings: Vec<Finding>,
+    /// Causes that come closest to a finding but are none, the closest first; empty if the verdict is `explained`.
+    pub suspects: Vec<Suspect>,
     /// Parts of the plant file that the record does not support; the extended simulation lacks them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub take_out: Vec<&'static str>,
@@ -160,6 +162,37 @@ pub struct Finding {
     pub rmse_after: f64,
     /// The evidence, in one sentence.
     pub evidence: String,
+}
+
+/// A cause that comes close to a finding but is none.
+#[derive(Clone, Debug, Serialize)]
+pub struct Suspect {
+    /// Its cause code.
+    pub cause: &'static str,
+    /// The other causes of the set in which it comes closest; empty if it is alone.
+    pub with: Vec<&'static str>,
+    /// Its parameters with their names, in the order of the cause's page in the manual.
+    #[serde(serialize_with = "by_name")]
+    pub parameters: Vec<(String, Parameter)>,
+    /// Root mean square error of the set without the cause, as `judge` measures it, in the reading's unit.
+    pub rmse_before: f64,
+    /// Root mean square error of the set, as `judge` measures it, in the reading's unit.
+    pub rmse_after: f64,
+    /// What the set's score lacks to that of the best set, in nats, not negative: with more, the cause would be a finding.
+    pub nats_short: f64,
+    /// How both errors were measured.
+    pub judge: Judge,
+}
+
+/// How the errors with and without a suspect are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Judge {
+    /// Held-out segments, each predicted by a fit to the others.
+    HeldOut,
+    /// Single readings, each predicted by a fit to all others: for causes that act in a part of the record, about which the other
+    /// segments cannot know.
+    LeaveOneOut,
 }
 
 fn by_name<S: Serializer>(parameters: &[(String, Parameter)], to: S) -> Result<S::Ok, S::Error> {

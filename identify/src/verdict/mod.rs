@@ -7,12 +7,14 @@
 //! | odds | difference of two scores, in nats |
 //! | margins | smallest errors of gain and time constant that a record without findings would have shown |
 //! | export | the extended simulation as a plant file |
+//! | suspect | a cause that comes close to a finding but is none |
 //! | ranking | the best sets of causes compared by score and held-out error |
 //! | restored | converted from the coordinates of the search to the file's units |
 //!
 //! [`diagnosis`] puts the parts together.
 
 pub mod alternatives;
+mod cause;
 pub mod diagnosis;
 pub mod export;
 pub mod finding;
@@ -22,3 +24,4 @@ pub mod quality;
 pub mod ranking;
 pub mod reading_findings;
 mod restore;
+pub(crate) mod suspects;

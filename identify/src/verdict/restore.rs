@@ -5,7 +5,7 @@ use std::iter;
 
 use simulation::record::Record;
 
-use crate::answer::{Finding, Parameter, Quality, Report};
+use crate::answer::{Finding, Parameter, Quality, Report, Suspect};
 use crate::dimension::Dimension;
 use crate::fit::engine::Fit;
 use crate::record::data::Data;
@@ -48,6 +48,10 @@ fn report(report: &mut Report, scales: &Scales) {
     quality(&mut report.extended.quality);
     report.noise.sigma = size(report.noise.sigma);
     for Finding { parameters, rmse_before, rmse_after, .. } in &mut report.findings {
+        parameters.iter_mut().for_each(|(_, it)| parameter(it, scales));
+        (*rmse_before, *rmse_after) = (size(*rmse_before), size(*rmse_after));
+    }
+    for Suspect { parameters, rmse_before, rmse_after, .. } in &mut report.suspects {
         parameters.iter_mut().for_each(|(_, it)| parameter(it, scales));
         (*rmse_before, *rmse_after) = (size(*rmse_before), size(*rmse_after));
     }

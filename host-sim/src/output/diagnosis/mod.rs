@@ -18,6 +18,7 @@ pub mod plots;
 mod records;
 mod residuals;
 pub(super) mod style;
+mod suspects;
 mod tables;
 pub mod text;
 

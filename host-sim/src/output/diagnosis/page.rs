@@ -7,6 +7,7 @@ use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::origin::Origin;
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::style;
+use crate::output::diagnosis::suspects;
 use crate::output::diagnosis::tables;
 use crate::output::diagnosis::text;
 use identify::answer::Verdict;
@@ -34,6 +35,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
                 }
                 h2 { "Causes" }
                 (tables::findings(&report.findings, scales))
+                (suspects::section(&report.suspects, scales))
                 (records::section(&report.records, scales))
                 h2 { "Readings and simulations" }
                 @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }

@@ -72,7 +72,7 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
                         td.bar { i style=(width(behind(standing))) {} }
                         td.number { (number(standing.rmse)) }
                         td.number { (number(standing.held_out_rmse)) }
-                        td.small.note { (note(standings, place)) }
+                        td.small.note { (note(standing, place)) }
                     }
                 }
             }
@@ -94,14 +94,12 @@ fn values(list: &str) -> Markup {
     }
 }
 
-fn note(standings: &[Standing], place: usize) -> String {
-    if place == 0 {
-        return "best".to_owned();
+fn note(standing: &Standing, place: usize) -> String {
+    match (place, standing.best_without.as_slice()) {
+        (0, _) => "best".to_owned(),
+        (_, []) => String::new(),
+        (_, without) => format!("best without {}", without.join(", ")),
     }
-    let lacks = |place: usize, cause: &&&str| !standings[place].causes.contains(cause);
-    let first_without = |cause: &&&str| lacks(place, cause) && !(1..place).any(|earlier| lacks(earlier, cause));
-    let without: Vec<&str> = standings[0].causes.iter().filter(first_without).copied().collect();
-    if without.is_empty() { String::new() } else { format!("best without {}", without.join(", ")) }
 }
 
 /// Accuracy of the simulation, and of the extended one if there is one.
@@ -204,16 +202,16 @@ mod tests {
     }
 
     #[test]
-    fn a_rival_is_noted_only_for_the_first_time_a_cause_is_missing() {
-        let standing = |causes: &[&'static str]| Standing {
-            causes: causes.to_vec(),
+    fn a_rival_is_noted_with_the_causes_that_it_is_the_best_without() {
+        let standing = |best_without: &[&'static str]| Standing {
+            causes: Vec::new(),
+            best_without: best_without.to_vec(),
             values: String::new(),
             score: 0.0,
             rmse: 1.0,
             held_out_rmse: 1.0,
         };
-        let standings = [standing(&["hum", "drift"]), standing(&["drift"]), standing(&["hum"]), standing(&[])];
-        let notes: Vec<String> = (0..4).map(|place| note(&standings, place)).collect();
-        assert_eq!(notes, ["best", "best without hum", "best without drift", ""]);
+        let notes = [note(&standing(&[]), 0), note(&standing(&["hum", "drift"]), 1), note(&standing(&[]), 2)];
+        assert_eq!(notes, ["best", "best without hum, drift", ""]);
     }
 }

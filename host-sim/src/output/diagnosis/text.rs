@@ -11,6 +11,7 @@ use identify::verdict::export::SMALL_ERROR_V;
 
 use crate::output::diagnosis::number::shown_name;
 use crate::output::diagnosis::records;
+use crate::output::diagnosis::suspects;
 
 /// Smallest held-out improvement that is reported as one.
 const SMALLEST_IMPROVEMENT: f64 = 0.005;
@@ -28,6 +29,7 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
             row(&mut text, finding, scales);
         }
     }
+    text += &suspects::text(&report.suspects, scales);
     text += &records::text(&report.records, scales);
     let (before, after) = (&report.baseline, &report.extended.quality);
     let extends = !report.findings.is_empty() || !report.take_out.is_empty();
@@ -291,6 +293,7 @@ mod tests {
             nominal: Nominal::default(),
             baseline: quality,
             findings: causes.iter().map(finding).collect(),
+            suspects: Vec::new(),
             take_out: Vec::new(),
             would_show: None,
             alternatives: alternatives.to_vec(),
