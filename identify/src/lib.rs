@@ -73,9 +73,9 @@ pub mod stats;
 pub mod verdict;
 
 pub use answer::{Margins, Report, Verdict};
-pub use examine::{Options, Several, diagnose, examine, examine_several};
+pub use examine::{Options, diagnose, examine, examine_several};
 pub use fit::budget::Effort;
 pub use fit::stop::Stop;
 pub use nominal::{Identified, identify};
-pub use record::data::Input;
+pub use record::input::Input;
 pub use verdict::diagnosis::Diagnosis;

@@ -1,6 +1,6 @@
 //! Several records of one spring are diagnosed together.
 
-use identify::{Options, Several, Verdict, examine_several};
+use identify::{Diagnosis, Options, Verdict, examine_several};
 use simulation::record::{Record, Row};
 
 /// Time between rows, in s.
@@ -42,8 +42,8 @@ fn record(name: &str, gain: f64, tau_s: f64, test: &Test) -> Record {
     Record { name: name.into(), rows: (0..500).map(&mut row).collect() }
 }
 
-fn causes(several: &Several) -> Vec<&'static str> {
-    let mut causes: Vec<_> = several.joint.report.findings.iter().map(|finding| finding.cause).collect();
+fn causes(several: &Diagnosis) -> Vec<&'static str> {
+    let mut causes: Vec<_> = several.report.findings.iter().map(|finding| finding.cause).collect();
     causes.sort_unstable();
     causes
 }
@@ -57,7 +57,7 @@ fn shared_causes_are_found_under_different_offsets_starts_and_noise() {
         record("third one", 1.1, 7.0, &Test { volts, ..PLAIN }),
     ];
     let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
-    let report = &several.joint.report;
+    let report = &several.report;
     assert_eq!(causes(&several), ["gain-error", "time-constant"], "{report:#?}");
     assert_eq!((report.verdict, report.rows), (Verdict::Explained, 1500));
     for (cause, truth) in [("gain-error", 1.1), ("time-constant", 7.0)] {
@@ -80,7 +80,7 @@ fn a_cause_in_one_record_only_is_a_fault_of_that_record() {
         record("third one", 1.1, 5.5, &Test { volts: [0.0, 500.0, 300.0, 100.0, 400.0], ..PLAIN }),
     ];
     let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
-    let report = &several.joint.report;
+    let report = &several.report;
     assert_eq!(causes(&several), ["gain-error"], "{report:#?}");
     let faults: Vec<(&str, &str)> = report
         .records

@@ -11,7 +11,7 @@ use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
 use host_sim::output::terminal::{json, print, print_error, wrote};
 use identify::plant::base::Base;
-use identify::{Effort, Input, Options, Several, Stop, examine_several, identify};
+use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify};
 use indicatif::{ProgressBar, ProgressStyle};
 use simulation::plant_file;
 use simulation::record::{MeasuredRecord, Record};
@@ -112,7 +112,7 @@ fn quoted(word: &str) -> String {
 }
 
 /// Diagnoses records and shows the best causes so far on stderr: as lines, or in one that moves on a terminal.
-fn with_progress(records: &[Record], options: &Options, lines: bool) -> Result<Several> {
+fn with_progress(records: &[Record], options: &Options, lines: bool) -> Result<Diagnosis> {
     let started = Instant::now();
     let said = |causes: &str| match causes {
         "" => "so far: no cause".to_owned(),
@@ -158,7 +158,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let options = arguments.options(&measured, &records, input, stop)?;
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
-    let mut diagnosis = with_progress(&records, &options, arguments.progress)?.joint;
+    let mut diagnosis = with_progress(&records, &options, arguments.progress)?;
     if let Some(folder) = &arguments.out {
         diagnosis.report.extended.model = Some(folder.join(output::PLANT_FILE).display().to_string());
     }

@@ -90,7 +90,7 @@ fn changed(errors: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::data::Input;
+    use crate::record::input::Input;
     use simulation::record::{Record, Row};
 
     /// Independent errors of unit variance, nearly normal.

@@ -109,7 +109,7 @@ fn densest(parts: &[(f64, usize)]) -> (Range<usize>, f64, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::data::Input;
+    use crate::record::input::Input;
     use simulation::record::{Record, Row};
 
     #[test]

@@ -87,7 +87,7 @@ mod tests {
     use crate::fit::engine::Engine;
     use crate::fit::simulator::Simulator;
     use crate::plant::base::Base;
-    use crate::record::data::Input;
+    use crate::record::input::Input;
     use crate::record::observed::Observed;
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};

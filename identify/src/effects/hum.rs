@@ -38,11 +38,7 @@ impl Effect for Hum {
         vec![frequency, Coordinate::new(-most, most), Coordinate::new(-most, most)]
     }
 
-    /// In several records it has a phase of its own in each, so that it is looked for record by record.
     fn initial_points(&self, _: usize, FitContext { data, residual, .. }: &FitContext) -> Vec<Vec<f64>> {
-        if data.is_joined() {
-            return Vec::new();
-        }
         spectrum::peaks(residual, data, PEAKS)
             .into_iter()
             .filter(|peak| peak.frequency_hz > FEWEST_PERIODS.get() / data.duration_s())

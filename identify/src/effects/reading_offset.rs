@@ -139,10 +139,8 @@ impl Effect for ReadingOffset {
         }
     }
 
-    /// Each of several records has a zero of its own, and a stretch of one of them is looked for in that record alone.
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         match form {
-            _ if context.data.is_joined() => Vec::new(),
             RUN => best_run(context).into_iter().collect(),
             _ if shows_at_rest(context.data) => vec![vec![-context.sigma], vec![context.sigma]],
             _ => Vec::new(),

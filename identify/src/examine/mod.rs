@@ -9,4 +9,4 @@ mod several;
 
 pub use options::Options;
 pub use passes::{diagnose, examine};
-pub use several::{Several, examine_several};
+pub use several::examine_several;

@@ -5,7 +5,7 @@ use simulation::units::Units;
 use crate::fit::budget::Effort;
 use crate::fit::stop::Stop;
 use crate::plant::base::Base;
-use crate::record::data::Input;
+use crate::record::input::Input;
 
 /// How a record is read, and with what it is compared.
 #[derive(Clone, Debug)]

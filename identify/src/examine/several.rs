@@ -18,30 +18,25 @@ use crate::examine::passes::{examine, joint};
 use crate::plant::base::Base;
 use crate::verdict::diagnosis::Diagnosis;
 
-/// The diagnosis of several records.
-#[derive(Clone, Debug)]
-pub struct Several {
-    /// The diagnosis of all records together; its report lists what is in single records.
-    pub joint: Diagnosis,
-    /// The diagnosis of each record against the spring with the shared causes; empty for a single record.
-    pub each: Vec<Diagnosis>,
-}
+/// Causes that are looked for in each record alone: a hum has a phase of its own in each, and each has a zero of its own.
+const OF_ONE_RECORD: [&str; 2] = ["hum", "reading-offset"];
 
-/// Finds out what the simulation gets wrong on several records of one spring; `progress` receives the names of the best causes
-/// so far, separated by commas. A single record is diagnosed as by [`examine`].
+/// Finds out what the simulation gets wrong on several records of one spring, together and, in the report's `records`, each
+/// beyond the shared causes; `progress` receives the names of the best causes so far, separated by commas. A single record is
+/// diagnosed as by [`examine`].
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
-pub fn examine_several(records: &[Record], options: &Options, mut progress: impl FnMut(&str)) -> Result<Several> {
-    let mut each = Vec::new();
-    if records.len() < 2 {
-        return Ok(Several { joint: joint(records, options, None, &mut progress)?, each });
+pub fn examine_several(records: &[Record], options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
+    if let [record] = records {
+        return examine(record, options, progress);
     }
     let mut shown = Vec::new();
     for record in records {
         let alone = examine(record, options, |causes| progress(&format!("{}: {causes}", record.name)))?;
         shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
     }
+    shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
     let mut joint = joint(records, options, Some(&shown), &mut progress)?;
     // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
     let mut spring = joint.plant.clone();
@@ -53,12 +48,11 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         let alone = examine(&from_zero, &options, |causes| progress(&format!("{}: {causes}", record.name)))?;
         joint.report.complete &= alone.report.complete;
         joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
-        each.push(alone);
     }
     joint.report.verdict = verdict(&joint);
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    Ok(Several { joint, each })
+    Ok(joint)
 }
 
 /// What is found in one record beyond the causes that all records share.

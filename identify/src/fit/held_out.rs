@@ -114,7 +114,8 @@ mod tests {
     use crate::effects::model::Block;
     use crate::fit::simulator::Simulator;
     use crate::plant::base::Base;
-    use crate::record::data::{Data, Input};
+    use crate::record::data::Data;
+    use crate::record::input::Input;
     use crate::record::observed::Observed;
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};

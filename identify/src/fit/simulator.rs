@@ -222,7 +222,7 @@ impl<'a> Simulator<'a> {
 mod tests {
     use super::*;
     use crate::effects::index_of;
-    use crate::record::data::Input;
+    use crate::record::input::Input;
     use simulation::record::Record;
 
     /// A simulation gives the same result as in a new simulator, whatever was simulated before.

@@ -3,8 +3,9 @@
 use simulation::record::Record;
 use simulation::schedule::Schedule;
 
-use crate::record::data::Input;
 use crate::record::folds::folds;
+use crate::record::input::Input;
+use crate::stats::median::median;
 
 /// Largest deviation of the rows' times from equal spacing, in spacings, that is attributed to the rounding of the times.
 const ROUNDING: f64 = 1e-3;
@@ -49,8 +50,7 @@ impl Series {
         let first = record.rows.first().map_or(0.0, |row| row.time_s);
         let mut times: Vec<f64> = record.rows.iter().map(|row| row.time_s - first).collect();
         let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        gaps.sort_by(f64::total_cmp);
-        let spacing = gaps.get(gaps.len() / 2).copied().unwrap_or(1.0);
+        let spacing = median(&mut gaps).unwrap_or(1.0);
         let step = times.last().unwrap_or(&0.0) / (times.len().max(2) - 1) as f64;
         let evenly = times.iter().enumerate().all(|(row, time)| (time - row as f64 * step).abs() <= ROUNDING * step);
         if evenly {

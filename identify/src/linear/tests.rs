@@ -3,7 +3,7 @@
 use simulation::record::{Record, Row};
 
 use crate::linear::*;
-use crate::record::data::Input;
+use crate::record::input::Input;
 use crate::stats::scale::{normals, root_mean_square};
 
 /// A spring as differential equations: slopes of the states, and the reading from states and voltage.

@@ -23,7 +23,7 @@ use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_re
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::report::{InputLaw, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant};
-use crate::record::data::Input;
+use crate::record::input::Input;
 use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::sums::dot;

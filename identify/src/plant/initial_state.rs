@@ -107,7 +107,8 @@ mod tests {
     use crate::fit::engine::Engine;
     use crate::fit::simulator::Simulator;
     use crate::plant::base::Base;
-    use crate::record::data::{Data, Input};
+    use crate::record::data::Data;
+    use crate::record::input::Input;
     use crate::record::observed::Observed;
     use simulation::record::{Record, Row};
 

@@ -8,21 +8,11 @@ use simulation::schedule::{Between, Schedule};
 
 use crate::record::decay::relaxes_from_earlier_input;
 use crate::record::folds::folds;
+use crate::record::input::Input;
 use crate::record::normalisation::Normalisation;
 use crate::record::scales::Scales;
 use crate::record::signal::Signal;
-
-/// Voltage between two rows of the record.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Input {
-    /// The voltage stays at the value of the earlier row.
-    #[default]
-    Hold,
-    /// The voltage is linear between the rows.
-    Linear,
-    /// The voltage is the report's stair with its ramps of 0.1 s.
-    Stair,
-}
+use crate::stats::median::median;
 
 /// Number of pieces of the command if only some rows of a long record are used.
 const THINNED_PIECES: usize = 8_000;
@@ -101,11 +91,10 @@ impl Data {
         });
         let full_scale_v = voltage_v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let mut gaps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        gaps.sort_by(f64::total_cmp);
-        let sample_s = gaps.get(gaps.len() / 2).copied().unwrap_or(1.0);
+        let sample_s = median(&mut gaps).unwrap_or(1.0);
         let record_sample_s = sample_s / every as f64;
-        let uniform =
-            gaps.last().zip(gaps.first()).is_some_and(|(longest, shortest)| longest - shortest < 0.01 * sample_s);
+        let [longest, shortest] = [gaps.iter().copied().reduce(f64::max), gaps.iter().copied().reduce(f64::min)];
+        let uniform = longest.zip(shortest).is_some_and(|(longest, shortest)| longest - shortest < 0.01 * sample_s);
         // A voltage at the first row was either applied before (the reading follows it) or is a step at that row.
         let first = reading.first().copied().unwrap_or(0.0) - offset;
         let responds_to_v = if normalisation.even { first_v.abs() } else { first_v };
@@ -142,8 +131,7 @@ impl Data {
     /// Joins several records of one spring; each is simulated from its own initial state and has its own zero offset. Each record
     /// is held out as a whole. Times of a record follow those of the record before it, after a pause of one row; effects
     /// that depend on time begin anew with each record.
-    pub fn joined(records: Vec<Data>) -> Self {
-        let mut records = records;
+    pub fn joined(mut records: Vec<Data>) -> Self {
         if records.len() == 1 {
             return records.remove(0);
         }

@@ -46,7 +46,8 @@ fn scaled_deviation_of_sum(noise: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::record::data::{Data, Input};
+    use crate::record::data::Data;
+    use crate::record::input::Input;
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 

@@ -12,6 +12,7 @@ use nalgebra::{SMatrix, SVector};
 use simulation::record::Record;
 
 use crate::record::signal::{Lag, Piece};
+use crate::stats::median::median;
 
 /// A first-order spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,10 +51,9 @@ impl<'r> Rows<'r> {
     /// `even`.
     pub(super) fn new(record: &'r Record, linear: bool, even: bool) -> Self {
         let mut gaps: Vec<f64> = record.rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
-        gaps.sort_by(f64::total_cmp);
         let length_s =
             record.rows.last().map_or(0.0, |last| last.time_s) - record.rows.first().map_or(0.0, |at| at.time_s);
-        Self { record, linear, even, spacing_s: gaps.get(gaps.len() / 2).copied().unwrap_or(0.0), length_s }
+        Self { record, linear, even, spacing_s: median(&mut gaps).unwrap_or(0.0), length_s }
     }
 
     /// Returns the shortest and the longest time constant that the record can show, in s.

@@ -60,7 +60,7 @@ pub(crate) fn weights(data: &Data, counts: impl Fn(usize) -> bool) -> Option<Arc
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::data::Input;
+    use crate::record::input::Input;
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};
 

@@ -14,6 +14,7 @@ mod decay;
 mod first_order;
 pub(crate) mod folds;
 pub mod heteroscedasticity;
+pub mod input;
 pub mod normalisation;
 pub mod observed;
 pub mod quantisation_grid;

@@ -13,8 +13,8 @@ use simulation::plant_file::{Amplifier, Law, Leakage, Memory, Mode, PlantFile, R
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
-use crate::record::data::Input;
 use crate::record::first_order::{FirstOrder, Rows};
+use crate::record::input::Input;
 use crate::record::scales::{REFERENCE_TIME_CONSTANT_S, REFERENCE_VOLTAGE_V, Scales};
 
 /// Ratio of the nominal time constant to the record's from which the record's is used.

@@ -139,7 +139,7 @@ fn line(residual: &[f64], data: &Data, frequency_hz: f64) -> Peak {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::data::Input;
+    use crate::record::input::Input;
     use simulation::record::{Record, Row};
 
     #[test]

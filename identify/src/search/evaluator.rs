@@ -69,7 +69,7 @@ pub trait Evaluator {
 impl Evaluator for Engine<'_> {
     fn initial_models(&self) -> Vec<Model> {
         let relaxation = &self.base().relaxation;
-        initial_models(self.data, relaxation.tau_s, relaxation.share)
+        initial_models(self.data, relaxation.tau_s, relaxation.share, |cause| self.allows(cause))
     }
 
     fn fit(&mut self, model: Model) -> Fit {

@@ -33,32 +33,19 @@ impl GainPredictor {
         let (points, bounds) = (fit.model.points(), fit.model.coordinates(engine.data));
         let mut own: Vec<Vec<f64>> = Vec::new();
         for (column, place) in columns.iter().zip(places) {
-            let mut column: Vec<f64> = column.iter().zip(&roots).map(|(value, root)| value * root).collect();
+            let column: Vec<f64> = column.iter().zip(&roots).map(|(value, root)| value * root).collect();
             // A parameter at its bound cannot move outwards, so that another effect may explain what it cannot.
             let slope = dot(&column, &residual);
             let Coordinate { lowest, highest, .. } = bounds[place];
             if points[place] <= lowest && slope < 0.0 || points[place] >= highest && slope > 0.0 {
                 continue;
             }
-            let size = norm(&column);
-            remove(&mut column, &own);
-            let left = norm(&column);
-            if left > DEPENDENT * size {
-                column.iter_mut().for_each(|value| *value /= left);
-                own.push(column);
-            }
+            add_direction(&mut own, column);
         }
         // The initial state follows as well.
         for state in engine.initial_states(&fit.model) {
-            let mut column: Vec<f64> =
-                noise.whitened(state).iter().zip(&roots).map(|(value, root)| value * root).collect();
-            let size = norm(&column);
-            remove(&mut column, &own);
-            let left = norm(&column);
-            if left > DEPENDENT * size {
-                column.iter_mut().for_each(|value| *value /= left);
-                own.push(column);
-            }
+            let column: Vec<f64> = noise.whitened(state).iter().zip(&roots).map(|(value, root)| value * root).collect();
+            add_direction(&mut own, column);
         }
         Self { noise, residual, roots, own }
     }
@@ -86,6 +73,17 @@ impl GainPredictor {
 /// Euclidean norm, in the unit of the values.
 fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
+}
+
+/// Adds the part of a vector that is orthogonal to all directions, unless almost nothing of it is left.
+fn add_direction(basis: &mut Vec<Vec<f64>>, mut vector: Vec<f64>) {
+    let size = norm(&vector);
+    remove(&mut vector, basis);
+    let left = norm(&vector);
+    if left > DEPENDENT * size {
+        vector.iter_mut().for_each(|value| *value /= left);
+        basis.push(vector);
+    }
 }
 
 /// Subtracts the projection onto an orthonormal basis.

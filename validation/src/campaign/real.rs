@@ -22,6 +22,7 @@ use anyhow::{Context, Result, bail};
 use cpu_time::ProcessTime;
 use identify::nominal::identify;
 use identify::plant::base::Base;
+use identify::stats::scale::root_mean_square;
 use identify::{Input, Options, examine};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -189,7 +190,10 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
         Errors { held_out: orders.map(|of| of.held_out_rmse).min_by(f64::total_cmp), last: None }
     };
     let nominal = Errors { held_out: Some(report.held_out_rmse), last: Some(report.last_40_percent_rmse) };
-    let extended = Errors { held_out: Some(diagnosis.report.extended.quality.held_out_rmse), last: Some(rms(&beyond)) };
+    let extended = Errors {
+        held_out: Some(diagnosis.report.extended.quality.held_out_rmse),
+        last: Some(root_mean_square(&beyond)),
+    };
     let read: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
     let mean = read.iter().sum::<f64>() / read.len() as f64;
     let verdict = serde_json::to_value(diagnosis.report.verdict)?;
@@ -199,7 +203,7 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
         known: known.clone(),
         rows: read.len(),
         unit: units.reading.clone(),
-        spread: rms(&read.iter().map(|y| y - mean).collect::<Vec<_>>()),
+        spread: root_mean_square(&read.iter().map(|y| y - mean).collect::<Vec<_>>()),
         nominal: in_words(report),
         verdict: verdict.as_str().unwrap_or_default().to_owned(),
         causes: findings.map(|finding| (finding.cause.to_owned(), finding.probability)).collect(),
@@ -217,10 +221,6 @@ fn in_words(report: &identify::nominal::report::Report) -> String {
     words.extend(nominal.tau_s.iter().map(|of| format!("tau {:.3} s ({:.2})", of.tau.value, of.weight.value)));
     words.extend(report.oscillation.iter().map(|of| format!("{:.3} Hz (zeta {:.3})", of.freq_hz.value, of.zeta.value)));
     words.join(", ")
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 /// Answers of PySINDy and SysIdentPy for every record.

@@ -17,7 +17,6 @@ pub mod panels;
 pub mod plots;
 mod records;
 mod residuals;
-pub(super) mod style;
 mod suspects;
 mod tables;
 pub mod text;

@@ -1,15 +1,15 @@
 //! The report page: one self-contained HTML file.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
 use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::origin::Origin;
 use crate::output::diagnosis::records;
-use crate::output::diagnosis::style;
 use crate::output::diagnosis::suspects;
 use crate::output::diagnosis::tables;
 use crate::output::diagnosis::text;
+use crate::output::document::document;
 use identify::answer::Verdict;
 use identify::{Diagnosis, Input};
 
@@ -17,59 +17,47 @@ use identify::{Diagnosis, Input};
 pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -> String {
     let (report, scales) = (&diagnosis.report, diagnosis.data.scales());
     let [readings, residual, residual_voltage, correlations @ ..] = figures else { unreachable!("see `figures`") };
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "Diagnosis of " (origin.record) }
-                style { (PreEscaped(style::sheet())) }
-            }
-            body {
-                h1 { "Diagnosis of " (origin.record) }
-                p { span.verdict { (verdict(report.verdict)) } }
-                div.sentences {
-                    p { (text::nominal(&report.nominal, scales)) }
-                    @for sentence in text::sentences(&origin.record, report, scales) { p { (sentence) } }
-                }
-                h2 { "Causes" }
-                (tables::findings(&report.findings, scales))
-                (suspects::section(&report.suspects, scales))
-                (records::section(&report.records, scales))
-                h2 { "Readings and simulations" }
-                @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
-                h2 { "Residual tests" }
-                div.pair { @for figure in correlations { (drawn(figure)) } }
-                @if let Some(leftover) = &report.leftover { p { (leftover) "." } }
-                h2 { "Ranking of the causes and their rivals" }
-                (tables::standings(diagnosis))
-                @if is_extended(diagnosis) {
-                    h2 { "Held-out improvement" }
-                    (tables::quality(diagnosis))
-                    @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
-                    @if let Some(sentence) = text::in_fixed_point(&report.extended, scales) { p { (sentence) } }
-                    h2 { "Improvement on each held-out segment" }
-                    (tables::folds(diagnosis))
-                } @else {
-                    h2 { "Accuracy" }
-                    (tables::quality(diagnosis))
-                    @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
-                }
-                h2 { "Next experiment" }
-                p {
-                    @match &report.next_experiment {
-                        Some(next) => { (capital(next)) "." }
-                        None => { "None needed: no decision is open." }
-                    }
-                }
-                h2 { "Noise" }
-                (tables::noise(diagnosis))
-                (footer(diagnosis, origin))
+    let body = html! {
+        p { span.verdict { (verdict(report.verdict)) } }
+        div.sentences {
+            p { (text::nominal(&report.nominal, scales)) }
+            @for sentence in text::sentences(&origin.record, report, scales) { p { (sentence) } }
+        }
+        h2 { "Causes" }
+        (tables::findings(&report.findings, scales))
+        (suspects::section(&report.suspects, scales))
+        (records::section(&report.records, scales))
+        h2 { "Readings and simulations" }
+        @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
+        h2 { "Residual tests" }
+        div.pair { @for figure in correlations { (drawn(figure)) } }
+        @if let Some(leftover) = &report.leftover { p { (leftover) "." } }
+        h2 { "Ranking of the causes and their rivals" }
+        (tables::standings(diagnosis))
+        @if is_extended(diagnosis) {
+            h2 { "Held-out improvement" }
+            (tables::quality(diagnosis))
+            @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
+            @if let Some(sentence) = text::in_fixed_point(&report.extended, scales) { p { (sentence) } }
+            h2 { "Improvement on each held-out segment" }
+            (tables::folds(diagnosis))
+        } @else {
+            h2 { "Accuracy" }
+            (tables::quality(diagnosis))
+            @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
+        }
+        h2 { "Next experiment" }
+        p {
+            @match &report.next_experiment {
+                Some(next) => { (capital(next)) "." }
+                None => { "None needed: no decision is open." }
             }
         }
+        h2 { "Noise" }
+        (tables::noise(diagnosis))
+        (footer(diagnosis, origin))
     };
-    page.into_string()
+    document(&format!("Diagnosis of {}", origin.record), body)
 }
 
 fn verdict(verdict: Verdict) -> &'static str {

@@ -3,8 +3,8 @@
 use kuva::prelude::*;
 
 use crate::output::diagnosis::plots::command;
-use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned_to};
+use crate::output::style::{AFTER, BEFORE, COMMAND, READING};
 use identify::record::data::Data;
 
 /// Number of stretches that a line is drawn by, since the panels are small.

@@ -3,8 +3,8 @@
 use kuva::prelude::*;
 
 use crate::output::diagnosis::extension::is_extended;
-use crate::output::diagnosis::style::{AFTER, BEFORE, COMMAND, READING};
 use crate::output::draw::{self, Axes, line, thinned};
+use crate::output::style::{AFTER, BEFORE, COMMAND, READING};
 use identify::answer;
 use identify::dimension::Dimension;
 use identify::record::data::Data;

@@ -1,12 +1,13 @@
 //! The report page: one self-contained HTML file.
 
 use identify::Identified;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use simulation::units::Units;
 
 use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::number::number;
-use crate::output::diagnosis::{page::drawn, style};
+use crate::output::diagnosis::page::drawn;
+use crate::output::document::document;
 use crate::output::identify::table::{self, Line};
 use crate::output::identify::{Origin, PLANT_FILE};
 
@@ -15,45 +16,33 @@ pub(super) fn page(identified: &Identified, units: &Units, origin: &Origin, figu
     let report = &identified.report;
     let names: Vec<&str> = identified.records.iter().map(|record| record.name.as_str()).collect();
     let title = format!("Identification of {}", names.join(", "));
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
-                style { (PreEscaped(style::sheet())) }
-            }
-            body {
-                h1 { (title) }
-                div.sentences {
-                    p { (table::sentence(report)) }
-                    @for remark in &report.remarks { p { (remark) } }
-                }
-                h2 { "The spring" }
-                (lines(["", "value", "95 % interval"], &table::quantities(report, units)))
-                h2 { "Readings and model" }
-                @for figure in figures { (drawn(figure)) }
-                h2 { "Linear models" }
-                p.small {
-                    "The best model of each order, in free run on segments that its fit did not use. On the last 40 %, by a fit to the "
-                    "first 60 %, the nominal model's error is " (number(report.last_40_percent_rmse)) " " (report.unit) "."
-                }
-                (lines(["order", &format!("held-out RMSE [{}]", report.unit), ""], &table::orders(report)))
-                h2 { "Plant file" }
-                p.small { (PLANT_FILE) ", for " code { "--plant" } }
-                pre { (identified.plant.to_toml().unwrap_or_default()) }
-                footer {
-                    dl {
-                        dt { "Version" } dd { "vsj " (env!("CARGO_PKG_VERSION")) }
-                        dt { "Command" } dd { code { (origin.command) } }
-                        dt { "Rows" } dd { (report.rows) }
-                    }
-                }
+    let body = html! {
+        div.sentences {
+            p { (table::sentence(report)) }
+            @for remark in &report.remarks { p { (remark) } }
+        }
+        h2 { "The spring" }
+        (lines(["", "value", "95 % interval"], &table::quantities(report, units)))
+        h2 { "Readings and model" }
+        @for figure in figures { (drawn(figure)) }
+        h2 { "Linear models" }
+        p.small {
+            "The best model of each order, in free run on segments that its fit did not use. On the last 40 %, by a fit to the "
+            "first 60 %, the nominal model's error is " (number(report.last_40_percent_rmse)) " " (report.unit) "."
+        }
+        (lines(["order", &format!("held-out RMSE [{}]", report.unit), ""], &table::orders(report)))
+        h2 { "Plant file" }
+        p.small { (PLANT_FILE) ", for " code { "--plant" } }
+        pre { (identified.plant.to_toml().unwrap_or_default()) }
+        footer {
+            dl {
+                dt { "Version" } dd { "vsj " (env!("CARGO_PKG_VERSION")) }
+                dt { "Command" } dd { code { (origin.command) } }
+                dt { "Rows" } dd { (report.rows) }
             }
         }
     };
-    page.into_string()
+    document(&title, body)
 }
 
 fn lines(head: [&str; 3], lines: &[Line]) -> Markup {

@@ -6,8 +6,8 @@ use kuva::prelude::*;
 use simulation::units::Units;
 
 use crate::output::diagnosis::figures::Figure;
-use crate::output::diagnosis::style::{AFTER, BEFORE, READING};
 use crate::output::draw::{self, Axes, line, thinned};
+use crate::output::style::{AFTER, BEFORE, READING};
 
 /// Two figures for each record: readings with the model, and the held-out residual.
 pub(super) fn figures(identified: &Identified, units: &Units) -> Vec<Figure> {

@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 /// Colour of the readings.
-pub(in crate::output) const READING: &str = "#000000";
+pub(super) const READING: &str = "#000000";
 /// Colour of the original simulation.
-pub(in crate::output) const BEFORE: &str = "#d55e00";
+pub(super) const BEFORE: &str = "#d55e00";
 /// Colour of the extended simulation.
-pub(in crate::output) const AFTER: &str = "#0072b2";
+pub(super) const AFTER: &str = "#0072b2";
 /// Colour of the commanded voltage.
-pub(in crate::output) const COMMAND: &str = "#888888";
+pub(super) const COMMAND: &str = "#888888";
 
 /// Colours of the plots, and their replacements on a dark screen.
 const ON_DARK: [(&str, &str); 5] =
@@ -18,7 +18,7 @@ const ON_DARK: [(&str, &str); 5] =
 const PAGE: &str = include_str!("page.css");
 
 /// The page's style sheet.
-pub(in crate::output) fn sheet() -> String {
+pub(super) fn sheet() -> String {
     let mut sheet = PAGE.to_owned();
     sheet.push_str("@media screen and (prefers-color-scheme: dark) {\n");
     for (light, dark) in ON_DARK {
