@@ -80,6 +80,8 @@ pub struct RecordReport {
 pub struct LinearError {
     /// Number of poles.
     pub order: usize,
+    /// Root mean square error of the fit to all rows in free run, in the reading's unit.
+    pub rmse: f64,
     /// Held-out root mean square error, in the reading's unit.
     pub held_out_rmse: f64,
     /// The same on the last 40 % of each record, by a fit to the first 60 %.
@@ -138,6 +140,10 @@ pub struct Extended {
     pub quality: Quality,
     /// Held-out improvement, `1 - extended / baseline` of the root mean square errors; 0 without findings.
     pub gain: f64,
+    /// Lowest and highest voltage at which the record shows the static law, in V, if a nonlinear one was found: the plant file is
+    /// straight outside of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law_range_v: Option<[f64; 2]>,
     /// Path of the plant file that was written; `None` if none was.
     pub model: Option<String>,
     /// Largest absolute difference between the fixed-point tick and the fit over the record, in V; `None` if it was not run.
@@ -213,6 +219,9 @@ pub struct Parameter {
     /// True if the value is at a bound of its range, so that the spring may need a value beyond.
     #[serde(skip_serializing_if = "is_false")]
     pub at_bound: bool,
+    /// Lowest and highest voltage of the record, in V, if the parameter is the value of a curve at a voltage outside of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extrapolated_from_v: Option<[f64; 2]>,
     /// Dimension, which decides the unit in which texts show the value.
     #[serde(skip)]
     pub dimension: Dimension,

@@ -9,6 +9,8 @@
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
+use crate::plant::relaxation::Relaxation;
+use crate::plant::visited::Axis;
 use crate::record::data::Data;
 
 pub(super) struct VoltageDependentTimeConstant;
@@ -62,11 +64,11 @@ impl Effect for VoltageDependentTimeConstant {
         INITIAL_TIME_CONSTANTS_S.map(start).to_vec()
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![
-            Quantity::new("tau_low_s", Dimension::Time, point[0].exp()),
-            Quantity::new("tau_high_s", Dimension::Time, point[1].exp()),
-        ]
+    fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        let axis = if FORMS[form].1 { Axis::Stiffness } else { Axis::Voltage };
+        let end =
+            |name: &str, point: f64, at_v| Quantity::new(name, Dimension::Time, point.exp()).end_of_curve(axis, at_v);
+        vec![end("tau_low_s", point[0], 0.0), end("tau_high_s", point[1], Relaxation::HIGH_V)]
     }
 
     /// In the fixed-point tick the time constant is linear in the voltage.

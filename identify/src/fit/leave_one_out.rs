@@ -52,7 +52,8 @@ mod tests {
     use crate::effects::index_of;
     use crate::effects::model::{Block, Model};
     use crate::plant::base::Base;
-    use crate::record::data::{Data, Input};
+    use crate::record::data::Data;
+    use crate::record::input::Input;
     use crate::record::observed::Observed;
     use crate::stats::scale::normals;
     use simulation::record::{Record, Row};

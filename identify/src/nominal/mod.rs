@@ -114,6 +114,7 @@ impl Models {
     fn errors(&self) -> Vec<LinearError> {
         let error = |(order, model): (usize, &Model)| LinearError {
             order,
+            rmse: root_mean_square(&model.fit.residual),
             held_out_rmse: root_mean_square(&model.held_out),
             last_40_percent_rmse: model.last_part,
         };

@@ -123,6 +123,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         extended: Extended {
             gain,
             quality: after,
+            law_range_v: export.law_range_v,
             model: None,
             fixed_point_error_v: export.fixed_point_error_v,
             tick_refuses: export.tick_refuses,
@@ -200,7 +201,14 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         would_show: None,
         alternatives: Vec::new(),
         next_experiment: Some(reason.next_experiment().into()),
-        extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+        extended: Extended {
+            quality,
+            gain: 0.0,
+            law_range_v: None,
+            model: None,
+            fixed_point_error_v: None,
+            tick_refuses: None,
+        },
         linear: None,
         leftover: reason.leftover(),
         noise: noise_report(&baseline.noise),

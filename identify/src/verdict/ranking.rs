@@ -6,6 +6,7 @@ use crate::effects::EFFECTS;
 use crate::effects::effect::Quantity;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
+use crate::plant::base::Base;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
 use crate::search::{Evaluator, Scored, Search, effects};
@@ -54,7 +55,7 @@ pub(crate) fn ranking(
     causes: &[Cause],
     known: [(&Fit, &[f64]); 2],
 ) -> Vec<RankedCauses> {
-    let (data, observed) = (engine.data, engine.observed);
+    let (data, observed, base) = (engine.data, engine.observed, engine.base());
     let mut ranked = |scored: &Scored| {
         let held_out_rmse = match known.iter().find(|(other, _)| other.model == scored.fit.model) {
             Some((_, held_out)) => rms(observed, held_out),
@@ -64,7 +65,7 @@ pub(crate) fn ranking(
         RankedCauses {
             causes: effects(&scored.fit.model).into_iter().map(|effect| EFFECTS[effect].cause()).collect(),
             best_without: without.map(|cause| EFFECTS[cause.effect].cause()).collect(),
-            values: values(data, &scored.fit.model),
+            values: values(data, base, &scored.fit.model),
             score: scored.score,
             rmse: rms(observed, &scored.fit.residual),
             held_out_rmse,
@@ -88,13 +89,13 @@ pub(crate) fn named(data: &Data, model: &Model) -> String {
 }
 
 /// Parameters of all blocks in the user's units, as `name = value unit, ...`.
-fn values(data: &Data, model: &Model) -> String {
-    let of_block = |(block, point): &(Block, Vec<f64>)| {
+fn values(data: &Data, base: &Base, model: &Model) -> String {
+    let of_block = |(index, (block, point)): (usize, &(Block, Vec<f64>))| {
         let gain = block.effect().own_gain(block.form, point, data);
         let gain = gain.map(|gain| Quantity::new("gain", Dimension::Ratio, gain));
-        block.effect().quantities(block.form, point, data).into_iter().chain(gain)
+        model.reported(index, base, data).into_iter().map(|reported| reported.quantity).chain(gain)
     };
-    let quantities = model.blocks.iter().flat_map(of_block);
+    let quantities = model.blocks.iter().enumerate().flat_map(of_block);
     let said =
         |Quantity { name, dimension, value, .. }| format!("{name} = {}", data.scales().shown(dimension, value, 4));
     quantities.map(said).collect::<Vec<_>>().join(", ")

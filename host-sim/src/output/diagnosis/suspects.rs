@@ -110,6 +110,7 @@ mod tests {
             unit: "V".into(),
             dimension: Dimension::ReadingDifference,
             at_bound: false,
+            extrapolated_from_v: None,
         };
         let parameters = vec![("offset".to_owned(), offset)];
         Suspect {

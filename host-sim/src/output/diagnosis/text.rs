@@ -9,7 +9,7 @@ use identify::effects::{EFFECTS, index_of};
 use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
-use crate::output::diagnosis::number::shown_name;
+use crate::output::diagnosis::number::{self, shown_name};
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
 
@@ -33,21 +33,28 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
     text += &records::text(&report.records, scales);
     let (before, after) = (&report.baseline, &report.extended.quality);
     let extends = !report.findings.is_empty() || !report.take_out.is_empty();
-    let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
+    let linear_column = report.linear.map_or_else(String::new, |linear| format!(" {:>16}", linear_name(&linear)));
+    let extended_column = if extends { "     extended" } else { "" };
+    let _ = writeln!(text, "\n{:22} {:>12}{extended_column}{linear_column}", "", "simulation");
     let error = |of: &str| format!("{of} RMSE [{}]", scales.unit(Dimension::ReadingSize));
-    for (what, before, after) in [
-        (error("free-run"), before.rmse, after.rmse),
-        (error("held-out"), before.held_out_rmse, after.held_out_rmse),
-        (error("one-step"), before.one_step_rmse, after.one_step_rmse),
-        ("fit [%]".to_owned(), before.fit_percent, after.fit_percent),
+    let of_linear = |of: fn(&LinearError) -> f64| report.linear.as_ref().map(of);
+    for (what, before, after, linear) in [
+        (error("free-run"), before.rmse, after.rmse, of_linear(|linear| linear.rmse)),
+        (error("held-out"), before.held_out_rmse, after.held_out_rmse, of_linear(|linear| linear.held_out_rmse)),
+        (error("one-step"), before.one_step_rmse, after.one_step_rmse, None),
+        ("fit [%]".to_owned(), before.fit_percent, after.fit_percent, None),
     ] {
         let dimension = if what == "fit [%]" { Dimension::Ratio } else { Dimension::ReadingSize };
         let number = |value: f64| if value.is_finite() { scales.number(dimension, value, 3) } else { "-".into() };
         let after = if extends { format!(" {:>12}", number(after)) } else { String::new() };
-        let _ = writeln!(text, "{what:22} {:>12}{after}", number(before));
+        let linear = linear.map_or_else(String::new, |linear| format!(" {:>16}", number(linear)));
+        let _ = writeln!(text, "{what:22} {:>12}{after}{linear}", number(before));
     }
     if let Some(linear) = linear(report, scales) {
         let _ = writeln!(text, "{linear}");
+    }
+    for sentence in limits_of_curves(report, scales) {
+        let _ = writeln!(text, "{sentence}");
     }
     if extends && let Some(sentence) = in_fixed_point(&report.extended, scales) {
         let _ = writeln!(text, "{sentence}");
@@ -55,11 +62,49 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
     text
 }
 
+/// Name of the best linear model in tables of errors.
+pub fn linear_name(linear: &LinearError) -> String {
+    format!("linear, order {}", linear.order)
+}
+
 /// States the held-out error of the best linear model, with which both simulations compete; `None` if there is none.
 pub fn linear(report: &answer::Report, scales: &Scales) -> Option<String> {
     let LinearError { order, held_out_rmse, .. } = report.linear?;
     let rmse = scales.with_unit(Dimension::ReadingSize, held_out_rmse, 3);
     Some(format!("The best linear model of order 1 to 4, of order {order}, has a held-out error of {rmse}."))
+}
+
+/// States where the record shows the curves of the extended spring: its static law, and parameters that are values of a curve.
+pub fn limits_of_curves(report: &answer::Report, scales: &Scales) -> Vec<String> {
+    let law = law_range(&report.extended, scales).into_iter();
+    law.chain(report.findings.iter().filter_map(|finding| extrapolated(finding, scales))).collect()
+}
+
+/// States where the static law is known, and how the plant file continues it; `None` if no nonlinear law was found.
+fn law_range(extended: &Extended, scales: &Scales) -> Option<String> {
+    let [low, high] = extended.law_range_v?;
+    let volts = |voltage| scales.with_unit(Dimension::Voltage, voltage, 0);
+    let below = if low > 0.0 { format!(", and below it as a straight line to {}", volts(0.0)) } else { String::new() };
+    Some(format!(
+        "The record shows the static law from {} to {}; the plant file continues it above with its end slope{below}.",
+        scales.number(Dimension::Voltage, low, 0),
+        volts(high)
+    ))
+}
+
+/// States which parameters of a finding are extrapolated, and from which voltages; `None` if none are.
+fn extrapolated(finding: &Finding, scales: &Scales) -> Option<String> {
+    let all = finding.parameters.iter().filter_map(|(name, it)| Some((name.as_str(), it.extrapolated_from_v?)));
+    let (names, ranges): (Vec<&str>, Vec<[f64; 2]>) = all.unzip();
+    let [low, high] = *ranges.first()?;
+    Some(format!(
+        "{}: {} {} extrapolated from a record of {} to {}.",
+        finding.cause,
+        names.join(" and "),
+        if names.len() == 1 { "is" } else { "are" },
+        scales.number(Dimension::Voltage, low, 0),
+        scales.with_unit(Dimension::Voltage, high, 0)
+    ))
 }
 
 /// States whether the fixed-point tick simulates the extended spring; `None` if that was not tested.
@@ -257,7 +302,8 @@ fn row(text: &mut String, finding: &Finding, scales: &Scales) {
             let small = it.value.abs() < 0.01 && matches!(it.dimension, Dimension::Ratio | Dimension::Rate);
             let number = |value| if small { significant(value, 4) } else { scales.number(it.dimension, value, 4) };
             let (name, unit) = (shown_name(name, it.dimension, scales), scales.unit(it.dimension));
-            format!("{name} = {} [{}, {}] {unit}", number(it.value), number(it.low), number(it.high)).trim().to_owned()
+            let text = format!("{name} = {} [{}, {}] {unit}", number(it.value), number(it.low), number(it.high));
+            text.trim().to_owned() + number::extrapolated(it)
         })
         .collect();
     let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
@@ -298,7 +344,14 @@ mod tests {
             would_show: None,
             alternatives: alternatives.to_vec(),
             next_experiment: None,
-            extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+            extended: Extended {
+                quality,
+                gain: 0.0,
+                law_range_v: None,
+                model: None,
+                fixed_point_error_v: None,
+                tick_refuses: None,
+            },
             linear: None,
             leftover: None,
             noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
