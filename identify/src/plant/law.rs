@@ -16,6 +16,8 @@ pub struct Law<'a> {
 
 /// Largest error of a chord, as a fraction of the range's end, that counts as none.
 const STRAIGHT_TOLERANCE: f64 = 1e-7;
+/// Largest number of points up to the lower end of the range.
+const MOST_BELOW: usize = 3;
 /// Number of intervals of the range at which a law is evaluated for its table.
 const STEPS: usize = 1000;
 
@@ -89,7 +91,16 @@ impl<'a> Law<'a> {
         voltage_v.sort_by(f64::total_cmp);
         voltage_v.dedup_by(|b, a| *b - *a < 1e-3 * step);
         let curve: Vec<Point> = voltage_v.into_iter().map(|voltage| (voltage, value(voltage))).collect();
-        let (voltage_v, stiffness) = knots(&curve, MAX_POINTS, STRAIGHT_TOLERANCE * high).into_iter().unzip();
+        // The range's lower end is a point of its own, so that no line crosses it.
+        let (below, within) = curve.split_at(curve.partition_point(|(voltage, _)| *voltage < low));
+        let tolerance = STRAIGHT_TOLERANCE * high;
+        let mut points = Vec::new();
+        if let (Some(first), false) = (within.first(), below.is_empty()) {
+            points = knots(&[below, &[*first]].concat(), MOST_BELOW, tolerance);
+            points.pop();
+        }
+        points.extend(knots(within, MAX_POINTS - points.len(), tolerance));
+        let (voltage_v, stiffness) = points.into_iter().unzip();
         Some(plant_file::Law { voltage_v, stiffness })
     }
 }

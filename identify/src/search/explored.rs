@@ -28,27 +28,26 @@ impl<'e, E: Evaluator> Search<'e, E> {
         Self { evaluated, first_fits, exhaustive: false, ..Self::new(evaluator) }
     }
 
-    /// The best structure with an effect that `best` lacks: of those that were evaluated, and of `best` extended by it, which is
-    /// fitted from one start if no search has done so. `None` if the effect cannot be identified together with `best`, or if
-    /// nothing was fitted.
-    pub fn nearest(&mut self, best: &Scored, effect: usize) -> Option<Scored> {
-        if contained(effect, &best.fit.model) {
-            return None;
-        }
+    /// The best structure with an effect among those that were evaluated; `None` if none has it.
+    pub fn best_with(&self, effect: usize) -> Option<Scored> {
+        self.ranked().into_iter().find(|scored| scored.fit.model.has(effect)).cloned()
+    }
+
+    /// Evaluates `best` extended by an effect, from one start, unless it was evaluated before or the two cannot be identified together.
+    pub fn evaluate_extension(&mut self, best: &Scored, effect: usize) {
         let mut set = effects(&best.fit.model);
         set.push(effect);
         set.sort_unstable();
-        let known = self.ranked().iter().any(|other| effects(&other.fit.model) == set);
-        if !known && !self.evaluator.is_over() {
-            let added = |fits: &FirstFits| fits.by.is_none() && fits.of == best.fit.model;
-            let kept =
-                self.first_fits.get(&best.fit.model.structure()).into_iter().flatten().filter(|fits| added(fits));
-            let kept = kept.flat_map(|fits| &fits.fits).filter(|fit| fit.model.has(effect));
-            let likeliest = kept.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)).cloned();
-            if let Some(first) = likeliest.or_else(|| self.evaluator.extended_by(&best.fit, effect)) {
-                self.evaluated.evaluate_again(self.evaluator, first);
-            }
+        let known = self.ranked().iter().any(|scored| effects(&scored.fit.model) == set);
+        if known || contained(effect, &best.fit.model) {
+            return;
         }
-        self.ranked().into_iter().find(|other| other.fit.model.has(effect)).cloned()
+        let kept = self.first_fits.get(&best.fit.model.structure()).into_iter().flatten();
+        let of_best = kept.filter(|kept| kept.by.is_none() && kept.of == best.fit.model).flat_map(|kept| &kept.fits);
+        let with_effect = of_best.filter(|fit| fit.model.has(effect));
+        let likeliest = with_effect.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)).cloned();
+        if let Some(first) = likeliest.or_else(|| self.evaluator.extended_by(&best.fit, effect)) {
+            self.evaluated.evaluate_again(self.evaluator, first);
+        }
     }
 }

@@ -104,10 +104,16 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));
     let verdict = verdict(unexplained, &alternatives, insufficient, &findings);
+    let may_be_suspect = |cause| match verdict {
+        Verdict::Explained => false,
+        // The open question is which of the alternatives it is.
+        Verdict::Ambiguous => alternatives.iter().any(|set| set.contains(&cause)),
+        Verdict::Consistent => unmodelled.is_some(),
+        Verdict::Unexplained | Verdict::Insufficient => true,
+    };
     let suspects = match verdict {
         Verdict::Explained => Vec::new(),
-        Verdict::Consistent if unmodelled.is_none() => Vec::new(),
-        _ => suspects(engine, &found.best, mem::take(&mut found.explored)),
+        _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect),
     };
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
     let export = export(engine, found.model(), held);

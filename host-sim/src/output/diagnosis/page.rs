@@ -37,7 +37,6 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         @if is_extended(diagnosis) {
             h2 { "Held-out improvement" }
             (tables::quality(diagnosis))
-            @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
             @for sentence in text::limits_of_curves(report, scales) { p { (sentence) } }
             @if let Some(sentence) = text::in_fixed_point(&report.extended, scales) { p { (sentence) } }
             h2 { "Improvement on each held-out segment" }
@@ -45,7 +44,6 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         } @else {
             h2 { "Accuracy" }
             (tables::quality(diagnosis))
-            @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
         }
         h2 { "Next experiment" }
         p {

@@ -50,9 +50,6 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
         let linear = linear.map_or_else(String::new, |linear| format!(" {:>16}", number(linear)));
         let _ = writeln!(text, "{what:22} {:>12}{after}{linear}", number(before));
     }
-    if let Some(linear) = linear(report, scales) {
-        let _ = writeln!(text, "{linear}");
-    }
     for sentence in limits_of_curves(report, scales) {
         let _ = writeln!(text, "{sentence}");
     }
@@ -65,13 +62,6 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
 /// Name of the best linear model in tables of errors.
 pub fn linear_name(linear: &LinearError) -> String {
     format!("linear, order {}", linear.order)
-}
-
-/// States the held-out error of the best linear model, with which both simulations compete; `None` if there is none.
-pub fn linear(report: &answer::Report, scales: &Scales) -> Option<String> {
-    let LinearError { order, held_out_rmse, .. } = report.linear?;
-    let rmse = scales.with_unit(Dimension::ReadingSize, held_out_rmse, 3);
-    Some(format!("The best linear model of order 1 to 4, of order {order}, has a held-out error of {rmse}."))
 }
 
 /// States where the record shows the curves of the extended spring: its static law, and parameters that are values of a curve.
