@@ -50,6 +50,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
     }
     joint.report.verdict = verdict(&joint);
+    if joint.report.verdict == Verdict::Explained {
+        joint.report.suspects.clear();
+    }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
     Ok(joint)

@@ -361,6 +361,49 @@ mod tests {
     }
 
     #[test]
+    fn best_linear_model_has_a_column_with_its_order() {
+        let mut report = report(Verdict::Explained, &["hum"], &[]);
+        report.linear = Some(LinearError { order: 3, rmse: 5.1, held_out_rmse: 6.7, last_40_percent_rmse: 9.0 });
+        let text = text("r.csv", &report, &Scales::default());
+        let words = |start: &str| {
+            let line = text.lines().find(|line| line.starts_with(start)).expect("a line");
+            line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert!(text.contains("simulation     extended  linear, order 3\n"), "{text}");
+        assert_eq!(words("free-run")[3..], ["7.860", "7.860", "5.100"]);
+        assert_eq!(words("held-out")[3..], ["7.860", "7.860", "6.700"]);
+    }
+
+    #[test]
+    fn ranges_of_curves_are_said() {
+        let mut report = report(Verdict::Explained, &["voltage-dependent-time-constant"], &[]);
+        assert!(limits_of_curves(&report, &Scales::default()).is_empty());
+        report.extended.law_range_v = Some([0.0, 330.2]);
+        let tau = answer::Parameter {
+            value: 8.0,
+            low: 7.0,
+            high: 9.0,
+            unit: "s".into(),
+            at_bound: false,
+            extrapolated_from_v: Some([0.0, 300.0]),
+            dimension: Dimension::Time,
+        };
+        report.findings[0].parameters.push(("tau_high_s".to_owned(), tau));
+        let said = limits_of_curves(&report, &Scales::default());
+        let law =
+            "The record shows the static law from 0 to 330 V; the plant file continues it above with its end slope.";
+        let tau = "voltage-dependent-time-constant: tau_high_s is extrapolated from a record of 0 to 300 V.";
+        assert_eq!(said, [law, tau]);
+        assert!(
+            text("r.csv", &report, &Scales::default())
+                .contains("tau_high_s = 8.0000 [7.0000, 9.0000] s (extrapolated)\n")
+        );
+        report.extended.law_range_v = Some([200.0, 500.0]);
+        let law = limits_of_curves(&report, &Scales::default()).remove(0);
+        assert!(law.ends_with("above with its end slope, and below it as a straight line to 0 V."), "{law}");
+    }
+
+    #[test]
     fn a_margin_has_two_digits() {
         for (part, said) in [
             (0.000_43, "0.043 %"),
