@@ -61,8 +61,8 @@ Examples:
     /// Run the fault drills under QEMU
     ///
     /// Panic, hard fault, stack overflow, the same with floats in use, stalled task, hanging control, the same with
-    /// interrupts off, overrun, interlock, both at once, silent host, missing guards. Exits with 1 unless the voltage goes away on the DAC's wire and
-    /// the log is the approved one.
+    /// interrupts off, overrun, interlock, overrun and interlock together, silent host, missing guards. Exits with 1
+    /// unless the voltage goes away on the DAC's wire and the log is the approved one.
     Drill(drill::Args),
     /// Let a host talk to the emulated firmware
     ///

@@ -113,3 +113,28 @@ fn documentation_is_up_to_date() {
     let said = text(&output.stdout);
     assert!(page.contains(said.trim_end()), "docs/identify.md should quote:\n{said}");
 }
+
+#[test]
+fn records_of_different_quantities_are_refused() {
+    let folder = tempdir().unwrap();
+    for (name, header) in [
+        ("mm.csv", "time_s,u [V],x [mm]"),
+        ("newton.csv", "time_s,u [V],x [N]"),
+        ("percent.csv", "time_s,u [%],x [mm]"),
+        ("kilovolt.csv", "time_s,u [kV],x [mm]"),
+    ] {
+        fs::write(folder.path().join(name), record(7.0).replace("time_s,voltage_v,force", header)).unwrap();
+    }
+    for command in ["identify", "diagnose"] {
+        for (second, line) in [
+            ("newton.csv", "vsj: newton.csv: unit of the reading: N; expected mm as in mm.csv\n"),
+            ("percent.csv", "vsj: percent.csv: unit of the voltage: %; expected V as in mm.csv\n"),
+        ] {
+            let refused = run(folder.path(), &[command, "mm.csv", second, "--voltage", "u", "--reading", "x"]);
+            assert_eq!(refused.status.code(), Some(2));
+            assert_eq!(text(&refused.stderr), line);
+        }
+    }
+    let volts = run(folder.path(), &["identify", "mm.csv", "kilovolt.csv", "--voltage", "u", "--reading", "x"]);
+    assert!(volts.status.success(), "{}", text(&volts.stderr));
+}

@@ -26,9 +26,10 @@ const RAMP_S: f64 = 0.1;
 /// Find out how the simulation differs from measured data, name the cause, and measure the held-out improvement
 ///
 /// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (as the equivalent static voltage in V, or -
-/// for a missing reading), or others that the options below name with their units. It must contain every change of the voltage. The voltage of a row applies from its time on,
-/// and its reading is taken just after, so that it includes the instantaneous part of a step to this voltage. If
-/// voltage_v is missing, applied_v is used, as written by `vsj stair --out`.
+/// for a missing reading), or others that the options below name with their units. It must contain every change of the
+/// voltage. The voltage of a row applies from its time on, and its reading is taken just after, so that it includes the
+/// instantaneous part of a step to this voltage. If voltage_v is missing, applied_v is used, as written by
+/// `vsj stair --out`.
 ///
 /// Several files are records of one spring: each has its own initial state, zero offset and noise, the causes are shared, and
 /// what is in one record only is listed as a fault of that record.
@@ -50,9 +51,9 @@ known cause does), insufficient (too little excitation to decide). All of them e
 pub(crate) struct Arguments {
     #[command(flatten)]
     record: RecordArguments,
-    /// The simulation to compare with: `paper`, `identify` for what `vsj identify` finds in the records, or a plant file. Parts of the file (memory, law, leakage, amplifier,
-    /// further time constants) that the spring does not have are named in a sentence and in the field `take_out` of the
-    /// JSON, and omitted from the extended spring
+    /// The simulation to compare with: `paper`, `identify` for what `vsj identify` finds in the records, or a plant
+    /// file. Parts of the file (memory, law, leakage, amplifier, further time constants) that the spring does not have
+    /// are named in a sentence and in the field `take_out` of the JSON, and omitted from the extended spring
     #[arg(long, default_value = "paper", value_name = "paper|identify|FILE.toml")]
     plant: String,
     /// Write report.html, diagnosis.json, residuals.csv, the plots and the extended spring (plant.toml) to this folder
@@ -61,8 +62,8 @@ pub(crate) struct Arguments {
     /// How long causes are searched for; the answer is the same on every machine
     #[arg(long, default_value = "normal", value_parser = one_of(EFFORT))]
     effort: Effort,
-    /// Longest time until the best answer so far is given, in s or with a unit (10, 10s, 2min). Ctrl-C gives it at once, a
-    /// second Ctrl-C ends the program
+    /// Longest time until the best answer so far is given, in s or with a unit (10, 10s, 2min). Ctrl-C gives it
+    /// immediately, a second Ctrl-C ends the program
     #[arg(long, value_name = "TIME", value_parser = duration)]
     within: Option<Duration>,
     /// A line on stderr for each set of causes that becomes the best, also where stderr is not a terminal

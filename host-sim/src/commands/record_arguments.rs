@@ -57,6 +57,9 @@ impl RecordArguments {
     pub(crate) fn open(&self) -> Result<(Vec<MeasuredRecord>, Input)> {
         let (format, input) = self.format()?;
         let records: Vec<MeasuredRecord> = self.data.iter().map(|path| format.open(path)).collect::<Result<_>>()?;
+        for record in &records[1..] {
+            record.expect_quantities_of(&records[0])?;
+        }
         for text in records.iter().flat_map(|record| &record.remarks) {
             remark(text);
         }

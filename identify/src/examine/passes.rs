@@ -7,9 +7,10 @@
 //! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
 //! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
 //!
-//! All passes work on a normalised record; the diagnosis is converted back to the file's units at the end. Every pass runs a `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that
-//! is higher by `CLEARLY_LIKELIER` nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that
-//! one's best models.
+//! All passes work on a normalised record; the diagnosis is converted back to the file's units at the end. Every pass runs a
+//! `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that is higher by
+//! `CLEARLY_LIKELIER` nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that one's best
+//! models.
 
 use anyhow::Result;
 

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use crate::linear::{Fit, Problem, Section};
 
-/// Ratio from which two time constants are told apart: closer ones would have large weights of opposite sign.
+/// Smallest ratio of two time constants that are separate lags: closer ones would have large weights of opposite sign.
 const DISTINCT: f64 = 1.25;
 
 /// The quantities of a model, in the units of the record; shares and weights are parts of the static gain.

@@ -334,8 +334,8 @@ fn not_negative(quantity: Quantity) -> Quantity {
     Quantity { low: quantity.low.max(0.0), ..quantity }
 }
 
-/// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row cannot be told from
-/// another numerator, so that the interval reaches one row further down.
+/// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row is
+/// equivalent to another numerator, so that the interval reaches one row further down.
 fn whole_rows(problem: &Problem, fit: &Fit) -> Quantity {
     const MOST: usize = 4;
     let neighbours = Spectrum::neighbours(&fit.residual).clamp(0.0, 0.95);

@@ -38,6 +38,26 @@ pub struct MeasuredRecord {
     pub remarks: Vec<String>,
 }
 
+impl MeasuredRecord {
+    /// Checks that commands and readings are quantities of the same kind as those of another record of the same spring.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the record and the unit that was expected.
+    pub fn expect_quantities_of(&self, other: &Self) -> Result<(), BadInput> {
+        let of_command =
+            |units: &Units| usual_volts(&units.voltage.name).map_or(units.voltage.name.clone(), |_| "V".into());
+        let of_reading = |units: &Units| units.reading.clone();
+        let kinds = |of: &dyn Fn(&Units) -> String| (of(&self.units), of(&other.units));
+        for (quantity, (own, expected)) in [("voltage", kinds(&of_command)), ("reading", kinds(&of_reading))] {
+            if own != expected {
+                let (name, of) = (&self.record.name, &other.record.name);
+                return Err(BadInput(format!("{name}: unit of the {quantity}: {own}; expected {expected} as in {of}")));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Name of the unit of a reading without unit.
 const NO_UNIT: &str = "units";
 

@@ -182,13 +182,23 @@ impl Column {
         table.find(name).map(|index| Self { index, unit: None })
     }
 
-    /// The column `NAME` or `NAME:UNIT`; a column's own name may contain a colon.
+    /// The column `NAME` or `NAME:UNIT`; a column's own name may contain a colon, and a unit that is left out.
     fn asked(table: &Table<'_>, asked: &str) -> Option<Self> {
-        Self::named(table, asked).or_else(|| {
+        let with_unit = || {
             let (name, unit) = asked.rsplit_once(':')?;
             let unit = Some(unit.trim().to_owned()).filter(|unit| !unit.is_empty());
-            table.find(name).map(|index| Self { index, unit })
-        })
+            let column = Self::named(table, name).or_else(|| Self::without_unit(table, name))?;
+            Some(Self { unit, ..column })
+        };
+        Self::named(table, asked).or_else(with_unit).or_else(|| Self::without_unit(table, asked))
+    }
+
+    /// The only column whose name without its unit is `name`.
+    fn without_unit(table: &Table<'_>, name: &str) -> Option<Self> {
+        let mut columns = (0..table.columns().count()).map(|index| Self::at(table, index));
+        let is_named = |column: &Self| plain(split_unit(table.column(column.index)).0) == plain(name);
+        let found = columns.by_ref().find(is_named)?;
+        (!columns.any(|column| is_named(&column))).then_some(found)
     }
 }
 
@@ -300,6 +310,11 @@ mod tests {
         assert_eq!(found("x_mm,a:b,\"t ms\",force_N,time_s\n", &asked), Ok(expected));
         let error = found("time_s,voltage_v,x_mm\n", &ColumnNames { reading: Some("y:mm".into()), ..asked.clone() });
         assert!(error.unwrap_err().contains("no column `T Ms:ms`"));
+        let names = |reading: &str| ColumnNames { reading: Some(reading.into()), ..ColumnNames::default() };
+        let without_unit = [(0, Some("s".to_owned())), (1, Some("V".to_owned())), (2, Some("mm".to_owned()))];
+        assert_eq!(found("time_s,voltage_v,x [mm]\n", &names("X")), Ok(without_unit.clone()));
+        assert_eq!(found("time_s,voltage_v,x [m]\n", &names("x:mm")), Ok(without_unit));
+        assert!(found("time_s,voltage_v,x [mm],x_N\n", &names("x")).unwrap_err().contains("no column `x`"));
         let twice = ColumnNames { time: Some("a".into()), voltage: Some("a".into()), ..ColumnNames::default() };
         assert!(found("a,b,stiffness\n", &twice).unwrap_err().contains("column `a` is the time; expected another"));
     }
