@@ -259,6 +259,17 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
             )
         });
     }
+    if report.verdict == Verdict::Unexplained
+        && let Some(suspect) = report.suspects.first()
+    {
+        sentences.push(format!(
+            "The best suspect is {}, {:.1} nats short of a finding: it changes the error from {} to {} {unit}.",
+            suspect.cause,
+            suspect.nats_short,
+            error(suspect.rmse_before),
+            error(suspect.rmse_after)
+        ));
+    }
     if !report.alternatives.is_empty() {
         let nothing = || "no error at all".to_owned();
         let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
@@ -372,6 +383,22 @@ mod tests {
         assert!(text.contains("simulation     extended  linear, order 3\n"), "{text}");
         assert_eq!(words("free-run")[3..], ["7.860", "7.860", "5.100"]);
         assert_eq!(words("held-out")[3..], ["7.860", "7.860", "6.700"]);
+    }
+
+    #[test]
+    fn best_suspect_of_an_unexplained_record_is_said() {
+        let mut report = report(Verdict::Unexplained, &[], &[]);
+        report.suspects.push(answer::Suspect {
+            cause: "reading-offset",
+            with: Vec::new(),
+            parameters: Vec::new(),
+            rmse_before: 42.675,
+            rmse_after: 20.029,
+            nats_short: 4.46,
+            judge: answer::Judge::LeaveOneOut,
+        });
+        let said = "The best suspect is reading-offset, 4.5 nats short of a finding: it changes the error from 42.675 to 20.029 V.";
+        assert_eq!(sentences("r.csv", &report, &Scales::default())[1], said);
     }
 
     #[test]
