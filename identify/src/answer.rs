@@ -27,6 +27,8 @@ pub struct Report {
     pub baseline: Quality,
     /// Named causes, the one that explains the largest mean square error first.
     pub findings: Vec<Finding>,
+    /// Causes that come closest to a finding but are none, the closest first; empty if the verdict is `explained`.
+    pub suspects: Vec<Suspect>,
     /// Parts of the plant file that the record does not support; the extended simulation lacks them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub take_out: Vec<&'static str>,
@@ -83,6 +85,8 @@ pub struct RecordReport {
 pub struct LinearError {
     /// Number of poles.
     pub order: usize,
+    /// Root mean square error of the fit to all rows in free run, in the reading's unit.
+    pub rmse: f64,
     /// Held-out root mean square error, in the reading's unit.
     pub held_out_rmse: f64,
     /// The same on the last 40 % of each record, by a fit to the first 60 %.
@@ -141,6 +145,10 @@ pub struct Extended {
     pub quality: Quality,
     /// Held-out improvement, `1 - extended / baseline` of the root mean square errors; 0 without findings.
     pub gain: f64,
+    /// Lowest and highest voltage at which the record shows the static law, in V, if a nonlinear one was found: the plant file is
+    /// straight outside of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law_range_v: Option<[f64; 2]>,
     /// Path of the plant file that was written; `None` if none was.
     pub model: Option<String>,
     /// Largest absolute difference between the fixed-point tick and the fit over the record, in V; `None` if it was not run.
@@ -167,6 +175,37 @@ pub struct Finding {
     pub evidence: String,
 }
 
+/// A cause that comes close to a finding but is none.
+#[derive(Clone, Debug, Serialize)]
+pub struct Suspect {
+    /// Its cause code.
+    pub cause: &'static str,
+    /// The other causes of the set in which it comes closest; empty if it is alone.
+    pub with: Vec<&'static str>,
+    /// Its parameters with their names, in the order of the cause's page in the manual.
+    #[serde(serialize_with = "by_name")]
+    pub parameters: Vec<(String, Parameter)>,
+    /// Root mean square error of the set without the cause, as `judge` measures it, in the reading's unit.
+    pub rmse_before: f64,
+    /// Root mean square error of the set, as `judge` measures it, in the reading's unit.
+    pub rmse_after: f64,
+    /// What the set's score lacks to that of the best set, in nats, not negative: with more, the cause would be a finding.
+    pub nats_short: f64,
+    /// How both errors were measured.
+    pub judge: Judge,
+}
+
+/// How the errors with and without a suspect are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Judge {
+    /// Held-out segments, each predicted by a fit to the others.
+    HeldOut,
+    /// Single readings, each predicted by a fit to all others: for causes that act in a part of the record, about which the other
+    /// segments cannot know.
+    LeaveOneOut,
+}
+
 fn by_name<S: Serializer>(parameters: &[(String, Parameter)], to: S) -> Result<S::Ok, S::Error> {
     to.collect_map(parameters.iter().map(|(name, parameter)| (name, parameter)))
 }
@@ -185,6 +224,9 @@ pub struct Parameter {
     /// True if the value is at a bound of its range, so that the spring may need a value beyond.
     #[serde(skip_serializing_if = "is_false")]
     pub at_bound: bool,
+    /// Lowest and highest voltage of the record, in V, if the parameter is the value of a curve at a voltage outside of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extrapolated_from_v: Option<[f64; 2]>,
     /// Dimension, which decides the unit in which texts show the value.
     #[serde(skip)]
     pub dimension: Dimension,

@@ -11,6 +11,7 @@
 use crate::dimension::Dimension;
 use crate::plant::chain::Chain;
 use crate::plant::initial_state::InitialState;
+use crate::plant::visited::Axis;
 use crate::record::data::Data;
 use crate::record::signal::Signal;
 
@@ -87,12 +88,35 @@ pub struct Quantity {
     pub dimension: Dimension,
     /// Value, normalised.
     pub value: f64,
+    /// Place on a curve of which it is the value; `None` if it is not one.
+    pub place: Option<Place>,
+}
+
+/// Place on a curve of the spring, which a record shows only where the spring has been.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Axis of the curve.
+    pub axis: Axis,
+    /// Place on that axis, in V.
+    pub at_v: f64,
+    /// True if the parameter is omitted where the record has not been, false if it is reported as extrapolated.
+    pub omitted: bool,
 }
 
 impl Quantity {
     /// Returns a named value.
     pub fn new(name: impl Into<String>, dimension: Dimension, value: f64) -> Self {
-        Self { name: name.into(), dimension, value }
+        Self { name: name.into(), dimension, value, place: None }
+    }
+
+    /// Returns the same as the value of a curve, reported only where the record has been.
+    pub fn point_of_curve(self, axis: Axis, at_v: f64) -> Self {
+        Self { place: Some(Place { axis, at_v, omitted: true }), ..self }
+    }
+
+    /// Returns the same as the value of a curve, reported as extrapolated where the record has not been.
+    pub fn end_of_curve(self, axis: Axis, at_v: f64) -> Self {
+        Self { place: Some(Place { axis, at_v, omitted: false }), ..self }
     }
 }
 
@@ -198,6 +222,6 @@ pub fn logarithms((from, to): (f64, f64), count: u32) -> impl Iterator<Item = f6
 /// Returns the reported parameters as a table of a plant file, in the file's units.
 pub fn table<E: Effect + ?Sized>(effect: &E, form: usize, point: &[f64], data: &Data) -> toml::Value {
     let quantities = effect.quantities(form, point, data).into_iter();
-    let restored = |Quantity { name, dimension, value }| (name, data.scales().restored(dimension, value).into());
+    let restored = |Quantity { name, dimension, value, .. }| (name, data.scales().restored(dimension, value).into());
     toml::Value::Table(quantities.map(restored).collect())
 }

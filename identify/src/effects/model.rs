@@ -1,9 +1,10 @@
 //! A model: the chain of a plant file with effects applied to it.
 
 use crate::effects::catalogue::EFFECTS;
-use crate::effects::effect::{Affects, Coordinate, Effect};
+use crate::effects::effect::{Affects, Coordinate, Effect, Place, Quantity};
 use crate::plant::base::Base;
 use crate::plant::chain::Chain;
+use crate::plant::visited::{Range, Visited};
 use crate::record::data::Data;
 use simulation::plant_file::PlantFile;
 
@@ -48,6 +49,17 @@ impl Block {
 pub struct Model {
     /// The blocks, and the coordinates' values of each.
     pub blocks: Vec<(Block, Vec<f64>)>,
+}
+
+/// A parameter that is reported of a block.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reported {
+    /// Index among all parameters of the block.
+    pub index: usize,
+    /// The parameter.
+    pub quantity: Quantity,
+    /// Range in which the record has been, if that does not contain the parameter's place on its curve.
+    pub extrapolated: Option<Range>,
 }
 
 impl Model {
@@ -113,11 +125,42 @@ impl Model {
         chain
     }
 
+    /// Returns where on its curves the spring has been in a record, or in several.
+    pub fn visited(&self, base: &Base, data: &Data) -> Visited {
+        let chain = self.chain(base, data);
+        let commands = data.parts.iter().map(|part| &part.data.command);
+        let all = commands.map(|command| chain.visited(command)).reduce(Visited::with);
+        all.unwrap_or_else(|| chain.visited(&data.command))
+    }
+
+    /// Returns the range of voltages over which a record shows the static law of the plant file.
+    pub fn known_law(&self, base: &Base, data: &Data) -> Range {
+        self.chain(base, data).known_law(&self.visited(base, data))
+    }
+
+    /// Returns the parameters that are reported of a block. Points of a curve are left out where the record has not been, unless it
+    /// has been near none of them.
+    pub fn reported(&self, block: usize, base: &Base, data: &Data) -> Vec<Reported> {
+        let (block, point) = &self.blocks[block];
+        let quantities = block.effect().quantities(block.form, point, data);
+        let visited = quantities.iter().any(|it| it.place.is_some()).then(|| self.visited(base, data));
+        let unknown =
+            |place: Place| visited.map(|visited| visited.of(place.axis)).filter(|range| !range.is_near(place.at_v));
+        let each = quantities.into_iter().enumerate();
+        let each = each.map(|(index, quantity)| {
+            let extrapolated = quantity.place.and_then(unknown);
+            Reported { index, quantity, extrapolated }
+        });
+        let all: Vec<Reported> = each.collect();
+        let omitted = |it: &Reported| it.extrapolated.is_some() && it.quantity.place.is_some_and(|place| place.omitted);
+        if all.iter().all(omitted) { all } else { all.into_iter().filter(|it| !omitted(it)).collect() }
+    }
+
     /// Returns the plant file of a plant with the effects of the model.
     pub fn extend(&self, base: &Base, data: &Data) -> PlantFile {
         let mut file = base.file().clone();
         let chain = self.chain(base, data);
-        chain.write(&mut file, data.full_scale_v);
+        chain.write(&mut file, &self.visited(base, data));
         for (block, point) in &self.blocks {
             if let Some(value) = block.effect().unmodelled(block.form, point, data, &chain) {
                 file.unmodelled.get_or_insert_default().insert(block.cause().to_owned(), value);

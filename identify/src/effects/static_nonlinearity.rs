@@ -15,6 +15,7 @@
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
+use crate::plant::visited::Axis;
 use crate::record::data::Data;
 use crate::record::scales::REFERENCE_VOLTAGE_V;
 
@@ -159,6 +160,7 @@ impl Effect for StaticNonlinearity {
             let name = format!("at_{voltage:.*}_v", decimals.max(0) as usize);
             let voltage = voltage / volt_v;
             Quantity::new(name, Dimension::Stiffness, voltage * secant(form, point, voltage, data))
+                .point_of_curve(if FORMS[form].1 { Axis::Stiffness } else { Axis::Law }, voltage)
         };
         (1..=POINTS).map(at).collect()
     }

@@ -10,6 +10,8 @@
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
+use crate::plant::relaxation::Relaxation;
+use crate::plant::visited::Axis;
 use crate::record::data::Data;
 
 pub(super) struct VoltageDependentTimeConstant;
@@ -71,8 +73,14 @@ impl Effect for VoltageDependentTimeConstant {
     }
 
     fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        let names = if form == BY_DIRECTION { ["tau_rising_s", "tau_falling_s"] } else { ["tau_low_s", "tau_high_s"] };
-        names.into_iter().zip(point).map(|(name, tau)| Quantity::new(name, Dimension::Time, tau.exp())).collect()
+        if form == BY_DIRECTION {
+            let of = |name: &str, tau: f64| Quantity::new(name, Dimension::Time, tau.exp());
+            return vec![of("tau_rising_s", point[0]), of("tau_falling_s", point[1])];
+        }
+        let axis = if by_state(form) { Axis::Stiffness } else { Axis::Voltage };
+        let end =
+            |name: &str, point: f64, at_v| Quantity::new(name, Dimension::Time, point.exp()).end_of_curve(axis, at_v);
+        vec![end("tau_low_s", point[0], 0.0), end("tau_high_s", point[1], Relaxation::HIGH_V)]
     }
 
     /// In the fixed-point tick the time constant is linear in the voltage.

@@ -231,6 +231,7 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
     report.extended.gain = 1.0 - report.extended.quality.held_out_rmse / report.baseline.held_out_rmse.max(1e-12);
     if report.verdict == Verdict::Consistent {
         report.verdict = Verdict::Explained;
+        report.suspects.clear();
     }
     report.take_out = unsupported_terms;
     without.baseline = with.baseline;

@@ -59,6 +59,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         credibility::in_unexplained(&mut joint.report.findings, 0.0);
     }
     joint.report.verdict = verdict;
+    if verdict == Verdict::Explained {
+        joint.report.suspects.clear();
+    }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
     compare(&mut joint, best_linear(records, input));

@@ -34,6 +34,14 @@ impl Engine<'_> {
         log_likelihood - fit.cost()
     }
 
+    /// Returns true if the rows outside of every fold hold information on an effect of the fit, so that held-out segments can judge
+    /// it.
+    pub fn held_out_informs(&mut self, fit: &Fit, effect: usize) -> bool {
+        let whole = FullFit::new(self, fit);
+        let without = |fold| whole.refitted(self, |row| usize::from(self.data.fold[row]) != fold);
+        !fit.model.searched(effect) && (0..self.data.folds).all(|fold| without(fold).has(effect))
+    }
+
     /// Returns reading minus prediction of each row, in V, by a fit without the row's fold.
     pub fn held_out_residual(&mut self, fit: &Fit) -> Vec<f64> {
         self.held_out(fit, true)

@@ -8,6 +8,8 @@
 //! `B` is the information of the bounds: `(1.96 / (highest - lowest))^2` for each coordinate. It is the only
 //! information where two effects are equivalent (a delay below one row, and the feedthrough).
 //!
+//! A point of a curve is reported only where the record has been, an end of a curve as extrapolated elsewhere.
+//!
 //! A parameter whose value is an end of what its bounds allow is marked as at a bound.
 //!
 //! A parameter that only a search finds has the range that the search returns.
@@ -17,7 +19,7 @@ use nalgebra::DMatrix;
 use crate::answer::Parameter;
 use crate::dimension::Dimension;
 use crate::effects::effect::{FitContext, Quantity};
-use crate::effects::model::Block;
+use crate::effects::model::{Block, Reported};
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::normal_equations;
 use crate::record::data::Data;
@@ -57,11 +59,11 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
     let places: Vec<usize> = (0..bounds.len()).filter(|&place| bounds[place].fitted).collect();
     let mut start = 0;
     let mut found = Vec::new();
-    for (block, point) in &fit.model.blocks {
+    for (of, (block, point)) in fit.model.blocks.iter().enumerate() {
         if block.effect == effect {
             let quantities = |point: &[f64]| block.effect().quantities(block.form, point, data);
-            let values = quantities(point);
-            for (index, Quantity { name, dimension, value }) in values.into_iter().enumerate() {
+            for Reported { index, quantity, extrapolated } in fit.model.reported(of, engine.base(), data) {
+                let Quantity { name, dimension, value, .. } = quantity;
                 let slope: Vec<f64> = places
                     .iter()
                     .map(|&place| {
@@ -79,7 +81,8 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
                     (slope.transpose() * matrix * &slope)[(0, 0)].max(0.0).sqrt()
                 });
                 let reach = reach(block, point, data, index);
-                found.push((name, interval(value, error, dimension, reach)));
+                let extrapolated_from_v = extrapolated.map(|range| [range.low, range.high]);
+                found.push((name, Parameter { extrapolated_from_v, ..interval(value, error, dimension, reach) }));
             }
             let residual = engine.residual(&fit.model.without(effect));
             let context = FitContext { data, residual: &residual, sigma: fit.noise.sigma };
@@ -129,5 +132,5 @@ fn interval(value: f64, error: f64, dimension: Dimension, reach: (f64, f64)) -> 
     let near = |one: f64, other: f64| (one - other).abs() <= AT_BOUND * other.abs();
     // A quantity that no coordinate changes has no range.
     let at_bound = !near(reach.0, reach.1) && (near(value, reach.0) || near(value, reach.1));
-    Parameter { value, low, high, unit: String::new(), at_bound, dimension }
+    Parameter { value, low, high, unit: String::new(), at_bound, extrapolated_from_v: None, dimension }
 }

@@ -114,6 +114,7 @@ impl Models {
     fn errors(&self) -> Vec<LinearError> {
         let error = |(order, model): (usize, &Model)| LinearError {
             order,
+            rmse: root_mean_square(&model.fit.residual),
             held_out_rmse: root_mean_square(&model.held_out),
             last_40_percent_rmse: model.last_part,
         };
@@ -190,7 +191,8 @@ pub fn best_linear(records: &[Record], input: Input) -> Option<BestLinear> {
     };
     let (order, held_out_rmse, held_out, fit) = fits.map(with_error).min_by(|a, b| a.1.total_cmp(&b.1))?;
     let last_40_percent_rmse = last_part(&problem, &fit.poles);
-    Some(BestLinear { error: LinearError { order, held_out_rmse, last_40_percent_rmse }, held_out })
+    let error = LinearError { order, rmse: root_mean_square(&fit.residual), held_out_rmse, last_40_percent_rmse };
+    Some(BestLinear { error, held_out })
 }
 
 fn check(record: &Record) -> Result<()> {

@@ -25,7 +25,7 @@ pub(super) fn intervals(design: &Design, commands: &Commands) -> Vec<Sharper> {
         let members = index..index + bends[index..].iter().take_while(same).count();
         let (of_block, point) = &bends[index].model.blocks[block];
         let quantities = |point: &[f64]| of_block.effect().quantities(of_block.form, point, &data);
-        for (number, Quantity { name, dimension, value }) in quantities(point).into_iter().enumerate() {
+        for (number, Quantity { name, dimension, value, .. }) in quantities(point).into_iter().enumerate() {
             let slope = |member: usize| {
                 let (mut moved, place) = (point.clone(), bends[member].place - first);
                 let step = 1e-5 * (1.0 + point[place].abs());

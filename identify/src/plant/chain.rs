@@ -18,6 +18,7 @@ use crate::plant::law::Law;
 use crate::plant::leakage::{InstantaneousLoss, Loss};
 use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
+use crate::plant::visited::{Range, Visited};
 use crate::record::scales::REFERENCE_VOLTAGE_V;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
@@ -86,8 +87,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Writes the chain to a plant file, with laws tabulated up to `full_scale_v`, in V.
-    pub fn write(&self, file: &mut PlantFile, full_scale_v: f64) {
+    /// Writes the chain to a plant file, with laws tabulated where a record has been.
+    pub fn write(&self, file: &mut PlantFile, visited: &Visited) {
         let amplifier = Amplifier {
             limit_v: Some(self.limit_v).filter(|limit| limit.is_finite()),
             // A file holds one rate; the faster one bounds both directions.
@@ -100,7 +101,7 @@ impl<'a> Chain<'a> {
         }
         let (gain, relaxation, leakage) = self.as_plant_file_tables();
         let relaxation = relaxation.in_series_with(&self.series_s).unwrap_or(relaxation);
-        file.law = self.law.table(gain, &self.law_behind, full_scale_v);
+        file.law = self.law.table(gain, &self.law_behind, visited);
         file.leakage = leakage;
         relaxation.extend(file);
     }
@@ -182,6 +183,29 @@ impl<'a> Chain<'a> {
         if !self.law_behind.is_identity() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }
+    }
+
+    /// Returns where on its curves the spring is under a command.
+    pub fn visited(&self, command: &Signal) -> Visited {
+        let mut signal = command.clone();
+        self.amplify(&mut signal);
+        let applied = signal.clone();
+        let mut memory = self.memory.clone();
+        signal.map(|voltage| memory.at(voltage));
+        let law = Range::of(&signal);
+        signal.map(|voltage| self.law.at(voltage));
+        let mut levels_v = Vec::new();
+        if self.relaxation.varies() && self.relaxation.by_state.is_none() {
+            applied.middles(&mut levels_v);
+        }
+        self.follow(&mut signal, &mut InitialState::at_rest(), &levels_v);
+        Visited { voltage: Range::of(&applied), law, stiffness: Range::of(&signal) }
+    }
+
+    /// Returns the range of voltages over which a record shows the static law that is written to a plant file.
+    pub fn known_law(&self, visited: &Visited) -> Range {
+        let (gain, ..) = self.as_plant_file_tables();
+        self.law.known(gain, &self.law_behind, visited)
     }
 
     /// Applies the linear part of the chain: leakage, relaxation and lags in series.

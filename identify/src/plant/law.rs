@@ -3,6 +3,8 @@
 use model::extended::law::MAX_POINTS;
 
 use crate::plant::knots::{Point, knots};
+use crate::plant::visited::{Range, Visited};
+use crate::record::scales::REFERENCE_VOLTAGE_V;
 use simulation::plant_file;
 
 /// A composition of static laws, the first of which may be a table.
@@ -12,9 +14,11 @@ pub struct Law<'a> {
     behind: Vec<Box<dyn Fn(f64) -> f64 + 'a>>,
 }
 
-/// Largest error of a chord, as a fraction of the full scale, that counts as none.
+/// Largest error of a chord, as a fraction of the range's end, that counts as none.
 const STRAIGHT_TOLERANCE: f64 = 1e-7;
-/// Number of intervals of the full scale at which a law is evaluated for its table.
+/// Largest number of points up to the lower end of the range.
+const MOST_BELOW: usize = 3;
+/// Number of intervals of the range at which a law is evaluated for its table.
 const STEPS: usize = 1000;
 
 impl<'a> Law<'a> {
@@ -35,23 +39,68 @@ impl<'a> Law<'a> {
 
     /// Returns the settled stiffness at a voltage, both in V.
     pub fn at(&self, voltage: f64) -> f64 {
-        let first = self.table.map_or(voltage, |table| straight(&table.voltage_v, &table.stiffness, voltage));
-        self.behind.iter().fold(first, |value, law| law(value))
+        self.behind.iter().fold(self.first(voltage), |value, law| law(value))
     }
 
-    /// Returns the table for a plant file, of this law multiplied by `gain` and followed by the law `behind`, up to
-    /// `full_scale_v` or the end of the file's own table; `None` for the identity.
-    pub fn table(&self, gain: f64, behind: &Law, full_scale_v: f64) -> Option<plant_file::Law> {
+    /// Returns the file's own table at a voltage, both in V.
+    fn first(&self, voltage: f64) -> f64 {
+        self.table.map_or(voltage, |table| straight(&table.voltage_v, &table.stiffness, voltage))
+    }
+
+    /// Returns the range of voltages over which a record shows this law multiplied by `gain` and followed by the law `behind`, which
+    /// it shows over the relaxed stiffness only.
+    pub fn known(&self, gain: f64, behind: &Law, visited: &Visited) -> Range {
+        let Range { low, high } = visited.law;
+        if behind.is_identity() {
+            return visited.law;
+        }
+        let mut voltages = (1..=STEPS).rev().map(|step| high * step as f64 / STEPS as f64);
+        let reached = voltages.find(|voltage| (gain * self.at(*voltage)).abs() <= visited.stiffness.high);
+        Range { low, high: reached.unwrap_or(high) }
+    }
+
+    /// Returns the table for a plant file, of this law multiplied by `gain` and followed by the law `behind`; `None` for the identity.
+    ///
+    /// It is taken where a record has been. Above, the law that follows the file's own table continues with its end slope; below, it
+    /// is straight to 0 V, where every table begins.
+    pub fn table(&self, gain: f64, behind: &Law, visited: &Visited) -> Option<plant_file::Law> {
         if self.behind.is_empty() && gain == 1.0 && behind.is_identity() {
             return self.table.cloned();
         }
-        let mut voltage_v: Vec<f64> = (0..=STEPS).map(|step| full_scale_v * step as f64 / STEPS as f64).collect();
+        let first = |voltage: f64| self.first(voltage);
+        let inner = |first: f64| gain * self.behind.iter().fold(first, |value, law| law(value));
+        let Range { low, high } = self.known(gain, behind, visited);
+        let high = if high > 0.0 { high } else { REFERENCE_VOLTAGE_V };
+        let step = high / STEPS as f64;
+        // Straight beyond the range as a function of the file's own table, which is known there.
+        let [start, before_end, end] = [low, high - step, high].map(|voltage| {
+            let first = first(voltage);
+            (first, behind.at(inner(first)))
+        });
+        let value = |voltage: f64| match first(voltage) {
+            first if voltage < low && start.0 != 0.0 => start.1 * first / start.0,
+            first if voltage > high && end.0 != before_end.0 => {
+                end.1 + (end.1 - before_end.1) / (end.0 - before_end.0) * (first - end.0)
+            }
+            first => behind.at(inner(first)),
+        };
+        let mut voltage_v: Vec<f64> =
+            (0..=STEPS).map(|of| step * of as f64).filter(|voltage| *voltage == 0.0 || *voltage > low).collect();
         voltage_v.extend(self.table.iter().flat_map(|table| &table.voltage_v));
+        voltage_v.push(low);
         voltage_v.sort_by(f64::total_cmp);
-        voltage_v.dedup_by(|b, a| *b - *a < 1e-3 * full_scale_v / STEPS as f64);
-        let curve: Vec<Point> =
-            voltage_v.into_iter().map(|voltage| (voltage, behind.at(gain * self.at(voltage)))).collect();
-        let (voltage_v, stiffness) = knots(&curve, MAX_POINTS, STRAIGHT_TOLERANCE * full_scale_v).into_iter().unzip();
+        voltage_v.dedup_by(|b, a| *b - *a < 1e-3 * step);
+        let curve: Vec<Point> = voltage_v.into_iter().map(|voltage| (voltage, value(voltage))).collect();
+        // The range's lower end is a point of its own, so that no line crosses it.
+        let (below, within) = curve.split_at(curve.partition_point(|(voltage, _)| *voltage < low));
+        let tolerance = STRAIGHT_TOLERANCE * high;
+        let mut points = Vec::new();
+        if let (Some(first), false) = (within.first(), below.is_empty()) {
+            points = knots(&[below, &[*first]].concat(), MOST_BELOW, tolerance);
+            points.pop();
+        }
+        points.extend(knots(within, MAX_POINTS - points.len(), tolerance));
+        let (voltage_v, stiffness) = points.into_iter().unzip();
         Some(plant_file::Law { voltage_v, stiffness })
     }
 }

@@ -15,3 +15,4 @@ pub mod law;
 pub mod leakage;
 pub mod play_bank;
 pub mod relaxation;
+pub mod visited;

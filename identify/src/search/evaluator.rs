@@ -37,6 +37,12 @@ pub trait Evaluator {
     /// `exhaustive` also of blocks whose gain the noise's autocorrelation may hide.
     fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit>;
 
+    /// First fit of the structure with one effect more, in the form and from the start with the largest predicted gain; `None` if
+    /// the effect has no start.
+    fn extended_by(&mut self, _fit: &Fit, _effect: usize) -> Option<Fit> {
+        None
+    }
+
     /// Price of a block, in nats.
     fn price(&self, block: &Block) -> f64;
 
@@ -83,7 +89,7 @@ impl Evaluator for Engine<'_> {
     }
 
     fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
-        let mut extensions = extensions(self, fit, exhaustive, wanted);
+        let mut extensions = extensions(self, fit, exhaustive, wanted, NATS_TO_FIT.get());
         // A search that is not exhaustive relies on the noise of the present fit, and on predicted gains.
         let law = if exhaustive { Noise::default_robust() } else { fit.noise.clone() };
         if !exhaustive {
@@ -99,6 +105,12 @@ impl Evaluator for Engine<'_> {
             fits.push(self.fit_added(fit.model.with(block, point), &law, block.effect));
         }
         fits
+    }
+
+    fn extended_by(&mut self, fit: &Fit, effect: usize) -> Option<Fit> {
+        let extensions = extensions(self, fit, false, &|other| other == effect, f64::NEG_INFINITY).into_iter();
+        let Extension { block, point, .. } = extensions.max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))?;
+        Some(self.fit_added(fit.model.with(block, point), &fit.noise, effect))
     }
 
     fn price(&self, block: &Block) -> f64 {
@@ -157,8 +169,15 @@ struct Extension {
     predicted_gain: f64,
 }
 
-/// Blocks that could be added, each at the starts with the largest predicted gain.
-fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Extension> {
+/// Blocks that could be added, each at the starts with the largest predicted gain; only of effects of which a form gains more than
+/// `least`, in nats.
+fn extensions(
+    engine: &mut Engine,
+    fit: &Fit,
+    exhaustive: bool,
+    wanted: &dyn Fn(usize) -> bool,
+    least: f64,
+) -> Vec<Extension> {
     let mut predictors = Vec::new();
     let (autocorrelated, rounded) = (!fit.noise.autocorrelation.is_white(), fit.noise.half_step > 0.0);
     // The rounding error depends on the voltage, so that every effect would seem to explain it.
@@ -205,7 +224,7 @@ fn extensions(engine: &mut Engine, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(
             of_effect.truncate(1);
         }
         // Predicted gains rank the forms of an effect poorly: if one form is worth fitting, all are fitted.
-        if of_effect.iter().any(|extension| extension.predicted_gain > NATS_TO_FIT.get()) {
+        if of_effect.iter().any(|extension| extension.predicted_gain > least) {
             found.extend(of_effect);
         }
     }

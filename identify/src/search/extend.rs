@@ -98,6 +98,6 @@ impl<E: Evaluator> Search<'_, E> {
 }
 
 /// True if an effect is a special case of one in the model, or contains one: the two would not be identifiable together.
-fn contained(effect: usize, model: &Model) -> bool {
+pub(super) fn contained(effect: usize, model: &Model) -> bool {
     effects(model).into_iter().any(|other| contains(other, effect) || contains(effect, other))
 }

@@ -27,9 +27,11 @@
 //! | `evaluated` | all structures evaluated so far, and the prices |
 //! | `structure_search` | the search |
 //! | `extend` | a structure's extensions: which are fitted, and which of those are evaluated |
+//! | `explored` | what a search has evaluated, for questions of the report |
 
 mod evaluated;
 mod evaluator;
+mod explored;
 mod extend;
 mod initial_models;
 mod penalty_factor;
@@ -41,6 +43,7 @@ mod tests;
 mod warm_start;
 
 pub use evaluator::Evaluator;
+pub use explored::Explored;
 pub use scored::{Scored, effects};
 pub use structure_search::Search;
 pub use warm_start::WarmStart;

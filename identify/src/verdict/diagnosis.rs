@@ -1,4 +1,6 @@
-//! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict.
+//! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict, suspects.
+
+use std::mem;
 
 use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
 use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, SearchReport, Verdict};
@@ -22,6 +24,7 @@ use crate::verdict::margins;
 use crate::verdict::quality::{noise_report, quality, residual_report};
 use crate::verdict::ranking::{RankedCauses, ranking};
 use crate::verdict::reading_findings::reading_findings;
+use crate::verdict::suspects::suspects;
 use simulation::plant_file::PlantFile;
 
 /// A finished diagnosis: the report and what is needed to draw it. All numbers are in the file's units, but for the points of
@@ -90,12 +93,12 @@ pub(crate) fn diagnose(
 }
 
 /// Reports a finished search.
-fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) -> Diagnosis {
+fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Found) -> Diagnosis {
     let (data, observed) = (engine.data, engine.observed);
     let extended = &found.best.fit;
     let mut held_out = [&baseline, extended].map(|fit| engine.held_out_residual(fit));
     let known = [(&baseline, &*held_out[0]), (extended, &*held_out[1])];
-    let ranking = ranking(engine, &found.contenders, known);
+    let ranking = ranking(engine, &found.contenders, &found.causes, known);
     // The simulation as it is given does not include what the readings cut off.
     for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
         *left -= observed.truncation_v;
@@ -123,6 +126,17 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));
     let verdict = verdict(unexplained, &alternatives, insufficient, &findings);
+    let may_be_suspect = |cause| match verdict {
+        Verdict::Explained => false,
+        // The open question is which of the alternatives it is.
+        Verdict::Ambiguous => alternatives.iter().any(|set| set.contains(&cause)),
+        Verdict::Consistent => unmodelled.is_some(),
+        Verdict::Unexplained | Verdict::Insufficient => true,
+    };
+    let suspects = match verdict {
+        Verdict::Explained => Vec::new(),
+        _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect),
+    };
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
     let export = export(engine, found.model(), held);
 
@@ -137,12 +151,14 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         extended: Extended {
             gain,
             quality: after,
+            law_range_v: export.law_range_v,
             model: None,
             fixed_point_error_v: export.fixed_point_error_v,
             tick_refuses: export.tick_refuses,
         },
         next_experiment: next_experiment(verdict, &findings, &alternatives, extended.strongly_autocorrelated()),
         findings,
+        suspects,
         take_out: Vec::new(),
         would_show,
         alternatives,
@@ -222,11 +238,19 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         nominal: Nominal::default(),
         baseline: quality,
         findings: Vec::new(),
+        suspects: Vec::new(),
         take_out: Vec::new(),
         would_show: None,
         alternatives: Vec::new(),
         next_experiment: Some(reason.next_experiment().into()),
-        extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+        extended: Extended {
+            quality,
+            gain: 0.0,
+            law_range_v: None,
+            model: None,
+            fixed_point_error_v: None,
+            tick_refuses: None,
+        },
         linear: None,
         leftover: reason.leftover(),
         noise: noise_report(&baseline.noise),

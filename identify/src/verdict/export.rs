@@ -1,6 +1,7 @@
 //! The extended simulation as a plant file, and the error of the fixed-point tick that runs it.
 
 use crate::dimension::Dimension;
+use crate::effects::index_of;
 use crate::effects::model::Model;
 use crate::fit::engine::Engine;
 use crate::plant::base::Base;
@@ -28,6 +29,8 @@ pub struct Export {
     /// rest and receive the voltages of the fitted amplifier at the record's rows, each held until the next; effects that the
     /// file lists as not modelled are in neither. `None` if the tick rejects the file, or the record's voltage is not held.
     pub fixed_point_error_v: Option<f64>,
+    /// Lowest and highest voltage at which the record shows a nonlinear static law, in normalised V; `None` without one.
+    pub law_range_v: Option<[f64; 2]>,
     /// Why the tick rejects the file; `None` if it accepts it.
     pub tick_refuses: Option<String>,
 }
@@ -40,7 +43,9 @@ pub(crate) fn export(engine: &Engine, model: &Model, held: bool) -> Export {
     let duration_s = data.scales().restored(Dimension::Time, data.duration_s());
     let runs = held && duration_s < LONGEST_TICKED_S && tick_refuses.is_none();
     let fixed_point_error_v = runs.then(|| tick_error(model, base, data, &file)).flatten();
-    Export { file, fixed_point_error_v, tick_refuses }
+    let law = index_of("static-nonlinearity").filter(|law| model.has(*law));
+    let law_range_v = law.map(|_| model.known_law(base, data)).map(|range| [range.low, range.high]);
+    Export { file, fixed_point_error_v, law_range_v, tick_refuses }
 }
 
 /// Returns a normalised spring in the file's units.

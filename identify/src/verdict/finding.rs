@@ -3,11 +3,11 @@
 use crate::answer::{Finding, Parameter};
 use crate::dimension::Dimension;
 use crate::effects::EFFECTS;
-use crate::fit::engine::{Engine, Fit};
+use crate::fit::engine::Engine;
 use crate::fit::interval::parameters;
-use crate::search::{Scored, effects};
-use crate::stats::scale::root_mean_square;
-use crate::verdict::found::Cause;
+use crate::search::Scored;
+use crate::verdict::cause::Cause;
+use crate::verdict::ranking::{named, rms};
 
 /// Largest odds that are converted to a probability, in nats.
 const LARGEST_ODDS: f64 = 40.0;
@@ -22,11 +22,11 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, cause: &Cause) -> Find
     let Cause { effect, without, left_out } = cause;
     let effect = *effect;
     let odds = best.score - without.score;
-    let [before, rival, after] = [left_out, without, best].map(|scored| rms(engine, &scored.fit));
-    let others: Vec<&str> = effects(&without.fit.model).into_iter().map(|other| EFFECTS[other].cause()).collect();
-    let scales = engine.data.scales();
-    let rival = scales.shown(Dimension::ReadingSize, rival, 3);
-    let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others.join(" and ") };
+    let (data, observed) = (engine.data, engine.observed);
+    let [before, rival, after] = [left_out, without, best].map(|scored| rms(observed, &scored.fit.residual));
+    let others = named(&without.fit.model);
+    let rival = data.scales().shown(Dimension::ReadingSize, rival, 3);
+    let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others };
     let better = if best.fit.model.searched(effect) {
         format!("with the price of all searched places deducted, the readings are {odds:.1} nats likelier")
     } else {
@@ -58,9 +58,4 @@ fn at_bounds(parameters: &[(String, Parameter)]) -> String {
             format!("; {} are at the bounds of their ranges, and the best values may be beyond", names.join(" and "))
         }
     }
-}
-
-/// Root mean square error of a fit, in V; readings at a bound count only where the fit is within it.
-fn rms(engine: &Engine, fit: &Fit) -> f64 {
-    root_mean_square(&engine.observed.errors(&fit.residual))
 }

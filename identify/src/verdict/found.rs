@@ -3,10 +3,11 @@
 use crate::adequacy::{self, Candidate, Unidentifiable, When};
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
-use crate::search::{Scored, Search, WarmStart, effects};
+use crate::search::{Explored, Scored, Search, WarmStart, effects};
 use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::LARGEST_ERROR_RATIO;
 use crate::verdict::alternatives::rivals;
+use crate::verdict::cause::Cause;
 use crate::verdict::ranking;
 
 /// A finished search.
@@ -21,16 +22,8 @@ pub(crate) struct Found {
     pub(crate) contenders: Vec<Scored>,
     /// From which a search under another reading of the same rows starts.
     pub(crate) warm_start: WarmStart,
-}
-
-/// An effect of the best structure.
-pub(crate) struct Cause {
-    /// Index of the effect.
-    pub(crate) effect: usize,
-    /// The best of all structures without the effect.
-    pub(crate) without: Scored,
-    /// The best structure with the effect removed and nothing in its place.
-    pub(crate) left_out: Scored,
+    /// All that the search has evaluated.
+    pub(crate) explored: Explored,
 }
 
 /// Searches for causes, from a warm start if there is one.
@@ -64,13 +57,13 @@ pub(crate) fn search(
     }
     // The rivals before further structures are evaluated for comparison, the contenders after.
     let rivals = rivals(&search, &best);
-    let causes = effects(&best.fit.model).into_iter().map(|effect| {
-        let left_out = search.left_out(&best, effect);
-        Cause { effect, without: search.best_without(effect), left_out }
-    });
-    let causes = causes.collect();
-    let contenders = ranking::contenders(&search, &best);
-    Ok(Found { causes, rivals, contenders, warm_start: search.warm_start(), best })
+    let effects = effects(&best.fit.model);
+    let left_out: Vec<Scored> = effects.iter().map(|&effect| search.left_out(&best, effect)).collect();
+    // The best without a cause is chosen after all were evaluated, so that sentence and ranking name the same.
+    let cause = |(effect, left_out)| Cause { effect, without: search.best_without(effect), left_out };
+    let causes: Vec<Cause> = effects.into_iter().zip(left_out).map(cause).collect();
+    let contenders = ranking::contenders(&search, &causes);
+    Ok(Found { causes, rivals, contenders, warm_start: search.warm_start(), best, explored: search.into_explored() })
 }
 
 impl Found {

@@ -9,6 +9,7 @@
 //! | linear rival, extrapolation | what the extended simulation has to predict as well as: the best linear model, the model without a cause |
 //! | margins | smallest errors of gain and time constant that a record without findings would have shown |
 //! | export | the extended simulation as a plant file |
+//! | suspect | a cause that comes close to a finding but is none |
 //! | ranking | the best sets of causes compared by score and held-out error |
 //! | hypotheses | the best sets with their fits, and the experiment: what the next experiment is computed from |
 //! | restored | converted from the coordinates of the search to the file's units |
@@ -16,6 +17,7 @@
 //! [`diagnosis`] puts the parts together.
 
 pub mod alternatives;
+mod cause;
 pub(crate) mod credibility;
 pub mod diagnosis;
 pub mod export;
@@ -29,3 +31,4 @@ pub mod quality;
 pub mod ranking;
 pub mod reading_findings;
 mod restore;
+pub(crate) mod suspects;

@@ -20,7 +20,10 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
     let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
     let scales = data.scales();
     let single = |name: &str, value: f64, low: f64, high: f64, dimension| {
-        vec![(name.to_owned(), Parameter { value, low, high, unit: String::new(), at_bound: false, dimension })]
+        vec![(
+            name.to_owned(),
+            Parameter { value, low, high, unit: String::new(), at_bound: false, extrapolated_from_v: None, dimension },
+        )]
     };
     if let Some(QuantisationGrid { step, low, high }) = observed.grid
         && (step > (STEP_TO_REPORT.get() * stopped_raw).max(2.0 * FINEST_V.get()) || observed.truncation_v != 0.0)

@@ -5,7 +5,7 @@ use std::iter;
 
 use simulation::record::Record;
 
-use crate::answer::{Finding, Parameter, Quality, Report};
+use crate::answer::{Finding, Parameter, Quality, Report, Suspect};
 use crate::dimension::Dimension;
 use crate::fit::engine::Fit;
 use crate::record::data::Data;
@@ -47,19 +47,29 @@ fn report(report: &mut Report, scales: &Scales) {
     };
     quality(&mut report.baseline);
     quality(&mut report.extended.quality);
+    let law_range_v = &mut report.extended.law_range_v;
+    *law_range_v = law_range_v.map(|range| range.map(|end| scales.restored(Dimension::Voltage, end)));
     report.noise.sigma = size(report.noise.sigma);
     for Finding { parameters, rmse_before, rmse_after, .. } in &mut report.findings {
+        parameters.iter_mut().for_each(|(_, it)| parameter(it, scales));
+        (*rmse_before, *rmse_after) = (size(*rmse_before), size(*rmse_after));
+    }
+    for Suspect { parameters, rmse_before, rmse_after, .. } in &mut report.suspects {
         parameters.iter_mut().for_each(|(_, it)| parameter(it, scales));
         (*rmse_before, *rmse_after) = (size(*rmse_before), size(*rmse_after));
     }
 }
 
 /// Converts a parameter to the file's units.
-pub(crate) fn parameter(Parameter { value, low, high, unit, dimension, .. }: &mut Parameter, scales: &Scales) {
+pub(crate) fn parameter(
+    Parameter { value, low, high, unit, extrapolated_from_v, dimension, .. }: &mut Parameter,
+    scales: &Scales,
+) {
     let ends = [*low, *high].map(|end| scales.restored(*dimension, end));
     *value = scales.restored(*dimension, *value);
     (*low, *high) = if scales.size(*dimension) < 0.0 { (ends[1], ends[0]) } else { (ends[0], ends[1]) };
     *unit = dimension.unit(&scales.units);
+    *extrapolated_from_v = extrapolated_from_v.map(|range| range.map(|end| scales.restored(Dimension::Voltage, end)));
 }
 
 /// Times, voltages and readings are those of the files, to the bit; times of a further record follow those of the one before it.

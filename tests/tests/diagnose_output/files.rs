@@ -19,6 +19,10 @@ fn write(folder: &Path, name: &str, cause: Cause) {
     fs::write(folder.join(name), Recipe { rows: 600, ..Recipe::of(&[cause]) }.draw(3).csv()).expect("a file");
 }
 
+fn answer_of(text: &str) -> Value {
+    serde_json::from_str(text).expect("JSON")
+}
+
 #[test]
 fn every_file_is_written_and_named() {
     let folder = folder();
@@ -44,11 +48,37 @@ fn every_file_is_written_and_named() {
     ] {
         assert!(page.contains(part), "no {part:?} on the page");
     }
+    // The best linear model has its line in the ranking, the errors and the held-out segments.
+    let order = answer_of(&made("diagnosis.json"))["linear"]["order"].to_string();
+    for (line, count) in [("best linear model, order ", 1), ("linear, order ", 2)] {
+        assert_eq!(
+            page.matches(&format!(">{line}{order}<")).count() + page.matches(&format!(">all, {line}{order}<")).count(),
+            count
+        );
+    }
     // The plots are on the page and in files.
     assert_eq!(page.matches("<svg ").count(), 5);
     // The file says the same as `--json`.
     let answer = json(folder.path(), &["diagnose", "record.csv", "--json", "--out", "made/here"]);
-    assert_eq!(serde_json::from_str::<Value>(&made("diagnosis.json")).expect("JSON"), answer);
+    assert_eq!(answer_of(&made("diagnosis.json")), answer);
+}
+
+/// The plant file, the page and the terminal say where the record shows the law.
+#[test]
+fn a_law_is_written_with_the_range_of_the_record() {
+    let folder = folder();
+    write(folder.path(), "record.csv", Cause::StaticNonlinearity);
+    let output = run(folder.path(), &["diagnose", "record.csv", "--out", "made"]);
+    let made = |name: &str| fs::read_to_string(folder.path().join("made").join(name)).expect("a file");
+    let range = &answer_of(&made("diagnosis.json"))["extended"]["law_range_v"];
+    let [low, high] = [0, 1].map(|end| range[end].as_f64().expect("a voltage"));
+    let said =
+        format!("The record shows the static law from {low:.0} to {high:.0} V; the plant file continues it above");
+    for text in [made("plant.toml"), made("report.html"), text(&output.stdout)] {
+        assert!(text.contains(&said), "{said}: {text}");
+    }
+    let plant = text(&run(folder.path(), &["stair", "--plant", "made/plant.toml"]).stdout);
+    assert!(!plant.is_empty());
 }
 
 #[test]

@@ -49,6 +49,12 @@ fn the_page_on_table_3_is_up_to_date() {
     }
     assert_eq!(today, documented, "{AGAIN}");
     assert_eq!(today["verdict"], "unexplained");
+    // A shift of the readings from 31 s to 45 s is the best suspect, judged by single readings.
+    let shift = &today["suspects"][0];
+    assert_eq!((&shift["cause"], &shift["judge"]), (&"reading-offset".into(), &"leave-one-out".into()), "{shift}");
+    assert_eq!(shift["parameters"]["from_s"]["value"], 31.0);
+    let [before, after, short] = ["rmse_before", "rmse_after", "nats_short"].map(|name| shift[name].as_f64().unwrap());
+    assert!(after < 0.5 * before && short > 0.0 && short < 10.0, "{shift}");
 
     let today = of_page(&fs::read_to_string(made.path().join("report.html")).expect("a page"));
     assert!(today.len() > 2, "{today:?}");

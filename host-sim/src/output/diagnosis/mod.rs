@@ -14,9 +14,11 @@ pub(super) mod number;
 mod origin;
 pub(super) mod page;
 pub mod panels;
+mod plant_file;
 pub mod plots;
 mod records;
 mod residuals;
+mod suspects;
 mod tables;
 pub mod text;
 
@@ -37,10 +39,8 @@ pub fn write(mut files: Files, diagnosis: &Diagnosis, origin: &Origin) -> Result
         files.add(name, |out| out.write_all(svg.as_bytes()))?;
     }
     files.add("residuals.csv", |out| residuals::write(out, diagnosis))?;
-    let plant = diagnosis.plant.to_toml()?;
-    files.add(PLANT_FILE, |out| {
-        write!(out, "# Identified from {}\n{plant}", origin.record.replace(['\n', '\r'], " "))
-    })?;
+    let plant = plant_file::text(diagnosis, &origin.record)?;
+    files.add(PLANT_FILE, |out| out.write_all(plant.as_bytes()))?;
     let answer = serde_json::to_string_pretty(&diagnosis.report).context("diagnosis.json")?;
     files.add("diagnosis.json", |out| writeln!(out, "{answer}"))?;
     files.finish()

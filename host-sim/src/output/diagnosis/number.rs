@@ -4,10 +4,17 @@ use identify::answer::Parameter;
 use identify::dimension::{Dimension, significant};
 use identify::record::scales::Scales;
 
-/// Formats a parameter with its interval and unit.
-pub(super) fn interval(&Parameter { value, low, high, dimension, .. }: &Parameter, scales: &Scales) -> String {
+/// Formats a parameter with its interval and unit, and says so if it is extrapolated.
+pub(super) fn interval(parameter: &Parameter, scales: &Scales) -> String {
+    let &Parameter { value, low, high, dimension, .. } = parameter;
     let shown = |value: f64| number(value / dimension.size_of_shown_unit(&scales.units));
-    format!("{} [{}, {}] {}", shown(value), shown(low), shown(high), scales.unit(dimension)).trim_end().to_owned()
+    let text = format!("{} [{}, {}] {}", shown(value), shown(low), shown(high), scales.unit(dimension));
+    text.trim_end().to_owned() + extrapolated(parameter)
+}
+
+/// The words after a parameter that is the value of a curve where the record has not been.
+pub(super) fn extrapolated(parameter: &Parameter) -> &'static str {
+    if parameter.extrapolated_from_v.is_some() { " (extrapolated)" } else { "" }
 }
 
 /// Formats a number with four significant digits.

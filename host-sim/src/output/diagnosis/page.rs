@@ -6,6 +6,7 @@ use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::origin::Origin;
 use crate::output::diagnosis::records;
+use crate::output::diagnosis::suspects;
 use crate::output::diagnosis::tables;
 use crate::output::diagnosis::text;
 use crate::output::document::document;
@@ -24,6 +25,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         }
         h2 { "Causes" }
         (tables::findings(&report.findings, scales))
+        (suspects::section(&report.suspects, scales))
         (records::section(&report.records, scales))
         h2 { "Readings and simulations" }
         @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
@@ -35,14 +37,13 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         @if is_extended(diagnosis) {
             h2 { "Held-out improvement" }
             (tables::quality(diagnosis))
-            @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
+            @for sentence in text::limits_of_curves(report, scales) { p { (sentence) } }
             @if let Some(sentence) = text::in_fixed_point(&report.extended, scales) { p { (sentence) } }
             h2 { "Improvement on each held-out segment" }
             (tables::folds(diagnosis))
         } @else {
             h2 { "Accuracy" }
             (tables::quality(diagnosis))
-            @if let Some(sentence) = text::linear(report, scales) { p { (sentence) } }
         }
         h2 { "Next experiment" }
         p {

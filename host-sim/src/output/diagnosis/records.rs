@@ -85,6 +85,7 @@ mod tests {
             unit: "V".into(),
             dimension: Dimension::Reading,
             at_bound: false,
+            extrapolated_from_v: None,
         };
         let finding = Finding {
             cause: "sensor-saturation",

@@ -4,7 +4,8 @@ use maud::{Markup, html};
 
 use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::number::{interval, number, shown_name};
-use identify::answer::Finding;
+use crate::output::diagnosis::text::linear_name;
+use identify::answer::{Finding, LinearError};
 use identify::dimension::Dimension;
 use identify::record::scales::Scales;
 use identify::stats::scale::root_mean_square;
@@ -72,7 +73,14 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
                         td.bar { i style=(width(behind(standing))) {} }
                         td.number { (number(standing.rmse)) }
                         td.number { (number(standing.held_out_rmse)) }
-                        td.small.note { (note(standings, place)) }
+                        td.small.note { (note(standing, place)) }
+                    }
+                }
+                @if let Some(linear) = &diagnosis.report.linear {
+                    tr.linear {
+                        td.set { "best linear model, order " (linear.order) } td.number {} td.bar {}
+                        td.number { (number(linear.rmse)) } td.number { (number(linear.held_out_rmse)) }
+                        td.small.note { "no causes" }
                     }
                 }
             }
@@ -94,14 +102,12 @@ fn values(list: &str) -> Markup {
     }
 }
 
-fn note(standings: &[Standing], place: usize) -> String {
-    if place == 0 {
-        return "best".to_owned();
+fn note(standing: &Standing, place: usize) -> String {
+    match (place, standing.best_without.as_slice()) {
+        (0, _) => "best".to_owned(),
+        (_, []) => String::new(),
+        (_, without) => format!("best without {}", without.join(", ")),
     }
-    let lacks = |place: usize, cause: &&&str| !standings[place].causes.contains(cause);
-    let first_without = |cause: &&&str| lacks(place, cause) && !(1..place).any(|earlier| lacks(earlier, cause));
-    let without: Vec<&str> = standings[0].causes.iter().filter(first_without).copied().collect();
-    if without.is_empty() { String::new() } else { format!("best without {}", without.join(", ")) }
 }
 
 /// Accuracy of the simulation, and of the extended one if there is one.
@@ -113,21 +119,37 @@ pub(super) fn quality(diagnosis: &Diagnosis) -> Markup {
     let of_spread = |percent| if spread { number(percent) } else { "-".to_owned() };
     let unit = diagnosis.data.scales().unit(Dimension::ReadingSize);
     let error = |of: &str| format!("{of} RMSE [{unit}]");
+    let linear = report.linear.as_ref();
+    let of_linear = |of: fn(&LinearError) -> f64| linear.map(|linear| number(of(linear)));
     let rows = [
-        (error("free-run"), number(before.rmse), number(after.rmse)),
-        (error("held-out"), number(before.held_out_rmse), number(after.held_out_rmse)),
-        (error("one-step"), number(before.one_step_rmse), number(after.one_step_rmse)),
-        ("fit [%]".to_owned(), of_spread(before.fit_percent), of_spread(after.fit_percent)),
+        (error("free-run"), number(before.rmse), number(after.rmse), of_linear(|linear| linear.rmse)),
+        (
+            error("held-out"),
+            number(before.held_out_rmse),
+            number(after.held_out_rmse),
+            of_linear(|linear| linear.held_out_rmse),
+        ),
+        (error("one-step"), number(before.one_step_rmse), number(after.one_step_rmse), None),
+        ("fit [%]".to_owned(), of_spread(before.fit_percent), of_spread(after.fit_percent), None),
     ];
     html! {
         div.scroll { table {
-            thead { tr { th { "" } th.number.before { "simulation" } @if extended { th.number.after { "extended" } } } }
+            thead { tr {
+                th { "" } th.number.before { "simulation" } @if extended { th.number.after { "extended" } }
+                @if let Some(linear) = linear { th.number { (linear_name(linear)) } }
+            } }
             tbody {
-                @for (what, before, after) in rows {
-                    tr { td { (what) } td.number { (before) } @if extended { td.number { (after) } } }
+                @for (what, before, after, of_linear) in rows {
+                    tr {
+                        td { (what) } td.number { (before) } @if extended { td.number { (after) } }
+                        @if linear.is_some() { td.number { (of_linear.unwrap_or_default()) } }
+                    }
                 }
                 @if extended {
-                    tr { td { "held-out improvement [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) } }
+                    tr {
+                        td { "held-out improvement [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) }
+                        @if let Some(linear) = linear { td.number { (gain(before.held_out_rmse, linear.held_out_rmse)) } }
+                    }
                 }
             }
         } }
@@ -162,6 +184,13 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
                         td.number { (number(before)) } td.number { (number(after)) }
                         td.bar { i.before style=(width(before)) {} i style=(width(after)) {} }
                         td.number { (gain(before, after)) }
+                    }
+                }
+                @if let Some(linear) = &diagnosis.report.linear {
+                    tr.linear {
+                        td colspan="2" { "all, " (linear_name(linear)) } td.number {} td.number { (number(linear.held_out_rmse)) }
+                        td.bar { i style=(width(linear.held_out_rmse.min(largest))) {} }
+                        td.number { (gain(diagnosis.report.baseline.held_out_rmse, linear.held_out_rmse)) }
                     }
                 }
             }
@@ -204,16 +233,16 @@ mod tests {
     }
 
     #[test]
-    fn a_rival_is_noted_only_for_the_first_time_a_cause_is_missing() {
-        let standing = |causes: &[&'static str]| Standing {
-            causes: causes.to_vec(),
+    fn a_rival_is_noted_with_the_causes_that_it_is_the_best_without() {
+        let standing = |best_without: &[&'static str]| Standing {
+            causes: Vec::new(),
+            best_without: best_without.to_vec(),
             values: String::new(),
             score: 0.0,
             rmse: 1.0,
             held_out_rmse: 1.0,
         };
-        let standings = [standing(&["hum", "drift"]), standing(&["drift"]), standing(&["hum"]), standing(&[])];
-        let notes: Vec<String> = (0..4).map(|place| note(&standings, place)).collect();
-        assert_eq!(notes, ["best", "best without hum", "best without drift", ""]);
+        let notes = [note(&standing(&[]), 0), note(&standing(&["hum", "drift"]), 1), note(&standing(&[]), 2)];
+        assert_eq!(notes, ["best", "best without hum, drift", ""]);
     }
 }

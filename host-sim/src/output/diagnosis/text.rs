@@ -9,8 +9,9 @@ use identify::effects::{EFFECTS, index_of};
 use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
-use crate::output::diagnosis::number::shown_name;
+use crate::output::diagnosis::number::{self, shown_name};
 use crate::output::diagnosis::records;
+use crate::output::diagnosis::suspects;
 
 /// Smallest held-out improvement that is reported as one.
 const SMALLEST_IMPROVEMENT: f64 = 0.005;
@@ -28,24 +29,29 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
             row(&mut text, finding, scales);
         }
     }
+    text += &suspects::text(&report.suspects, scales);
     text += &records::text(&report.records, scales);
     let (before, after) = (&report.baseline, &report.extended.quality);
     let extends = !report.findings.is_empty() || !report.take_out.is_empty();
-    let _ = writeln!(text, "\n{:22} {:>12}{}", "", "simulation", if extends { "     extended" } else { "" });
+    let linear_column = report.linear.map_or_else(String::new, |linear| format!(" {:>16}", linear_name(&linear)));
+    let extended_column = if extends { "     extended" } else { "" };
+    let _ = writeln!(text, "\n{:22} {:>12}{extended_column}{linear_column}", "", "simulation");
     let error = |of: &str| format!("{of} RMSE [{}]", scales.unit(Dimension::ReadingSize));
-    for (what, before, after) in [
-        (error("free-run"), before.rmse, after.rmse),
-        (error("held-out"), before.held_out_rmse, after.held_out_rmse),
-        (error("one-step"), before.one_step_rmse, after.one_step_rmse),
-        ("fit [%]".to_owned(), before.fit_percent, after.fit_percent),
+    let of_linear = |of: fn(&LinearError) -> f64| report.linear.as_ref().map(of);
+    for (what, before, after, linear) in [
+        (error("free-run"), before.rmse, after.rmse, of_linear(|linear| linear.rmse)),
+        (error("held-out"), before.held_out_rmse, after.held_out_rmse, of_linear(|linear| linear.held_out_rmse)),
+        (error("one-step"), before.one_step_rmse, after.one_step_rmse, None),
+        ("fit [%]".to_owned(), before.fit_percent, after.fit_percent, None),
     ] {
         let dimension = if what == "fit [%]" { Dimension::Ratio } else { Dimension::ReadingSize };
         let number = |value: f64| if value.is_finite() { scales.number(dimension, value, 3) } else { "-".into() };
         let after = if extends { format!(" {:>12}", number(after)) } else { String::new() };
-        let _ = writeln!(text, "{what:22} {:>12}{after}", number(before));
+        let linear = linear.map_or_else(String::new, |linear| format!(" {:>16}", number(linear)));
+        let _ = writeln!(text, "{what:22} {:>12}{after}{linear}", number(before));
     }
-    if let Some(linear) = linear(report, scales) {
-        let _ = writeln!(text, "{linear}");
+    for sentence in limits_of_curves(report, scales) {
+        let _ = writeln!(text, "{sentence}");
     }
     if extends && let Some(sentence) = in_fixed_point(&report.extended, scales) {
         let _ = writeln!(text, "{sentence}");
@@ -53,11 +59,42 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
     text
 }
 
-/// States the held-out error of the best linear model, with which both simulations compete; `None` if there is none.
-pub fn linear(report: &answer::Report, scales: &Scales) -> Option<String> {
-    let LinearError { order, held_out_rmse, .. } = report.linear?;
-    let rmse = scales.with_unit(Dimension::ReadingSize, held_out_rmse, 3);
-    Some(format!("The best linear model of order 1 to 4, of order {order}, has a held-out error of {rmse}."))
+/// Name of the best linear model in tables of errors.
+pub fn linear_name(linear: &LinearError) -> String {
+    format!("linear, order {}", linear.order)
+}
+
+/// States where the record shows the curves of the extended spring: its static law, and parameters that are values of a curve.
+pub fn limits_of_curves(report: &answer::Report, scales: &Scales) -> Vec<String> {
+    let law = law_range(&report.extended, scales).into_iter();
+    law.chain(report.findings.iter().filter_map(|finding| extrapolated(finding, scales))).collect()
+}
+
+/// States where the static law is known, and how the plant file continues it; `None` if no nonlinear law was found.
+fn law_range(extended: &Extended, scales: &Scales) -> Option<String> {
+    let [low, high] = extended.law_range_v?;
+    let volts = |voltage| scales.with_unit(Dimension::Voltage, voltage, 0);
+    let below = if low > 0.0 { format!(", and below it as a straight line to {}", volts(0.0)) } else { String::new() };
+    Some(format!(
+        "The record shows the static law from {} to {}; the plant file continues it above with its end slope{below}.",
+        scales.number(Dimension::Voltage, low, 0),
+        volts(high)
+    ))
+}
+
+/// States which parameters of a finding are extrapolated, and from which voltages; `None` if none are.
+fn extrapolated(finding: &Finding, scales: &Scales) -> Option<String> {
+    let all = finding.parameters.iter().filter_map(|(name, it)| Some((name.as_str(), it.extrapolated_from_v?)));
+    let (names, ranges): (Vec<&str>, Vec<[f64; 2]>) = all.unzip();
+    let [low, high] = *ranges.first()?;
+    Some(format!(
+        "{}: {} {} extrapolated from a record of {} to {}.",
+        finding.cause,
+        names.join(" and "),
+        if names.len() == 1 { "is" } else { "are" },
+        scales.number(Dimension::Voltage, low, 0),
+        scales.with_unit(Dimension::Voltage, high, 0)
+    ))
 }
 
 /// States whether the fixed-point tick simulates the extended spring; `None` if that was not tested.
@@ -222,6 +259,17 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
             )
         });
     }
+    if report.verdict == Verdict::Unexplained
+        && let Some(suspect) = report.suspects.first()
+    {
+        sentences.push(format!(
+            "The best suspect is {}, {:.1} nats short of a finding: it changes the error from {} to {} {unit}.",
+            suspect.cause,
+            suspect.nats_short,
+            error(suspect.rmse_before),
+            error(suspect.rmse_after)
+        ));
+    }
     if !report.alternatives.is_empty() {
         let nothing = || "no error at all".to_owned();
         let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
@@ -255,7 +303,8 @@ fn row(text: &mut String, finding: &Finding, scales: &Scales) {
             let small = it.value.abs() < 0.01 && matches!(it.dimension, Dimension::Ratio | Dimension::Rate);
             let number = |value| if small { significant(value, 4) } else { scales.number(it.dimension, value, 4) };
             let (name, unit) = (shown_name(name, it.dimension, scales), scales.unit(it.dimension));
-            format!("{name} = {} [{}, {}] {unit}", number(it.value), number(it.low), number(it.high)).trim().to_owned()
+            let text = format!("{name} = {} [{}, {}] {unit}", number(it.value), number(it.low), number(it.high));
+            text.trim().to_owned() + number::extrapolated(it)
         })
         .collect();
     let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
@@ -291,11 +340,21 @@ mod tests {
             nominal: Nominal::default(),
             baseline: quality,
             findings: causes.iter().map(finding).collect(),
+            rivals: Vec::new(),
+            experiment: None,
+            suspects: Vec::new(),
             take_out: Vec::new(),
             would_show: None,
             alternatives: alternatives.to_vec(),
             next_experiment: None,
-            extended: Extended { quality, gain: 0.0, model: None, fixed_point_error_v: None, tick_refuses: None },
+            extended: Extended {
+                quality,
+                gain: 0.0,
+                law_range_v: None,
+                model: None,
+                fixed_point_error_v: None,
+                tick_refuses: None,
+            },
             linear: None,
             leftover: None,
             noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
@@ -312,6 +371,65 @@ mod tests {
         assert!(first(&report).ends_with("everything; `--effort thorough` searches longer."));
         report.complete = false;
         assert!(first(&report).starts_with("The search was stopped after 33 % of the work"));
+    }
+
+    #[test]
+    fn best_linear_model_has_a_column_with_its_order() {
+        let mut report = report(Verdict::Explained, &["hum"], &[]);
+        report.linear = Some(LinearError { order: 3, rmse: 5.1, held_out_rmse: 6.7, last_40_percent_rmse: 9.0 });
+        let text = text("r.csv", &report, &Scales::default());
+        let words = |start: &str| {
+            let line = text.lines().find(|line| line.starts_with(start)).expect("a line");
+            line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert!(text.contains("simulation     extended  linear, order 3\n"), "{text}");
+        assert_eq!(words("free-run")[3..], ["7.860", "7.860", "5.100"]);
+        assert_eq!(words("held-out")[3..], ["7.860", "7.860", "6.700"]);
+    }
+
+    #[test]
+    fn best_suspect_of_an_unexplained_record_is_said() {
+        let mut report = report(Verdict::Unexplained, &[], &[]);
+        report.suspects.push(answer::Suspect {
+            cause: "reading-offset",
+            with: Vec::new(),
+            parameters: Vec::new(),
+            rmse_before: 42.675,
+            rmse_after: 20.029,
+            nats_short: 4.46,
+            judge: answer::Judge::LeaveOneOut,
+        });
+        let said = "The best suspect is reading-offset, 4.5 nats short of a finding: it changes the error from 42.675 to 20.029 V.";
+        assert_eq!(sentences("r.csv", &report, &Scales::default())[1], said);
+    }
+
+    #[test]
+    fn ranges_of_curves_are_said() {
+        let mut report = report(Verdict::Explained, &["voltage-dependent-time-constant"], &[]);
+        assert!(limits_of_curves(&report, &Scales::default()).is_empty());
+        report.extended.law_range_v = Some([0.0, 330.2]);
+        let tau = answer::Parameter {
+            value: 8.0,
+            low: 7.0,
+            high: 9.0,
+            unit: "s".into(),
+            at_bound: false,
+            extrapolated_from_v: Some([0.0, 300.0]),
+            dimension: Dimension::Time,
+        };
+        report.findings[0].parameters.push(("tau_high_s".to_owned(), tau));
+        let said = limits_of_curves(&report, &Scales::default());
+        let law =
+            "The record shows the static law from 0 to 330 V; the plant file continues it above with its end slope.";
+        let tau = "voltage-dependent-time-constant: tau_high_s is extrapolated from a record of 0 to 300 V.";
+        assert_eq!(said, [law, tau]);
+        assert!(
+            text("r.csv", &report, &Scales::default())
+                .contains("tau_high_s = 8.0000 [7.0000, 9.0000] s (extrapolated)\n")
+        );
+        report.extended.law_range_v = Some([200.0, 500.0]);
+        let law = limits_of_curves(&report, &Scales::default()).remove(0);
+        assert!(law.ends_with("above with its end slope, and below it as a straight line to 0 V."), "{law}");
     }
 
     #[test]

@@ -1,0 +1,13 @@
+//! An effect of the best structure with the structures that lack it.
+
+use crate::search::Scored;
+
+/// An effect of the best structure.
+pub(crate) struct Cause {
+    /// Index of the effect.
+    pub(crate) effect: usize,
+    /// The best of all structures without the effect.
+    pub(crate) without: Scored,
+    /// The best structure with the effect removed and nothing in its place.
+    pub(crate) left_out: Scored,
+}
