@@ -167,12 +167,6 @@ pub trait Effect: Sync {
     /// Returns the reported parameters at a point.
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity>;
 
-    /// Returns the static gain that a form has beside what its parameters say: a gain error that it would hide; `None` if it has
-    /// none of its own.
-    fn own_gain(&self, _form: usize, _point: &[f64], _data: &Data) -> Option<f64> {
-        None
-    }
-
     /// Returns true if [`Effect::refine_searched`] finds some coordinates of a form, which the fit does not move.
     fn searched(&self, _form: usize) -> bool {
         false

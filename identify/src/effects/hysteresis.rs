@@ -88,10 +88,6 @@ impl Effect for Hysteresis {
         vec![Quantity::new("width_v", Dimension::Voltage, bank(form, point).width(data.full_scale_v))]
     }
 
-    fn own_gain(&self, form: usize, point: &[f64], _: &Data) -> Option<f64> {
-        FORMS[form].1.then(|| point[point.len() - 1])
-    }
-
     /// A plant file holds a limited number of plays.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
         (!chain.memory.fits_plant_file()).then(|| table(self, form, point, data))

@@ -165,12 +165,6 @@ impl Effect for StaticNonlinearity {
         (1..=POINTS).map(at).collect()
     }
 
-    /// The gain of the line from 0 V to the curve's end.
-    fn own_gain(&self, form: usize, point: &[f64], data: &Data) -> Option<f64> {
-        let fixed_at_ends = matches!(FORMS[form].0, Bend | Exponential);
-        (!fixed_at_ends).then(|| secant(form, point, data.full_scale_v, data))
-    }
-
     /// In the fixed-point tick the law is in front of the relaxation.
     fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
         FORMS[form].1.then(|| "fitted behind the relaxation, written before it".into())

@@ -7,7 +7,7 @@ use crate::fit::engine::Engine;
 use crate::fit::interval::parameters;
 use crate::search::Scored;
 use crate::verdict::cause::Cause;
-use crate::verdict::ranking::{named, rms};
+use crate::verdict::ranking::rms;
 
 /// Largest odds that are converted to a probability, in nats.
 const LARGEST_ODDS: f64 = 40.0;
@@ -24,9 +24,9 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, cause: &Cause) -> Find
     let odds = best.score - without.score;
     let (data, observed) = (engine.data, engine.observed);
     let [before, rival, after] = [left_out, without, best].map(|scored| rms(observed, &scored.fit.residual));
-    let others = named(data, &without.fit.model);
+    let others: Vec<&str> = without.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
     let rival = data.scales().shown(Dimension::ReadingSize, rival, 3);
-    let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others };
+    let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others.join(" and ") };
     let better = if best.fit.model.searched(effect) {
         format!("with the price of all searched places deducted, the readings are {odds:.1} nats likelier")
     } else {

@@ -1,10 +1,9 @@
 //! The best sets of causes compared by score and by held-out error: the one source of what is the best without a cause, for the
 //! page and for the sentence on its evidence.
 
-use crate::dimension::Dimension;
 use crate::effects::EFFECTS;
 use crate::effects::effect::Quantity;
-use crate::effects::model::{Block, Model};
+use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::plant::base::Base;
 use crate::record::data::Data;
@@ -20,8 +19,7 @@ pub struct RankedCauses {
     pub causes: Vec<&'static str>,
     /// Findings of which it is the best explanation without them.
     pub best_without: Vec<&'static str>,
-    /// Parameters of the fit to all rows in the user's units, as `name = value unit, ...`; with the gain of a cause that has one
-    /// of its own.
+    /// Parameters of the fit to all rows in the user's units, as `name = value unit, ...`.
     pub values: String,
     /// Held-out log-likelihood less the price of the blocks, in nats.
     pub score: f64,
@@ -79,24 +77,11 @@ pub(crate) fn rms(observed: &Observed, residual: &[f64]) -> f64 {
     root_mean_square(&observed.errors(residual))
 }
 
-/// The causes of a model joined by "and", each with the gain that it has of its own.
-pub(crate) fn named(data: &Data, model: &Model) -> String {
-    let name = |(block, point): &(Block, Vec<f64>)| match block.effect().own_gain(block.form, point, data) {
-        Some(gain) => format!("{} with a gain of {}", block.cause(), data.scales().shown(Dimension::Ratio, gain, 3)),
-        None => block.cause().to_owned(),
-    };
-    model.blocks.iter().map(name).collect::<Vec<_>>().join(" and ")
-}
-
 /// Parameters of all blocks in the user's units, as `name = value unit, ...`.
 fn values(data: &Data, base: &Base, model: &Model) -> String {
-    let of_block = |(index, (block, point)): (usize, &(Block, Vec<f64>))| {
-        let gain = block.effect().own_gain(block.form, point, data);
-        let gain = gain.map(|gain| Quantity::new("gain", Dimension::Ratio, gain));
-        model.reported(index, base, data).into_iter().map(|reported| reported.quantity).chain(gain)
+    let reported = (0..model.blocks.len()).flat_map(|block| model.reported(block, base, data));
+    let said = |Quantity { name, dimension, value, .. }: Quantity| {
+        format!("{name} = {}", data.scales().shown(dimension, value, 4))
     };
-    let quantities = model.blocks.iter().enumerate().flat_map(of_block);
-    let said =
-        |Quantity { name, dimension, value, .. }| format!("{name} = {}", data.scales().shown(dimension, value, 4));
-    quantities.map(said).collect::<Vec<_>>().join(", ")
+    reported.map(|reported| said(reported.quantity)).collect::<Vec<_>>().join(", ")
 }
