@@ -106,7 +106,7 @@ fn exported_law_keeps_its_end_slope_and_survives_the_file_to_the_bit() {
     assert!((settled - (at_end + slope * 400.0)).abs() < 1e-9, "{settled}");
 }
 
-/// The bend of the full scale of 300 V.
+/// A bend over a full scale of 300 V with a gain of 1 at 500 V.
 fn law_of_bend(voltage: f64) -> f64 {
-    voltage * (1.0 + 0.4 * (voltage / 300.0 - 1.0))
+    voltage * (1.0 + 0.4 * (voltage - 500.0) / 300.0)
 }
