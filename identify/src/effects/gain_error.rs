@@ -8,7 +8,7 @@ use crate::record::data::Data;
 pub(super) struct GainError;
 
 /// Returns the size of the gain relative to the nominal one: 1, or that of the search's start, of any sign and size.
-pub(super) fn size(data: &Data) -> f64 {
+fn size(data: &Data) -> f64 {
     data.normalisation.start.map_or(1.0, |start| start.gain)
 }
 
@@ -27,10 +27,6 @@ impl Effect for GainError {
 
     fn isolating_experiment(&self) -> &'static str {
         "one step, held for ten time constants: the settled value gives the gain"
-    }
-
-    fn special_case_of(&self) -> &'static [&'static str] {
-        &["static-nonlinearity"]
     }
 
     fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {

@@ -1,13 +1,13 @@
 //! Rate-independent hysteresis: the ascending and descending branches differ.
 //!
-//! A [`PlayBank`] of play operators, each with a threshold `r`: `f = gain ((1 - sum weights) u + sum weight play)`.
+//! A [`PlayBank`] of play operators, each with a threshold `r`: `f = (1 - sum weights) u + sum weight play`. The mean line of a
+//! large loop has the slope 1: what is linear belongs to `gain-error`.
 //!
 //! | form | plays | coordinates |
 //! | --- | --- | --- |
 //! | whole | one, weight 1 | r |
 //! | part | one | r, weight |
 //! | bank | five, at r / 5 to r | r, weights |
-//! | part with gain, bank with gain | the same, with the gain of the loop's mean line | and the gain |
 //! | cycled part, cycled bank | the same, with the initial condition on the descending branch | the same |
 //!
 //! The initial condition belongs to the record, not to the spring.
@@ -22,31 +22,22 @@ pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
 
-/// Number of plays, own gain, and initial condition on the descending branch, for each form.
-const FORMS: [(usize, bool, bool); 7] = [
-    (1, false, false),
-    (1, false, false),
-    (5, false, false),
-    (1, true, false),
-    (5, true, false),
-    (1, true, true),
-    (5, true, true),
-];
+/// Number of plays, and initial condition on the descending branch, for each form.
+const FORMS: [(usize, bool); 5] = [(1, false), (1, false), (5, false), (1, true), (5, true)];
 /// Thresholds of a bank relative to `r`.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
 /// Returns the bank of a form at a point.
 fn bank(form: usize, point: &[f64]) -> PlayBank {
-    let (count, own_gain, cycled) = FORMS[form];
+    let (count, cycled) = FORMS[form];
     let threshold = point[0].exp();
     let plays: Vec<(f64, f64)> = match (form, count) {
         (WHOLE, _) => vec![(threshold, 1.0)],
         (_, 1) => vec![(threshold, point[1])],
         _ => PARTS.iter().zip(&point[1..]).map(|(part, &weight)| (threshold * part, weight)).collect(),
     };
-    let gain = if own_gain { point[point.len() - 1] } else { 1.0 };
     let direct = 1.0 - plays.iter().map(|(_, weight)| weight).sum::<f64>();
-    let bank = PlayBank::new(gain * direct, plays.into_iter().map(|(threshold, weight)| (threshold, gain * weight)));
+    let bank = PlayBank::new(direct, plays);
     if cycled { bank.cycled() } else { bank }
 }
 
@@ -72,26 +63,20 @@ impl Effect for Hysteresis {
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
-        let (count, own_gain, _) = FORMS[form];
+        let (count, _) = FORMS[form];
         let mut coordinates = vec![Coordinate::log(1e-4 * data.full_scale_v, 0.5 * data.full_scale_v)];
         if form != WHOLE {
             coordinates.resize(1 + count, Coordinate::new(0.0, 2.0));
-        }
-        if own_gain {
-            coordinates.push(Coordinate::new(0.2, 5.0));
         }
         coordinates
     }
 
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
-        let (count, own_gain, _) = FORMS[form];
+        let (count, _) = FORMS[form];
         let start = |part: f64, weight: f64| {
             let mut point = vec![(part * data.full_scale_v).ln()];
             if form != WHOLE {
                 point.resize(1 + count, weight / count as f64);
-            }
-            if own_gain {
-                point.push(1.0);
             }
             point
         };

@@ -1,73 +1,95 @@
-//! The sensitivity depends on the voltage, without hysteresis: `f = f(u)`, with `x = |u| / full scale`.
+//! The sensitivity depends on the voltage, without hysteresis: `f = f(u)`, with `x = |u| / full scale`, and `X` the reference
+//! voltage over the full scale.
 //!
 //! | curve | `f / u` |
 //! | --- | --- |
-//! | bend | `1 + a (x - 1)`, fixed at both ends |
-//! | exponential | `(1 - exp(-k x)) / (x (1 - exp(-k)))`, fixed at both ends |
-//! | exponential with gain | `g` times that |
-//! | quadratic, cubic, quintic | `g + a x`, `+ b x^2`, `+ c x^3 + d x^4`, with a gain of its own |
+//! | exponential | `s(x) / s(X)` with `s(x) = (1 - exp(-k x)) / x` |
+//! | quadratic, cubic, quintic | `1 + a (x - X)`, `+ b (x^2 - X^2)`, `+ c (x^3 - X^3) + d (x^4 - X^4)` |
 //!
-//! Gains are relative to the size of the gain: 1, unless the nominal spring is far from the record.
+//! Every curve is fixed at 0 V and at the reference voltage of the nominal spring, where the static gain is 1: what is linear
+//! belongs to `gain-error`.
 //!
 //! The curve is in front of the relaxation (Hammerstein model), or in some forms behind it (Wiener model), where `u` is
 //! the relaxed value. The settled curve is the same; the instantaneous part and the speed of a step distinguish both.
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
-use crate::effects::gain_error::size;
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
+use crate::record::scales::REFERENCE_VOLTAGE_V;
 
 pub(super) struct StaticNonlinearity;
 
 /// The curve of `f / u` over `x`.
 #[derive(Clone, Copy)]
 enum Curve {
-    Bend,
     Exponential,
-    ExponentialWithGain,
-    /// A polynomial with this number of coefficients.
+    /// A polynomial with this number of free coefficients.
     Polynomial(usize),
 }
-use Curve::{Bend, Exponential, ExponentialWithGain, Polynomial};
+use Curve::{Exponential, Polynomial};
 
 /// Curve of each form, and whether it is behind the relaxation.
-const FORMS: [(Curve, bool); 10] = [
-    (Bend, false),
+const FORMS: [(Curve, bool); 8] = [
+    (Polynomial(1), false),
     (Exponential, false),
-    (ExponentialWithGain, false),
     (Polynomial(2), false),
-    (Polynomial(3), false),
-    (Polynomial(5), false),
-    (Bend, true),
-    (ExponentialWithGain, true),
-    (Polynomial(3), true),
-    (Polynomial(5), true),
+    (Polynomial(4), false),
+    (Polynomial(1), true),
+    (Exponential, true),
+    (Polynomial(2), true),
+    (Polynomial(4), true),
 ];
 
 /// Number of points of the curve that are reported.
 const POINTS: u32 = 5;
+/// Number of intervals of the full scale in which levels of the voltage are counted.
+const LEVELS: usize = 20;
+/// Smallest fraction of the rows at a level.
+const ROWS_OF_LEVEL: f64 = 0.01;
 
 impl Curve {
-    /// Returns `f / u` at `x`.
-    fn secant(self, point: &[f64], x: f64) -> f64 {
+    /// Returns `f / u` at `x`, which is 1 at `fixed`.
+    fn secant(self, point: &[f64], x: f64, fixed: f64) -> f64 {
         match self {
-            Bend => 1.0 + point[0] * (x - 1.0),
-            ExponentialWithGain => point[1] * Exponential.secant(point, x),
             Exponential => {
                 let k = if point[0].abs() < 1e-6 { 1e-6 } else { point[0] };
-                if x < 1e-9 { k / -(-k).exp_m1() } else { (-k * x).exp_m1() / (x * (-k).exp_m1()) }
+                let secant = |x: f64| if x < 1e-9 { k } else { -(-k * x).exp_m1() / x };
+                secant(x) / secant(fixed)
             }
-            Polynomial(_) => point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient),
+            Polynomial(_) => {
+                let polynomial = |x: f64| x * point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient);
+                1.0 + polynomial(x) - polynomial(fixed)
+            }
+        }
+    }
+
+    /// Returns the number of free parameters.
+    fn coefficients(self) -> usize {
+        match self {
+            Exponential => 1,
+            Polynomial(coefficients) => coefficients,
         }
     }
 }
 
-/// Returns `f / u` of a form at a voltage; a gain of its own is relative to the size of the gain.
+/// Returns `f / u` of a form at a voltage.
 fn secant(form: usize, point: &[f64], voltage: f64, data: &Data) -> f64 {
-    let (curve, _) = FORMS[form];
-    let secant = curve.secant(point, voltage.abs() / data.full_scale_v);
-    if matches!(curve, Bend | Exponential) { secant } else { size(data) * secant }
+    let full_scale_v = data.full_scale_v;
+    FORMS[form].0.secant(point, voltage.abs() / full_scale_v, REFERENCE_VOLTAGE_V / full_scale_v)
+}
+
+/// Returns the number of levels of the voltage other than 0 at which the record has rows.
+fn levels(data: &Data) -> usize {
+    let mut rows = [0; LEVELS];
+    for voltage in &data.voltage_v {
+        let part = voltage.abs() / data.full_scale_v.max(f64::MIN_POSITIVE);
+        let level = (part * LEVELS as f64).round() as usize;
+        if level > 0 {
+            rows[level.min(LEVELS) - 1] += 1;
+        }
+    }
+    rows.iter().filter(|rows| **rows as f64 >= ROWS_OF_LEVEL * data.rows() as f64).count()
 }
 
 impl Effect for StaticNonlinearity {
@@ -93,41 +115,32 @@ impl Effect for StaticNonlinearity {
 
     fn coordinates(&self, form: usize, _: &Data) -> Vec<Coordinate> {
         match FORMS[form].0 {
-            Bend => vec![Coordinate::new(-2.0, 2.0)],
             Exponential => vec![Coordinate::new(-8.0, 8.0)],
-            ExponentialWithGain => vec![Coordinate::new(-8.0, 8.0), Coordinate::new(0.02, 50.0)],
-            Polynomial(coefficients) => {
-                let mut coordinates = vec![Coordinate::new(-20.0, 20.0)];
-                coordinates.resize(coefficients, Coordinate::new(-100.0, 100.0));
-                coordinates
-            }
+            Polynomial(1) => vec![Coordinate::new(-2.0, 2.0)],
+            Polynomial(coefficients) => vec![Coordinate::new(-100.0, 100.0); coefficients],
         }
     }
 
-    /// Forms behind the relaxation are not tried with an unknown initial state, in which their prediction is not
-    /// linear.
+    /// A curve needs one level of the voltage more than it has parameters. Forms behind the relaxation are not tried with an
+    /// unknown initial state, in which their prediction is not linear.
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
-        if FORMS[form].1 && context.data.initial_state_unknown {
+        let (curve, behind) = FORMS[form];
+        if levels(context.data) <= curve.coefficients() || behind && context.data.initial_state_unknown {
             return Vec::new();
         }
-        match FORMS[form].0 {
-            Bend => vec![vec![0.1], vec![-0.1]],
+        match curve {
             Exponential => vec![vec![0.3], vec![-0.3]],
-            ExponentialWithGain => vec![vec![0.3, 1.0], vec![-0.3, 1.0]],
+            Polynomial(1) => vec![vec![0.1], vec![-0.1]],
             Polynomial(coefficients) => {
-                let start = |bend: f64| {
-                    let mut start = vec![1.0 - bend, bend];
+                let start = |of: &[f64]| {
+                    let mut start = of.to_vec();
                     start.resize(coefficients, 0.0);
                     start
                 };
                 // An S-shaped curve is zero at both ends and in the middle, so no gradient leads to it from a bend.
-                let s = |size: f64| {
-                    let mut start = vec![1.0 + size, -3.0 * size, 2.0 * size];
-                    start.resize(coefficients, 0.0);
-                    start
-                };
-                let mut starts = vec![start(0.05), start(-0.05)];
-                if coefficients > 2 {
+                let s = |size: f64| start(&[-3.0 * size, 2.0 * size]);
+                let mut starts = vec![start(&[0.05]), start(&[-0.05])];
+                if coefficients > 1 {
                     starts.extend([s(0.1), s(-0.1)]);
                 }
                 starts

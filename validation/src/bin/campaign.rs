@@ -9,11 +9,16 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use validation::campaign::diagnosis::diagnose;
+use validation::campaign::answer;
+use validation::campaign::case::Case;
+use validation::campaign::diagnosis::{self, diagnose};
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
-use validation::campaign::{criteria, out_of_model, plan, real, rivals, scales, tables};
+use validation::campaign::{
+    answer_table, criteria, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps, tables,
+    unforeseen,
+};
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
@@ -50,8 +55,9 @@ struct Cli {
     /// Parts to run
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
-    /// Records per cause (singles, scales, forms, stress, small, noise, speed), per form (out-of-model), per pair (pairs,
-    /// long), in each of two sets (plan), in total (nulls, triples), or times 53 (thresholds)
+    /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
+    /// unforeseen), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each of two sets (plan), in total (nulls,
+    /// triples), or times 53 (thresholds) or 455 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -140,10 +146,16 @@ enum Part {
     Pairs,
     /// Three effects of different blocks: 100 records
     Triples,
+    /// Two effects of one block, or that mimic each other: 3 records of every pair at full size and at half of it
+    Shared,
+    /// Plain steps of one to three levels, with each cause that they can show: 3 records of each
+    Steps,
     /// Two effects in records of 20 000 rows, white and coloured noise: 1 record of every pair
     Long,
     /// One effect in few rows, uneven rows, coloured, heavy-tailed or strong noise: 5 records of each cause
     Stress,
+    /// Stated probabilities compared with frequencies, over all sets: 1 record of each case, 3 of each cause
+    Reliability,
     /// Smallest effect that is named: 20 records of each cause and size
     Small,
     /// Smallest effect that is named at 0.1, 0.2, 0.5 and 1 % noise
@@ -153,8 +165,12 @@ enum Part {
     /// One effect by laws that the diagnosis does not model: 5 records of each
     #[value(alias = "strangers")]
     OutOfModel,
+    /// Laws from the literature that nobody looked at while the diagnosis was made: 3 records of each
+    Unforeseen,
     /// One effect in a spring of any time constant, share, full scale and unit: 20 records of each cause
     Scales,
+    /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 8 records of each cause
+    Plants,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
     Rivals,
     /// Six other instruments, simulated, in their own units
@@ -229,6 +245,8 @@ struct Done {
     wrong: String,
     criteria: Vec<Criterion>,
     json: Value,
+    /// Name and text of an SVG file beside the page.
+    figure: Option<(&'static str, String)>,
 }
 
 fn main() -> ExitCode {
@@ -291,6 +309,24 @@ impl Cli {
             Part::Pairs => self.jobs(part, &part::pairs(first, self.count(3)), criteria::pairs),
             Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), criteria::triples),
             Part::Long => self.jobs(part, &part::long(first, self.count(1)), criteria::pairs),
+            Part::Shared => self.answers(part, &["causes", "size"], &shared::cases(first, self.count(3))),
+            Part::Steps => self.answers(part, &["causes", "experiment"], &steps::cases(first, self.count(3))),
+            Part::Plants => {
+                let cases = plants::cases(first, self.count(8));
+                self.answers(part, &["cause", "schedule", "noise", "time constants"], &cases)
+            }
+            Part::Reliability => {
+                let mut sets = Vec::new();
+                for (name, cases) in reliability::sets(first, self.count(1)) {
+                    let bar = bar(name, cases.len())?;
+                    sets.push((name, answer::run(&cases, &diagnosis::answer, &bar)));
+                    bar.finish_and_clear();
+                }
+                let markdown = reliability::page(&sets);
+                let figure = Some(("reliability.svg", reliability::figure(&sets)));
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(sets), figure })
+            }
+            Part::Unforeseen => self.answers(part, &["law"], &unforeseen::cases(first, self.count(3))),
             Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
             Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.sensitivities(part, &[0.2]),
@@ -306,7 +342,7 @@ impl Cli {
                 let answers = out_of_model::run(&jobs, &diagnose, &bar)?;
                 bar.finish_and_clear();
                 let (markdown, wrong) = (out_of_model::page(&forms, &answers), out_of_model::wrong(&forms, &answers));
-                Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!(answers) })
+                Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!(answers), figure: None })
             }
             Part::Scales => {
                 let jobs = scales::jobs(first, self.count(20));
@@ -314,19 +350,26 @@ impl Cli {
                 let outcomes = scales::run(&jobs, &bar);
                 bar.finish_and_clear();
                 let (markdown, wrong) = (tables::named("cause", &jobs, &outcomes), tables::wrong(&jobs, &outcomes));
-                Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!({"records": outcomes}) })
+                Ok(Done {
+                    part,
+                    markdown,
+                    wrong,
+                    criteria: Vec::new(),
+                    json: json!({"records": outcomes}),
+                    figure: None,
+                })
             }
             Part::Rivals => {
                 let bar = bar("rivals", rivals::RECORDS)?;
                 let rows = rivals::run(first, &bar)?;
                 bar.finish_and_clear();
                 let markdown = rivals::table(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows) })
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
             }
             Part::Instruments => {
                 let rows = measured("instruments", &real::twins(first), true)?;
                 let markdown = real::table(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows) })
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
             }
             Part::Plan => {
                 let cases = plan::cases(&ground_truth::out_of_model::all(), first, self.count(30));
@@ -334,13 +377,14 @@ impl Cli {
                 let outcomes = plan::run(&cases, &bar)?;
                 bar.finish_and_clear();
                 let markdown = plan::page(&outcomes);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(outcomes) })
+                let json = json!(outcomes);
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None })
             }
             #[cfg(not(feature = "sensitivity"))]
             Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),
             #[cfg(feature = "sensitivity")]
             Part::Thresholds => {
-                use validation::campaign::{diagnosis, thresholds};
+                use validation::campaign::thresholds;
 
                 let cases = thresholds::cases(first, self.count(1));
                 let bar = bar("thresholds", thresholds::diagnoses(&cases))?;
@@ -348,7 +392,7 @@ impl Cli {
                 bar.finish_and_clear();
                 let markdown = thresholds::page(&cases, &as_set, &rows);
                 let json = json!({"as_set": as_set, "thresholds": rows});
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json })
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None })
             }
         }
     }
@@ -380,7 +424,20 @@ impl Cli {
         let wrong = tables::wrong(jobs, &outcomes);
         let criteria = criteria(&outcomes);
         let json = json!({"aims": criteria, "records": outcomes});
-        Ok(Done { part, markdown, wrong, criteria, json })
+        Ok(Done { part, markdown, wrong, criteria, json, figure: None })
+    }
+
+    /// Diagnoses cases and grades the answers; `heads` are those of the tables' first columns.
+    fn answers(&self, part: Part, heads: &[&str], cases: &[Case]) -> Result<Done> {
+        let bar = bar(&part.name(), cases.len())?;
+        let answers = answer::run(cases, &diagnosis::answer, &bar);
+        bar.finish_and_clear();
+        let markdown = match part {
+            Part::Unforeseen => unforeseen::page(&answers),
+            _ => format!("{}\n{}", answer_table::legend(), answer_table::page(heads[0], &heads[1..], &answers)),
+        };
+        let wrong = answer_table::wrong(&answers);
+        Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!({"records": answers}), figure: None })
     }
 
     fn sensitivities(&self, part: Part, levels: &[f64]) -> Result<Done> {
@@ -396,7 +453,7 @@ impl Cli {
         let markdown = if small { tables::sensitivity(&found) } else { tables::noise(&found) };
         let criteria = if small { criteria::small(&found) } else { Vec::new() };
         let json = json!({"aims": criteria, "climbs": found});
-        Ok(Done { part, markdown, wrong: String::new(), criteria, json })
+        Ok(Done { part, markdown, wrong: String::new(), criteria, json, figure: None })
     }
 }
 
@@ -413,7 +470,11 @@ impl Done {
             text.push('\n');
             self.criteria.iter().try_for_each(|criterion| writeln!(text, "- {criterion}"))?;
         }
-        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+        let files = [(path, &text)].into_iter().chain(self.figure.iter().map(|(name, svg)| (folder.join(name), svg)));
+        for (path, text) in files {
+            std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        Ok(())
     }
 }
 

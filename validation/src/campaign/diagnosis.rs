@@ -15,6 +15,7 @@ use serde_json::Value;
 use simulation::plant_file::PlantFile;
 use simulation::record::Record;
 
+use super::case::Subject;
 use crate::ground_truth::LabelledRecord;
 
 /// A diagnosis of a record, as the JSON of `vsj diagnose`; tests of the campaign replace it by an oracle.
@@ -45,6 +46,17 @@ pub fn planned(report: &Value, minutes: f64) -> Result<(Vec<(f64, f64)>, Option<
 pub fn compared_with(record: &Record, nominal: PlantFile) -> Result<Value> {
     let options = Options { base: Base::new(nominal)?, ..Options::default() };
     Ok(serde_json::to_value(identify::examine::diagnose(record, &options)?)?)
+}
+
+/// Report of `identify` on a record compared with its nominal spring, as JSON.
+///
+/// # Errors
+/// As [`compared_with`].
+pub fn answer(subject: &Subject) -> Result<Value> {
+    match &subject.nominal {
+        Some(nominal) => compared_with(&subject.record, nominal.clone()),
+        None => Ok(serde_json::to_value(identify::examine::diagnose(&subject.record, &Options::default())?)?),
+    }
 }
 
 /// Prediction of a whole record, in V, from its voltages alone by the model identified on its first `rows` rows, and

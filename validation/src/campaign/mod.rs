@@ -11,14 +11,24 @@
 //! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
 //! | [`score`] | the diagnosis of one record compared with the truth |
 //! | [`part`], [`summary`] | the parts of the campaign, and the counts over their records |
+//! | [`case`] | records that can be drawn, with the names that are true of them |
+//! | [`answer`], [`answer_table`] | diagnoses graded by these names; their tables |
+//! | [`shared`] | pairs of causes that share a stage or mimic each other |
+//! | [`steps`] | plain steps of one to three levels |
 //! | [`sensitivity`] | the smallest effect that is named |
 //! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
 //! | [`scales`] | single effects in springs of any size, in any unit |
+//! | [`plants`] | single effects in springs of several time constants, other schedules and noise |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
 //! | [`plan`] | minutes of the next experiment until the diagnosis is right, by schedule |
+//! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made |
+//! | [`reliability`] | stated probabilities compared with frequencies, over all sets |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
 
+pub mod answer;
+pub mod answer_table;
+pub mod case;
 pub mod cramer_rao;
 pub mod criteria;
 pub mod detectable;
@@ -28,12 +38,17 @@ pub mod mixture;
 pub mod out_of_model;
 pub mod part;
 pub mod plan;
+pub mod plants;
 pub mod real;
+pub mod reliability;
 pub mod rivals;
 pub mod scales;
 pub mod score;
 pub mod sensitivity;
+pub mod shared;
 pub mod statistics;
+pub mod steps;
 pub mod summary;
 pub mod tables;
 pub mod thresholds;
+pub mod unforeseen;

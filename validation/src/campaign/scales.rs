@@ -79,12 +79,18 @@ pub fn draw(job: &Job) -> (LabelledRecord, Size) {
     let mut random = ChaCha8Rng::seed_from_u64(job.seed);
     random.set_stream(3);
     let record = job.recipe.draw(job.seed);
+    let size = size_for(&record, &mut random);
+    (record.with_share(size.share), size)
+}
+
+/// Draws a size whose share differs from the one that an effect of the record sets.
+pub(super) fn size_for(record: &LabelledRecord, random: &mut ChaCha8Rng) -> Size {
     let changed = record.effects.iter().find(|effect| effect.cause == Cause::InstantaneousShare);
     let changed = changed.map(|effect| effect.values()[0]);
     loop {
-        let size = Size::draw(&mut random);
+        let size = Size::draw(random);
         if changed.is_none_or(|share| (share - size.share).abs() > SHARES_APART) {
-            return (record.with_share(size.share), size);
+            return size;
         }
     }
 }

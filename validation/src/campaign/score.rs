@@ -16,12 +16,21 @@ pub(super) struct Report {
     pub(super) findings: Vec<Finding>,
     #[serde(default)]
     pub(super) alternatives: Vec<Vec<String>>,
+    #[serde(default)]
+    pub(super) suspects: Vec<Suspect>,
     extended: Option<Extended>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Suspect {
+    pub(super) cause: String,
 }
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Finding {
     pub(super) cause: String,
+    #[serde(default)]
+    pub(super) probability: f64,
     #[serde(default)]
     parameters: BTreeMap<String, Parameter>,
 }
@@ -140,7 +149,7 @@ impl Outcome {
 }
 
 /// Every parameter of a finding whose cause is correct, including the documented ones that the finding lacks.
-fn estimates(hidden: &LabelledRecord, finding: &Finding) -> Vec<Estimate> {
+pub(super) fn estimates(hidden: &LabelledRecord, finding: &Finding) -> Vec<Estimate> {
     let Some(cause) = Cause::named(&finding.cause) else { return Vec::new() };
     let missing = cause.facts().parameters.iter().filter(|&&name| !finding.parameters.contains_key(name));
     let names = finding.parameters.keys().map(String::as_str).chain(missing.copied());

@@ -9,7 +9,7 @@ use super::summary::{Accuracy, Summary};
 use crate::ground_truth::Cause;
 use crate::markdown::table;
 
-fn percent(part: f64) -> String {
+pub(super) fn percent(part: f64) -> String {
     let percent = 100.0 * part;
     if percent.fract().abs() < 1e-9 { format!("{percent:.0} %") } else { format!("{percent:.1} %") }
 }

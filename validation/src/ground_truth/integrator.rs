@@ -29,7 +29,7 @@ impl Integrator {
     pub fn new(spring: Spring, start_s: f64) -> Self {
         let hysteresis = spring.hysteresis.clone();
         let (now_s, on_the_way) = (start_s, VecDeque::new());
-        Self { spring, start_s, now_s, on_the_way, target: 0.0, hysteresis, u: 0.0, v: 0.0, state: [0.0; 5] }
+        Self { spring, start_s, now_s, on_the_way, target: 0.0, hysteresis, u: 0.0, v: 0.0, state: [0.0; 7] }
     }
 
     /// Current time, in s.

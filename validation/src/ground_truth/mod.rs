@@ -17,9 +17,11 @@
 //! | [`spring`], [`integrator`] | spring and amplifier as differential equations; their integration over time |
 //! | [`sensor`] | from stiffness to reading |
 //! | [`live`] | spring and sensor step by step, for a controller in closed loop |
+//! | [`plain_steps`] | records of one to three levels |
 //! | [`record`], [`truth`] | the finished record and the true values of its parameters |
 //! | [`export`] | the record as CSV, as JSON and as the host tools' record type |
 //! | [`out_of_model`] | other laws for the same causes, by a simulator of their own |
+//! | [`unforeseen`] | laws of a second such set, which nobody looked at while the diagnosis was made |
 //! | [`other_plants`] | records of other instruments, in their own units |
 
 pub mod cause;
@@ -33,11 +35,13 @@ pub mod noise;
 pub mod other_plants;
 pub mod out_of_model;
 pub mod physics;
+pub mod plain_steps;
 pub mod record;
 pub mod schedule;
 pub mod sensor;
 pub mod spring;
 pub mod truth;
+pub mod unforeseen;
 
 pub use cause::{Block, Cause};
 pub use effect::Effect;

@@ -55,6 +55,21 @@ impl Tau {
     }
 }
 
+/// A further lag of the nominal spring: its part of the relaxing response, whose rest has the main time constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Further {
+    /// Part of the relaxing response, 0 to 1.
+    pub part: f64,
+    /// Time constant, in s.
+    pub tau_s: f64,
+}
+
+impl Default for Further {
+    fn default() -> Self {
+        Self { part: 0.0, tau_s: TAU_S }
+    }
+}
+
 /// Second relaxation (creep): part of the response has a slower time constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::cause::Cause;
 use super::effect::Effect;
 use super::noise::Noise;
-use super::physics::SHARE;
+use super::physics::{Further, SHARE};
 use super::schedule::{Kind, Sampling, Schedule};
 use super::sensor::Readings;
 use super::spring::Spring;
@@ -81,7 +81,12 @@ impl LabelledRecord {
 
     /// The same schedule, effects and noise with a spring whose instantaneous share is `share`, 0 to 1, unless an effect sets it.
     pub fn with_share(&self, share: f64) -> Self {
-        let own = Spring::with(&self.effects);
+        self.with_relaxation(share, [Further::default(); 2])
+    }
+
+    /// As [`with_share`](Self::with_share), and with further lags.
+    pub fn with_relaxation(&self, share: f64, further: [Further; 2]) -> Self {
+        let own = Spring { further, ..Spring::with(&self.effects) };
         let spring = if own.share == SHARE { Spring { share, ..own } } else { own };
         Self::of(&spring, self.schedule.clone(), self.effects.clone(), self.noise, self.seed)
     }

@@ -1,5 +1,7 @@
 //! Commanded voltages: random schedules that start at rest, reach full scale and return.
 
+use std::f64::consts::TAU;
+
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -23,6 +25,12 @@ pub enum Kind {
     Sweep,
     /// Eight levels in random order, each held for a short random time.
     MultiLevel,
+    /// Eight sines of random phases, from 1 to 200 periods in the record.
+    Multisine,
+    /// A sine of a frequency that rises by a factor of 40, logarithmically.
+    Chirp,
+    /// Ramps of random rates between random levels, each held for a random time.
+    Ramps,
 }
 
 /// Sampling of a record.
@@ -42,7 +50,7 @@ impl Sampling {
         Self { rows, every_s: 0.02 * 10f64.powf(random.random_range(0.0..1.0)), uneven }
     }
 
-    fn times(&self, random: &mut ChaCha8Rng) -> Vec<f64> {
+    pub(super) fn times(&self, random: &mut ChaCha8Rng) -> Vec<f64> {
         let mut at = 0.0;
         (0..self.rows)
             .map(|_| {
@@ -91,8 +99,23 @@ impl Schedule {
 }
 
 impl Kind {
-    /// All kinds.
+    /// Kinds of most records.
     pub const ALL: [Self; 4] = [Self::UpDown, Self::Random, Self::Sweep, Self::MultiLevel];
+    /// Kinds that the records of other plants have in addition.
+    pub const SMOOTH: [Self; 3] = [Self::Multisine, Self::Chirp, Self::Ramps];
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::UpDown => "stair",
+            Self::Random => "random levels",
+            Self::Sweep => "sweep",
+            Self::MultiLevel => "eight levels",
+            Self::Multisine => "multisine",
+            Self::Chirp => "chirp",
+            Self::Ramps => "ramps",
+        }
+    }
 
     /// Voltage in V as a function of time in s.
     fn course(self, random: &mut ChaCha8Rng, duration: f64, full_v: f64) -> Box<dyn Fn(f64) -> f64> {
@@ -118,6 +141,45 @@ impl Kind {
                 let hold = (duration / random.random_range(60.0..150.0)).clamp(0.4, 6.0);
                 let level = |random: &mut ChaCha8Rng| full_v * f64::from(random.random_range(0..8u32)) / 7.0;
                 stairs(random, duration, 0.4 * hold..1.6 * hold, level, full_v)
+            }
+            Self::Multisine => {
+                let sines: Vec<(f64, f64)> = (0..8)
+                    .map(|k| {
+                        let periods = 200f64.powf((f64::from(k) + random.random_range(0.0..1.0)) / 8.0);
+                        (TAU * periods / duration, random.random_range(0.0..TAU))
+                    })
+                    .collect();
+                let sum = move |t: f64| sines.iter().map(|(omega, phase)| (omega * t + phase).sin()).sum::<f64>();
+                let course: Vec<f64> = (0..4000).map(|k| sum(duration * f64::from(k) / 4000.0)).collect();
+                let (low, high) = course.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
+                Box::new(move |t| full_v * ((sum(t) - low) / (high - low)).clamp(0.0, 1.0))
+            }
+            Self::Chirp => {
+                let (first, factor) = (random.random_range(1.0..4.0) / duration, 40f64);
+                Box::new(move |t| {
+                    let phase = first * duration * (factor.powf(t / duration) - 1.0) / factor.ln();
+                    full_v * 0.5 * (1.0 - (TAU * phase).cos())
+                })
+            }
+            Self::Ramps => {
+                let mut points = vec![(0.0, 0.0)];
+                let turns = random.random_range(8..30usize);
+                let each = duration / turns as f64;
+                for turn in 0..=turns {
+                    let (t, _) = points[points.len() - 1];
+                    let level = match turn {
+                        1 => full_v,
+                        3 => 0.0,
+                        _ => full_v * random.random_range(0.0..=1.0),
+                    };
+                    let top = t + each * random.random_range(0.1..0.9);
+                    points.extend([(top, level), (top + each * random.random_range(0.05..0.6), level)]);
+                }
+                Box::new(move |t| {
+                    let next = points.partition_point(|&(at, _)| at <= t).clamp(1, points.len() - 1);
+                    let ((t0, v0), (t1, v1)) = (points[next - 1], points[next]);
+                    v0 + (v1 - v0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
+                })
             }
             Self::Sweep => {
                 let periods = random.random_range(3.0..8.0);
@@ -176,7 +238,7 @@ mod tests {
     #[test]
     fn every_schedule_starts_at_rest_reaches_full_scale_and_falls() {
         for seed in 0..40 {
-            for kind in Kind::ALL {
+            for kind in Kind::ALL.into_iter().chain(Kind::SMOOTH) {
                 let mut random = ChaCha8Rng::seed_from_u64(seed);
                 let sampling = Sampling::draw(&mut random, 2401, seed % 2 == 1);
                 let schedule = Schedule::draw(&mut random, kind, sampling, 500.0);
@@ -185,7 +247,9 @@ mod tests {
                 assert!(schedule.rows().all(|(_, v)| (0.0..=500.0).contains(&v)));
                 assert!(schedule.full_v() > 495.0, "{kind:?} {seed}: {}", schedule.full_v());
                 assert_eq!(schedule.voltage_v[0], 0.0);
-                let top = schedule.voltage_v.iter().position(|&v| v > 495.0).unwrap();
+                // A multisine may be at its lowest before it is at full scale.
+                let high = if kind == Kind::Multisine { 100.0 } else { 495.0 };
+                let top = schedule.voltage_v.iter().position(|&v| v > high).unwrap();
                 assert!(schedule.voltage_v[top..].iter().any(|&v| v < 20.0), "{kind:?} {seed} does not fall");
             }
         }

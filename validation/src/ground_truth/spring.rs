@@ -1,13 +1,13 @@
 //! The spring and its amplifier as differential equations.
 //!
-//! Command, delay, limit, slew -> voltage u -> hysteresis, law, gain -> v -> relaxation (w, creep w2) -> leakage L ->
+//! Command, delay, limit, slew -> voltage u -> hysteresis, law, gain -> v -> relaxation (w, w3, w4, creep w2) -> leakage L ->
 //! resonance p -> drift -> stiffness. A row's voltage is held until the next row; its stiffness is read just after the
 //! command. [`integrator`](super::integrator) integrates the equations over time.
 
 use super::cause::Cause;
 use super::effect::Effect;
 use super::hysteresis::Hysteresis;
-use super::physics::{Creep, Drift, Law, Leakage, Resonance, SHARE, TAU_S, Tau};
+use super::physics::{Creep, Drift, Further, Law, Leakage, Resonance, SHARE, TAU_S, Tau};
 
 /// Parameters of a spring and its amplifier. The default is the paper's plant behind an ideal amplifier.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +24,7 @@ pub struct Spring {
     pub gain: f64,
     pub share: f64,
     pub tau: Tau,
+    pub further: [Further; 2],
     pub creep: Option<Creep>,
     pub leakage: Option<Leakage>,
     pub resonance: Option<Resonance>,
@@ -41,6 +42,7 @@ impl Default for Spring {
             gain: 1.0,
             share: SHARE,
             tau: Tau::Linear { low_s: TAU_S, high_s: TAU_S },
+            further: [Further::default(); 2],
             creep: None,
             leakage: None,
             resonance: None,
@@ -49,8 +51,8 @@ impl Default for Spring {
     }
 }
 
-/// State of the differential equations, without that of the hysteresis: w, w2, L, p, p'.
-pub(super) type State = [f64; 5];
+/// State of the differential equations, without that of the hysteresis: w, w2, L, p, p', w3, w4.
+pub(super) type State = [f64; 7];
 
 impl Spring {
     /// The paper's spring with those of the effects that act before the sensor.
@@ -97,8 +99,10 @@ impl Spring {
     }
 
     /// Response before resonance and drift, and the excitation of the resonance, both in V.
-    pub(super) fn response(&self, v: f64, [w, w2, leaked, ..]: State) -> (f64, f64) {
+    pub(super) fn response(&self, v: f64, [w, w2, leaked, _, _, further @ ..]: State) -> (f64, f64) {
         let immediate = self.share * v;
+        let slower = self.further.iter().zip(further).map(|(lag, at)| lag.part * (at - w)).sum::<f64>();
+        let w = w + slower;
         let mut y = immediate + (1.0 - self.share) * w;
         match self.creep {
             None => {}
@@ -111,7 +115,7 @@ impl Spring {
 
     /// Time derivative of the state at voltage `u`; `v` is the settled response to it, both in V.
     pub(super) fn rates(&self, u: f64, v: f64, state: State) -> State {
-        let [w, w2, leaked, p, p_rate] = state;
+        let [w, w2, leaked, p, p_rate, further @ ..] = state;
         let (y, excites) = self.response(v, state);
         let creep = self.creep.map_or(0.0, |creep| (v - w2) / creep.tau_s);
         let leak = self.leakage.map_or(0.0, |Leakage { share, tau_s, before }| {
@@ -123,6 +127,7 @@ impl Spring {
             let omega = std::f64::consts::TAU * mode.freq_hz;
             omega * omega * (excites - p) - 2.0 * mode.zeta * omega * p_rate
         });
-        [(v - w) / self.tau.at(u), creep, leak, p_rate, acceleration]
+        let [third, fourth] = std::array::from_fn(|i| (v - further[i]) / self.further[i].tau_s);
+        [(v - w) / self.tau.at(u), creep, leak, p_rate, acceleration, third, fourth]
     }
 }

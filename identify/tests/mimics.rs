@@ -1,0 +1,93 @@
+//! Causes that can stand in for each other are named each for itself.
+
+use identify::{Options, diagnose};
+use simulation::record::{Record, Row};
+
+/// Time between rows, in s.
+const SAMPLE_S: f64 = 0.1;
+/// Rows of each level.
+const HELD: usize = 120;
+
+/// A spring: what follows the voltage at once, what relaxes, and what precedes both.
+struct Spring {
+    gain: f64,
+    /// Width of a play in front of the relaxation, in V.
+    width_v: f64,
+    /// Bend of the settled curve, fixed at 0 and 500 V.
+    bend: f64,
+    share: f64,
+    tau_s: f64,
+    /// Part of the relaxing response with a time constant of its own, in s.
+    slow: (f64, f64),
+    /// Part of the response that is lost under constant voltage, with its time constant, in s.
+    leaks: (f64, f64),
+}
+
+const PAPER: Spring =
+    Spring { gain: 1.0, width_v: 0.0, bend: 0.0, share: 1.0 / 11.0, tau_s: 5.5, slow: (0.0, 40.0), leaks: (0.0, 30.0) };
+
+/// The causes that are named on a record of held levels with noise of 1 V, in alphabetical order.
+fn causes(spring: &Spring, levels: &[f64]) -> Vec<&'static str> {
+    let mut state = 1u32;
+    let mut uniform = move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+    };
+    let (mut play, mut lag, mut slow, mut leak) = (0.0f64, 0.0, 0.0, 0.0);
+    let follow =
+        |state: &mut f64, target: f64, tau_s: f64| *state += (target - *state) * -f64::exp_m1(-SAMPLE_S / tau_s);
+    let mut row = |index: usize| {
+        let voltage_v = levels[index / HELD];
+        play = play.clamp(voltage_v - spring.width_v / 2.0, voltage_v + spring.width_v / 2.0);
+        let input = spring.gain * play * (1.0 + spring.bend * (play.abs() / 500.0 - 1.0));
+        let ((part, slow_s), (lost, leak_s)) = (spring.slow, spring.leaks);
+        let whole = spring.share * input + (1.0 - spring.share) * ((1.0 - part) * lag + part * slow);
+        let noise = 2.0 * (uniform() + uniform() + uniform());
+        let reading = whole - lost * leak + noise;
+        follow(&mut lag, input, spring.tau_s);
+        follow(&mut slow, input, slow_s);
+        follow(&mut leak, whole, leak_s);
+        Row { line: index + 2, time_s: SAMPLE_S * index as f64, voltage_v, measured: Some(reading) }
+    };
+    let record = Record { name: String::new(), rows: (0..HELD * levels.len()).map(&mut row).collect() };
+    let report = diagnose(&record, &Options::default()).unwrap();
+    let mut causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
+    causes.sort_unstable();
+    causes
+}
+
+/// Up and down with reversals between.
+const LOOPS: [f64; 16] =
+    [0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 350.0, 200.0, 50.0, 250.0, 450.0, 300.0, 150.0, 0.0, 400.0, 100.0];
+
+#[test]
+fn a_gain_is_named_beside_hysteresis_and_beside_a_curve() {
+    let loops = Spring { gain: 1.1, width_v: 40.0, ..PAPER };
+    assert_eq!(causes(&loops, &LOOPS), ["gain-error", "hysteresis"]);
+    let curve = Spring { gain: 0.9, bend: 0.2, ..PAPER };
+    assert_eq!(causes(&curve, &LOOPS), ["gain-error", "static-nonlinearity"]);
+    assert_eq!(causes(&Spring { width_v: 40.0, ..PAPER }, &LOOPS), ["hysteresis"]);
+    assert_eq!(causes(&Spring { bend: 0.2, ..PAPER }, &LOOPS), ["static-nonlinearity"]);
+}
+
+#[test]
+fn a_share_and_a_time_constant_are_not_leakage_and_gain() {
+    let spring = Spring { share: 0.16, tau_s: 7.5, ..PAPER };
+    assert_eq!(causes(&spring, &LOOPS), ["instantaneous-share", "time-constant"]);
+    let spring = Spring { gain: 1.1, leaks: (0.15, 40.0), ..PAPER };
+    assert_eq!(causes(&spring, &LOOPS), ["charge-leakage", "gain-error"]);
+}
+
+#[test]
+fn a_slower_second_relaxation_does_not_trade_places_with_the_main_one() {
+    let spring = Spring { tau_s: 8.0, slow: (0.2, 60.0), ..PAPER };
+    assert_eq!(causes(&spring, &LOOPS), ["second-relaxation", "time-constant"]);
+}
+
+#[test]
+fn one_level_shows_no_curve() {
+    let spring = Spring { gain: 1.1, tau_s: 7.0, ..PAPER };
+    for levels in [&[0.0, 300.0, 300.0, 300.0, 300.0][..], &[0.0, 300.0, 300.0, 300.0, 0.0, 0.0, 0.0]] {
+        assert_eq!(causes(&spring, levels), ["gain-error", "time-constant"]);
+    }
+}
