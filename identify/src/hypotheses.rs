@@ -69,7 +69,7 @@ pub struct Experiment {
     pub noise: FittedNoise,
 }
 
-/// The normalised coordinates of a record, as [`Normalisation`] defines them.
+/// The normalised coordinates of a record, in which the search works.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coordinates {
     /// Length of a normalised second, in s.

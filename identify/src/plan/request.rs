@@ -98,7 +98,7 @@ impl Request {
             bad_input!("--limit-v: expected, because the voltage of the record is always 0 V");
         }
         let slew = self.slew_v_per_s.unwrap_or(f64::INFINITY);
-        if !(slew > 0.0) {
+        if slew.is_nan() || slew <= 0.0 {
             bad_input!("--slew-v-per-s {}: expected a rate above 0 V/s", number(slew));
         }
         let volt_v = experiment.coordinates.volt_v;

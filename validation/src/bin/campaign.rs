@@ -377,14 +377,8 @@ impl Cli {
                 let outcomes = plan::run(&cases, &bar)?;
                 bar.finish_and_clear();
                 let markdown = plan::page(&outcomes);
-                Ok(Done {
-                    part,
-                    markdown,
-                    wrong: String::new(),
-                    criteria: Vec::new(),
-                    json: json!(outcomes),
-                    figure: None,
-                })
+                let json = json!(outcomes);
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None })
             }
             #[cfg(not(feature = "sensitivity"))]
             Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),

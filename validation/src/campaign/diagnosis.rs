@@ -29,11 +29,14 @@ pub fn diagnose(hidden: &LabelledRecord) -> Result<Value> {
     Ok(serde_json::to_value(identify::examine::diagnose(&hidden.record(), &Options::default())?)?)
 }
 
-/// Times in s and voltages in V of the schedule that `vsj plan` computes from a report, and the probability that it predicts.
+/// Times in s and the voltages, in V, that are held from then on.
+pub type Commands = Vec<(f64, f64)>;
+
+/// The schedule that `vsj plan` computes from a report, and the probability that it predicts.
 ///
 /// # Errors
 /// The report or the duration is rejected.
-pub fn planned(report: &Value, minutes: f64) -> Result<(Vec<(f64, f64)>, Option<f64>)> {
+pub fn planned(report: &Value, minutes: f64) -> Result<(Commands, Option<f64>)> {
     let basis: Basis = serde_json::from_value(report.clone())?;
     let plan = plan(&basis, &Request { minutes: Some(minutes), ..Request::default() }, "the report")?;
     Ok((plan.commands.iter().map(|command| (command.time_s, command.voltage_v)).collect(), plan.probability))
