@@ -19,9 +19,14 @@ const STRAIGHT: usize = 0;
 const EXPONENTIAL: usize = 1;
 const STEP: usize = 3;
 
+/// Smallest part of the readings' sum of squares before a step of the gain, and after it: with less before, it is a gain error.
+const LEAST_PART: f64 = 0.1;
+
 /// Returns the row from which on a factor other than 1 reduces the squared error most, and the factor less 1; NaN rows do not count.
 fn best_step(FitContext { data, residual, .. }: &FitContext) -> Option<Vec<f64>> {
     let (mut product, mut square) = (0.0, 0.0);
+    let seen = data.reading.iter().zip(*residual).filter(|(_, left)| !left.is_nan());
+    let all: f64 = seen.map(|(reading, _)| reading * reading).sum();
     let mut best: Option<(f64, f64, f64)> = None;
     let rows = residual.len();
     for row in (1..rows).rev() {
@@ -30,7 +35,8 @@ fn best_step(FitContext { data, residual, .. }: &FitContext) -> Option<Vec<f64>>
             square += data.reading[row] * data.reading[row];
         }
         let long = rows - row >= SHORTEST_RUN.count() && row >= SHORTEST_RUN.count();
-        if long && square > 0.0 && best.is_none_or(|(gain, ..)| product * product / square > gain) {
+        let both = square >= LEAST_PART * all && square <= (1.0 - LEAST_PART) * all;
+        if long && both && square > 0.0 && best.is_none_or(|(gain, ..)| product * product / square > gain) {
             best = Some((product * product / square, row as f64, product / square));
         }
     }
