@@ -17,6 +17,8 @@ use crate::examine::options::Options;
 use crate::examine::passes::{examine, joint};
 use crate::nominal::best_linear;
 use crate::plant::base::Base;
+use crate::stats::median::median;
+use crate::stats::thresholds::probability::Z_ZERO;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::linear_rival::compare;
@@ -47,10 +49,20 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     spring.unmodelled = None;
     let plant = "the spring with the shared causes".to_owned();
     let options = Options { plant, base: Base::new(spring)?, ..options.clone() };
-    for (record, offset) in records.iter().zip(joint.zero_offsets.clone()) {
-        let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-        let from_zero = [from_zero];
-        let alone = self::joint(&from_zero, &options, None, &mut |of| progress(&format!("{}: {of}", record.name)))?;
+    for (record, mut offset) in records.iter().zip(joint.zero_offsets.clone()) {
+        let mut from = |offset: f64| {
+            let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
+            self::joint(&[from_zero], &options, None, &mut |of| progress(&format!("{}: {of}", record.name)))
+        };
+        let mut alone = from(offset)?;
+        // A shifted stretch had a part in the zero that the joint fit found.
+        let left = median(&mut alone.extended.residual.clone()).unwrap_or(0.0);
+        let chance = Z_ZERO * alone.report.noise.sigma / (alone.data.rows() as f64).sqrt();
+        let shifted = alone.report.findings.iter().any(|finding| finding.cause == "reading-offset");
+        if shifted && left.abs() > chance {
+            offset += left;
+            alone = from(offset)?;
+        }
         joint.report.complete &= alone.report.complete;
         joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
     }

@@ -47,8 +47,15 @@ pub(crate) fn search(
         Some(warm_start) => search.run_from(warm_start, progress),
     };
     search.evaluator().budget().close();
-    let [before, after] = [baseline, &best.fit].map(|fit| root_mean_square(&observed.errors(&fit.residual)));
-    if after > LARGEST_ERROR_RATIO.get() * before {
+    let error = |residual: &[f64]| root_mean_square(&observed.errors(residual));
+    let [before, after] = [baseline, &best.fit].map(|fit| error(&fit.residual));
+    let is_worse = |engine: &mut Engine| {
+        let [before, after] = [baseline, &best.fit].map(|fit| error(&engine.held_out_residual(fit)));
+        after > before
+    };
+    // A search that was cut may end with causes that do not predict.
+    let cut = search.evaluator().budget().was_cut();
+    if after > LARGEST_ERROR_RATIO.get() * before || cut && is_worse(search.evaluator()) {
         best = search.root();
     }
     let candidate = Candidate { fit: &best.fit, score: best.score };

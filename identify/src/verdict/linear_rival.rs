@@ -15,7 +15,7 @@ use crate::nominal::BestLinear;
 use crate::record::observed::Kind;
 use crate::stats::scale::root_mean_square;
 use crate::stats::sums::dot;
-use crate::stats::thresholds::empirical::WORSE_THAN_LINEAR;
+use crate::stats::thresholds::empirical::{FINEST_V, WORSE_THAN_LINEAR};
 use crate::stats::thresholds::probability::Z_WORSE;
 use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
@@ -43,7 +43,8 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<BestLinear>) {
     };
     let [ours, theirs] = [ours, theirs].map(|errors| exact(errors));
     let [ours_less, theirs_less] = [&ours, &theirs].map(|errors| without_cubic(errors, &diagnosis.data.time_s));
-    if !is_worse(&ours_less, &theirs_less, WORSE_THAN_LINEAR.get()) {
+    let finest = diagnosis.data.scales().restored(Dimension::ReadingSize, FINEST_V.get());
+    if root_mean_square(&ours) <= finest || !is_worse(&ours_less, &theirs_less, WORSE_THAN_LINEAR.get()) {
         return;
     }
     let shown = |errors: &[f64]| {
