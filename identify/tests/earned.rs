@@ -78,3 +78,19 @@ fn a_cause_that_leaves_nothing_but_noise_is_explained_and_sure() {
     assert_eq!((found.verdict, found.findings[0].cause), (Verdict::Explained, "gain-error"), "{found:?}");
     assert!(found.findings[0].probability > 0.99, "{:?}", found.findings[0]);
 }
+
+/// Readings at a bound say only that the stiffness is beyond it, also where the rest of a record is predicted.
+#[test]
+fn a_drift_into_the_bound_of_the_sensor_is_explained() {
+    let mut drifting = record(
+        |voltage_v, state, _| lag(voltage_v, state, 5.5),
+        |voltage_v, state, time_s| (1.0 + 0.002 * time_s) * plain(voltage_v, state),
+    );
+    for row in &mut drifting.rows {
+        row.measured = row.measured.map(|reading| reading.min(150.0));
+    }
+    let found = report(&drifting);
+    let mut causes: Vec<_> = found.findings.iter().map(|finding| finding.cause).collect();
+    causes.sort_unstable();
+    assert_eq!((found.verdict, causes), (Verdict::Explained, vec!["drift", "sensor-saturation"]), "{found:?}");
+}

@@ -68,20 +68,22 @@ impl Engine<'_> {
         unseen
     }
 
-    /// Returns reading minus prediction of the rows from `rows` on, in V, by a fit to the rows before; searched coordinates stay.
+    /// Returns the errors of the rows from `rows` on, in V, by a fit to the rows before; searched coordinates stay, and a reading at a
+    /// bound counts only where the prediction is within it.
     pub fn extrapolation_residual(&mut self, fit: &Fit, rows: usize) -> Vec<f64> {
         let mut before = fit.clone();
         for _ in 0..EXTRAPOLATION_STEPS {
             let model = FullFit::new(self, &before).refitted(self, |row| row < rows);
             let residual = self.residual(&model);
             // A step that the rows before do not confirm is beyond the linearisation.
-            let is_better = root_mean_square(&residual[..rows]) <= root_mean_square(&before.residual[..rows]);
+            let error = |residual: &[f64]| root_mean_square(&self.observed.errors(residual)[..rows]);
+            let is_better = error(&residual) <= error(&before.residual);
             if !is_better || model == before.model {
                 break;
             }
             before = Fit { model, residual, ..before };
         }
-        before.residual.split_off(rows)
+        self.observed.errors(&before.residual)[rows..].to_vec()
     }
 }
 
