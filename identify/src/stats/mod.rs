@@ -10,5 +10,6 @@
 pub mod median;
 pub mod periodogram;
 pub mod scale;
+pub(crate) mod segments;
 pub mod sums;
 pub mod thresholds;

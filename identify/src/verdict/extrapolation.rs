@@ -8,9 +8,9 @@ use crate::effects::EFFECTS;
 use crate::fit::engine::{Engine, Fit};
 use crate::record::scales::Scales;
 use crate::stats::scale::root_mean_square;
+use crate::stats::segments::is_worse;
 use crate::stats::thresholds::empirical::WORSE_THAN_WITHOUT;
 use crate::verdict::found::Found;
-use crate::verdict::linear_rival::is_worse;
 
 /// Part of the rows to which a cause is fitted.
 const FIRST_PART: f64 = 0.6;

@@ -1,11 +1,7 @@
 //! Whether a linear model predicts held-out segments better than the extended simulation.
 //!
 //! A linear model has its own zero and free responses, which follow slow noise that no simulation knows. So a cubic of the time is
-//! removed from both errors before they are compared, segment by segment:
-//!
-//! ```text
-//! z = sum_k d_k / sqrt(sum_k d_k^2)        d_k: sum of squares of the extension less that of the linear model in segment k
-//! ```
+//! removed from both errors before they are compared, segment by segment ([`segments`](crate::stats::segments)).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,15 +10,12 @@ use crate::dimension::Dimension;
 use crate::nominal::BestLinear;
 use crate::record::observed::Kind;
 use crate::stats::scale::root_mean_square;
-use crate::stats::sums::dot;
+use crate::stats::segments::{SEGMENTS, is_worse};
 use crate::stats::thresholds::empirical::{FINEST_V, WORSE_THAN_LINEAR};
-use crate::stats::thresholds::probability::Z_WORSE;
 use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 
-/// Number of segments that are compared.
-const SEGMENTS: usize = 40;
 /// Coefficients of the cubic.
 const COEFFICIENTS: usize = 4;
 
@@ -62,17 +55,6 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<BestLinear>) {
         shown(&theirs),
         shown(&ours)
     ));
-}
-
-/// True if the errors `ours` are larger than `theirs` by more than a `factor` in root mean square, and beyond chance.
-pub(crate) fn is_worse(ours: &[f64], theirs: &[f64], factor: f64) -> bool {
-    if root_mean_square(ours) <= factor * root_mean_square(theirs) {
-        return false;
-    }
-    let length = ours.len().div_ceil(SEGMENTS).max(1);
-    let more = |(ours, theirs): (&[f64], &[f64])| dot(ours, ours) - dot(theirs, theirs);
-    let more: Vec<f64> = ours.chunks(length).zip(theirs.chunks(length)).map(more).collect();
-    more.iter().sum::<f64>() > Z_WORSE * dot(&more, &more).sqrt()
 }
 
 /// Errors less their best cubic of the time.
@@ -117,14 +99,5 @@ mod tests {
     #[test]
     fn slow_noise_does_not_make_a_linear_model_better() {
         assert!(!worse(1.0, 2.0));
-    }
-
-    /// One segment with a large error tells nothing about the others.
-    #[test]
-    fn one_bad_segment_is_not_beyond_chance() {
-        let theirs = normals(ROWS);
-        let mut ours = theirs.clone();
-        ours[200..250].iter_mut().for_each(|error| *error += 10.0);
-        assert!(!is_worse(&ours, &theirs, WORSE_THAN_LINEAR.get()));
     }
 }

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::case::{Case, Subject};
+use super::case::Case;
 use super::score::{Estimate, Report, estimates};
+use super::subject::Subject;
 
 /// A probability above which a wrong name counts as confidently wrong.
 pub const SURE: f64 = 0.9;

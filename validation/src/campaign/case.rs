@@ -2,12 +2,10 @@
 
 use std::fmt::{self, Debug};
 
-use simulation::plant_file::PlantFile;
-use simulation::record::Record;
-
 use super::part::Job;
+use super::subject::Subject;
+use crate::ground_truth::Cause;
 use crate::ground_truth::out_of_model::form::Form;
-use crate::ground_truth::{Cause, LabelledRecord};
 
 /// Cause codes that are true of a record; without one the record has no effect.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,23 +35,6 @@ impl Expected {
     pub fn is_named(&self, mut names: impl FnMut(&str) -> bool) -> bool {
         let mut codes = self.first.iter();
         if self.all { codes.all(|code| names(code)) } else { codes.any(|code| names(code)) }
-    }
-}
-
-/// A record to diagnose, and the nominal spring that it is compared with.
-#[derive(Clone, Debug)]
-pub struct Subject {
-    /// Simulated record with its true effects, in s and V.
-    pub hidden: LabelledRecord,
-    /// The record that is diagnosed, which may be in other units.
-    pub record: Record,
-    /// Nominal spring; `None` for the paper's.
-    pub nominal: Option<PlantFile>,
-}
-
-impl From<LabelledRecord> for Subject {
-    fn from(hidden: LabelledRecord) -> Self {
-        Self { record: hidden.record(), hidden, nominal: None }
     }
 }
 

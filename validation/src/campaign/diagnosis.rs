@@ -15,7 +15,7 @@ use serde_json::Value;
 use simulation::plant_file::PlantFile;
 use simulation::record::Record;
 
-use super::case::Subject;
+use super::subject::Subject;
 use crate::ground_truth::LabelledRecord;
 
 /// A diagnosis of a record, as the JSON of `vsj diagnose`; tests of the campaign replace it by an oracle.

@@ -11,6 +11,7 @@
 //! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
 //! | [`score`] | the diagnosis of one record compared with the truth |
 //! | [`part`], [`summary`] | the parts of the campaign, and the counts over their records |
+//! | [`subject`] | what is diagnosed: a record in any units with its nominal spring |
 //! | [`case`] | records that can be drawn, with the names that are true of them |
 //! | [`answer`], [`answer_table`] | diagnoses graded by these names; their tables |
 //! | [`shared`] | pairs of causes that share a stage or mimic each other |
@@ -48,6 +49,7 @@ pub mod sensitivity;
 pub mod shared;
 pub mod statistics;
 pub mod steps;
+pub mod subject;
 pub mod summary;
 pub mod tables;
 pub mod thresholds;

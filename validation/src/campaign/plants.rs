@@ -8,9 +8,10 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::case::{Case, Expected, Subject};
+use super::case::{Case, Expected};
 use super::part::seed;
 use super::scales;
+use super::subject::Subject;
 use super::{detectable, isolable};
 use crate::ground_truth::noise::{Kind as NoiseKind, Noise};
 use crate::ground_truth::physics::{Further, TAU_S};

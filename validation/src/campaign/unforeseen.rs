@@ -4,8 +4,9 @@ use std::fmt::Write;
 
 use super::answer::Answer;
 use super::answer_table::{legend, page as tables};
-use super::case::{Case, Expected, Subject};
+use super::case::{Case, Expected};
 use super::part::seed;
+use super::subject::Subject;
 use crate::ground_truth::unforeseen::all;
 use crate::ground_truth::unforeseen::law::Law;
 use crate::markdown::table;
