@@ -8,7 +8,7 @@ const SAMPLE_S: f64 = 0.1;
 /// Rows of each level.
 const HELD: usize = 120;
 
-/// A spring: what follows the voltage at once, what relaxes, and what precedes both.
+/// A spring: what follows the voltage instantaneously, what relaxes, and what precedes both.
 struct Spring {
     gain: f64,
     /// Width of a play in front of the relaxation, in V.

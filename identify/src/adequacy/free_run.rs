@@ -26,7 +26,7 @@ use crate::adequacy::spikes::far_off;
 use crate::adequacy::voltage_history::{Column, columns};
 use crate::fit::engine::{Engine, Fit};
 use crate::record::folds::folds_of_segments;
-use crate::stats::scale::{negligible, root_mean_square};
+use crate::stats::scale::{centred, negligible, root_mean_square};
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{COLOUR_OF_WHITE, FEWEST_BLOCKS, SHARE_OF_COLOURED_NOISE, SHARE_UNEXPLAINED};
 
@@ -60,7 +60,7 @@ fn predictable(engine: &Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
         return None;
     }
     let target = means(&errors, rows_of_block);
-    let per_block = |column: Column| Column { values: standardised(means(&column.values, rows_of_block)), ..column };
+    let per_block = |column: Column| Column { values: standardised(&means(&column.values, rows_of_block)), ..column };
     let all: Vec<Column> = columns(engine.data, engine.base().relaxation.tau_s).into_iter().map(per_block).collect();
     let varies = |column: &&Column| column.values.iter().any(|value| *value != 0.0);
     let all: Vec<&Column> = all.iter().filter(varies).collect();
@@ -109,14 +109,12 @@ fn means(values: &[f64], rows: usize) -> Vec<f64> {
 }
 
 /// Values less their mean, with a mean square of 1; zeros if they are constant.
-fn standardised(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
+fn standardised(values: &[f64]) -> Vec<f64> {
     let largest = values.iter().fold(0.0f64, |most, value| most.max(value.abs()));
-    values.iter_mut().for_each(|value| *value -= mean);
-    let scale = root_mean_square(&values);
+    let centred = centred(values);
+    let scale = root_mean_square(&centred);
     let constant = scale <= 1e-9 * largest;
-    values.iter_mut().for_each(|value| *value = if constant { 0.0 } else { *value / scale });
-    values
+    centred.into_iter().map(|value| if constant { 0.0 } else { value / scale }).collect()
 }
 
 /// Reduction of the sum of squares of `target` on held-out segments, by the best ridge; negative if no ridge predicts.

@@ -12,6 +12,7 @@ use crate::adequacy::unidentifiable::Unidentifiable;
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
 use crate::stats::median::median;
+use crate::stats::scale::centred;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 
@@ -50,10 +51,6 @@ impl Check for NoResponse {
 
 /// Returns the squared correlation of two series of equal length; 0 if one of them is constant.
 fn squared_correlation(a: &[f64], b: &[f64]) -> f64 {
-    let centred = |values: &[f64]| -> Vec<f64> {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        values.iter().map(|value| value - mean).collect()
-    };
     let (a, b) = (centred(a), centred(b));
     dot(&a, &b).powi(2) / (dot(&a, &a) * dot(&b, &b)).max(f64::MIN_POSITIVE)
 }

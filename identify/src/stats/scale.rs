@@ -16,6 +16,12 @@ pub fn negligible(residual: &[f64]) -> bool {
     root_mean_square(residual) <= FINEST_V.get()
 }
 
+/// Returns the values less their mean.
+pub fn centred(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().map(|value| value - mean).collect()
+}
+
 /// Returns the root mean square of the values, in their unit; 0 if there are none.
 pub fn root_mean_square(residual: &[f64]) -> f64 {
     (dot(residual, residual) / residual.len().max(1) as f64).sqrt()

@@ -6,7 +6,7 @@ use crate::answer::{NoiseReport, Quality, ResidualReport};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
 use crate::record::data::Data;
-use crate::stats::scale::root_mean_square;
+use crate::stats::scale::{centred, root_mean_square};
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::FINEST_V;
 use crate::stats::thresholds::probability::Z;
@@ -20,9 +20,7 @@ pub(crate) fn quality(engine: &Engine, fit: &Fit, held_out: &[f64], stops: bool)
     let observed = engine.observed;
     let error = |residual: &[f64]| root_mean_square(&if stops { observed.errors(residual) } else { residual.into() });
     let rmse = error(&fit.residual);
-    let reading = &engine.data.reading;
-    let mean = reading.iter().sum::<f64>() / reading.len() as f64;
-    let spread = root_mean_square(&reading.iter().map(|value| value - mean).collect::<Vec<_>>());
+    let spread = root_mean_square(&centred(&engine.data.reading));
     Quality {
         rmse,
         // Undefined for readings that never change.

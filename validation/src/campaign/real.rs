@@ -22,7 +22,7 @@ use anyhow::{Context, Result, bail};
 use cpu_time::ProcessTime;
 use identify::nominal::identify;
 use identify::plant::base::Base;
-use identify::stats::scale::root_mean_square;
+use identify::stats::scale::{centred, root_mean_square};
 use identify::{Input, Options, examine};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -195,7 +195,6 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
         last: Some(root_mean_square(&beyond)),
     };
     let read: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
-    let mean = read.iter().sum::<f64>() / read.len() as f64;
     let verdict = serde_json::to_value(diagnosis.report.verdict)?;
     let findings = diagnosis.report.findings.iter();
     Ok(Row {
@@ -203,7 +202,7 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
         known: known.clone(),
         rows: read.len(),
         unit: units.reading.clone(),
-        spread: root_mean_square(&read.iter().map(|y| y - mean).collect::<Vec<_>>()),
+        spread: root_mean_square(&centred(&read)),
         nominal: in_words(report),
         verdict: verdict.as_str().unwrap_or_default().to_owned(),
         causes: findings.map(|finding| (finding.cause.to_owned(), finding.probability)).collect(),
