@@ -104,6 +104,18 @@ impl Evaluated {
         ranked
     }
 
+    /// The structures with the same effects as `best` in other forms, with scores at most `nats` below its score.
+    pub(super) fn other_forms(&self, best: &Scored, nats: f64) -> Vec<&Scored> {
+        let (structure, set) = (best.fit.model.structure(), effects(&best.fit.model));
+        let is_other_form = |other: &&Scored| {
+            let model = &other.fit.model;
+            other.score > best.score - nats && model.structure() != structure && effects(model) == set
+        };
+        let mut others: Vec<&Scored> = self.scored.values().filter(is_other_form).collect();
+        others.sort_by_key(|other| other.fit.model.structure());
+        others
+    }
+
     /// The best of all structures without an effect and without every effect that contains it as a special case.
     pub(super) fn best_without(&self, effect: usize) -> Option<Scored> {
         let has = |model: &Model| effects(model).into_iter().any(|other| other == effect || contains(other, effect));

@@ -16,6 +16,13 @@ pub struct Explored {
     first_fits: HashMap<Vec<Block>, Vec<FirstFits>>,
 }
 
+impl Explored {
+    /// The structures with the same effects as `best` in other forms, with scores at most `nats` below its score.
+    pub fn other_forms(&self, best: &Scored, nats: f64) -> Vec<&Scored> {
+        self.evaluated.other_forms(best, nats)
+    }
+}
+
 impl<'e, E: Evaluator> Search<'e, E> {
     /// Ends the search and returns what it has evaluated.
     pub fn into_explored(self) -> Explored {

@@ -197,7 +197,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
 /// All findings, the one that explains the largest mean square error first.
 fn findings(engine: &mut Engine, found: &Found) -> Vec<Finding> {
     let (data, observed, fit) = (engine.data, engine.observed, &found.best.fit);
-    let mut findings: Vec<Finding> = found.causes.iter().map(|cause| finding(engine, &found.best, cause)).collect();
+    let mut findings: Vec<Finding> =
+        found.causes.iter().map(|cause| finding(engine, &found.best, &found.explored, cause)).collect();
     let isolated = adequacy::spikes(engine, fit).is_none();
     findings.extend(reading_findings(data, observed, fit, isolated));
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));

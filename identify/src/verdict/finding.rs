@@ -4,9 +4,9 @@ use crate::answer::{Finding, Parameter};
 use crate::dimension::Dimension;
 use crate::effects::EFFECTS;
 use crate::fit::engine::Engine;
-use crate::fit::interval::parameters;
-use crate::search::Scored;
+use crate::search::{Explored, Scored};
 use crate::verdict::cause::Cause;
+use crate::verdict::form_average::parameters_over_forms;
 use crate::verdict::ranking::{named, rms};
 
 /// Largest odds that are converted to a probability, in nats.
@@ -18,7 +18,7 @@ pub(crate) fn explained(finding: &Finding) -> f64 {
 }
 
 /// Reports an effect of the best structure.
-pub(crate) fn finding(engine: &mut Engine, best: &Scored, cause: &Cause) -> Finding {
+pub(crate) fn finding(engine: &mut Engine, best: &Scored, explored: &Explored, cause: &Cause) -> Finding {
     let Cause { effect, without, left_out } = cause;
     let effect = *effect;
     let odds = best.score - without.score;
@@ -32,7 +32,7 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, cause: &Cause) -> Find
     } else {
         format!("on held-out segments this is {odds:.1} nats better")
     };
-    let parameters = parameters(engine, &best.fit, effect);
+    let parameters = parameters_over_forms(engine, best, explored, effect);
     let at_bounds = at_bounds(&parameters);
     Finding {
         cause: EFFECTS[effect].cause(),

@@ -23,6 +23,7 @@ pub mod diagnosis;
 pub mod export;
 mod extrapolation;
 pub mod finding;
+mod form_average;
 pub(crate) mod found;
 pub(crate) mod hypotheses;
 pub(crate) mod linear_rival;

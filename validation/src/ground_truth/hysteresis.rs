@@ -78,7 +78,7 @@ impl Hysteresis {
     /// Largest distance along the voltage axis between the branches of a full slow loop from 0 to 500 V, in V, found by
     /// simulating the loop.
     pub fn width_v(&self) -> f64 {
-        const STEPS: u32 = 4000;
+        const STEPS: u32 = 40_000;
         let mut hysteresis = self.clone();
         let mut go = |up: bool| -> Vec<(f64, f64)> {
             let part = |i: u32| f64::from(if up { i } else { STEPS - i }) / f64::from(STEPS);

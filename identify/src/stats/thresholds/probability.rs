@@ -41,6 +41,8 @@ limits! {
     Z_IN_STEP = 4.6, Permutations(2e-5);
     /// Natural logarithm of the odds against a rival set of causes, in nats, below which the record cannot reject it: 20 to 1.
     RIVAL_ODDS = 2.995_732_273_553_991, Odds(1.0 / 20.0);
+    /// Difference of two scores, in nats, beyond which a form of the same causes is left out of their intervals: a weight of 1 to 100.
+    NATS_OF_A_FORM = 4.605_170_185_988_091, Odds(0.01);
     /// Difference of two scores, in nats, from which the less usual explanation is kept: readings that were cut off instead of
     /// rounded, a spring that lacks a part of the plant file. The odds are 20 to 1.
     CLEARLY_LIKELIER = 2.995_732_273_553_991, Odds(1.0 / 20.0);
