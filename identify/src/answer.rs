@@ -193,6 +193,9 @@ pub struct Suspect {
     pub nats_short: f64,
     /// How both errors were measured.
     pub judge: Judge,
+    /// Its probability, below 0.5, if the extended simulation contains it; none otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probability: Option<f64>,
 }
 
 /// How the errors with and without a suspect are measured.
@@ -204,6 +207,8 @@ pub enum Judge {
     /// Single readings, each predicted by a fit to all others: for causes that act in a part of the record, about which the other
     /// segments cannot know.
     LeaveOneOut,
+    /// All readings, those of the fit: for causes that the extended simulation contains.
+    Fit,
 }
 
 fn by_name<S: Serializer>(parameters: &[(String, Parameter)], to: S) -> Result<S::Ok, S::Error> {

@@ -32,6 +32,7 @@ use crate::record::observed::Observed;
 use crate::search::{Scored, Search, WarmStart};
 use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
+use crate::verdict::credibility;
 use crate::verdict::diagnosis::{self, Diagnosis};
 use crate::verdict::hypotheses::hypotheses;
 use crate::verdict::linear_rival::compare;
@@ -53,6 +54,7 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let records = std::slice::from_ref(record);
     let mut found = joint(records, options, None, &mut progress)?;
     compare(&mut found, best_linear(records, options.input));
+    credibility::unlikely_to_suspects(&mut found.report);
     Ok(found)
 }
 

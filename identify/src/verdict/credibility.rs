@@ -15,11 +15,16 @@
 //! ```text
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
 //! ```
+//!
+//! and what is then less likely true than untrue is a suspect, no finding.
 
-use crate::answer::Finding;
+use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
 use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
 use crate::verdict::extrapolation::Spoils;
 use crate::verdict::finding::explained;
+
+/// Probability of what is as likely true as untrue.
+const EVEN: f64 = 0.5;
 
 /// Causes that exact equality of readings proves.
 const EXACT: [&str; 2] = ["quantisation", "sensor-saturation"];
@@ -60,6 +65,32 @@ pub(crate) fn in_unexplained(findings: &mut [Finding], structure: f64) {
 pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
     let spoils = |finding: &&mut Finding| spoiling.iter().any(|spoils| spoils.is(finding));
     findings.iter_mut().filter(spoils).for_each(|finding| lower(finding, IF_SPOILING.get()));
+}
+
+/// In a record with the verdict `unexplained`, makes suspects of the findings that are less likely true than untrue.
+pub(crate) fn unlikely_to_suspects(report: &mut Report) {
+    if report.verdict == Verdict::Unexplained {
+        let unlikely = unlikely(&mut report.findings);
+        report.suspects.splice(0..0, unlikely);
+    }
+}
+
+/// Takes the findings with a probability below [`EVEN`] out; returns them as suspects, the likeliest first.
+fn unlikely(findings: &mut Vec<Finding>) -> Vec<Suspect> {
+    let causes: Vec<&str> = findings.iter().map(|finding| finding.cause).collect();
+    let mut unlikely: Vec<Finding> = findings.extract_if(.., |finding| finding.probability < EVEN).collect();
+    unlikely.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let suspect = |Finding { cause, probability, parameters, rmse_before, rmse_after, .. }| Suspect {
+        cause,
+        with: causes.iter().copied().filter(|other| *other != cause).collect(),
+        parameters,
+        rmse_before,
+        rmse_after,
+        nats_short: 0.0,
+        judge: Judge::Fit,
+        probability: Some(probability),
+    };
+    unlikely.into_iter().map(suspect).collect()
 }
 
 /// Part of the sum that is `removed`; 1 if both are 0.
@@ -105,5 +136,16 @@ mod tests {
         in_unexplained(&mut findings, 0.5);
         let [large, small] = probabilities(&findings)[..] else { panic!() };
         assert!((0.89..0.9).contains(&large) && small < 0.5, "{large} {small}");
+    }
+
+    #[test]
+    fn what_is_less_likely_than_not_is_a_suspect() {
+        let probable = |cause, probability| Finding { probability, ..finding(cause, 2.0) };
+        let mut findings = vec![probable("hum", 0.2), probable("drift", 0.6), probable("delay", 0.4)];
+        let suspects = unlikely(&mut findings);
+        assert!(findings.len() == 1 && findings[0].cause == "drift");
+        let suspects: Vec<_> = suspects.into_iter().map(|it| (it.cause, it.probability, it.with)).collect();
+        let expected = [("delay", Some(0.4), vec!["hum", "drift"]), ("hum", Some(0.2), vec!["drift", "delay"])];
+        assert_eq!(suspects, expected);
     }
 }

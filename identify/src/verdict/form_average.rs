@@ -48,12 +48,8 @@ pub(crate) fn parameters_over_forms(
     let others: Vec<_> =
         others.into_iter().map(|other| (other.score - best.score, parameters(engine, &other.fit, effect))).collect();
     for (name, parameter) in &mut found {
-        let component = |score: f64, of: &Parameter| Component {
-            weight: score.exp(),
-            value: of.value,
-            low: of.low,
-            high: of.high,
-        };
+        let component =
+            |score: f64, of: &Parameter| Component { weight: score.exp(), value: of.value, low: of.low, high: of.high };
         let same = |(score, parameters): &(f64, Vec<(String, Parameter)>)| {
             parameters.iter().find(|(other, _)| other == name).map(|(_, of)| component(*score, of))
         };

@@ -74,6 +74,7 @@ fn suspect(search: &mut Search<Engine>, best: &Scored, effect: usize, set: &Scor
         rmse_after,
         nats_short: (best.score - set.score).max(0.0),
         judge,
+        probability: None,
     })
 }
 
@@ -89,6 +90,7 @@ fn error(engine: &mut Engine, fit: &Fit, judge: Judge) -> f64 {
     let residual = match judge {
         Judge::HeldOut => engine.held_out_residual(fit),
         Judge::LeaveOneOut => engine.leave_one_out_residual(fit),
+        Judge::Fit => fit.residual.clone(),
     };
     rms(engine.observed, &residual)
 }

@@ -11,7 +11,8 @@ use crate::output::diagnosis::number::{interval, number, shown_name};
 
 /// Explanation of the table.
 const CAPTION: &str = "Causes that come closest to a finding and are none. Each would be one with so many nats more; an error that \
-                       grows means that the rest of the record does not predict the cause.";
+                       grows means that the rest of the record does not predict the cause. One that the extended simulation \
+                       contains has a probability below 0.5.";
 
 /// The table for the terminal; empty without suspects.
 pub(super) fn text(suspects: &[Suspect], scales: &Scales) -> String {
@@ -89,12 +90,18 @@ fn judge(judge: Judge) -> &'static str {
         Judge::LeaveOneOut => {
             "errors with one reading left out at a time: the cause acts in a part of the record, which held-out segments cannot judge"
         }
+        Judge::Fit => "errors of the fit to all readings",
     }
 }
 
-/// The causes beside which a suspect stands.
+/// The causes beside which a suspect stands, and its probability.
 fn company(suspect: &Suspect) -> String {
-    if suspect.with.is_empty() { String::new() } else { format!(", together with {}", suspect.with.join(" and ")) }
+    let with =
+        if suspect.with.is_empty() { String::new() } else { format!(", together with {}", suspect.with.join(" and ")) };
+    match suspect.probability {
+        Some(probability) => format!("{with}; in the extended simulation, with a probability of {probability:.2}"),
+        None => with,
+    }
 }
 
 #[cfg(test)]
@@ -121,6 +128,7 @@ mod tests {
             rmse_after: 21.5,
             nats_short: 2.26,
             judge,
+            probability: None,
         }
     }
 

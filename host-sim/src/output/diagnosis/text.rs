@@ -262,10 +262,13 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
     if report.verdict == Verdict::Unexplained
         && let Some(suspect) = report.suspects.first()
     {
+        let distance = match suspect.probability {
+            Some(probability) => format!("with a probability of {probability:.2}"),
+            None => format!("{:.1} nats short of a finding", suspect.nats_short),
+        };
         sentences.push(format!(
-            "The best suspect is {}, {:.1} nats short of a finding: it changes the error from {} to {} {unit}.",
+            "The best suspect is {}, {distance}: it changes the error from {} to {} {unit}.",
             suspect.cause,
-            suspect.nats_short,
             error(suspect.rmse_before),
             error(suspect.rmse_after)
         ));
@@ -398,6 +401,7 @@ mod tests {
             rmse_after: 20.029,
             nats_short: 4.46,
             judge: answer::Judge::LeaveOneOut,
+            probability: None,
         });
         let said = "The best suspect is reading-offset, 4.5 nats short of a finding: it changes the error from 42.675 to 20.029 V.";
         assert_eq!(sentences("r.csv", &report, &Scales::default())[1], said);
