@@ -14,10 +14,8 @@ use crate::noise::Noise;
 use crate::stats::median::median;
 use crate::stats::scale::centred;
 use crate::stats::sums::dot;
+use crate::stats::thresholds::empirical::RESPONSE;
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
-
-/// Smallest squared correlation of the readings with the voltage or the simulation that is a response.
-const RESPONSE: f64 = 0.25;
 
 /// The check of a record, with the fit of the simulation as it is given.
 pub(super) struct NoResponse;
@@ -31,7 +29,7 @@ impl Check for NoResponse {
         let reading = &engine.data.reading;
         let constant = median(&mut reading.clone()).expect("readings");
         let simulated: Vec<f64> = reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
-        let responds = |to: &[f64]| squared_correlation(reading, to) > RESPONSE;
+        let responds = |to: &[f64]| squared_correlation(reading, to) > RESPONSE.get();
         if responds(&engine.data.voltage_v) || responds(&simulated) {
             return None;
         }

@@ -10,7 +10,7 @@
 use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
-use crate::stats::thresholds::empirical::SHORTEST_RUN;
+use crate::stats::thresholds::empirical::{LEAST_PART_OF_STEP, SHORTEST_RUN};
 use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
 
 pub(super) struct Drift;
@@ -19,11 +19,9 @@ const STRAIGHT: usize = 0;
 const EXPONENTIAL: usize = 1;
 const STEP: usize = 3;
 
-/// Smallest part of the readings' sum of squares before a step of the gain, and after it: with less before, it is a gain error.
-const LEAST_PART: f64 = 0.1;
-
 /// Returns the row from which on a factor other than 1 reduces the squared error most, and the factor less 1; NaN rows do not count.
 fn best_step(FitContext { data, residual, .. }: &FitContext) -> Option<Vec<f64>> {
+    let least = LEAST_PART_OF_STEP.get();
     let (mut product, mut square) = (0.0, 0.0);
     let seen = data.reading.iter().zip(*residual).filter(|(_, left)| !left.is_nan());
     let all: f64 = seen.map(|(reading, _)| reading * reading).sum();
@@ -35,7 +33,7 @@ fn best_step(FitContext { data, residual, .. }: &FitContext) -> Option<Vec<f64>>
             square += data.reading[row] * data.reading[row];
         }
         let long = rows - row >= SHORTEST_RUN.count() && row >= SHORTEST_RUN.count();
-        let both = square >= LEAST_PART * all && square <= (1.0 - LEAST_PART) * all;
+        let both = (least * all..=(1.0 - least) * all).contains(&square);
         if long && both && square > 0.0 && best.is_none_or(|(gain, ..)| product * product / square > gain) {
             best = Some((product * product / square, row as f64, product / square));
         }

@@ -229,7 +229,7 @@ impl Answer {
 /// `count` random pairs of causes that a voltage can show, of 0.15 times their full size, and one record of each form of the out-of-model
 /// set with such a cause, `count` at most.
 pub fn cases(forms: &[Form], first: u64, count: usize) -> Vec<Case> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed(first, 15, 0));
+    let mut random = ChaCha8Rng::seed_from_u64(seed(first, 19, 0));
     let causes: Vec<Cause> = Cause::ALL.into_iter().filter(|cause| cause.block() != Block::Reading).collect();
     let mut pairs: Vec<[Cause; 2]> =
         causes.iter().enumerate().flat_map(|(i, &a)| causes[i + 1..].iter().map(move |&b| [a, b])).collect();
@@ -244,7 +244,7 @@ pub fn cases(forms: &[Form], first: u64, count: usize) -> Vec<Case> {
     forms.shuffle(&mut random);
     let forms = forms.into_iter().take(count).map(Spring::OutOfModel);
     let sets = pairs.into_iter().map(|spring| ("pairs", spring)).chain(forms.map(|spring| ("out of model", spring)));
-    sets.enumerate().map(|(index, (set, spring))| Case { set, spring, seed: seed(first, 15, index) }).collect()
+    sets.enumerate().map(|(index, (set, spring))| Case { set, spring, seed: seed(first, 19, index) }).collect()
 }
 
 /// Size of the causes of a pair.

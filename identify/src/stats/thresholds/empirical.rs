@@ -102,6 +102,8 @@ thresholds! {
     LEAST_DAMPED = 0.005, "damping ratio";
     /// Largest damping ratio of a resonance; with an overshoot below a sixth, an oscillation cannot be distinguished from a lag.
     MOST_DAMPED = 0.5, "damping ratio", set by "cargo campaign out-of-model";
+    /// Smallest part of the readings' sum of squares before a step of the gain, and after it: with less before, it is a gain error.
+    LEAST_PART_OF_STEP = 0.1, "of the sum of squares";
     /// Shortest run of shifted readings that is a reading offset.
     SHORTEST_RUN = 5.0, "rows";
     /// Price of the places of a run of shifted readings; neighbouring runs are nearly equivalent.
@@ -122,6 +124,8 @@ thresholds! {
     LEAST_INFORMATION = 0.01, "of the coordinate's information";
 
     // adequacy
+    /// Smallest squared correlation of the readings with the voltage or the simulation that is a response.
+    RESPONSE = 0.25, "squared correlation";
     /// Fewest rows in each of the parts or stretches of a record whose means are tested.
     ROWS_PER_MEAN = 5.0, "rows";
     /// An error in step with the spring counts from this ratio of its root mean square to its scatter within the parts.
