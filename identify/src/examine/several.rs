@@ -14,8 +14,7 @@ use simulation::record::Record;
 
 use crate::answer::{RecordReport, Verdict};
 use crate::examine::options::Options;
-use crate::examine::passes::{examine, joint};
-use crate::nominal::best_linear;
+use crate::examine::passes::{self, Rivals, examine, joint};
 use crate::plant::base::Base;
 use crate::stats::median::median;
 use crate::stats::thresholds::probability::Z_ZERO;
@@ -36,14 +35,14 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     if let [record] = records {
         return examine(record, options, progress);
     }
-    let (input, mut shown) = (options.input, Vec::new());
+    let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
-        let alone = joint(record, options, None, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
+        let alone = joint(record, options, None, Rivals::Omitted, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
         shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
-    let mut joint = joint(records, options, Some(&shown), &mut progress)?;
+    let mut joint = joint(records, options, Some(&shown), Rivals::Reported, &mut progress)?;
     // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
     let mut spring = joint.plant.clone();
     spring.unmodelled = None;
@@ -52,7 +51,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     for (record, mut offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let mut from = |offset: f64| {
             let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-            self::joint(&[from_zero], &options, None, &mut |of| progress(&format!("{}: {of}", record.name)))
+            self::joint(&[from_zero], &options, None, Rivals::Omitted, &mut |of| progress(&format!("{}: {of}", record.name)))
         };
         let mut alone = from(offset)?;
         // A shifted stretch had a part in the zero that the joint fit found.
@@ -76,7 +75,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    compare(&mut joint, best_linear(records, input));
+    compare(&mut joint, linear);
     Ok(joint)
 }
 

@@ -58,6 +58,8 @@ pub struct Identified {
     pub report: Report,
     /// The spring as a plant file.
     pub plant: PlantFile,
+    /// The best linear model of the records, which may be of another order or law of the input.
+    pub linear: Option<BestLinear>,
     /// The readings of each record and the model of them.
     pub records: Vec<Course>,
 }
@@ -121,6 +123,13 @@ impl Models {
         self.fits.iter().enumerate().skip(1).map(error).collect()
     }
 
+    /// The best model of order 1 or more by its held-out error.
+    fn best(&self) -> Option<BestLinear> {
+        let errors = self.errors().into_iter().zip(self.fits.iter().skip(1));
+        let (error, model) = errors.min_by(|(a, _), (b, _)| a.held_out_rmse.total_cmp(&b.held_out_rmse))?;
+        Some(BestLinear { error, held_out: model.held_out.clone() })
+    }
+
     fn held_out_rmse(&self) -> f64 {
         root_mean_square(&self.fits[self.chosen].held_out)
     }
@@ -160,13 +169,14 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     }
     let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
     let mut models = Models::of(series.clone(), InputLaw::Linear);
+    let linear = models.best();
     if series.iter().any(Series::has_both_signs) {
         let even = Models::of(series.iter().map(Series::rectified).collect(), InputLaw::Even);
         if even.held_out_rmse() < models.held_out_rmse() {
             models = even;
         }
     }
-    Ok(identified(records, models, units))
+    Ok(Identified { linear, ..identified(records, models, units) })
 }
 
 /// The best linear model of some records.
@@ -299,7 +309,7 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
         }
     };
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
-    Identified { report, plant, records }
+    Identified { report, plant, linear: None, records }
 }
 
 /// The directions in which a fit has taken errors away; none for a long record, which has lost a small part of them.
