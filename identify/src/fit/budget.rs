@@ -43,7 +43,7 @@ impl Effort {
 }
 
 /// Work for a record of at most [`ROWS`] rows at the normal effort.
-const WORK: f64 = 420e6;
+const WORK: f64 = 560e6;
 /// Rows up to which the work is constant.
 const ROWS: f64 = 2400.0;
 /// Exponent of the growth with the rows.
@@ -52,7 +52,7 @@ const GROWTH: f64 = 0.55;
 const SCARCE: f64 = 0.5;
 
 /// Ratio of the work that a diagnosis may do once a model leaves nothing but noise to the work that it may do if nothing fits.
-const EXTENSION: f64 = 1.5;
+const EXTENSION: f64 = 1.15;
 
 /// The work that was done and that may be done.
 #[derive(Debug)]
