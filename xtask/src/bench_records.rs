@@ -57,7 +57,8 @@ pub(crate) fn measure(python: &Path, target: &Path) -> Result<Value> {
 /// # Errors
 /// If a record lacks a number.
 pub(crate) fn table(records: &Value) -> Result<String> {
-    let rows: Vec<Row> = records.as_array().context("no list of records")?.iter().map(Row::of).collect::<Result<_>>()?;
+    let rows: Vec<Row> =
+        records.as_array().context("no list of records")?.iter().map(Row::of).collect::<Result<_>>()?;
     let mut text = format!(
         "{:<30}{:>7}{:>10}{:>8}{:>10}{:>8}{:>14}   aim\n",
         "CPU time in s", "rows", "identify", "to OE", "diagnose", "to OE", "output error"

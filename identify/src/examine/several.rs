@@ -44,7 +44,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
-        let alone = joint(record, options, None, Rivals::Omitted, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
+        let alone = joint(record, options, None, Rivals::Omitted, &mut |causes| {
+            progress(&format!("{}: {causes}", record[0].name))
+        })?;
         shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
@@ -63,7 +65,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     for (record, mut offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let mut from = |offset: f64| {
             let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-            self::joint(&[from_zero], &options, None, Rivals::Omitted, &mut |of| progress(&format!("{}: {of}", record.name)))
+            self::joint(&[from_zero], &options, None, Rivals::Omitted, &mut |of| {
+                progress(&format!("{}: {of}", record.name))
+            })
         };
         let mut alone = from(offset)?;
         // A shifted stretch had a part in the zero that the joint fit found.

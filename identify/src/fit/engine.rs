@@ -429,8 +429,7 @@ impl<'a> Engine<'a> {
                 Some(held) => self.residual_from(&nudged, &held.estimate.start_v),
                 None => self.residual(&nudged),
             };
-            let mut column: Vec<f64> =
-                residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
+            let mut column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
             if let Some(held) = &held {
                 held.estimate.follow(&mut column, &held.kernels);
                 self.budget.spend(held.kernels.len() as u64 * work::FOLLOWING * column.len() as u64);
