@@ -3,7 +3,8 @@
 Takes the path of `vsj`. Prints one JSON object: for each record its rows, the CPU time in s of `vsj identify`, of
 `vsj diagnose --plant identify` and of SciPy's linear output-error fits of order 1 to 4, and the errors of the fits.
 
-SciPy       y(k) = zero + b(q) / a(q) u(k),   least squares over a and b (`least_squares`, `lfilter`), started by ARX
+SciPy       y(k) = zero + b(q) / a(q) u(k) + free response,   least squares over a, b, zero and start
+            (`least_squares`, `lfilter`), started by ARX
 """
 
 import json
@@ -101,11 +102,12 @@ def output_error(command, reading):
         arx = np.linalg.lstsq(np.array(lagged).T, y[order:], rcond=None)[0]
 
         def residual(p):
+            a, b, start = np.split(p[:-1], [order, 2 * order + 1])
             with np.errstate(all="ignore"):
-                left = y - p[-1] - signal.lfilter(p[order:-1], np.concatenate(([1], p[:order])), u)
+                left = y - p[-1] - signal.lfilter(b, np.concatenate(([1], a)), u, zi=start)[0]
             return np.nan_to_num(left, nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)
 
-        fit = optimize.least_squares(residual, np.append(arx, 0), x_scale="jac", max_nfev=60)
+        fit = optimize.least_squares(residual, np.append(arx, np.zeros(order + 1)), x_scale="jac", max_nfev=60)
         smallest = min(smallest, float(np.sqrt(np.mean(fit.fun**2))))
     return smallest
 
@@ -149,5 +151,4 @@ def main():
 
 
 if __name__ == "__main__":
-    # One thread: CPU times are compared.
     main()

@@ -3,7 +3,7 @@
 //! The unit of work is one piece of the voltage through one lag. Other steps count by their time relative to that.
 //!
 //! ```text
-//! budget = WORK (rows / 2400)^0.55 for more than 2400 rows, WORK for fewer; a quarter if quick, ten times if thorough
+//! budget = WORK (rows / 4000)^0.55 for more than 4000 rows, WORK for fewer; a quarter if quick, ten times if thorough
 //! ```
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -43,9 +43,9 @@ impl Effort {
 }
 
 /// Work for a record of at most [`ROWS`] rows at the normal effort.
-const WORK: f64 = 560e6;
+const WORK: f64 = 530e6;
 /// Rows up to which the work is constant.
-const ROWS: f64 = 2400.0;
+const ROWS: f64 = 4000.0;
 /// Exponent of the growth with the rows.
 const GROWTH: f64 = 0.55;
 /// Fraction of a search's budget after which it only follows the most promising extensions.
