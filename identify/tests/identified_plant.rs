@@ -1,7 +1,8 @@
 //! The plant file of an identified spring is the spring that was identified: a diagnosis against it starts from the same error.
 
+use identify::nominal::report::InputLaw;
 use identify::plant::base::Base;
-use identify::{Input, Options, examine, identify};
+use identify::{Input, Options, Verdict, examine, identify};
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
@@ -49,5 +50,25 @@ fn a_diagnosis_starts_from_the_error_of_the_identified_spring() {
         let options = Options { base: Base::new(identified.plant).unwrap(), ..Options::default() };
         let baseline = examine(&record, &options, |_| ()).unwrap().report.baseline;
         assert!(baseline.rmse < 1.1 * report.rmse, "{name}: {} instead of {}", baseline.rmse, report.rmse);
+    }
+}
+
+/// The square law in the plant file is the spring's, so that nothing is found beyond it.
+#[test]
+fn a_diagnosis_of_an_identified_square_law_is_consistent() {
+    let square: Rates = |u, [x, _]| [(u * u - x) / 0.4, 0.0];
+    for (reading, share) in [
+        ((|u, [x, _]| 5.0 + 0.06 * u * u + 0.14 * x) as fn(f64, [f64; 2]) -> f64, 0.3),
+        (|u, _| 5.0 + 0.2 * u * u, 1.0),
+    ] {
+        for heights in [[-4.0, 4.0], [0.0, 4.0]] {
+            let record = record(square, reading, heights);
+            let identified = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
+            assert_eq!((identified.report.input_law, identified.plant.even), (InputLaw::Square, heights[0] < 0.0));
+            assert!((identified.report.nominal.share.value - share).abs() < 0.02, "{:?}", identified.report.nominal);
+            let options = Options { base: Base::new(identified.plant).unwrap(), ..Options::default() };
+            let report = examine(&record, &options, |_| ()).unwrap().report;
+            assert_eq!((report.verdict, report.findings.len()), (Verdict::Consistent, 0), "{report:#?}");
+        }
     }
 }

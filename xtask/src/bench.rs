@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: ns per sample of the closed loop, compared with Python.
+//! `cargo xtask bench`: ns per sample of the closed loop, and CPU time of identifications and diagnoses, compared with Python.
 
 use std::fs;
 use std::path::Path;
@@ -7,6 +7,8 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 use xtask::{python, shell};
+
+use crate::bench_records;
 
 /// Samples in one run of a contender: 70 s at 1 kHz and the one at 0 s, as in `rivals.py` and the Rust bench.
 const SAMPLES: u32 = 70_001;
@@ -38,6 +40,18 @@ pub(crate) struct Args {
     /// Print the table as JSON
     #[arg(long)]
     json: bool,
+    /// Measure the closed loop or the records only
+    #[arg(long, value_enum)]
+    only: Option<Part>,
+}
+
+/// One of the two tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// The closed loop.
+    ClosedLoop,
+    /// Identification and diagnosis of records.
+    Records,
 }
 
 /// One line of the table.
@@ -53,26 +67,37 @@ impl Row {
     }
 }
 
-/// Measures every contender and prints the table. A time above its bound is marked and is no error.
+/// Measures every contender and prints the tables. A time above its bound is marked and is no error.
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let metadata = shell::metadata()?;
-    find_bench(&metadata)?;
     let target = shell::target_directory()?;
+    let wants = |part: Part| args.only.is_none_or(|only| only == part);
+    if wants(Part::ClosedLoop) {
+        find_bench(&shell::metadata()?)?;
+    }
     let python = python::environment(&target, "bench", "xtask/bench/requirements.txt")?;
-    shell::run(cargo_bench().arg("--no-run"))?;
+    let closed_loop = if wants(Part::ClosedLoop) { Some(closed_loop(&python, &target)?) } else { None };
+    let records = if wants(Part::Records) { Some(bench_records::measure(&python, &target)?) } else { None };
+    if args.json {
+        let mut report = report(closed_loop.as_deref().unwrap_or_default());
+        report["records"] = records.unwrap_or_default();
+        println!("{report}");
+        return Ok(());
+    }
+    let closed_loop = closed_loop.map(|rows| table(&rows));
+    let records = records.map(|records| bench_records::table(&records)).transpose()?;
+    print!("{}", closed_loop.into_iter().chain(records).collect::<Vec<String>>().join("\n"));
+    Ok(())
+}
 
+/// The table of the closed loop.
+fn closed_loop(python: &Path, target: &Path) -> Result<Vec<Row>> {
+    shell::run(cargo_bench().arg("--no-run"))?;
     let mut rounds = Vec::new();
     for round in 1..=ROUNDS {
         eprintln!("round {round} of {ROUNDS}");
-        rounds.push(measure(&python, &target)?);
+        rounds.push(measure(python, target)?);
     }
-    let rows = rows(&rounds);
-    if args.json {
-        println!("{}", report(&rows));
-    } else {
-        print!("{}", table(&rows));
-    }
-    Ok(())
+    Ok(rows(&rounds))
 }
 
 /// One round: ns per sample of each contender, in the order of [`CONTENDERS`].

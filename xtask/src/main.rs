@@ -2,6 +2,7 @@
 //! this binary starts.
 
 mod bench;
+mod bench_records;
 mod check;
 mod emulation;
 mod flash;

@@ -31,6 +31,8 @@ const RAMP_S: f64 = 0.1;
 /// instantaneous part of a step to this voltage. If voltage_v is missing, applied_v is used, as written by
 /// `vsj stair --out`.
 ///
+/// A file has at most a million rows and 512 MiB (64 MiB if it is not UTF-8).
+///
 /// Several files are records of one spring: each has its own initial state, zero offset and noise, the causes are shared, and
 /// what is in one record only is listed as a fault of that record.
 #[derive(Args, Debug)]
@@ -78,11 +80,15 @@ impl Arguments {
     /// The options of the diagnosis: the one place where its nominal spring is made.
     fn options(&self, measured: &[MeasuredRecord], records: &[Record], input: Input, stop: Stop) -> Result<Options> {
         let units = measured.first().map(|measured| measured.units.clone()).unwrap_or_default();
-        let file = match self.plant.as_str() {
-            "identify" => identify(records, input, &units)?.plant,
-            plant => plant_file::load_for_host(plant)?,
+        let (file, linear) = match self.plant.as_str() {
+            "identify" => {
+                let identified = identify(records, input, &units)?;
+                (identified.plant, identified.linear)
+            }
+            plant => (plant_file::load_for_host(plant)?, None),
         };
-        Ok(Options { plant: self.plant.clone(), units, input, base: Base::new(file)?, effort: self.effort, stop })
+        let plant = self.plant.clone();
+        Ok(Options { plant, units, input, base: Base::new(file)?, effort: self.effort, linear, stop })
     }
 
     fn origin(measured: &[MeasuredRecord], input: Input) -> Origin {

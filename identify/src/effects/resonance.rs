@@ -103,6 +103,9 @@ impl Effect for Resonance {
         let mut slow = point.get(3).map(|tau_s| Lag::at(tau_s.exp(), signal.before + start.next_offset_v()));
         let at_start = if slow.is_some() { 0.0 } else { signal.before } + start.next_offset_v();
         let mut oscillator = Oscillator::at(omega, zeta, at_start, omega * start.next_offset_v());
+        if oscillator.is_zero() && slow.is_none_or(|slow| slow.value() == 0.0) && signal.is_zero() {
+            return;
+        }
         signal.pass(|piece| {
             let (slow_from, slow_to) = slow.as_mut().map_or((0.0, 0.0), |slow| slow.pass(piece));
             let (from, to) = (piece.from - slow_from, piece.to - slow_to);

@@ -4,6 +4,7 @@ use simulation::units::Units;
 
 use crate::fit::budget::Effort;
 use crate::fit::stop::Stop;
+use crate::nominal::BestLinear;
 use crate::plant::base::Base;
 use crate::record::input::Input;
 
@@ -20,6 +21,8 @@ pub struct Options {
     pub base: Base,
     /// How long causes are searched for.
     pub effort: Effort,
+    /// The best linear model of the records, if it is known; it is fitted otherwise.
+    pub linear: Option<BestLinear>,
     /// Ends the search early with the best answer so far.
     pub stop: Stop,
 }
@@ -33,6 +36,7 @@ impl Default for Options {
             input: Input::Hold,
             base: Base::paper(),
             effort: Effort::Normal,
+            linear: None,
             stop: Stop::default(),
         }
     }

@@ -23,7 +23,7 @@ use crate::effects::index_of;
 use crate::examine::options::Options;
 use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
-use crate::nominal::best_linear;
+use crate::nominal::{BestLinear, best_linear};
 use crate::plant::base::Base;
 use crate::record::data::Data;
 use crate::record::input::Input;
@@ -52,10 +52,22 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
     let records = std::slice::from_ref(record);
-    let mut found = joint(records, options, None, &mut progress)?;
-    compare(&mut found, best_linear(records, options.input));
+    let mut found = joint(records, options, None, Rivals::Reported, &mut progress)?;
+    compare(&mut found, linear(records, options));
     credibility::unlikely_to_suspects(&mut found.report);
     Ok(found)
+}
+
+/// The best linear model of some records.
+pub(super) fn linear(records: &[Record], options: &Options) -> Option<BestLinear> {
+    options.linear.clone().or_else(|| best_linear(records, options.input))
+}
+
+/// Whether the rival sets of causes are fitted and reported, for the plan of the next experiment.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Rivals {
+    Reported,
+    Omitted,
 }
 
 /// Finds out what the simulation gets wrong on all of several records of one spring; `only` limits the search to some causes.
@@ -66,6 +78,7 @@ pub(super) fn joint(
     records: &[Record],
     options: &Options,
     only: Option<&[&'static str]>,
+    rivals: Rivals,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Diagnosis> {
     let normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
@@ -92,9 +105,11 @@ pub(super) fn joint(
     let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget, only };
     let found = of_readings(&examined, &base, progress);
     let found = without_unsupported_terms(&examined, &base, found, progress);
-    let (rivals, experiment) = hypotheses(&found, records, &options.units.reading);
+    let reported = (rivals == Rivals::Reported).then(|| hypotheses(&found, records, &options.units.reading));
     let mut found = found.restored(records, &normalisations);
-    (found.report.rivals, found.report.experiment) = (rivals, Some(experiment));
+    if let Some((rivals, experiment)) = reported {
+        (found.report.rivals, found.report.experiment) = (rivals, Some(experiment));
+    }
     found.report.nominal = nominal(options);
     found.report.complete = !budget.is_stopped();
     found.report.search = SearchReport {

@@ -5,20 +5,25 @@
 //! 1. Each record is diagnosed on its own: a cause that no record shows is not looked for in all of them, where a fault of one record
 //!    would find a cause that explains a part of it.
 //! 2. Of these causes, those that the records share are found in all of them, each record held out as a whole.
-//! 3. Each record is diagnosed on its own against the spring with the shared causes; what is found there is in that record only: a
+//! 3. All causes are searched in all of them. Those that no record shows alone are kept if they predict most records better than
+//!    without them, by a fit to the others: what all records share, each of them too weakly.
+//! 4. Each record is diagnosed on its own against the spring with the shared causes; what is found there is in that record only: a
 //!    fault, not a property of the spring.
+
+use std::ops::Range;
 
 use anyhow::Result;
 
 use simulation::record::Record;
 
 use crate::answer::{RecordReport, Verdict};
+use crate::effects::EFFECTS;
 use crate::examine::options::Options;
-use crate::examine::passes::{examine, joint};
-use crate::nominal::best_linear;
+use crate::examine::passes::{self, Rivals, examine, joint};
 use crate::plant::base::Base;
 use crate::stats::median::median;
-use crate::stats::thresholds::probability::Z_ZERO;
+use crate::stats::scale::root_mean_square;
+use crate::stats::thresholds::probability::{CLEARLY_LIKELIER, Z_ZERO};
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::linear_rival::compare;
@@ -36,14 +41,22 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     if let [record] = records {
         return examine(record, options, progress);
     }
-    let (input, mut shown) = (options.input, Vec::new());
+    let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
-        let alone = joint(record, options, None, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
+        let alone = joint(record, options, None, Rivals::Omitted, &mut |causes| {
+            progress(&format!("{}: {causes}", record[0].name))
+        })?;
         shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
-    let mut joint = joint(records, options, Some(&shown), &mut progress)?;
+    let mut joint = joint(records, options, Some(&shown), Rivals::Reported, &mut progress)?;
+    let all: Vec<&'static str> =
+        EFFECTS.iter().map(|effect| effect.cause()).filter(|cause| !OF_ONE_RECORD.contains(cause)).collect();
+    let weak = self::joint(records, options, Some(&all), Rivals::Reported, &mut progress)?;
+    if weak.score > joint.score + CLEARLY_LIKELIER && predicts_most_records_better(&weak, &joint) {
+        joint = weak;
+    }
     // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
     let mut spring = joint.plant.clone();
     spring.unmodelled = None;
@@ -52,7 +65,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     for (record, mut offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let mut from = |offset: f64| {
             let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-            self::joint(&[from_zero], &options, None, &mut |of| progress(&format!("{}: {of}", record.name)))
+            self::joint(&[from_zero], &options, None, Rivals::Omitted, &mut |of| {
+                progress(&format!("{}: {of}", record.name))
+            })
         };
         let mut alone = from(offset)?;
         // A shifted stretch had a part in the zero that the joint fit found.
@@ -76,9 +91,17 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    compare(&mut joint, best_linear(records, input));
+    compare(&mut joint, linear);
     credibility::unlikely_to_suspects(&mut joint.report);
     Ok(joint)
+}
+
+/// True if a diagnosis predicts more than half of the records better than another one, each by a fit to the other records.
+fn predicts_most_records_better(one: &Diagnosis, other: &Diagnosis) -> bool {
+    let parts = &one.data.parts;
+    let error = |of: &Diagnosis, rows: &Range<usize>| root_mean_square(&of.held_out_in_place[rows.clone()]);
+    let better = parts.iter().filter(|part| error(one, &part.rows) < error(other, &part.rows)).count();
+    2 * better > parts.len()
 }
 
 /// What is found in one record beyond the causes that all records share.

@@ -3,7 +3,7 @@
 //! The unit of work is one piece of the voltage through one lag. Other steps count by their time relative to that.
 //!
 //! ```text
-//! budget = WORK (rows / 2400)^0.55 for more than 2400 rows, WORK for fewer; a quarter if quick, ten times if thorough
+//! budget = WORK (rows / 4000)^0.55 for more than 4000 rows, WORK for fewer; a quarter if quick, ten times if thorough
 //! ```
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -15,7 +15,7 @@ use crate::fit::stop::Stop;
 pub enum Effort {
     /// A quarter of the normal effort.
     Quick,
-    /// Up to 3 s of CPU time for 2400 rows, 20 s for 100 000, if nothing fits.
+    /// At most 2 s of CPU time for 2400 rows, 8 s for 10 000 and 20 s for 100 000.
     #[default]
     Normal,
     /// Ten times the normal effort.
@@ -43,16 +43,16 @@ impl Effort {
 }
 
 /// Work for a record of at most [`ROWS`] rows at the normal effort.
-const WORK: f64 = 700e6;
+const WORK: f64 = 530e6;
 /// Rows up to which the work is constant.
-const ROWS: f64 = 2400.0;
+const ROWS: f64 = 4000.0;
 /// Exponent of the growth with the rows.
 const GROWTH: f64 = 0.55;
 /// Fraction of a search's budget after which it only follows the most promising extensions.
 const SCARCE: f64 = 0.5;
 
 /// Ratio of the work that a diagnosis may do once a model leaves nothing but noise to the work that it may do if nothing fits.
-const EXTENSION: f64 = 2.0;
+const EXTENSION: f64 = 1.15;
 
 /// The work that was done and that may be done.
 #[derive(Debug)]

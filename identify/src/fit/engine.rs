@@ -10,7 +10,7 @@ use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, pred
 use crate::fit::simulator::Simulator;
 use crate::noise::{Noise, Term};
 use crate::plant::base::Base;
-use crate::plant::initial_state;
+use crate::plant::initial_state::{self, Estimate};
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::stats::scale::robust_scale;
@@ -52,6 +52,8 @@ mod work {
     pub(super) const RESIDUAL: u64 = 1;
     /// The estimate of one initial state.
     pub(super) const INITIAL_STATE: u64 = 6;
+    /// What one initial state takes over of a change.
+    pub(super) const FOLLOWING: u64 = 1;
     /// The scale of the noise and the likelihood.
     pub(super) const SCALE: u64 = 4;
     /// One column of derivatives, with its products with the others.
@@ -69,6 +71,14 @@ const LEAST_PREDICTED_GAIN: f64 = 0.1 * LEAST_GAIN;
 
 /// Largest number of discontinuities of the prediction that a fit crosses one after the other.
 const MOST_JUMPS: usize = 30;
+
+/// The unknown initial state of a record at a model.
+struct HeldStart {
+    estimate: Estimate,
+    kernels: Vec<Vec<f64>>,
+    /// Reading minus prediction from that state, in V.
+    residual: Vec<f64>,
+}
 
 /// Fits models to one record.
 ///
@@ -375,12 +385,37 @@ impl<'a> Engine<'a> {
         (0..residual.len()).map(|row| noise.term(self.observed.kinds[row], residual[row], white[row])).collect()
     }
 
-    /// Returns the derivatives of the prediction by forward differences, or backward differences at upper bounds.
+    /// Returns the initial state of a single record at a model, if it is unknown, and the residual from there.
+    fn held_start(&mut self, model: &Model) -> Option<HeldStart> {
+        if !self.data.initial_state_unknown || self.data.is_joined() {
+            return None;
+        }
+        let forced = self.residual_from_rest(model);
+        let kernels = self.initial_states(model).to_vec();
+        let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
+        let estimate = Estimate::of(&forced, &kernels, self.data.full_scale_v, exact)?;
+        self.budget.spend(work::INITIAL_STATE * (kernels.len() * forced.len()) as u64);
+        let residual = self.residual_from(model, &estimate.start_v);
+        Some(HeldStart { estimate, kernels, residual })
+    }
+
+    /// Returns reading minus prediction of each row, in V, from a given initial state.
+    fn residual_from(&mut self, model: &Model, start_v: &[f64]) -> Vec<f64> {
+        self.simulator.run_from(model, start_v, &mut self.predicted);
+        self.budget.spend(self.simulator.take_work() + work::RESIDUAL * self.predicted.len() as u64);
+        self.data.reading.iter().zip(&self.predicted).map(|(reading, predicted)| reading - predicted).collect()
+    }
+
+    /// Returns the derivatives of the prediction by forward differences, or backward differences at upper bounds. An unknown
+    /// initial state follows with the weights and kernels that it has at the model (Kaufman's approximation of variable
+    /// projection, BIT 15, 1975): one simulation for each column instead of one for each state of it as well.
     pub fn jacobian(&mut self, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
         let bounds = model.coordinates(self.data);
         let points = model.points();
         let places: Vec<usize> = (0..points.len()).filter(|&place| bounds[place].fitted).collect();
         let mut nudged = model.clone();
+        let held = self.held_start(model);
+        let residual = held.as_ref().map_or(residual, |held| &held.residual);
         let columns = places.iter().map(|&place| {
             let bound = &bounds[place];
             let mut step = 1e-5 * (bound.highest - bound.lowest).min(1.0 + points[place].abs());
@@ -390,8 +425,15 @@ impl<'a> Engine<'a> {
             let mut moved = points.clone();
             moved[place] += step;
             nudged.set_points(&moved);
-            let there = self.residual(&nudged);
-            let column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
+            let there = match &held {
+                Some(held) => self.residual_from(&nudged, &held.estimate.start_v),
+                None => self.residual(&nudged),
+            };
+            let mut column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
+            if let Some(held) = &held {
+                held.estimate.follow(&mut column, &held.kernels);
+                self.budget.spend(held.kernels.len() as u64 * work::FOLLOWING * column.len() as u64);
+            }
             // Rows that stopped at a bound are not whitened.
             let mut white = noise.whitened(&column);
             self.budget.spend(work::WHITENING * column.len() as u64);

@@ -3,6 +3,7 @@
 use crate::effects::effect::Affects;
 use crate::effects::model::{Block, Model};
 use crate::plant::base::Base;
+use crate::plant::chain::Chain;
 use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::signal::Signal;
@@ -25,6 +26,8 @@ pub struct Simulator<'a> {
     response: Cached<Vec<f64>>,
     /// Response of the stiffness to each initial state.
     kernels: Cached<Vec<Vec<f64>>>,
+    /// Index of the state of each of these kernels.
+    states: Vec<usize>,
     /// Simulators of several records, in their order; empty for a single one.
     parts: Vec<Simulator<'a>>,
     /// Pieces that went through a block since they were counted last.
@@ -44,7 +47,12 @@ impl<T> Cached<T> {
     /// Returns true if the result was computed from the same blocks up to `last`; otherwise sets the key to the blocks
     /// of the model.
     fn update_key(&mut self, model: &Model, last: Affects) -> bool {
-        let blocks = || model.blocks.iter().filter(|(block, _)| block.affects() <= last);
+        self.update_key_by(model, |affects| affects <= last)
+    }
+
+    /// Returns true if the result was computed from the same blocks of those that `matter`; otherwise sets the key to these.
+    fn update_key_by(&mut self, model: &Model, matter: impl Fn(Affects) -> bool) -> bool {
+        let blocks = || model.blocks.iter().filter(|(block, _)| matter(block.affects()));
         if self.key.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks())) {
             return true;
         }
@@ -61,7 +69,7 @@ const AMPLIFIER: u64 = 2;
 const STATIC_RESPONSE: u64 = 3;
 const RELAXATION: u64 = 1;
 const RESPONSE: u64 = 4;
-const INITIAL_STATE: u64 = 3;
+const INITIAL_STATE: u64 = 9;
 /// Further work of a piece that is not as long as the one before it.
 const IRREGULAR: f64 = 3.0;
 
@@ -86,6 +94,7 @@ impl<'a> Simulator<'a> {
             chained: Cached::default(),
             response: Cached::default(),
             kernels: Cached::default(),
+            states: Vec::new(),
             parts: data.parts.iter().map(|part| Self::new(&part.data, base)).collect(),
             work: 0,
         }
@@ -153,25 +162,23 @@ impl<'a> Simulator<'a> {
             return self.run_parts(model, readings, Some(kernels));
         }
         self.run(model, readings);
-        if !self.kernels.update_key(model, Affects::Response) {
-            let chain = model.chain(self.base, self.data);
+        let chain = model.chain(self.base, self.data);
+        let depends = chain.initial_state_depends_on_voltage();
+        let matter = |affects| affects <= Affects::Response && (depends || affects != Affects::StaticResponse);
+        if !self.kernels.update_key_by(model, matter) {
             self.kernels.value.clear();
+            self.states.clear();
             let (mut state, mut states) = (0, 1);
             while state < states {
                 let mut start = InitialState::off(state);
-                self.signal.clone_from(&self.amplified.value);
-                chain.initial_state_response(&mut self.signal, &mut start, &self.levels_v);
-                self.work += RELAXATION * chain.work(&self.signal) + INITIAL_STATE * self.signal.len() as u64;
-                for (block, point) in &model.blocks {
-                    block.effect().modify_response(block.form, point, &mut self.signal, &mut start);
-                    self.work += response_work(*block, &self.signal);
-                }
-                (state, states) = (state + 1, start.states());
+                self.free_response(model, &chain, &mut start);
                 // A state that changes no row is not estimated.
                 if self.signal.at_rows().any(|value| value.abs() > LEAST_KERNEL) {
                     let output = self.data.scales().output;
                     self.kernels.value.push(self.signal.at_rows().map(|value| output * value).collect());
+                    self.states.push(state);
                 }
+                (state, states) = (state + 1, start.states());
             }
         }
         kernels.clone_from(&self.kernels.value);
@@ -181,6 +188,30 @@ impl<'a> Simulator<'a> {
                 self.modify_readings(model, kernel);
                 kernel.iter_mut().zip(&*readings).for_each(|(moved, reading)| *moved -= reading);
             }
+        }
+    }
+
+    /// Computes the prediction of a model from an initial state: `start_v` holds the offset, in V, of each state that had a kernel
+    /// when these were computed last. Of a single record.
+    pub fn run_from(&mut self, model: &Model, start_v: &[f64], readings: &mut Vec<f64>) {
+        let mut offsets_v = vec![0.0; self.states.last().map_or(0, |last| last + 1)];
+        self.states.iter().zip(start_v).for_each(|(&state, &offset_v)| offsets_v[state] = offset_v);
+        self.run(model, readings);
+        let chain = model.chain(self.base, self.data);
+        self.free_response(model, &chain, &mut InitialState::of(offsets_v));
+        let output = self.data.scales().output;
+        readings.clone_from(&self.response.value);
+        readings.iter_mut().zip(self.signal.at_rows()).for_each(|(reading, free)| *reading += output * free);
+        self.modify_readings(model, readings);
+    }
+
+    /// Sets `signal` to the response of the stiffness to an initial state, of the model that was simulated last.
+    fn free_response(&mut self, model: &Model, chain: &Chain, start: &mut InitialState) {
+        chain.initial_state_response(&self.amplified.value, &mut self.signal, start, &self.levels_v);
+        self.work += INITIAL_STATE * self.signal.len() as u64;
+        for (block, point) in &model.blocks {
+            block.effect().modify_response(block.form, point, &mut self.signal, start);
+            self.work += response_work(*block, &self.signal);
         }
     }
 

@@ -10,6 +10,9 @@ use crate::stats::median::median;
 /// Largest deviation of the rows' times from equal spacing, in spacings, that is attributed to the rounding of the times.
 const ROUNDING: f64 = 1e-3;
 
+/// Number of straight pieces that stand for the square of a ramp between two rows.
+const CHORDS: usize = 8;
+
 /// The voltage from a time on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
@@ -139,6 +142,24 @@ impl Series {
             }
         }
         rectified
+    }
+
+    /// The series under the square of its voltage, divided by `full_scale` so that it is a voltage again. The square of a ramp is
+    /// cut into straight pieces.
+    pub fn squared(&self, full_scale: f64) -> Self {
+        let square = |voltage: f64| voltage * voltage / full_scale;
+        let of_piece = |(index, &Piece { start, from, slope }): (usize, &Piece)| {
+            let length = self.pieces.get(index + 1).map_or(0.0, |next| next.start - start);
+            let parts = if slope == 0.0 || length == 0.0 { 1 } else { CHORDS };
+            let step = length / parts as f64;
+            let chord = move |part: usize| {
+                let [before, after] = [part, part + 1].map(|part| square(from + slope * step * part as f64));
+                let slope = if step > 0.0 { (after - before) / step } else { 2.0 * from * slope / full_scale };
+                Piece { start: start + step * part as f64, from: before, slope }
+            };
+            (0..parts).map(chord).collect::<Vec<Piece>>()
+        };
+        Self { pieces: self.pieces.iter().enumerate().flat_map(of_piece).collect(), ..self.clone() }
     }
 
     /// True if the voltage has both signs.

@@ -4,6 +4,7 @@
 //! - *Share*: part of the static gain that is instantaneous.
 //! - *Weight*: part of the static gain that a time constant or an oscillation contributes.
 //! - *Even*: the spring responds to the magnitude of the voltage.
+//! - *Square*: it responds to the square of the voltage, as electrostatic forces do.
 
 mod canonical;
 pub mod covariance;
@@ -22,6 +23,7 @@ use crate::answer::{LinearError, SCHEMA};
 use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
+use crate::nominal::plant::VoltageRange;
 use crate::nominal::report::{InputLaw, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant};
 use crate::record::input::Input;
 use crate::stats::median::robust_deviation;
@@ -38,6 +40,8 @@ const MOST_SPOILED: f64 = 10.0;
 const PRICE_OF_POLE: f64 = 4.0;
 /// ... and that it has to bring if the last part of the records confirms it by a smaller error.
 const PRICE_IF_CONFIRMED: f64 = 3.0;
+/// Largest held-out error under the square of a voltage of one sign, relative to that under the voltage, with which it is the law.
+const MOST_OF_SQUARE: f64 = 0.5;
 /// Fewest readings of a record.
 const FEWEST_READINGS: usize = 8;
 /// Part of a record to which a model is fitted that predicts the rest.
@@ -58,6 +62,8 @@ pub struct Identified {
     pub report: Report,
     /// The spring as a plant file.
     pub plant: PlantFile,
+    /// The best linear model of the records, which may be of another order or law of the input.
+    pub linear: Option<BestLinear>,
     /// The readings of each record and the model of them.
     pub records: Vec<Course>,
 }
@@ -121,6 +127,13 @@ impl Models {
         self.fits.iter().enumerate().skip(1).map(error).collect()
     }
 
+    /// The best model of order 1 or more by its held-out error.
+    fn best(&self) -> Option<BestLinear> {
+        let errors = self.errors().into_iter().zip(self.fits.iter().skip(1));
+        let (error, model) = errors.min_by(|(a, _), (b, _)| a.held_out_rmse.total_cmp(&b.held_out_rmse))?;
+        Some(BestLinear { error, held_out: model.held_out.clone() })
+    }
+
     fn held_out_rmse(&self) -> f64 {
         root_mean_square(&self.fits[self.chosen].held_out)
     }
@@ -160,13 +173,27 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     }
     let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
     let mut models = Models::of(series.clone(), InputLaw::Linear);
-    if series.iter().any(Series::has_both_signs) {
+    let linear = models.best();
+    let both_signs = series.iter().any(Series::has_both_signs);
+    if both_signs {
         let even = Models::of(series.iter().map(Series::rectified).collect(), InputLaw::Even);
         if even.held_out_rmse() < models.held_out_rmse() {
             models = even;
         }
     }
-    Ok(identified(records, models, units))
+    // A curved law is not a square one: where one sign alone cannot tell, the square has to explain most of what is left.
+    let most = if both_signs { 1.0 } else { MOST_OF_SQUARE };
+    let full_scale = series.iter().map(Series::full_scale).fold(0.0, f64::max);
+    let squared: Vec<Series> = series.iter().map(|series| series.squared(full_scale)).collect();
+    let poles = models.fits[models.chosen].fit.poles.clone();
+    if Problem::new(squared.clone()).fit(poles).cost < models.fits[models.chosen].fit.cost {
+        let square = Models::of(squared, InputLaw::Square);
+        if square.held_out_rmse() < most * models.held_out_rmse() {
+            models = square;
+        }
+    }
+    let voltage = VoltageRange { full_scale_v: full_scale, both_signs };
+    Ok(Identified { linear, ..identified(records, models, voltage, units) })
 }
 
 /// The best linear model of some records.
@@ -215,7 +242,7 @@ fn check(record: &Record) -> Result<()> {
     Ok(())
 }
 
-fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
+fn identified(records: &[Record], models: Models, voltage: VoltageRange, units: &Units) -> Identified {
     let Models { law, problem, fits, chosen } = &models;
     let Model { fit, held_out, last_part } = &fits[*chosen];
     let rows = problem.rows();
@@ -266,7 +293,7 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
         autocorrelation: Spectrum::neighbours(&fit.residual),
         scatter: robust_deviation(differences).unwrap_or(0.0),
     };
-    let plant = plant::plant_file(&nominal, &oscillation, *law, units, problem.spacing);
+    let plant = plant::plant_file(&nominal, &oscillation, *law, voltage, units, problem.spacing);
     let mut report = Report {
         schema: SCHEMA,
         rows,
@@ -299,7 +326,7 @@ fn identified(records: &[Record], models: Models, units: &Units) -> Identified {
         }
     };
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
-    Identified { report, plant, records }
+    Identified { report, plant, linear: None, records }
 }
 
 /// The directions in which a fit has taken errors away; none for a long record, which has lost a small part of them.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use simulation::plant_file::{Amplifier, Mode, PlantFile, Reading, Relaxation};
+use simulation::plant_file::{Amplifier, Law, Mode, PlantFile, Reading, Relaxation};
 use simulation::units::{UnitNames, Units};
 
 use crate::nominal::report::{InputLaw, Nominal, Oscillation};
@@ -10,12 +10,32 @@ use crate::nominal::report::{InputLaw, Nominal, Oscillation};
 /// Largest damping ratio of an oscillation in a plant file.
 const MOST_DAMPED: f64 = 1.0 - 1e-6;
 
+/// Number of straight lines that stand for a square law: they are off by at most 1/4096 of the full scale.
+const CHORDS: usize = 32;
+
+/// The voltages of the records.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VoltageRange {
+    /// Largest magnitude, in V.
+    pub(super) full_scale_v: f64,
+    /// True if both signs occur.
+    pub(super) both_signs: bool,
+}
+
+/// The law `v^2 / full scale` as a table.
+fn square(full_scale_v: f64) -> Law {
+    let parts = (0..=CHORDS).map(|chord| chord as f64 / CHORDS as f64);
+    let (voltage_v, stiffness) = parts.map(|part| (full_scale_v * part, full_scale_v * part * part)).unzip();
+    Law { voltage_v, stiffness }
+}
+
 /// The plant file. An instantaneous part outside of 0 to 1 is described under `[unmodelled]`. `spacing_s` stands in for the time
 /// constant of a spring that has neither a time constant nor an oscillation.
 pub(super) fn plant_file(
     nominal: &Nominal,
     oscillations: &[Oscillation],
     law: InputLaw,
+    voltage: VoltageRange,
     units: &Units,
     spacing_s: f64,
 ) -> PlantFile {
@@ -53,11 +73,11 @@ pub(super) fn plant_file(
     let delay_s = nominal.delay_s.value;
     PlantFile {
         schema: 1,
-        even: law == InputLaw::Even,
+        even: law == InputLaw::Even || law == InputLaw::Square && voltage.both_signs,
         units: Some(UnitNames::from(units)),
         reading: Some(Reading { gain: nominal.gain.value, zero: nominal.zero.value }),
         memory: None,
-        law: None,
+        law: (law == InputLaw::Square).then(|| square(voltage.full_scale_v)),
         leakage: None,
         relaxation: Relaxation { share, tau_s, weights, tau_high_s: None, tau_high_at_v: None },
         amplifier: (delay_s > 0.0).then(|| Amplifier { delay_s: Some(delay_s), ..Amplifier::default() }),

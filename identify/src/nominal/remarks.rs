@@ -4,7 +4,7 @@ use simulation::units::Units;
 
 use crate::dimension::significant;
 use crate::linear::{Fit, Problem};
-use crate::nominal::report::Report;
+use crate::nominal::report::{InputLaw, Report};
 
 /// Errors that are larger than their scatter from row to row by this factor are no noise of the sensor.
 const STRUCTURED: f64 = 3.0;
@@ -15,6 +15,14 @@ const HARDLY_KNOWN: f64 = 4.0;
 pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {
     let nominal = &report.nominal;
     let mut remarks = Vec::new();
+    if report.input_law == InputLaw::Square {
+        let full_scale = problem.series.iter().map(|series| series.full_scale()).fold(0.0, f64::max);
+        remarks.push(format!(
+            "The gain is that at {} {}: the reading follows the square of the voltage.",
+            significant(full_scale / units.voltage.si, 4),
+            units.voltage.name
+        ));
+    }
     let time = |seconds: f64| format!("{} {}", significant(seconds / units.time.si, 4), units.time.name);
     if nominal.gain.low <= 0.0 && nominal.gain.high >= 0.0 {
         remarks.push("The records show no static response: the interval of the gain contains 0.".into());

@@ -77,7 +77,7 @@ pub struct Noise {
     pub scatter: f64,
 }
 
-/// How the spring responds to the sign of the voltage.
+/// What of the voltage the spring responds to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum InputLaw {
@@ -85,6 +85,8 @@ pub enum InputLaw {
     Linear,
     /// The reading follows the magnitude of the voltage.
     Even,
+    /// The reading follows the square of the voltage, divided by the voltage's largest magnitude: the gain is that at this voltage.
+    Square,
 }
 
 /// The answer of `vsj identify`.
@@ -100,7 +102,7 @@ pub struct Report {
     pub nominal: Nominal,
     /// Complex pairs of poles.
     pub oscillation: Vec<Oscillation>,
-    /// How the spring responds to the sign of the voltage.
+    /// What of the voltage the spring responds to.
     pub input_law: InputLaw,
     /// Root mean square of the free-running error, in the reading's unit.
     pub rmse: f64,

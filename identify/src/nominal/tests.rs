@@ -78,6 +78,73 @@ fn even_springs_are_recognised_where_the_voltage_has_both_signs() {
     assert_eq!(switched(true), InputLaw::Even);
 }
 
+/// A record of a spring that follows a function of the voltage with a share and a time constant, by its exact recursion; the rows
+/// are 1/16 of the time constant apart.
+fn of_law(law: impl Fn(f64) -> f64, both_signs: bool, share: f64, tau_s: f64) -> Record {
+    let (steps, noise) = (normals(1000), normals(2000).split_off(1000));
+    let sign = |row: usize| if both_signs && row / 30 % 2 == 1 { -1.0 } else { 1.0 };
+    let mut lag = 0.0;
+    let row = |row: usize| {
+        let voltage_v = sign(row) * (100.0 + 30.0 * steps[row / 20]).max(0.0);
+        let settled = law(voltage_v);
+        let reading = 3.0 + 0.5 * (share * settled + (1.0 - share) * lag) + 0.02 * noise[row];
+        lag = settled + (lag - settled) * f64::exp(-1.0 / 16.0);
+        Row { line: 0, time_s: tau_s / 16.0 * row as f64, voltage_v, measured: Some(reading) }
+    };
+    Record { name: "spring".into(), rows: (0..1000).map(row).collect() }
+}
+
+/// The gain is that at the largest voltage, 1/100 of it for `v^2 / 100`, and the file's law is the square.
+#[test]
+fn square_law_is_recognised_for_one_sign_and_for_both() {
+    for both_signs in [false, true] {
+        let record = of_law(|voltage| voltage * voltage / 100.0, both_signs, 0.2, 4.0);
+        let full_scale = record.rows.iter().map(|row| row.voltage_v.abs()).fold(0.0, f64::max);
+        let Identified { report, plant, .. } = found(std::slice::from_ref(&record));
+        let Nominal { gain, share, tau_s, .. } = &report.nominal;
+        assert_eq!((report.input_law, plant.even), (InputLaw::Square, both_signs), "{report:#?}");
+        let expected = 0.5 * full_scale / 100.0;
+        assert!(gain.low < expected && expected < gain.high && gain.high - gain.low < 0.01 * expected, "{gain:?}");
+        assert!((share.value - 0.2).abs() < 0.01 && (tau_s[0].tau.value - 4.0).abs() < 0.1, "{report:#?}");
+        plant.check_for_host().unwrap();
+        let law = plant.law.as_ref().expect("a law");
+        let at_half = law.voltage_v.iter().position(|voltage| (voltage - 0.5 * full_scale).abs() < 1e-9).unwrap();
+        assert!((law.stiffness[at_half] - 0.25 * full_scale).abs() < 1e-9);
+    }
+}
+
+/// A linear spring, and one whose gain falls by a third, are not taken for a square law.
+#[test]
+fn other_laws_of_one_sign_stay_linear() {
+    for law in [|voltage: f64| voltage, |voltage: f64| voltage * (1.0 - voltage / 600.0)] {
+        assert_eq!(found(&[of_law(law, false, 0.2, 4.0)]).report.input_law, InputLaw::Linear);
+    }
+}
+
+/// Static, mixed and purely delayed springs, of microseconds to days, that follow voltage, magnitude or square.
+#[test]
+fn any_share_any_time_constant_and_any_law_are_identified() {
+    let laws: [(InputLaw, fn(f64) -> f64); 3] = [
+        (InputLaw::Linear, |voltage| voltage),
+        (InputLaw::Even, f64::abs),
+        (InputLaw::Square, |voltage| voltage * voltage / 100.0),
+    ];
+    for (law, of_voltage) in laws {
+        for share in [0.0, 0.3, 0.8, 1.0] {
+            for tau_s in [1e-6, 5.5, 3.0 * 86400.0] {
+                let Identified { report, plant, .. } = found(&[of_law(of_voltage, true, share, tau_s)]);
+                let context = format!("{law:?}, share {share}, {tau_s} s: {:#?}", report.nominal);
+                assert_eq!((report.input_law, plant.even), (law, law != InputLaw::Linear), "{context}");
+                let Nominal { share: found, tau_s: lags, .. } = &report.nominal;
+                assert!((found.value - share).abs() < 0.01, "{context}");
+                assert_eq!(lags.len(), usize::from(share < 1.0), "{context}");
+                assert!(lags.iter().all(|lag| (lag.tau.value / tau_s - 1.0).abs() < 0.03), "{context}");
+                plant.check_for_host().unwrap();
+            }
+        }
+    }
+}
+
 #[test]
 fn records_without_information_are_rejected_in_one_line() {
     let mut still = record(100, 0, 0.0, 0.1);

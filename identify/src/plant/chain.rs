@@ -20,7 +20,7 @@ use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
 use crate::plant::visited::{Range, Visited};
 use crate::record::scales::REFERENCE_VOLTAGE_V;
-use crate::record::signal::{Lag, Piece, Signal};
+use crate::record::signal::{Lag, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 
 /// All blocks between the command and the stiffness that effects can modify.
@@ -122,6 +122,11 @@ impl<'a> Chain<'a> {
         self.as_plant_file_tables().1.in_series_with(&self.series_s).is_some()
     }
 
+    /// Returns true if the response to the initial state depends on the settled stiffness.
+    pub fn initial_state_depends_on_voltage(&self) -> bool {
+        self.memory.table().is_some() || self.relaxation.varies() || self.relaxation.falling_tau_s.is_some()
+    }
+
     /// Returns the work of the linear part on a signal, in units of one lag.
     pub fn work(&self, signal: &Signal) -> u64 {
         match self.exact_series() {
@@ -219,14 +224,22 @@ impl<'a> Chain<'a> {
         }
         for &tau_s in self.series_s.iter().filter(|_| exact.is_none()) {
             let mut lag = Lag::at(tau_s, signal.before + start.next_offset_v());
-            signal.pass(|piece| lag.pass(piece));
+            if lag.value() != 0.0 || !signal.is_zero() {
+                signal.pass(|piece| lag.pass(piece));
+            }
         }
     }
 
-    /// Replaces `signal`, the voltage on the electrodes, by the response of the stiffness to the initial state:
+    /// Replaces `signal` by the response of the stiffness to the initial state, where `applied` is the voltage on the electrodes:
     /// voltages sent before the first row that arrive delayed, play operators as the largest voltage leaves them, and
     /// the states of the lags.
-    pub fn initial_state_response(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
+    pub fn initial_state_response(
+        &self,
+        applied: &Signal,
+        signal: &mut Signal,
+        start: &mut InitialState,
+        levels_v: &[f64],
+    ) {
         let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.next_offset_v() } else { 0.0 });
         let late = if self.delay_s > 0.0 {
             [0.0; DELAY_INTERVALS].map(|_| start.next_offset_v())
@@ -235,25 +248,27 @@ impl<'a> Chain<'a> {
         };
         let kept = if self.memory.table().is_some() { start.next_offset_v() } else { 0.0 };
         let (mut rest, mut above) = (self.memory.clone(), self.memory.clone());
-        rest.at(signal.before);
+        rest.at(applied.before);
         above.at(HIGHEST_V);
         let mut apart = |voltage| match kept {
             0.0 => 0.0,
             _ => kept * (self.law.at(above.at(voltage)) - self.law.at(rest.at(voltage))),
         };
-        let mut at_s = 0.0;
-        signal.before = 0.0;
-        let at_rest = output.value() == 0.0 && kept == 0.0 && late == [0.0; DELAY_INTERVALS];
-        signal.pass(|piece| {
-            if at_rest {
-                return (0.0, 0.0);
-            }
-            let part = (at_s + piece.duration_s / 2.0) / self.delay_s * DELAY_INTERVALS as f64;
-            at_s += piece.duration_s;
-            let sent = late.get(part as usize).copied().unwrap_or(0.0);
-            let (from, to) = output.pass(Piece { from: 0.0, to: 0.0, ..piece });
-            (from + sent + apart(piece.from), to + sent + apart(piece.to))
-        });
+        signal.silence_as(applied);
+        if output.value() != 0.0 || kept != 0.0 || late != [0.0; DELAY_INTERVALS] {
+            let (mut at_s, mut voltages) = (0.0, applied.pieces().iter());
+            signal.pass(|piece| {
+                let part = (at_s + piece.duration_s / 2.0) / self.delay_s * DELAY_INTERVALS as f64;
+                at_s += piece.duration_s;
+                if kept == 0.0 && output.value() == 0.0 && at_s > 2.0 * self.delay_s {
+                    return (0.0, 0.0);
+                }
+                let sent = late.get(part as usize).copied().unwrap_or(0.0);
+                let (from, to) = if output.value() == 0.0 { (0.0, 0.0) } else { output.pass(piece) };
+                let voltage = voltages.next().expect("as many pieces");
+                (from + sent + apart(voltage.from), to + sent + apart(voltage.to))
+            });
+        }
         self.follow(signal, start, levels_v);
     }
 }

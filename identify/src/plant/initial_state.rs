@@ -7,7 +7,7 @@
 //! prior whose width is the record's full scale (the prior decides between kernels of the same shape). Held-out
 //! segments use the same estimate. The likelihood is reduced by the cost of the states, by Schwarz's criterion.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
@@ -18,11 +18,12 @@ const ROUNDS: usize = 4;
 /// Rows in which all kernels are below this fraction of their maximum do not contribute to the estimate.
 const NEGLIGIBLE: f64 = 0.05;
 
-/// The initial offsets of a chain's states, requested one after the other: all 0, or one of them 1 V.
+/// The initial offsets of a chain's states, requested one after the other.
 #[derive(Debug, Default)]
 pub struct InitialState {
     asked: usize,
-    off: Option<usize>,
+    /// Offsets by the index of their state, in V; 0 beyond.
+    offsets_v: Vec<f64>,
 }
 
 impl InitialState {
@@ -33,18 +34,87 @@ impl InitialState {
 
     /// Returns the state in which the offset with this index is 1 V and all others are 0.
     pub(crate) fn off(state: usize) -> Self {
-        Self { asked: 0, off: Some(state) }
+        let mut offsets_v = vec![0.0; state + 1];
+        offsets_v[state] = 1.0;
+        Self::of(offsets_v)
+    }
+
+    /// Returns the state with these offsets, in V, and all others 0.
+    pub(crate) fn of(offsets_v: Vec<f64>) -> Self {
+        Self { asked: 0, offsets_v }
     }
 
     /// Returns the offset of the next state from its settled value, in V.
     pub fn next_offset_v(&mut self) -> f64 {
         self.asked += 1;
-        f64::from(u8::from(self.off == Some(self.asked - 1)))
+        self.offsets_v.get(self.asked - 1).copied().unwrap_or(0.0)
     }
 
     /// Returns the number of offsets that have been requested.
     pub(crate) fn states(&self) -> usize {
         self.asked
+    }
+}
+
+/// The most likely initial state, and how it follows a change of the residual.
+pub(crate) struct Estimate {
+    /// Offset of each kernel's state, in V.
+    pub(crate) start_v: Vec<f64>,
+    /// Rows that the estimate uses.
+    rows: Vec<usize>,
+    /// Kernels in these rows, weighted.
+    weighted: Vec<Vec<f64>>,
+    /// Normal matrix of the weighted least squares, factorised.
+    normal: Cholesky<f64, Dyn>,
+}
+
+impl Estimate {
+    /// Estimates the initial state from the rows of a residual for which `counts` is true, with a prior of standard deviation
+    /// `reach_v`, in V; `None` if it cannot be estimated.
+    pub(crate) fn of(
+        residual: &[f64],
+        kernels: &[Vec<f64>],
+        reach_v: f64,
+        counts: impl Fn(usize) -> bool,
+    ) -> Option<Self> {
+        let early = kernels.iter().map(|kernel| decay_end(kernel)).max().unwrap_or(0);
+        let rows: Vec<usize> = (0..early).filter(|&row| counts(row)).collect();
+        let counted = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
+        let read = counted(residual);
+        let used: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
+        let mut weighted = used.clone();
+        let mut start = DVector::zeros(kernels.len());
+        let mut left = read.clone();
+        let (mut usual, mut far) = (robust_scale(&left), f64::INFINITY);
+        for round in 1.. {
+            let prior = (usual / reach_v).powi(2);
+            let mut normal = DMatrix::from_diagonal_element(kernels.len(), kernels.len(), prior);
+            for (i, kernel) in used.iter().enumerate() {
+                let weights = left.iter().map(|left| (far / left.abs()).min(1.0));
+                weighted[i].iter_mut().zip(kernel).zip(weights).for_each(|((to, kernel), of)| *to = of * kernel);
+                start[i] = dot(&weighted[i], &read);
+                // The Cholesky decomposition reads the lower triangle only.
+                used[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted[i], other));
+            }
+            let normal = normal.cholesky()?;
+            normal.solve_mut(&mut start);
+            if round == ROUNDS {
+                return Some(Self { start_v: start.as_slice().to_vec(), rows, weighted, normal });
+            }
+            left.clone_from(&read);
+            subtract(start.as_slice(), &used, &mut left);
+            usual = robust_scale(&left);
+            far = HUBER_THRESHOLD.get() * usual;
+        }
+        None
+    }
+
+    /// Subtracts from a change of the residual what the initial state takes over of it, its weights unchanged.
+    pub(crate) fn follow(&self, change: &mut [f64], kernels: &[Vec<f64>]) {
+        let counted: Vec<f64> = self.rows.iter().map(|&row| change[row]).collect();
+        let mut start = DVector::from_iterator(kernels.len(), self.weighted.iter().map(|of| dot(of, &counted)));
+        self.normal.solve_mut(&mut start);
+        subtract(start.as_slice(), kernels, change);
     }
 }
 
@@ -57,38 +127,11 @@ pub(crate) fn subtract_estimate(
     reach_v: f64,
     counts: impl Fn(usize) -> bool,
 ) -> f64 {
-    let early = kernels.iter().map(|kernel| decay_end(kernel)).max().unwrap_or(0);
-    let counted = |values: &[f64]| (0..early).filter(|&row| counts(row)).map(|row| values[row]).collect::<Vec<f64>>();
-    let read = counted(residual);
-    let used: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
-    let mut start = DVector::zeros(kernels.len());
-    let mut left = read.clone();
-    let mut weighted = left.clone();
-    let (mut usual, mut far) = (robust_scale(&left), f64::INFINITY);
-    for round in 1..=ROUNDS {
-        let prior = (usual / reach_v).powi(2);
-        let mut normal = DMatrix::from_diagonal_element(kernels.len(), kernels.len(), prior);
-        for (i, kernel) in used.iter().enumerate() {
-            let weights = left.iter().map(|left| (far / left.abs()).min(1.0));
-            weighted.iter_mut().zip(kernel).zip(weights).for_each(|((to, kernel), weight)| *to = weight * kernel);
-            start[i] = dot(&weighted, &read);
-            // The Cholesky decomposition reads the lower triangle only.
-            used[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted, other));
-        }
-        let Some(cholesky) = normal.cholesky() else { return 0.0 };
-        cholesky.solve_mut(&mut start);
-        if round < ROUNDS {
-            left.clone_from(&read);
-            subtract(&start, &used, &mut left);
-            usual = robust_scale(&left);
-            far = HUBER_THRESHOLD.get() * usual;
-        }
-    }
-    subtract(&start, kernels, residual);
-    0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * start.norm_squared() / reach_v.powi(2)
+    let Some(Estimate { start_v, .. }) = Estimate::of(residual, kernels, reach_v, counts) else { return 0.0 };
+    subtract(&start_v, kernels, residual);
+    0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * dot(&start_v, &start_v) / reach_v.powi(2)
 }
-
-fn subtract(start: &DVector<f64>, kernels: &[Vec<f64>], from: &mut [f64]) {
+fn subtract(start: &[f64], kernels: &[Vec<f64>], from: &mut [f64]) {
     for (start, kernel) in start.iter().zip(kernels) {
         from.iter_mut().zip(kernel).for_each(|(left, kernel)| *left -= start * kernel);
     }

@@ -44,6 +44,9 @@ impl Loss {
         let mut lag = Lag::at(self.tau_s, signal.before + start.next_offset_v());
         lost.before += instantaneous * signal.before;
         signal.before *= 1.0 - passes;
+        if lag.value() == 0.0 && signal.is_zero() {
+            return;
+        }
         let mut number = 0;
         signal.pass(|piece| {
             let (start, end) = lag.pass(piece);

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 
 use crate::plant::initial_state::InitialState;
 use crate::record::scales::REFERENCE_VOLTAGE_V;
-use crate::record::signal::{Lag, Oscillator, Piece, Signal};
+use crate::record::signal::{Lag, Oscillator, Piece, Signal, pass_lags};
 use simulation::plant_file::{self, Mode, PlantFile};
 
 /// A further lag and its weight.
@@ -195,11 +195,16 @@ impl Relaxation {
             (mode, Oscillator::at(omega, mode.zeta, x, rate))
         };
         let mut modes: Vec<(Mode, Oscillator)> = self.oscillations().map(at_first).collect();
-        if further.is_empty() && modes.is_empty() && self.is_linear() {
-            return signal.pass(|piece| {
-                let (start, end) = lag.pass(piece);
-                (share * piece.from + main * start, share * piece.to + main * end)
-            });
+        let free = signal.is_zero();
+        if self.is_linear() || free && lag.value() == 0.0 {
+            let mut lags = further;
+            lags.push((main, lag));
+            if free {
+                // Of an initial state only what it moves is simulated.
+                lags.retain(|(_, lag)| lag.value() != 0.0);
+                modes.retain(|(_, oscillator)| !oscillator.is_zero());
+            }
+            return pass_all(signal, share, &lags, modes, free);
         }
         let by_state = self.by_state.filter(|_| self.varies());
         let mut levels = levels_v.iter().copied().filter(|_| self.varies() && by_state.is_none());
@@ -226,10 +231,9 @@ impl Relaxation {
                 to += *part * end;
             }
             for (mode, oscillator) in &mut modes {
-                from += mode.rate_weight * oscillator.scaled_rate();
-                let (start, end) = oscillator.pass(piece);
-                from += mode.weight * start;
-                to += mode.weight * end + mode.rate_weight * oscillator.scaled_rate();
+                let (start, end) = contribution(mode, oscillator, piece);
+                from += start;
+                to += end;
             }
             (from, to)
         });
@@ -268,5 +272,26 @@ impl Relaxation {
             from += rise;
         }
         (start, lag.value())
+    }
+}
+
+/// Returns what an oscillation contributes at start and end of a piece of its input.
+fn contribution(mode: &Mode, oscillator: &mut Oscillator, piece: Piece) -> (f64, f64) {
+    let rate = mode.rate_weight * oscillator.scaled_rate();
+    let (start, end) = oscillator.pass(piece);
+    (mode.weight * start + rate, mode.weight * end + mode.rate_weight * oscillator.scaled_rate())
+}
+
+/// Replaces a signal, which is 0 if `free`, by `share` of it and its responses of lags and oscillations.
+fn pass_all(signal: &mut Signal, share: f64, lags: &[(f64, Lag)], modes: Vec<(Mode, Oscillator)>, free: bool) {
+    let input = (!modes.is_empty()).then(|| signal.clone());
+    pass_lags(signal, share, lags, free);
+    for (mode, mut oscillator) in modes {
+        let mut input = input.iter().flat_map(Signal::pieces);
+        signal.pass(|piece| {
+            let input = input.next().expect("as many pieces");
+            let (from, to) = contribution(&mode, &mut oscillator, *input);
+            (piece.from + from, piece.to + to)
+        });
     }
 }

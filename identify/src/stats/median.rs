@@ -14,8 +14,10 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
 /// Returns the standard deviation of the zero-mean normal distribution whose median absolute value is that of the
 /// values, in their unit; `None` if there are none.
 pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut sizes: Vec<f64> = values.map(f64::abs).collect();
-    median(&mut sizes).map(|size| size / NORMAL_MEDIAN_SIZE)
+    // Positive numbers are ordered as their bits, which are compared faster.
+    let mut sizes: Vec<u64> = values.map(|value| value.abs().to_bits()).collect();
+    let middle = sizes.len() / 2;
+    (!sizes.is_empty()).then(|| f64::from_bits(*sizes.select_nth_unstable(middle).1) / NORMAL_MEDIAN_SIZE)
 }
 
 /// Returns the median of each row and its two neighbours on each side; the first two rows take the median of the first

@@ -14,6 +14,8 @@ use crate::bad_input::BadInput;
 const MOST_ROWS: usize = 1_000_000;
 /// Largest size of a file, in bytes.
 const MOST_BYTES: usize = 1 << 29;
+/// Largest size of a file in another encoding than UTF-8, in bytes: its text is a second copy.
+const MOST_CONVERTED: usize = MOST_BYTES / 8;
 /// Largest length of a line, in bytes: a thousand columns of a thousand characters.
 const MOST_LINE: usize = 1 << 20;
 
@@ -101,8 +103,16 @@ impl Source {
     /// [`BadInput`] for invalid UTF-16.
     pub fn decode(self) -> Result<(String, Option<String>)> {
         let name = &self.name;
+        let refuse_large = |bytes: usize, encoding: &str| match bytes > MOST_CONVERTED {
+            true => Err(BadInput(format!(
+                "{name}: more than {} MiB in {encoding}; expected at most that, or UTF-8 (for example by iconv -t UTF-8)",
+                MOST_CONVERTED >> 20
+            ))),
+            false => Ok(()),
+        };
         match Encoding::for_bom(&self.bytes) {
             Some((encoding, mark)) if encoding != UTF_8 => {
+                refuse_large(self.bytes.len(), encoding.name())?;
                 let Some(text) = encoding.decode_without_bom_handling_and_without_replacement(&self.bytes[mark..])
                 else {
                     bad_input!("{name}: not {}, although it starts with its mark; expected UTF-8", encoding.name());
@@ -113,6 +123,7 @@ impl Source {
             _ => match String::from_utf8(self.bytes) {
                 Ok(text) => Ok((without_mark(text), None)),
                 Err(error) => {
+                    refuse_large(error.as_bytes().len(), "Latin-1")?;
                     let line = line_at(error.as_bytes(), error.utf8_error().valid_up_to());
                     let text = WINDOWS_1252.decode_without_bom_handling(error.as_bytes()).0.into_owned();
                     let remark = format!("{name}, line {line}: not UTF-8; read as Latin-1 (Windows-1252)");
@@ -128,11 +139,38 @@ fn line_at(bytes: &[u8], place: usize) -> usize {
     bytes[..place].iter().filter(|byte| **byte == b'\n').count() + 1
 }
 
-/// Removes the byte order mark, and turns carriage returns that stand alone into line feeds.
+/// Removes the byte order mark, and turns carriage returns that stand alone into line feeds, in place: a text may be large.
 fn without_mark(mut text: String) -> String {
     if text.starts_with('\u{feff}') {
         text.remove(0);
     }
-    let is_lone = |(place, _): (usize, &str)| text.as_bytes().get(place + 1) != Some(&b'\n');
-    if text.match_indices('\r').any(is_lone) { text.replace("\r\n", "\n").replace('\r', "\n") } else { text }
+    let mut bytes = text.into_bytes();
+    for place in 0..bytes.len() {
+        if bytes[place] == b'\r' && bytes.get(place + 1) != Some(&b'\n') {
+            bytes[place] = b'\n';
+        }
+    }
+    String::from_utf8(bytes).expect("ASCII for ASCII")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lone_carriage_returns_become_line_feeds() {
+        let read = |text: &str| Source::new("a", text).utf_8().unwrap();
+        assert_eq!(read("\u{feff}a,b\r1,2\r\r\n3,ä\r\n4,5\r"), "a,b\n1,2\n\r\n3,ä\r\n4,5\n");
+    }
+
+    /// A second copy of the largest file would need more memory than a diagnosis of a million rows.
+    #[test]
+    fn large_text_in_another_encoding_is_refused_in_one_line() {
+        for start in [&b"a,\xe4\n"[..], b"\xff\xfea\0"] {
+            let mut bytes = start.to_vec();
+            bytes.resize(MOST_CONVERTED + 2, b'1');
+            let error = Source::new("file.csv", bytes).decode().unwrap_err().to_string();
+            assert!(error.starts_with("file.csv: more than 64 MiB in ") && !error.contains('\n'), "{error}");
+        }
+    }
 }

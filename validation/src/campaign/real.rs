@@ -174,6 +174,7 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
         units: units.clone(),
         input: *input,
         base: Base::new(identified.plant.clone())?,
+        linear: identified.linear.clone(),
         ..Options::default()
     };
     let diagnosis = examine(record, &options, |_| ())?;
@@ -182,7 +183,7 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
     let learnt = (LEARN * record.rows.len() as f64) as usize;
     let first = Record { name: record.name.clone(), rows: record.rows[..learnt].to_vec() };
     let of_first = identify(std::slice::from_ref(&first), *input, units)?;
-    let options = Options { base: Base::new(of_first.plant)?, ..options };
+    let options = Options { base: Base::new(of_first.plant)?, linear: of_first.linear, ..options };
     let beyond = residual_beyond(record, learnt, &options)?;
 
     let linear = |most: usize| {

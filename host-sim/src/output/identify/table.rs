@@ -76,6 +76,7 @@ pub(super) fn sentence(report: &Report) -> String {
     let law = match report.input_law {
         InputLaw::Linear => "",
         InputLaw::Even => ", driven by the magnitude of the voltage",
+        InputLaw::Square => ", driven by the square of the voltage",
     };
     format!("{} readings show {dynamics}{law}.", report.rows)
 }

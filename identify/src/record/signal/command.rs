@@ -11,13 +11,13 @@
 //! The coarseness is the smallest that leads to the allowed number of pieces, which grows with the number of rows and not with
 //! the time: where the voltage changes at every row, every row gets one or two pieces, and a pause a few hundred.
 
+use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
 use crate::record::signal::piecewise::{Piece, Signal};
-use model::Plant;
 use simulation::schedule::{Schedule, Stretch};
 
 /// Maximum length of a piece just after a change, in s, for records whose time is scaled to the paper's time constant: a
 /// transient with a fifth of that time constant departs from its chord by at most 1/900 of its amplitude.
-const SHORTEST_PIECE_S: f64 = Plant::PAPER.time_constant_s / 55.0;
+const SHORTEST_PIECE_S: f64 = REFERENCE_TIME_CONSTANT_S / 55.0;
 /// Maximum length of a later piece relative to the time since the last change: a transient of any time constant departs
 /// from its chord by at most 1/6000 of its amplitude.
 const GROWTH: f64 = 0.05;

@@ -1,6 +1,6 @@
 //! A second-order low-pass filter, solved exactly for straight pieces of its input.
 
-use crate::record::signal::lag::NO_SUBNORMAL;
+use crate::record::signal::lag::{NO_SUBNORMAL, SAME_DURATION};
 use crate::record::signal::piecewise::Piece;
 
 /// An underdamped second-order low-pass filter of unit gain, `x'' / w^2 + 2 zeta x' / w + x = u`, exact for straight pieces of the
@@ -10,19 +10,42 @@ pub struct Oscillator {
     /// Angular frequency `w`, in 1/s.
     omega: f64,
     zeta: f64,
+    /// Time by which the output follows a ramp, `2 zeta / w`, in s.
+    behind_s: f64,
     x: f64,
     /// Rate of change of `x`, per s.
     rate: f64,
-    /// Duration of a piece for which the transition matrix holds, in s.
+    /// State-transition matrices of the last duration, and of another one before: a delay divides every row into the same two
+    /// pieces.
+    transitions: [Transition; 2],
+}
+
+/// A state-transition matrix over a duration, in s.
+#[derive(Clone, Copy, Debug)]
+struct Transition {
     duration_s: f64,
-    transition: [[f64; 2]; 2],
+    matrix: [[f64; 2]; 2],
+}
+
+impl Transition {
+    /// The identity over no time.
+    const NONE: Self = Self { duration_s: 0.0, matrix: [[1.0, 0.0], [0.0, 1.0]] };
+
+    fn differs_from(&self, duration_s: f64) -> bool {
+        (duration_s - self.duration_s).abs() > SAME_DURATION * duration_s
+    }
 }
 
 impl Oscillator {
     /// Returns a filter with an angular frequency, in 1/s, and a damping ratio below 1, at an output `x` that changes by `rate`
     /// per second.
     pub fn at(omega: f64, zeta: f64, x: f64, rate: f64) -> Self {
-        Self { omega, zeta, x, rate, duration_s: f64::NAN, transition: [[1.0, 0.0], [0.0, 1.0]] }
+        Self { omega, zeta, behind_s: 2.0 * zeta / omega, x, rate, transitions: [Transition::NONE; 2] }
+    }
+
+    /// Returns true if output and rate of change are 0.
+    pub fn is_zero(&self) -> bool {
+        self.x == 0.0 && self.rate == 0.0
     }
 
     /// Returns the present rate of change divided by the angular frequency, which has the unit of the output.
@@ -34,16 +57,18 @@ impl Oscillator {
     pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
         let start = self.x;
         if duration_s > 0.0 {
-            // Durations of a uniformly sampled record differ by rounding only.
-            if (duration_s - self.duration_s).abs() > 1e-9 * duration_s || self.duration_s.is_nan() {
-                self.duration_s = duration_s;
-                self.transition = transition(self.omega, self.zeta, duration_s);
+            if self.transitions[0].differs_from(duration_s) {
+                self.transitions.swap(0, 1);
+                if self.transitions[0].differs_from(duration_s) {
+                    let matrix = transition(self.omega, self.zeta, duration_s);
+                    self.transitions[0] = Transition { duration_s, matrix };
+                }
             }
             // The oscillation is around the straight line that the oscillator would settle on.
-            let slope = (to - from) / duration_s;
-            let lag = 2.0 * self.zeta / self.omega * slope;
+            let slope = if to == from { 0.0 } else { (to - from) / duration_s };
+            let lag = self.behind_s * slope;
             let (dx, dv) = (self.x - (from - lag), self.rate - slope);
-            let step = &self.transition;
+            let step = &self.transitions[0].matrix;
             self.x = to - lag + NO_SUBNORMAL + step[0][0] * dx + step[0][1] * dv;
             self.rate = slope + NO_SUBNORMAL + step[1][0] * dx + step[1][1] * dv;
         }

@@ -47,6 +47,24 @@ impl Signal {
         self.pieces.is_empty()
     }
 
+    /// Returns true if the signal is 0 at all times.
+    pub fn is_zero(&self) -> bool {
+        self.before == 0.0 && self.pieces.iter().all(|piece| piece.from == 0.0 && piece.to == 0.0)
+    }
+
+    /// Becomes a signal with the pieces of another that is 0 at all times.
+    pub fn silence_as(&mut self, other: &Self) {
+        self.before = 0.0;
+        self.pieces.clear();
+        self.pieces.extend(other.pieces.iter().map(|piece| Piece { from: 0.0, to: 0.0, ..*piece }));
+        self.rows.clone_from(&other.rows);
+    }
+
+    /// Returns the pieces in the order of time.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
     /// Returns the number of pieces that are not as long as the one before them.
     pub fn changes_of_duration(&self) -> usize {
         let differ = |pair: &&[Piece]| (pair[1].duration_s - pair[0].duration_s).abs() > 1e-9 * pair[1].duration_s;

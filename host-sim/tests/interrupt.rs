@@ -1,0 +1,77 @@
+//! Ctrl-C during a diagnosis: the first gives the best answer so far, the second ends the program.
+#![cfg(unix)]
+
+use std::fmt::Write;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+/// Rows of a voltage that changes at every row, with a response that no cause explains: a thorough search takes minutes.
+fn write_record(path: &Path) {
+    let mut state = 1u32;
+    let mut uniform = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24)
+    };
+    let mut text = "time_s,voltage_v,stiffness\n".to_owned();
+    let mut slow = 0.0;
+    for row in 0..4000 {
+        let voltage_v = 500.0 * uniform();
+        let reading = slow + 0.0006 * (voltage_v - slow) * (slow - 250.0) * (slow / 60.0).sin() + uniform();
+        slow += 0.04 * (voltage_v - slow);
+        writeln!(text, "{},{voltage_v},{reading}", 0.2 * f64::from(row)).unwrap();
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+/// Starts a thorough diagnosis with its files in `out`, and waits until its search has begun.
+fn start(folder: &Path) -> Child {
+    let record = folder.join("record.csv");
+    write_record(&record);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
+    command.arg("diagnose").arg(&record).args(["--effort", "thorough", "--json", "--out"]).arg(folder.join("out"));
+    let diagnosis = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // The folder is created just before the search.
+    while !folder.join("out").exists() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    diagnosis
+}
+
+fn interrupt(diagnosis: &Child) {
+    assert!(Command::new("kill").args(["-INT", &diagnosis.id().to_string()]).status().unwrap().success());
+}
+
+/// Names of the files in a folder.
+fn files(folder: &Path) -> Vec<String> {
+    let names = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
+    names.map(|name| name.to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn first_ctrl_c_gives_the_best_answer_so_far() {
+    let folder = tempfile::tempdir().unwrap();
+    let diagnosis = start(folder.path());
+    interrupt(&diagnosis);
+    let Output { status, stdout, .. } = diagnosis.wait_with_output().unwrap();
+    assert!(status.success(), "{status}");
+    let report: serde_json::Value = serde_json::from_slice(&stdout).unwrap();
+    assert_eq!(report["complete"], false);
+    let files = files(&folder.path().join("out"));
+    assert!(files.iter().any(|name| name == "plant.toml"), "{files:?}");
+    assert!(!files.iter().any(|name| name.starts_with('.')), "{files:?}");
+}
+
+#[test]
+fn second_ctrl_c_ends_the_program_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let diagnosis = start(folder.path());
+    interrupt(&diagnosis);
+    // Two signals at once would be one.
+    std::thread::sleep(Duration::from_millis(2));
+    interrupt(&diagnosis);
+    let Output { status, stdout, .. } = diagnosis.wait_with_output().unwrap();
+    // The report of what was found takes longer than that.
+    assert_eq!((status.code(), stdout.len()), (Some(130), 0));
+    assert!(files(&folder.path().join("out")).is_empty());
+}
