@@ -51,3 +51,15 @@ pub const fn fast(amplifier: Amplifier) -> Settings {
 pub const fn with_sensor(settings: Settings) -> Settings {
     Settings { feedback: SENSOR, ..settings }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_takes_its_amplifier_and_its_sensor_from_its_features_alone() {
+        assert_eq!(paper(KILOVOLT), Settings { amplifier: KILOVOLT, ..Settings::PAPER });
+        let other = Settings { feedback: Some(Feedback { noise_v: 3.0, ..Feedback::TYPICAL }), ..SETTINGS };
+        assert_eq!(with_sensor(other), Settings { feedback: SENSOR, ..SETTINGS });
+    }
+}

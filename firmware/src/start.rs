@@ -117,4 +117,12 @@ mod tests {
             assert_eq!(start.model, if rejected.is_some() { ModelId::default() } else { start.stored });
         }
     }
+
+    #[test]
+    fn a_model_is_checked_before_it_is_stored() {
+        let payload = |share| model(share).payload().unwrap();
+        assert_eq!(check(&payload(0.1)), Ok(()));
+        assert_eq!(check(b"noise"), Err(Reason::ModelDamaged));
+        assert!(matches!(check(&payload(2.0)), Err(reason) if reason != Reason::ModelDamaged));
+    }
 }

@@ -1,5 +1,6 @@
 use super::*;
 use proptest::prelude::*;
+use std::vec::Vec;
 
 fn config(amplifier: &Amplifier, rate_hz: f64) -> Config {
     amplifier.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize()
@@ -191,4 +192,15 @@ fn each_limit_has_its_own_bit_in_the_telemetry() {
     let both = Limits::UPPER.with(Limits::SLEW, true).with(Limits::LOWER, false);
     assert_eq!((both.bits(), both.intersects(Limits::SLEW), both.with(Limits::SLEW, true)), (5, true, both));
     assert!(!Limits::NONE.intersects(both));
+}
+
+#[test]
+fn the_slew_is_the_same_in_both_directions() {
+    let config = config(&Amplifier { slew_v_per_s: Some(1000.0), ..Amplifier::PAPER }, 1000.0);
+    let mut state = State::default();
+    let up: Vec<f64> = (0..300).map(|_| config.drive(&mut state, volts(300.0)).voltage.to_f64()).collect();
+    let down: Vec<f64> = (0..300).map(|_| config.drive(&mut state, volts(0.0)).voltage.to_f64()).collect();
+    for (tick, (up, down)) in up.into_iter().zip(down).enumerate() {
+        assert_eq!((up, down), (tick as f64 + 1.0, 299.0 - tick as f64));
+    }
 }
