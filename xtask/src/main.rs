@@ -6,6 +6,7 @@ mod check;
 mod emulation;
 mod flash;
 mod image;
+mod mutants;
 mod steps;
 mod test;
 mod times;
@@ -94,6 +95,8 @@ Examples:
     Image(Variant),
     /// Run the image that is flashed on models of the STM32G474's registers
     Boot(Forwarded),
+    /// Run random ticks on the host and check every invariant in each
+    Soak(Forwarded),
     /// Compare the host's speed with Python's
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Marks a time of Rust's above
@@ -103,6 +106,20 @@ Examples:
         after_help = "Example:\n  cargo xtask bench --json | jq '.rows[] | {name, to_numba, met}'"
     )]
     Bench(bench::Args),
+    /// Change the code in one place at a time; count what no test notices
+    ///
+    /// Over model, link and the parts of the firmware that a host can run. Fails below 95 % caught, or if a change lives
+    /// that is not in .cargo/mutants-survivors.toml with its reason. Takes hours; installs cargo-mutants under the target
+    /// directory unless it is there.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Examples:
+  cargo xtask mutants --jobs 4
+  cargo xtask mutants --package model --file 'model/src/extended/*'
+  cargo xtask mutants --package model --iterate        only what the last run has not caught"
+    )]
+    Mutants(mutants::Args),
     /// Measure how long a build takes: first result, xtask, check
     #[command(after_help = times::EXAMPLES)]
     Times(times::Args),
@@ -139,7 +156,8 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Drill, Emulate, Flash, Image, Proof, Setup, Size, Story, Talk, Test, Times};
+    use Command::{Bench, Boot, Check, Drill, Emulate, Flash, Image, Mutants, Proof, Setup, Size, Soak, Story, Talk};
+    use Command::{Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -148,7 +166,8 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Image(variant) => image::run(variant),
         Bench(args) => bench::run(&args),
         Times(args) => times::run(&args),
-        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Story(_) | Size(_) | Boot(_) => {
+        Mutants(args) => mutants::run(&args),
+        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Story(_) | Size(_) | Boot(_) | Soak(_) => {
             emulation::replace(args).map(|never: Infallible| match never {})
         }
     }
