@@ -105,7 +105,7 @@ impl Events {
         Event {
             command,
             heard,
-            late_us: if happens(first, 3, phase.late) { self.random.random_range(0..20_000) } else { 0 },
+            late_us: if happens(first, 3, phase.late) { self.lateness() } else { 0 },
             interlock_closed: !happens(second, 1, phase.open),
             monitors: self.monitors(happens(second, 2, phase.monitor)),
             fault: happens(second, 3, phase.fault).then(|| self.random.random_range(1..=8)).and_then(Fault::from_code),
@@ -137,6 +137,12 @@ impl Events {
             monitor,
             reading,
         }
+    }
+
+    /// Mostly some ticks, sometimes up to 71 minutes.
+    fn lateness(&mut self) -> u32 {
+        let most = if self.random.random_range(0..100) == 0 { u32::MAX } else { 20_000 };
+        self.random.random_range(0..=most)
     }
 
     /// Any target: mostly inside the range, sometimes anywhere in the format.

@@ -191,3 +191,24 @@ fn every_state_of_the_sensor_has_a_name_of_its_own() {
     assert_eq!(faults.map(|fault| Sensor::Failed(fault).name()), names);
     assert_eq!(Sensor::Trusted.name(), "trusted");
 }
+
+/// After 65 535 good readings, after 49.7 days without one.
+#[test]
+fn counters_stay_at_their_ends() {
+    let mut bench = Bench::trusted(Signal::ZERO);
+    for reading in 0..70_000 {
+        let noise = Signal::from_bits(reading % 2);
+        assert_eq!(bench.read(noise, Signal::ZERO), Some(noise), "reading {reading}");
+    }
+    assert_eq!(bench.state.good, u16::MAX);
+    bench.state.since = u32::MAX - 1;
+    for _ in 0..3 {
+        bench.config.evaluate(&mut bench.state, None);
+        assert_eq!((bench.state.since, bench.sensor()), (u32::MAX, Sensor::Failed(Fault::Absent)));
+    }
+    for reading in 0..70_000 {
+        bench.read(volts(0.5), Signal::ZERO);
+        assert!(reading < 100 || bench.sensor() == Sensor::Failed(Fault::Stuck), "reading {reading}");
+    }
+    assert_eq!(bench.state.identical, u16::MAX);
+}

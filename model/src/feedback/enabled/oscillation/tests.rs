@@ -74,3 +74,15 @@ fn each_reduction_divides_a_step_of_the_correction_by_four() {
         assert_eq!(state.reduce(-step), Accumulator::from_num(-left));
     }
 }
+
+#[test]
+fn counters_stay_at_their_ends() {
+    let config = Config::new(1e-3, SampleTime::from_rate(1000.0).unwrap());
+    let reduced = State { crossings: u8::MAX, since: u32::MAX, reductions: MAX_REDUCTIONS, ..State::default() };
+    let mut state = reduced;
+    config.detect(&mut state, Signal::ZERO, Signal::from_num(6));
+    assert_eq!((state.since, state.crossings), (u32::MAX, 0), "no crossing for that long");
+    let mut state = State { since: 0, ..reduced };
+    config.detect(&mut state, Signal::from_num(200), Signal::from_num(6));
+    assert_eq!((state.crossings, state.reductions), (u8::MAX, MAX_REDUCTIONS));
+}
