@@ -76,3 +76,19 @@ fn the_magnitudes_of_all_weights_in_a_sum_share_one_budget() {
     assert_eq!(spent(6.0, 6.5), Err("weights"));
     assert_eq!(spent(6.0, -6.5), Err("weights"));
 }
+
+#[cfg(feature = "time-optimal")]
+#[test]
+fn a_signal_divided_by_a_weight_and_multiplied_again_is_the_signal() {
+    for factor in [1.0, -2.5, 0.125, 10.0, 1.0 / 3.0] {
+        for volts in [0.0, 1.0, -7.5, 100.0] {
+            let (weight, signal) = (Weight::new(factor), Signal::from_num(volts));
+            let quotient = weight.divide(signal);
+            assert!((quotient.to_num::<f64>() - volts / weight.to_f64()).abs() < 2e-6, "{volts} / {factor}");
+            assert!((saturated(weight.times(quotient)) - signal).abs() <= Signal::from_bits(11), "{volts} / {factor}");
+        }
+    }
+    assert_eq!(Weight::new(0.001).divide(Signal::from_num(1000)), Signal::MAX);
+    assert_eq!(Weight::new(0.001).divide(Signal::from_num(-1000)), Signal::MIN);
+    assert_eq!(Weight::default().divide(Signal::ZERO), Signal::ZERO);
+}
