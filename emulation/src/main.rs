@@ -7,6 +7,7 @@
 //! - [`qemu`] runs an image under QEMU and compares the run with the same code on the host: [`emulate`], [`rivals`],
 //!   [`blocks`], [`drill`], [`talk`], [`story`].
 //! - [`boot`] runs the image that is flashed on models of the chip's registers.
+//! - [`soak`] runs random ticks of the control on the host and checks every invariant in each.
 //! - [`proof`] is what all of `cargo xtask test` asks of the emulated board.
 
 mod binary;
@@ -17,6 +18,7 @@ mod emulate;
 mod proof;
 mod qemu;
 mod rivals;
+mod soak;
 mod story;
 mod talk;
 mod variant;
@@ -108,6 +110,16 @@ Examples:
   cargo xtask boot --controller fast                   the image of the time-optimal controller
   cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V")]
     Boot(Variant),
+    /// Run random ticks on the host and check every invariant in each
+    ///
+    /// Random settings, commands, readings, missed ticks, silences, interlock openings and faults. In each tick: range,
+    /// slew, no wrap, the supervisor's state and its reasons, every missed tick counted. Prints what the ticks covered.
+    /// A share of it is part of the unit tests.
+    #[command(after_help = "\
+Examples:
+  cargo xtask soak                                     100 million ticks
+  cargo xtask soak --ticks 1000000")]
+    Soak(soak::Args),
 }
 
 fn main() -> ExitCode {
@@ -119,6 +131,7 @@ fn main() -> ExitCode {
         Command::Story(args) => story::run(&args),
         Command::Size(args) => size::run(&args),
         Command::Boot(variant) => boot::run(variant),
+        Command::Soak(args) => soak::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

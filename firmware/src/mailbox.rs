@@ -57,6 +57,7 @@ mod tests {
     use super::*;
     use crate::control::{Control, Sensors, Untimed};
     use crate::settings::{SETTINGS, SUPERVISION};
+    use link::Telemetry;
     use model::supervisor;
 
     const DISARM: Command = Command { heard: true, arming: Some(supervisor::Command::Disarm), target: None };
@@ -109,5 +110,17 @@ mod tests {
         mailbox.put(Command { heard: false, ..ARM }, State::Disarmed);
         assert_eq!(mailbox.take(State::Disarmed), (ARM, true));
         assert_eq!(mailbox.take(State::Disarmed), (Command::default(), false));
+    }
+
+    #[test]
+    fn the_view_is_that_of_the_last_tick_and_absent_before_the_first() {
+        let mut mailbox = Mailbox::EMPTY;
+        assert_eq!(mailbox.view(), None);
+        for overruns in [3, 4] {
+            let view = View { sample: Telemetry::default(), state: State::Disarmed, refusal: None, overruns };
+            mailbox.show(view);
+            assert_eq!(mailbox.view(), Some(view));
+            assert_eq!(mailbox.take(State::Disarmed), (Command::default(), false), "a view is no command");
+        }
     }
 }

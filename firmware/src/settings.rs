@@ -51,3 +51,14 @@ pub const fn fast(amplifier: Amplifier) -> Settings {
 pub const fn with_sensor(settings: Settings) -> Settings {
     Settings { feedback: SENSOR, ..settings }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_takes_its_amplifier_and_its_sensor_from_its_features_alone() {
+        assert_eq!(paper(KILOVOLT), Settings { amplifier: KILOVOLT, ..Settings::PAPER });
+        assert_eq!(with_sensor(SETTINGS), Settings { feedback: SENSOR, ..SETTINGS });
+    }
+}

@@ -23,11 +23,11 @@ pub fn set(mpu: &mut MPU) {
     // The default memory map applies elsewhere. Hard fault and NMI handlers run without protection.
     const DEFAULT_MAP: u32 = 1 << 2;
     // SAFETY: removes the access rights of 256 unused bytes only.
-    unsafe {
-        mpu.rbar.write(end | VALID);
-        mpu.rasr.write(NEVER_EXECUTE | (LOG2_SIZE - 1) << 1 | ENABLE);
-        mpu.ctrl.write(DEFAULT_MAP | ENABLE);
-    }
+    unsafe { mpu.rbar.write(end | VALID) };
+    // SAFETY: as above.
+    unsafe { mpu.rasr.write(NEVER_EXECUTE | (LOG2_SIZE - 1) << 1 | ENABLE) };
+    // SAFETY: as above.
+    unsafe { mpu.ctrl.write(DEFAULT_MAP | ENABLE) };
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
 }

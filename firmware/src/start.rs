@@ -80,6 +80,7 @@ fn build<'a>(settings: &Settings, place: &'a mut Option<Control>) -> Result<&'a 
 mod tests {
     use super::*;
     use crate::settings::SETTINGS;
+    use link::wire_model::FORMAT;
     use model::supervisor::{Faults, State};
 
     fn model(share: f64) -> WireModel {
@@ -115,6 +116,30 @@ mod tests {
             assert_eq!(start.last_fault, last_fault, "reported in any case");
             assert_eq!(start.stored.number, if stored.is_some() { 3 } else { 0 }, "valid or not");
             assert_eq!(start.model, if rejected.is_some() { ModelId::default() } else { start.stored });
+        }
+    }
+
+    #[test]
+    fn a_model_is_checked_before_it_is_stored() {
+        let payload = |share| model(share).payload().unwrap();
+        assert_eq!(check(&payload(0.1)), Ok(()));
+        assert_eq!(check(b"noise"), Err(Reason::ModelDamaged));
+        assert!(matches!(check(&payload(2.0)), Err(reason) if reason != Reason::ModelDamaged));
+    }
+
+    /// The first byte of a payload is the version of its format.
+    #[test]
+    fn a_model_of_a_newer_format_is_neither_stored_nor_run() {
+        let mut newer = model(0.1).payload().unwrap();
+        for version in (0..=u8::MAX).filter(|version| *version != FORMAT) {
+            newer[0] = version;
+            assert_eq!(check(&newer), Err(Reason::ModelDamaged), "format {version}");
+            let mut place = None;
+            let stored = Some((ModelId::of(3, &newer), &newer[..]));
+            let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
+            let (control, start) = control(&SETTINGS, stored, &cause, &mut place).unwrap();
+            assert_eq!((start.rejected, start.model), (Some("format"), ModelId::default()));
+            assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config));
         }
     }
 }

@@ -153,7 +153,8 @@ impl Validated<'_, Amplifier> {
             lowest: Signal::ZERO,
             highest: Signal::ZERO,
             slew: Limits::NONE.with(Limits::SLEW, step_v.is_some()),
-            step: accumulator(step_v.unwrap_or(amplifier.full_scale_v)),
+            // 1 V more than any change inside the range, so that a voltage beyond its end is seen to be held there.
+            step: accumulator(step_v.unwrap_or(amplifier.full_scale_v + 1.0)),
             codes_per_volt: signal(1.0 / unit),
             // Rounded down: the highest code never stands for more than the full scale.
             volts_per_code: I3F29::from_bits((unit * f64::from(1 << 29)) as i32),
@@ -229,81 +230,4 @@ impl State {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn config(amplifier: &Amplifier, rate_hz: f64) -> Config {
-        amplifier.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize()
-    }
-
-    fn volts(value: f64) -> Volts {
-        Volts::new(value).unwrap()
-    }
-
-    proptest! {
-        #[test]
-        fn a_code_survives_conversion_to_volts(full_scale in 50.0..1000.0f64, bits in 8u32..=16, part: f64) {
-            let config = config(&Amplifier { dac_bits: bits, ..Amplifier::up_to(full_scale) }, 1000.0);
-            let code = DacCode((part.abs().fract() * f64::from((1u32 << bits) - 1)) as u16);
-            prop_assert_eq!(config.code(config.volts(code)), code);
-        }
-
-        #[test]
-        fn the_output_stays_in_range_and_is_rounded_to_the_nearest_code(
-            full_scale in 50.0..1000.0f64,
-            (low, high) in (0.0..0.5f64, 0.6..1.0f64),
-            bits in 8u32..=16,
-            wanted in -2000.0..2000.0f64,
-        ) {
-            let (min_v, max_v) = (low * (full_scale - 30.0), high * full_scale);
-            let amplifier = Amplifier { min_v, max_v, dac_bits: bits, ..Amplifier::up_to(full_scale) };
-            let config = config(&amplifier, 1000.0);
-            let (lowest, highest) = config.range();
-            let unit = amplifier.volts_per_code();
-            let inward = 0.0..unit + 3e-4;
-            prop_assert!(inward.contains(&(lowest.to_f64() - min_v + 1.5e-4)));
-            prop_assert!(inward.contains(&(max_v - highest.to_f64() + 1.5e-4)));
-
-            let drive = config.drive(&mut State::default(), volts(wanted));
-            let out = drive.applied;
-            prop_assert!(out >= lowest && out <= highest, "{out:?} outside {lowest:?}..{highest:?}");
-            let ideal = wanted.clamp(lowest.to_f64(), highest.to_f64());
-            prop_assert!((out.to_f64() - ideal).abs() <= 0.503 * unit + 2e-6);
-            prop_assert_eq!(drive.limits.intersects(Limits::UPPER), volts(wanted) > highest);
-            prop_assert_eq!(drive.limits.intersects(Limits::LOWER), volts(wanted) < lowest);
-            prop_assert!(!drive.limits.intersects(Limits::SLEW), "no slew limit is set");
-        }
-
-        #[test]
-        fn the_mean_slew_is_exact_even_below_one_code_per_tick(slew in 1.0..5000.0f64, rate in 100.0..10_000.0f64) {
-            let config = config(&Amplifier { slew_v_per_s: Some(slew), ..Amplifier::PAPER }, rate);
-            let mut state = State::default();
-            let ticks = (rate / 20.0) as u32;
-            let mut drive = config.drive(&mut state, volts(700.0));
-            for _ in 1..ticks {
-                drive = config.drive(&mut state, volts(700.0));
-            }
-            let expected = (slew / rate * f64::from(ticks)).min(700.0);
-            prop_assert!((drive.voltage.to_f64() - expected).abs() < 5e-5);
-            prop_assert_eq!(drive.limits.intersects(Limits::SLEW), expected < 700.0);
-        }
-    }
-
-    #[test]
-    fn a_setting_out_of_range_is_rejected_by_name() {
-        let sample_time = SampleTime::from_rate(1000.0).unwrap();
-        let good = Amplifier::PAPER;
-        for (field, wrong) in [
-            ("full_scale_v", Amplifier { full_scale_v: 1500.0, ..good }),
-            ("full_scale_v", Amplifier { full_scale_v: f64::NAN, ..good }),
-            ("dac_bits", Amplifier { dac_bits: 24, ..good }),
-            ("min_v", Amplifier { min_v: -5.0, ..good }),
-            ("max_v", Amplifier { min_v: 500.0, max_v: 300.0, ..good }),
-            ("max_v", Amplifier { max_v: 701.0, ..good }),
-            ("slew_v_per_s", Amplifier { slew_v_per_s: Some(0.0), ..good }),
-        ] {
-            assert_eq!(wrong.validate(sample_time).unwrap_err().field, field, "{wrong:?}");
-        }
-    }
-}
+mod tests;

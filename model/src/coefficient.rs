@@ -165,41 +165,4 @@ pub(crate) const fn widened(signal: Signal) -> Accumulator {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn a_gain_rounds_down_by_at_most_one_step(gain in -100.0..100.0f64, volts in -20.0..20.0f64) {
-            let signal = Signal::from_num(volts);
-            let got = f64::from(Gain::new(gain).times(signal).to_bits());
-            let exact = gain * f64::from(signal.to_bits());
-            prop_assert!(got <= exact + 0.01 && got > exact - 1.01, "{got} {exact}");
-        }
-
-        #[test]
-        fn a_wide_gain_is_exact_to_2e_9_or_saturates(exponent in -31.0..28.0f64, volts in -2000.0..2000.0f64) {
-            let (factor, signal) = (libm::exp2(exponent), Signal::from_num(volts));
-            let got = WideGain::new(factor).times(signal).to_num::<f64>();
-            let exact = (factor * signal.to_num::<f64>()).clamp(-2048.0, Signal::MAX.to_num());
-            prop_assert!((got - exact).abs() < exact.abs() * 2e-9 + 1e-6, "{got} {exact}");
-        }
-
-        #[test]
-        fn a_rate_keeps_its_precision_over_eight_decades(exponent in -8.0..-0.302f64, volts in -1000.0..1000.0f64) {
-            let (rate, lag) = (libm::pow(10.0, exponent), Signal::from_num(volts));
-            let got = Rate::new(rate).step(lag).to_bits() as f64;
-            let exact = rate * f64::from(lag.to_bits()) * TWO_TO_32;
-            prop_assert!((got - exact).abs() <= exact.abs() * 1e-15 + 2.0, "{got} {exact}");
-        }
-    }
-
-    #[test]
-    fn gains_of_and_near_one_half_are_exact() {
-        for value in [0.0, 0.5, -0.5, 1.5, 0.499_999_999_99, 99.5, 1.0 - 1e-12] {
-            let got = Gain::new(value).times(Signal::from_num(16)).to_num::<f64>();
-            assert!((got - 16.0 * value).abs() < 2e-6, "{value} {got}");
-        }
-    }
-}
+mod tests;

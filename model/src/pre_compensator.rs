@@ -134,28 +134,4 @@ impl ProportionalIntegral {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::estimator::{Model, Plant};
-
-    #[test]
-    fn a_gain_out_of_range_is_rejected_by_name() {
-        let time = SampleTime::from_rate(1000.0).unwrap();
-        let named = |proportional, integral_per_s| {
-            let gains = Gains { proportional, integral_per_s };
-            gains.check(&Plant::PAPER.largest_step_gain(time), time).unwrap_err().field
-        };
-        assert_eq!(named(-4.0, 1.35), "proportional_gain");
-        assert_eq!(named(0.0, 1.35), "proportional_gain");
-        assert_eq!(named(f64::NAN, 1.35), "proportional_gain");
-        assert_eq!(named(4.0, -1.35), "integral_gain_per_s");
-        assert_eq!(named(4.0, f64::NAN), "integral_gain_per_s");
-        // The reset time is shorter than ten ticks.
-        assert_eq!(named(4.0, 401.0), "integral_gain_per_s");
-        // The spring would overshoot its target in every tick: it would ring.
-        let slow = SampleTime::from_rate(100.0).unwrap();
-        let quick = Plant { share: 0.0, time_constant_s: 0.1 }.largest_step_gain(slow);
-        let error = Gains { proportional: 20.0, integral_per_s: 1.0 }.check(&quick, slow);
-        assert_eq!(error.unwrap_err().field, "proportional_gain");
-    }
-}
+mod tests;

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result};
 
@@ -59,7 +60,7 @@ impl Board {
     }
 
     /// Package with the binary of the board.
-    const fn package(self) -> &'static str {
+    pub const fn package(self) -> &'static str {
         match self {
             Self::Nucleo => "firmware",
             Self::Mps2 => "test-bench",
@@ -99,20 +100,42 @@ fn compile(package: &str, features: &str, opt: Opt, what: [&str; 2], file: &str,
     // No other build may take place between building and copying.
     let turn = fs::File::create(folder.join("turn.lock")).context("cannot make a lock")?;
     turn.lock().context("cannot wait for a lock")?;
-    shell::run(shell::cargo().args(["build", "--quiet", "--package", package]).args(what).args([
-        "--features",
-        features,
-        "--profile",
-        opt.profile(),
-        "--target",
-        shell::MCU,
-    ]))?;
+    shell::run(cargo_build(shell::root(), package, features, opt).args(what))?;
     let (built, own) = (folder.join(file), images.join(name));
     // Replaces the old file instead of overwriting it: an emulator may be running it.
     let new = own.with_extension("new");
     fs::copy(&built, &new).with_context(|| format!("cannot copy {}", built.display()))?;
     fs::rename(&new, &own).with_context(|| format!("cannot write {}", own.display()))?;
     Ok(own)
+}
+
+/// Builds the image of a board from the sources in `root`, which may be a copy, into a target directory of that copy.
+/// Returns the path of its ELF file.
+pub fn image_of_copy(root: &Path, features: &[&str], board: Board) -> Result<PathBuf> {
+    let features = [&[board.name()], features].concat().join(",");
+    let target = root.join("target");
+    let mut command = cargo_build(root, board.package(), &features, Opt::S);
+    shell::run(command.args(["--bin", board.name()]).env("CARGO_TARGET_DIR", &target))?;
+    Ok(target.join(shell::MCU).join(Opt::S.profile()).join(board.name()))
+}
+
+/// The command that compiles a package for the MCU. No path of this machine gets into what is built: the sources are
+/// named as if they were in `/vsj`, and those of the registry as if they were in `/cargo`.
+fn cargo_build(root: &Path, package: &str, features: &str, opt: Opt) -> Command {
+    let mut command = shell::cargo();
+    command.current_dir(root).args(["build", "--quiet", "--package", package]);
+    command.args(["--features", features, "--profile", opt.profile(), "--target", shell::MCU]);
+    let remapped = [(root.to_owned(), "/vsj"), (cargo_home(), "/cargo")];
+    let flags = remapped.map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()));
+    // Separated as cargo wants it, so that a path may contain spaces.
+    command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
+    command
+}
+
+/// The folder in which cargo keeps the sources of dependencies.
+fn cargo_home() -> PathBuf {
+    let home = || std::env::home_dir().unwrap_or_default().join(".cargo");
+    std::env::var_os("CARGO_HOME").map_or_else(home, PathBuf::from)
 }
 
 /// Reads a file. The error names it.

@@ -1,4 +1,4 @@
-//! `cargo xtask image`: the MCU's images as ELF, bin and hex.
+//! `cargo xtask image`: the MCU's images as ELF, bin and hex, each with its software bill of materials.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,9 @@ use xtask::build::{self, Board, Opt};
 use xtask::segments;
 use xtask::variant::Variant;
 
-/// Builds the image of each board and prints the paths of its three files.
+use crate::sbom;
+
+/// Builds the image of each board and prints the paths of its four files.
 pub(crate) fn run(variant: Variant) -> Result<()> {
     for board in Board::ALL {
         let path = build::image_with(&variant.features(), board, Opt::S)?;
@@ -16,7 +18,10 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         let (bin, hex) = (path.with_extension("bin"), path.with_extension("hex"));
         write(&bin, &flash.bytes)?;
         write(&hex, intel_hex(flash.address, &flash.bytes).as_bytes())?;
-        println!("{}\n{}\n{}", path.display(), bin.display(), hex.display());
+        let bom = path.with_extension("cdx.json");
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        write(&bom, sbom::of_image(board, &variant.features(), &name)?.as_bytes())?;
+        println!("{}\n{}\n{}\n{}", path.display(), bin.display(), hex.display(), bom.display());
     }
     Ok(())
 }

@@ -8,4 +8,5 @@ pub mod python;
 pub mod segments;
 pub mod setup;
 pub mod shell;
+pub mod tool;
 pub mod variant;

@@ -4,12 +4,19 @@
 mod bench;
 mod bench_records;
 mod check;
+mod deny;
 mod emulation;
 mod flash;
 mod image;
+mod mutants;
+mod reproducible;
+mod sanitize;
+mod sbom;
 mod steps;
 mod test;
 mod times;
+#[cfg(test)]
+mod unsafe_code;
 
 use std::convert::Infallible;
 use std::ffi::OsString;
@@ -84,7 +91,7 @@ Examples:
     Flash(Variant),
     /// Flash, RAM and worst stack of each image
     Size(Forwarded),
-    /// Make the MCU's images: ELF, bin and hex
+    /// Make the MCU's images: ELF, bin, hex and bill of materials (CycloneDX)
     ///
     /// Prints their paths; each image has a name of its own.
     #[command(after_help = "\
@@ -95,6 +102,8 @@ Examples:
     Image(Variant),
     /// Run the image that is flashed on models of the STM32G474's registers
     Boot(Forwarded),
+    /// Run random ticks on the host and check every invariant in each
+    Soak(Forwarded),
     /// Compare the host's speed with Python's
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Marks a time of Rust's above
@@ -104,6 +113,40 @@ Examples:
         after_help = "Example:\n  cargo xtask bench --json | jq '.rows[] | {name, to_numba, met}'"
     )]
     Bench(bench::Args),
+    /// Change the code in one place at a time; count what no test notices
+    ///
+    /// Over model, link and the parts of the firmware that a host can run. Fails below 95 % caught, or if a change lives
+    /// that is not in .cargo/mutants-survivors.toml with its reason. Takes hours; installs cargo-mutants under the target
+    /// directory unless it is there.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Examples:
+  cargo xtask mutants --jobs 4
+  cargo xtask mutants --package model --file 'model/src/extended/*'
+  cargo xtask mutants --package model --iterate        only what the last run has not caught"
+    )]
+    Mutants(mutants::Args),
+    /// Run the tests of the MCU's code under Miri and the address sanitizer
+    ///
+    /// Overflow checks are on in both. Installs a nightly toolchain with Miri unless it is there.
+    #[command(verbatim_doc_comment)]
+    Sanitize(sanitize::Args),
+    /// Check licences, duplicates, sources and advisories of all dependencies
+    ///
+    /// As deny.toml says. Installs cargo-deny under the target directory unless it is there.
+    #[command(verbatim_doc_comment)]
+    Deny {
+        /// Fail if the database of advisories cannot be had
+        #[arg(long)]
+        require_advisories: bool,
+    },
+    /// Build the images in two folders and compare every byte
+    #[command(after_help = "\
+Examples:
+  cargo xtask reproducible
+  cargo xtask reproducible --controller fast --limit-v 1000")]
+    Reproducible(Variant),
     /// Measure how long a build takes: first result, xtask, check
     #[command(after_help = times::EXAMPLES)]
     Times(times::Args),
@@ -140,7 +183,8 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Drill, Emulate, Flash, Image, Proof, Setup, Size, Story, Talk, Test, Times};
+    use Command::{Bench, Boot, Check, Drill, Emulate, Flash, Image, Mutants, Proof, Setup, Size, Soak, Story, Talk};
+    use Command::{Deny, Reproducible, Sanitize, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -149,7 +193,11 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Image(variant) => image::run(variant),
         Bench(args) => bench::run(&args),
         Times(args) => times::run(&args),
-        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Story(_) | Size(_) | Boot(_) => {
+        Mutants(args) => mutants::run(&args),
+        Sanitize(args) => sanitize::run(&args),
+        Deny { require_advisories } => deny::run(require_advisories),
+        Reproducible(variant) => reproducible::run(variant),
+        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Story(_) | Size(_) | Boot(_) | Soak(_) => {
             emulation::replace(args).map(|never: Infallible| match never {})
         }
     }

@@ -2,7 +2,11 @@
 
 use std::vec::Vec;
 
+use link::wire_model::MOST_PARTS;
+
 use super::*;
+
+mod other_store;
 
 /// Simulated flash with a power cut.
 #[derive(Clone, Debug)]
@@ -173,4 +177,76 @@ fn random_pages_contain_no_model() {
         }
         assert_eq!(newest(&flash), None);
     }
+}
+
+/// Thirteen parts of 32 bytes, the longest payload.
+#[test]
+fn the_longest_payload_fills_all_parts_and_no_further_part_is_written() {
+    let longest: Vec<u8> = (0..MOST_BYTES as u32).map(|i| (i * 7) as u8).collect();
+    let (flash, stored) = store(&Flash::BLANK, &longest, Ok(()));
+    assert_eq!(stored.map(|id| usize::from(id.length)), Ok(MOST_BYTES));
+    assert_eq!(newest(&flash), Some(longest.clone()));
+
+    let mut store = Store::new(flash);
+    for (number, part) in (0..).zip(longest.as_chunks().0) {
+        store.part(number, part).unwrap();
+    }
+    assert_eq!(store.part(MOST_PARTS, &[0; PART]), Err(Reason::PartMissing(MOST_PARTS)));
+    assert_eq!(store.newest().map(|(_, payload)| payload.len()), Some(MOST_BYTES), "the old one stays");
+}
+
+/// Flash that reports success and writes nothing from a number of steps on.
+struct Deaf {
+    flash: Flash,
+    hears: usize,
+}
+
+impl Pages for Deaf {
+    fn bytes(&self, side: Side) -> &[u8; PAGE] {
+        self.flash.bytes(side)
+    }
+
+    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
+        self.hears = self.hears.saturating_sub(1);
+        if self.hears > 0 { self.flash.erase(side) } else { Ok(()) }
+    }
+
+    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+        self.hears = self.hears.saturating_sub(1);
+        if self.hears > 0 { self.flash.program(side, at, word) } else { Ok(()) }
+    }
+}
+
+#[test]
+fn success_is_reported_only_for_a_model_that_can_be_read_back() {
+    let (old, new) = (payload(1), payload(2));
+    let (flash, _) = store(&Flash::BLANK, &old, Ok(()));
+    let steps = 1 + new.len().div_ceil(PART) * PART / WORD + 2;
+    for hears in 0..=steps + 1 {
+        let mut store = Store::new(Deaf { flash: flash.clone(), hears });
+        for (number, part) in (0..).zip(new.chunks(PART)) {
+            let mut bytes = [0; PART];
+            bytes[..part.len()].copy_from_slice(part);
+            store.part(number, &bytes).unwrap();
+        }
+        let stored = store.end(new.len() as u16, frame::checksum(&new), |_| Ok(()));
+        let expected = if hears > steps { &new } else { &old };
+        assert_eq!(stored.is_ok(), hears > steps, "deaf from step {hears} on: {stored:?}");
+        assert_eq!(store.newest().map(|(_, payload)| payload), Some(&expected[..]), "deaf from step {hears} on");
+    }
+}
+
+/// After 2^32 - 1 stores, which no flash survives, the count could only begin again below the stored one.
+#[test]
+fn the_last_number_is_the_end_and_keeps_its_model() {
+    let mut flash = Flash::BLANK;
+    let last = payload(1);
+    let id = ModelId::of(u32::MAX, &last);
+    flash.pages[0][HEADER..HEADER + last.len()].copy_from_slice(&last);
+    for (word, bytes) in header(&id).iter().enumerate() {
+        flash.pages[0][word * WORD..][..WORD].copy_from_slice(bytes);
+    }
+    assert_eq!(newest(&flash), Some(last.clone()));
+    let (after, stored) = store(&flash, &payload(2), Ok(()));
+    assert_eq!((stored, newest(&after)), (Err(Reason::NotStored), Some(last)));
 }

@@ -168,46 +168,4 @@ impl Config {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The slowest lag of 3000 s is integrated even at 10 kHz.
-    #[test]
-    fn a_step_response_is_the_exact_sum_of_exponentials_at_any_rate() {
-        let relaxation = Relaxation {
-            share: 0.1,
-            time_constants_s: &[0.3, 2.0, 40.0, 3000.0],
-            weights: &[0.5, 0.2, 0.15, 0.05],
-            time_constant_high_s: None,
-        };
-        for rate_hz in [100.0, 10_000.0] {
-            let config = relaxation.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize();
-            let (mut state, input) = (State::default(), Signal::from_num(600));
-            for tick in 0..(10.0 * rate_hz) as u32 {
-                let time = f64::from(tick) / rate_hz;
-                let lags = relaxation.lags().map(|(tau, weight)| weight * (1.0 - (-time / tau).exp()));
-                let exact = 600.0 * (0.1 + lags.sum::<f64>());
-                let got = config.stiffness(&state, input).to_num::<f64>();
-                assert!((got - exact).abs() < 1e-4, "{rate_hz} Hz, {time} s: {got} {exact}");
-                config.advance(&mut state, input, Signal::ZERO);
-            }
-        }
-    }
-
-    #[test]
-    fn a_setting_out_of_range_is_rejected_by_name() {
-        let named = |share, time_constants_s: &[f64], weights: &[f64], time_constant_high_s| {
-            let relaxation = Relaxation { share, time_constants_s, weights, time_constant_high_s };
-            relaxation.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field
-        };
-        assert_eq!(named(-0.1, &[5.0], &[], None), "relaxation.share");
-        assert_eq!(named(0.1, &[], &[], None), "relaxation.tau_s");
-        assert_eq!(named(0.1, &[5.0; 5], &[0.1; 5], None), "relaxation.tau_s");
-        assert_eq!(named(0.1, &[5.0, 0.001], &[0.4, 0.4], None), "relaxation.tau_s");
-        assert_eq!(named(0.1, &[5.0, 9.0], &[], None), "relaxation.weights");
-        assert_eq!(named(0.1, &[5.0, 9.0], &[0.4, 10.0], None), "relaxation.weights");
-        assert_eq!(named(0.1, &[5.0], &[], Some(51.0)), "relaxation.tau_high_s");
-        assert_eq!(named(0.1, &[0.003], &[], Some(0.005)), "relaxation.tau_s");
-        assert_eq!(named(0.1, &[5.0], &[], Some(f64::NAN)), "relaxation.tau_high_s");
-    }
-}
+mod tests;

@@ -182,3 +182,6 @@ impl Estimator for Config {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -97,15 +97,17 @@ fn main() -> ! {
             cortex_m::asm::wfi();
         }
     };
-    // SAFETY: the interrupts are not enabled yet. A smaller number is a higher priority: the alarm wakes the control task,
-    // which preempts everything else.
-    unsafe {
-        core.NVIC.set_priority(Interrupt::Timer0, 0x20);
-        core.NVIC.set_priority(Interrupt::Timer1, 0x20);
-        core.NVIC.set_priority(Interrupt::High, 0x40);
-        core.NVIC.set_priority(Interrupt::Received, 0x80);
-        core.NVIC.set_priority(Interrupt::Sent, 0x80);
-        core.NVIC.set_priority(Interrupt::Low, 0xc0);
+    // A smaller number is a higher priority: the alarm wakes the control task, which preempts everything else.
+    for (interrupt, priority) in [
+        (Interrupt::Timer0, 0x20),
+        (Interrupt::Timer1, 0x20),
+        (Interrupt::High, 0x40),
+        (Interrupt::Received, 0x80),
+        (Interrupt::Sent, 0x80),
+        (Interrupt::Low, 0xc0),
+    ] {
+        // SAFETY: the interrupts are not enabled yet.
+        unsafe { core.NVIC.set_priority(interrupt, priority) };
     }
     let low = LOW.start(Interrupt::Low);
     let high = HIGH.start(Interrupt::High);

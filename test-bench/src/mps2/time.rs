@@ -36,10 +36,9 @@ pub(super) fn init() {
     TIMER_0.value.write(TOP);
     TIMER_0.control.write(COUNT | INTERRUPT);
     // SAFETY: the vector table contains the handlers.
-    unsafe {
-        cortex_m::peripheral::NVIC::unmask(Interrupt::Timer0);
-        cortex_m::peripheral::NVIC::unmask(Interrupt::Timer1);
-    }
+    unsafe { cortex_m::peripheral::NVIC::unmask(Interrupt::Timer0) };
+    // SAFETY: as above.
+    unsafe { cortex_m::peripheral::NVIC::unmask(Interrupt::Timer1) };
 }
 
 /// Handles the wrap-around of the time base.

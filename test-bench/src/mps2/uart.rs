@@ -35,10 +35,9 @@ impl Uart {
         UART_0_DIVIDER.write(CLOCK_HZ / BAUD);
         UART_0_CONTROL.write(0b1111);
         // SAFETY: the vector table contains the handlers.
-        unsafe {
-            NVIC::unmask(Interrupt::Received);
-            NVIC::unmask(Interrupt::Sent);
-        }
+        unsafe { NVIC::unmask(Interrupt::Received) };
+        // SAFETY: as above.
+        unsafe { NVIC::unmask(Interrupt::Sent) };
         Self(())
     }
 }

@@ -304,3 +304,6 @@ fn distance(a: Signal, b: Signal) -> Signal {
     // The lowest signal has no positive counterpart.
     a.saturating_sub(b).saturating_abs()
 }
+
+#[cfg(test)]
+mod tests;

@@ -95,37 +95,4 @@ impl State {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Returns how often the gain is divided by four for a mismatch that changes its side every `half_s`, each time
-    /// with `ratio` of its previous amplitude.
-    fn reductions(half_s: f64, ratio: f64, sides: u32) -> u8 {
-        let config = Config::new(1e-3, SampleTime::from_rate(1000.0).unwrap());
-        let mut state = State::default();
-        let target = Signal::from_num(300);
-        // Long enough at rest for the envelope to close.
-        (0..20_000).for_each(|_| config.track_target(&mut state, target));
-        let mut amplitude = 200.0;
-        for _ in 0..sides {
-            for _ in 0..(half_s * 1e3) as u32 {
-                config.track_target(&mut state, target);
-                config.detect(&mut state, Signal::from_num(amplitude), Signal::from_num(6));
-            }
-            amplitude *= -ratio;
-        }
-        state.reductions
-    }
-
-    #[test]
-    fn only_an_oscillation_that_is_fast_and_does_not_decay_reduces_the_gain() {
-        let six = u32::from(SWINGS);
-        assert_eq!(reductions(0.05, 1.0, six - 1), 0);
-        // The mean has to settle first: the first amplitudes decay.
-        assert_eq!(reductions(0.05, 1.0, six + 3), 1);
-        assert_eq!(reductions(0.05, 1.05, six + 3), 1);
-        assert_eq!(reductions(0.05, 1.0, 100), MAX_REDUCTIONS);
-        assert_eq!(reductions(0.05, 0.8, 100), 0);
-        assert_eq!(reductions(1.2 * PAUSE_S, 1.0, 100), 0);
-    }
-}
+mod tests;

@@ -1,0 +1,125 @@
+//! The same stores and the same power cuts with the crate `sequential-storage`, which keeps key-value pairs in any number
+//! of pages: both must have the old or the new payload after each cut, and the same one after each completed store.
+
+use core::ops::Range;
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+use std::vec;
+
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use sequential_storage::cache::Cache;
+use sequential_storage::map::{MapConfig, MapStorage};
+
+use super::*;
+
+const KEY: u8 = 1;
+const RANGE: Range<u32> = 0..2 * PAGE as u32;
+
+/// The simulated flash as the other crate expects it.
+impl ErrorType for Flash {
+    type Error = FlashError;
+}
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+const SIDES: [Side; 2] = [Side::A, Side::B];
+
+impl ReadNorFlash for Flash {
+    const READ_SIZE: usize = 1;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        let from = offset as usize;
+        bytes.copy_from_slice(&self.pages.as_flattened()[from..from + bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        2 * PAGE
+    }
+}
+
+impl NorFlash for Flash {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = PAGE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        for page in from as usize / PAGE..to as usize / PAGE {
+            Pages::erase(self, SIDES[page])?;
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        for (at, word) in (offset as usize..).step_by(WORD).zip(bytes.as_chunks().0) {
+            self.program(SIDES[at / PAGE], at % PAGE, *word)?;
+        }
+        Ok(())
+    }
+}
+
+/// The result of a future that never waits.
+fn now<T>(future: impl Future<Output = T>) -> T {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(result) => result,
+        Poll::Pending => unreachable!("the simulated flash never waits"),
+    }
+}
+
+fn other(flash: Flash) -> MapStorage<u8, Flash, impl sequential_storage::cache::CacheImpl<u8>> {
+    MapStorage::new(flash, const { MapConfig::new(RANGE) }, Cache::new_uncached())
+}
+
+fn other_store(flash: &Flash, payload: &[u8]) -> (Flash, bool) {
+    let mut map = other(flash.clone());
+    let stored = now(map.store_item(&mut [0; 1024], &KEY, &payload)).is_ok();
+    (map.destroy().0, stored)
+}
+
+fn other_newest(flash: &Flash) -> Option<Vec<u8>> {
+    let mut buffer = vec![0; 1024];
+    let found = now(other(flash.clone()).fetch_item::<&[u8]>(&mut buffer, &KEY)).expect("a readable map");
+    found.map(<[u8]>::to_vec)
+}
+
+#[test]
+fn both_stores_keep_the_old_or_the_new_payload_and_agree_after_each_store() {
+    let mut random = 1u32;
+    let (mut ours, mut theirs) = (Flash::BLANK, Flash::BLANK);
+    let mut last: Option<Vec<u8>> = None;
+    let (mut cuts, mut kept, mut advanced) = (0, [0; 2], [0; 2]);
+    for number in 1..=20u8 {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let length = 1 + (random >> 8) as usize % MOST_BYTES;
+        let new: Vec<u8> = (0..length).map(|i| (i as u8).wrapping_mul(number)).collect();
+        for (cut, torn) in (1..80).flat_map(|cut| [Torn::Nothing, Torn::All].map(|torn| (cut, torn))) {
+            let until = |flash: &Flash| Flash { steps: Some(cut), torn, ..flash.clone() };
+            let (our_cut, stored) = store(&until(&ours), &new, Ok(()));
+            let (their_cut, their_stored) = other_store(&until(&theirs), &new);
+            for (which, flash, complete) in [(0, our_cut, stored.is_ok()), (1, their_cut, their_stored)] {
+                let flash = Flash { steps: None, ..flash };
+                let found = if which == 0 { newest(&flash) } else { other_newest(&flash) };
+                assert!(found == last || found.as_ref() == Some(&new), "store {number}, step {cut}, {torn:?}, {which}");
+                assert!(!complete || found.as_ref() == Some(&new), "a completed store is there");
+                kept[which] += u32::from(found == last);
+                advanced[which] += u32::from(found != last);
+                // The next attempt succeeds in both.
+                let again = if which == 0 {
+                    newest(&store(&flash, &new, Ok(())).0)
+                } else {
+                    other_newest(&other_store(&flash, &new).0)
+                };
+                assert_eq!(again.as_ref(), Some(&new), "store {number}, step {cut}, {torn:?}, {which}");
+            }
+            cuts += 1;
+        }
+        ours = store(&ours, &new, Ok(())).0;
+        theirs = other_store(&theirs, &new).0;
+        assert_eq!((newest(&ours).as_ref(), other_newest(&theirs).as_ref()), (Some(&new), Some(&new)));
+        last = Some(new);
+    }
+    assert!(cuts == 20 * 79 * 2 && kept.into_iter().chain(advanced).all(|count| count > 100), "{kept:?} {advanced:?}");
+}

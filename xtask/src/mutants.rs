@@ -1,0 +1,244 @@
+//! `cargo xtask mutants`: changes the code in one place at a time, and counts the changes that no test notices.
+//!
+//! In: packages, and `.cargo/mutants-survivors.toml`, the list of changes that live with the reason of each. Out: caught
+//! and missed changes by package on stdout. It fails if fewer than [`LEAST_CAUGHT`] are caught, or if a change lives that
+//! is not listed. The unit tests see each change first; what they miss is tried again with all tests of its package.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use xtask::shell;
+use xtask::tool::Tool;
+
+const TOOL: Tool = Tool { name: "cargo-mutants", version: "26.0.0" };
+/// Smallest share of the changes that must be caught, those that do not compile left out.
+const LEAST_CAUGHT: f64 = 0.95;
+/// The list of changes that live.
+const SURVIVORS: &str = ".cargo/mutants-survivors.toml";
+/// The packages whose tests run on a host and that the MCU runs.
+const PACKAGES: [&str; 3] = ["model", "link", "firmware"];
+
+/// Arguments of `cargo xtask mutants`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Package whose code is changed; all three without it
+    #[arg(long, value_parser = PACKAGES)]
+    package: Vec<String>,
+    /// Only in files that match this pattern, for example 'model/src/extended/*'
+    #[arg(long, value_name = "PATTERN")]
+    file: Vec<String>,
+    /// Number of changes that are compiled and tested at the same time
+    #[arg(long, default_value_t = 1)]
+    jobs: u32,
+    /// Try only what the last run has not caught
+    #[arg(long)]
+    iterate: bool,
+}
+
+/// Tries every change and prints the counts.
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let program = TOOL.program()?;
+    let listed = listed()?;
+    let packages: Vec<&str> = match args.package.as_slice() {
+        [] => PACKAGES.to_vec(),
+        some => some.iter().map(String::as_str).collect(),
+    };
+    let folder = shell::target_directory()?.join("mutants");
+    let (mut all, mut unlisted) = (Counts::default(), Vec::new());
+    let mut living = BTreeSet::new();
+    for package in &packages {
+        let out = folder.join(package);
+        fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
+        for (tests, iterate) in [("--lib", args.iterate), ("--tests", true)] {
+            try_changes(&program, args, package, tests, iterate, &out)?;
+            keep(&out, iterate)?;
+        }
+        let outcomes = Outcomes::read(&out)?;
+        println!("{package:<10} {}", outcomes.counts);
+        all = all.and(&outcomes.counts);
+        for missed in outcomes.missed {
+            if !listed.contains_key(&missed.key) {
+                unlisted.push(missed.line);
+            }
+            living.insert(missed.key);
+        }
+    }
+    println!("{:<10} {all}", "in all");
+    if args.package.is_empty() && args.file.is_empty() {
+        for key in listed.keys().filter(|key| !living.contains(*key)) {
+            println!("caught by now, to be deleted from {SURVIVORS}: {key}");
+        }
+    }
+    for line in &unlisted {
+        println!("lives, and is not listed: {line}");
+    }
+    if !unlisted.is_empty() {
+        bail!("{} changes live that are not in {SURVIVORS}", unlisted.len());
+    }
+    if all.share() < LEAST_CAUGHT {
+        bail!("{:.1} % caught, at least {:.0} % wanted", 100.0 * all.share(), 100.0 * LEAST_CAUGHT);
+    }
+    Ok(())
+}
+
+/// Runs the tool once. It exits with 2 or 3 when changes live, which is no failure here.
+fn try_changes(program: &Path, args: &Args, package: &str, tests: &str, iterate: bool, out: &Path) -> Result<()> {
+    let mut command = shell::command(program);
+    command.args(["mutants", "--no-shuffle", "--colors", "never", "--timeout", "60", "--package", package]);
+    command.arg(format!("--jobs={}", args.jobs)).arg(format!("--cargo-arg={tests}")).arg("--output").arg(out);
+    args.file.iter().for_each(|file| _ = command.args(["--file", file]));
+    if iterate {
+        command.args(["--iterate", "--baseline", "skip"]);
+    }
+    // Its copies are built with the settings of its own profile.
+    command.env_remove("CARGO_INCREMENTAL");
+    let status = command.stdout(std::io::stderr()).status().context("cannot start cargo-mutants")?;
+    match status.code() {
+        Some(0 | 2 | 3) => Ok(()),
+        _ => bail!("cargo-mutants failed ({status})"),
+    }
+}
+
+/// How many changes were caught, lived, ran into the time limit (which is caught, too) or did not compile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Counts {
+    caught: u64,
+    missed: u64,
+    timeout: u64,
+    unviable: u64,
+}
+
+impl Counts {
+    fn and(&self, other: &Self) -> Self {
+        Self {
+            caught: self.caught + other.caught,
+            missed: self.missed + other.missed,
+            timeout: self.timeout + other.timeout,
+            unviable: self.unviable + other.unviable,
+        }
+    }
+
+    /// Share of the changes that the tests notice; 1 if there are none.
+    fn share(&self) -> f64 {
+        let noticed = self.caught + self.timeout;
+        let all = noticed + self.missed;
+        if all == 0 { 1.0 } else { noticed as f64 / all as f64 }
+    }
+}
+
+impl std::fmt::Display for Counts {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { caught, missed, timeout, unviable } = self;
+        let percent = 100.0 * self.share();
+        write!(
+            f,
+            "{caught} caught, {timeout} timeout, {missed} missed ({percent:.1} % caught); {unviable} do not compile"
+        )
+    }
+}
+
+/// A change that lives.
+struct Missed {
+    /// Without line and column, so that an edit elsewhere in the file does not invalidate the list.
+    key: String,
+    line: String,
+}
+
+/// The results of the tool for one package.
+struct Outcomes {
+    counts: Counts,
+    missed: Vec<Missed>,
+}
+
+impl Outcomes {
+    /// Reads what the last pass wrote to `folder`. It lists changes that were tried before as caught, whether they were
+    /// or did not compile, so the others are kept in [`keep`].
+    fn read(folder: &Path) -> Result<Self> {
+        let tried = folder.join("mutants.out");
+        let (timeout, unviable) = (lines(&folder.join("timeout.txt")), lines(&folder.join("unviable.txt")));
+        let mut caught = lines(&tried.join("caught.txt"));
+        caught.extend(lines(&tried.join("previously_caught.txt")));
+        caught.retain(|line| !timeout.contains(line) && !unviable.contains(line));
+        let path = tried.join("missed.txt");
+        let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let missed: Vec<Missed> = text.lines().map(|line| Missed { key: key(line), line: line.to_owned() }).collect();
+        let [caught, timeout, unviable] = [caught, timeout, unviable].map(|lines| lines.len() as u64);
+        Ok(Self { counts: Counts { caught, missed: missed.len() as u64, timeout, unviable }, missed })
+    }
+}
+
+/// Adds the changes of the last pass that ran into the time limit or did not compile to those of earlier passes.
+fn keep(folder: &Path, iterate: bool) -> Result<()> {
+    for name in ["timeout.txt", "unviable.txt"] {
+        let kept = folder.join(name);
+        let mut all = if iterate { lines(&kept) } else { BTreeSet::new() };
+        all.extend(lines(&folder.join("mutants.out").join(name)));
+        let text: String = all.iter().map(|line| format!("{line}\n")).collect();
+        fs::write(&kept, text).with_context(|| format!("cannot write {}", kept.display()))?;
+    }
+    Ok(())
+}
+
+/// The lines of a file; none if there is no such file.
+fn lines(file: &Path) -> BTreeSet<String> {
+    fs::read_to_string(file).unwrap_or_default().lines().map(str::to_owned).collect()
+}
+
+/// A line of the tool, `FILE:LINE:COLUMN: CHANGE in FUNCTION`, without line and column.
+fn key(line: &str) -> String {
+    match line.splitn(4, ':').collect::<Vec<_>>().as_slice() {
+        [file, _, _, change] => format!("{file}:{change}"),
+        _ => line.to_owned(),
+    }
+}
+
+/// The listed changes with their reasons.
+fn listed() -> Result<BTreeMap<String, String>> {
+    let path = shell::root().join(SURVIVORS);
+    let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    parse(&text).with_context(|| format!("cannot use {SURVIVORS}"))
+}
+
+/// Parses `[[survivor]]` tables of `changes` and one `reason`.
+fn parse(text: &str) -> Result<BTreeMap<String, String>> {
+    let file: toml::Table = text.parse()?;
+    let mut listed = BTreeMap::new();
+    for entry in file.get("survivor").and_then(|list| list.as_array()).into_iter().flatten() {
+        let reason = entry.get("reason").and_then(|it| it.as_str()).context("a survivor without a reason")?;
+        let changes = entry.get("changes").and_then(|it| it.as_array()).context("a survivor without changes")?;
+        for change in changes {
+            let change = change.as_str().context("a change that is no text")?;
+            listed.insert(change.to_owned(), reason.to_owned());
+        }
+    }
+    Ok(listed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_listed_change_is_found_wherever_it_has_moved_within_its_file() {
+        let line = "model/src/amplifier.rs:51:56: replace > with >= in Amplifier::limited_to";
+        assert_eq!(key(line), "model/src/amplifier.rs: replace > with >= in Amplifier::limited_to");
+        assert_eq!(key(&line.replace("51:56", "9:1")), key(line));
+    }
+
+    #[test]
+    fn each_survivor_in_the_list_has_a_reason() {
+        let listed = listed().unwrap();
+        assert!(listed.iter().all(|(change, reason)| change.contains(".rs: ") && reason.len() > 20), "{listed:#?}");
+        assert!(parse("[[survivor]]\nchanges = ['a']").is_err());
+        assert!(parse("[[survivor]]\nreason = 'a'").is_err());
+    }
+
+    #[test]
+    fn a_change_that_runs_into_the_time_limit_counts_as_caught() {
+        let counts = Counts { caught: 94, timeout: 1, missed: 5, unviable: 7 };
+        assert_eq!(counts.share(), 0.95);
+        assert_eq!(Counts::default().share(), 1.0);
+    }
+}

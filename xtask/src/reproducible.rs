@@ -1,0 +1,57 @@
+//! `cargo xtask reproducible`: builds the images in two folders with names of different lengths, and compares the files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use xtask::build::{self, Board};
+use xtask::segments;
+use xtask::shell;
+use xtask::variant::Variant;
+
+/// Names of the two folders under the target directory. A path's length once changed the size of an image.
+const FOLDERS: [&str; 2] = ["a", "another-folder-whose-name-is-longer"];
+
+/// Copies the sources to both folders, builds each board's image in both, and prints their sizes if all bytes agree.
+pub(crate) fn run(variant: Variant) -> Result<()> {
+    let target = shell::target_directory()?.join("reproducible");
+    let copies = FOLDERS.map(|name| target.join(name));
+    copies.iter().try_for_each(|folder| copy_sources(folder))?;
+    for board in Board::ALL {
+        let [one, other] = [&copies[0], &copies[1]].map(|root| build::image_of_copy(root, &variant.features(), board));
+        let (one, other) = (build::read(&one?)?, build::read(&other?)?);
+        let flash = [&one, &other].map(|elf| segments::flash(elf));
+        let [flash, other_flash] = flash;
+        let (flash, other_flash) = (flash?.bytes, other_flash?.bytes);
+        ensure!(flash == other_flash, "{}: the flash differs {}", board.name(), first(&flash, &other_flash));
+        ensure!(one == other, "{}: the ELF file differs {}", board.name(), first(&one, &other));
+        println!("{}: {} bytes of flash and {} bytes of ELF agree", board.name(), flash.len(), one.len());
+    }
+    Ok(())
+}
+
+/// Where two files differ first.
+fn first(one: &[u8], other: &[u8]) -> String {
+    let at = one.iter().zip(other).take_while(|(one, other)| one == other).count();
+    format!("from byte {at} on ({} and {} bytes)", one.len(), other.len())
+}
+
+/// Copies every file that git tracks, as it is now, to `folder`; what was built there before stays.
+fn copy_sources(folder: &Path) -> Result<()> {
+    let files = shell::output(shell::command("git").args(["ls-files", "-z"]))?;
+    for file in files.split('\0').filter(|file| !file.is_empty()) {
+        let (from, to): (PathBuf, PathBuf) = (shell::root().join(file), folder.join(file));
+        // Tracked, but deleted since.
+        if !from.is_file() {
+            continue;
+        }
+        let parent = to.parent().context("a file in a folder")?;
+        fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
+        let bytes = build::read(&from)?;
+        // Unchanged files keep their time, so that cargo does not compile them again.
+        if fs::read(&to).ok().as_ref() != Some(&bytes) {
+            fs::write(&to, bytes).with_context(|| format!("cannot write {}", to.display()))?;
+        }
+    }
+    Ok(())
+}
