@@ -55,11 +55,11 @@ fn word(elf: &[u8], at: usize) -> Result<u32> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// An ELF file with these program headers (type, load address, content).
-    fn file(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
+    pub(crate) fn file(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
         let mut elf = b"\x7fELF\x01\x01".to_vec();
         elf.resize(0x34, 0);
         elf[0x1c] = 0x34;
