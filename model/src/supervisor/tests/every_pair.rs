@@ -50,15 +50,17 @@ const ON_COMMAND: [(Option<Command>, [Then; 5]); 3] = [
 ];
 
 /// What speaks against arming; the first row that applies is the reason.
-const AGAINST_ARMING: [(Input, Refusal); 3] = [
+const AGAINST_ARMING: [(Input, Refusal); 4] = [
     (Input::InterlockOpen, Refusal::InterlockOpen),
     (Input::HostSilent, Refusal::HostSilent),
-    (Input::Disagrees, Refusal::Live),
+    (Input::SupplyWrong, Refusal::Reference),
+    (Input::VoltageWrong, Refusal::Live),
 ];
 
 /// What speaks against acknowledging a fault (`None`: any fault); the first row that applies is the reason.
-const AGAINST_ACKNOWLEDGING: [(Option<Fault>, Input, Refusal); 4] = [
-    (None, Input::Disagrees, Refusal::Live),
+const AGAINST_ACKNOWLEDGING: [(Option<Fault>, Input, Refusal); 5] = [
+    (None, Input::SupplyWrong, Refusal::Reference),
+    (None, Input::VoltageWrong, Refusal::Live),
     (Some(Fault::Interlock), Input::InterlockOpen, Refusal::InterlockOpen),
     (Some(Fault::Overrun), Input::MissedLately, Refusal::CausePresent),
     (None, Input::Reported, Refusal::CausePresent),
@@ -71,9 +73,11 @@ enum Input {
     Reported,
     InterlockOpen,
     HostSilent,
-    /// The monitors disagree in this tick.
-    Disagrees,
-    /// The same, for longer than allowed.
+    /// The supply of the converters is out of its range in this tick.
+    SupplyWrong,
+    /// The amplifier's monitors disagree in this tick.
+    VoltageWrong,
+    /// One of both, for longer than allowed.
     DisagreesTooLong,
     /// A tick was missed within the time in which one is forgotten.
     MissedLately,
@@ -101,6 +105,15 @@ enum Disagreed {
     AsAllowed,
 }
 
+/// What the monitors read in the tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Reading {
+    None,
+    Agrees,
+    Voltage,
+    Supply,
+}
+
 #[derive(Clone, Debug)]
 struct Before {
     was: Was,
@@ -116,8 +129,7 @@ struct Event {
     interlock_closed: bool,
     silent: bool,
     missed_ticks: u32,
-    /// `None` without monitors, else whether they agree.
-    agree: Option<bool>,
+    monitors: Reading,
     fault: Option<Fault>,
 }
 
@@ -205,7 +217,7 @@ impl Before {
 }
 
 /// Readings that disagree with every output of this test.
-const FAR_OFF: Monitors = Monitors { voltage: Volts(Signal::MAX), current_ua: 0 };
+const FAR_OFF: Monitors = Monitors { voltage: Volts(Signal::MAX), current_ua: 0, supply_mv: None };
 
 impl Event {
     fn all() -> Vec<Self> {
@@ -214,8 +226,8 @@ impl Event {
         for command in [None, Some(Command::Arm), Some(Command::Disarm)] {
             for (interlock_closed, silent) in [(false, false), (false, true), (true, false), (true, true)] {
                 for missed_ticks in [0, 1, 6] {
-                    for agree in [None, Some(true), Some(false)] {
-                        let event = |fault| Self { command, interlock_closed, silent, missed_ticks, agree, fault };
+                    for monitors in [Reading::None, Reading::Agrees, Reading::Voltage, Reading::Supply] {
+                        let event = |fault| Self { command, interlock_closed, silent, missed_ticks, monitors, fault };
                         all.extend(faults().map(event));
                     }
                 }
@@ -225,26 +237,34 @@ impl Event {
     }
 
     fn inputs(&self, driven: bool) -> Inputs {
-        let agreeing = Monitors { voltage: volts(if driven { 300.0 } else { 0.0 }), current_ua: 0 };
+        let voltage = volts(if driven { 300.0 } else { 0.0 });
+        let reading = |supply_mv| Some(Monitors { voltage, current_ua: 0, supply_mv: Some(supply_mv) });
         Inputs {
             command: self.command,
             target: volts(300.0),
             ticks_since_host: if self.silent { 11 } else { 0 },
             interlock_closed: self.interlock_closed,
             missed_ticks: self.missed_ticks,
-            monitors: self.agree.map(|agree| if agree { agreeing } else { FAR_OFF }),
+            monitors: match self.monitors {
+                Reading::None => None,
+                Reading::Agrees => reading(3300),
+                Reading::Voltage => Some(FAR_OFF),
+                Reading::Supply => reading(3600),
+            },
             fault: self.fault,
         }
     }
 
     /// Whether `input` is there in this tick.
     fn has(&self, input: Input, before: &Before) -> bool {
+        let disagrees = matches!(self.monitors, Reading::Voltage | Reading::Supply);
         match input {
             Input::Reported => self.fault.is_some(),
             Input::InterlockOpen => !self.interlock_closed,
             Input::HostSilent => self.silent,
-            Input::Disagrees => self.agree == Some(false),
-            Input::DisagreesTooLong => self.agree == Some(false) && before.disagreed == Disagreed::AsAllowed,
+            Input::SupplyWrong => self.monitors == Reading::Supply,
+            Input::VoltageWrong => self.monitors == Reading::Voltage,
+            Input::DisagreesTooLong => disagrees && before.disagreed == Disagreed::AsAllowed,
             Input::MissedLately => self.missed_ticks > 0 || matches!(before.missed, Missed::Lately | Missed::Five),
             Input::MissedTooMany => self.missed_ticks == 6 || self.missed_ticks == 1 && before.missed == Missed::Five,
         }
@@ -320,6 +340,6 @@ fn every_state_and_event_leads_where_the_tables_say_and_only_armed_has_a_voltage
         }
     }
     std::println!("{pairs} pairs of state and event, {driven} of them with a voltage");
-    assert_eq!(pairs, 12 * (4 + 1024) * 972, "a pair is missing");
+    assert_eq!(pairs, 12 * (4 + 1024) * 1296, "a pair is missing");
     assert!(driven > 500, "{driven} pairs with a voltage show little");
 }
