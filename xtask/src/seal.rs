@@ -9,9 +9,10 @@ const MARK: &[u8] = b"vsj image crc32c";
 /// Length of the checksum, in bytes.
 const LENGTH: usize = 4;
 
-/// Writes the checksum into an ELF file; one that has it already does not change. A file without exactly one mark in
+/// Writes the checksum into an ELF file, and 0xff between its segments; one that has it already does not change. A file without exactly one mark in
 /// its flash and in itself is an error.
 pub(crate) fn seal(elf: &mut [u8]) -> Result<()> {
+    segments::fill_gaps(elf)?;
     let mut flash = segments::flash(elf)?.bytes;
     let place = |bytes: &[u8]| -> Result<std::ops::Range<usize>> {
         let mut found = bytes.windows(MARK.len()).enumerate().filter(|(_, window)| *window == MARK);
