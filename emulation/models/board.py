@@ -23,6 +23,7 @@ FRAME = (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_
 FLOATS = tuple(UC_ARM_REG_S0 + i for i in range(16))
 
 FLASH_ECCR, FLASH_OPTR = 0x4002_2018, 0x4002_2020
+RNG, VREFINT_CAL = 0x5006_0800, 0x1FFF_75AA
 RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0800, 0x5000_0000
 GPIO = 0x4800_0000
 TIM15, TIM15_IRQ = 0x4001_4000, 24  # Used by the time driver.
@@ -31,6 +32,7 @@ SCS = 0xE000_E000
 SYSTICK_IRQ = -1  # Exception 15.
 NMI_IRQ = -14  # Exception 2.
 BAUD = 115_200  # Baud rate of the host.
+VREFINT = 1.212  # Volts of the internal reference.
 MONITOR_SCALE = 1000  # Volts of the amplifier at the ADC's full range.
 ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
 
@@ -38,8 +40,9 @@ ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
 class Board:
     """One chip with the image in its flash. `log` receives (time in us, name, value) of every event outside."""
 
-    def __init__(self, image, rtt, host, full_scale):
-        """`host` lists (time of the first bit in us, frame). `full_scale` is the voltage at the highest code."""
+    def __init__(self, image, rtt, host, full_scale, random_number):
+        """`host` lists (time of the first bit in us, frame). `full_scale` is the voltage at the highest code.
+        `random_number` is what the random number generator delivers; it never delivers 0."""
         self.image, self.rtt, self.log = image, rtt, []
         byte = self.byte_of_host = 10 * HZ // BAUD
         self.incoming = [
@@ -47,6 +50,7 @@ class Board:
         ]
         self.traps, self.trapped, self.sprung = {}, False, False
         self.closed, self.monitors, self.full_scale = True, {}, full_scale
+        self.random_number, self.supply = random_number, 3.3
         self.now, self.end, self.deadline = 0, 0, 0
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M4)
@@ -55,6 +59,7 @@ class Board:
         uc.mem_map(RAM, RAM_SIZE)
         uc.mem_write(RAM, random.Random(1).randbytes(RAM_SIZE))
         uc.mem_map(0x1FFF_7000, 0x1000)
+        uc.mem_write(VREFINT_CAL, struct.pack("<H", round(VREFINT / 3.0 * 4096)))
         for base, size in ((0x4000_0000, 0x0400_0000), (0x4800_0000, 0x0100_0000), (0x5000_0000, 0x0100_0000),
                            (0xE000_0000, 0x0010_0000)):
             uc.mmio_map(base, size, self._read, base, self._write, base)
@@ -286,6 +291,10 @@ class Board:
             return value | (value & 3) << 2
         if at in (RCC + 0x90, RCC + 0x94, RCC + 0x98):
             return value | (value & 1) << 1
+        if at == RNG + 4:
+            return int(self.regs.get(RNG, 0) & 4 and self.random_number != 0)
+        if at == RNG + 8:
+            return self.random_number
         if at == DAC1 + 0x34:
             return value | 1 << 11
         if at == DAC1 + 0x2C:
@@ -293,11 +302,14 @@ class Board:
         if at == ADC1:
             return 0xF
         if at == ADC1 + 0x40:
-            # Channel 1 measures the amplifier's voltage, channel 2 no current, unless `monitors` overrides them.
+            # Channel 1 measures the amplifier's voltage, channel 2 no current, channel 18 the internal reference if
+            # ADC12_CCR.VREFEN is set; `monitors` overrides them.
             channel = self.regs.get(ADC1 + 0x30, 0) >> 6 & 0x1F
             volts = self.regs.get(DAC1 + 0x08, 0) * self.full_scale / 4095
             voltage = min(round(volts * 4096 / MONITOR_SCALE), 4095)
-            return self.monitors.get(channel, voltage if channel == 1 else 2048)
+            # DAC and ADC share their supply, so that an error of it cancels out; the current's zero is ignored.
+            reference = round(VREFINT / self.supply * 4096) if self.regs.get(ADC1 + 0x308, 0) & 1 << 22 else 0
+            return self.monitors.get(channel, {1: voltage, 18: reference}.get(channel, 2048))
         if at & ~0x1FFF == GPIO and at & 0x3FF == 0x10:
             port, pin = INTERLOCK
             # A broken wire reads as the pin's pull resistor sets it: low with the pull-down only.

@@ -1,8 +1,9 @@
-"""Boots an image and injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN VOLTS HOST prints the events outside as JSON.
+"""Boots an image, injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN VOLTS HOST RECORDED RANDOM prints the events as JSON.
 
 TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's, MAIN that of the
 program's first function after start-up, TAKEN that of `cortex_m::peripheral::TAKEN`. VOLTS is the full scale of its
-amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each.
+amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each, and RECORDED the same of another chip. RANDOM
+is what the random number generator delivers.
 """
 
 import json
@@ -69,6 +70,11 @@ def mistaken(board):
     board.full_scale = 1000
 
 
+def oversupplied(board):
+    """DAC and ADC are supplied with 3.6 V."""
+    board.supply = 3.6
+
+
 def arcing(board):
     """The current monitor measures 3 mA; half its range is 5 mA."""
     board.monitors[2] = 2048 + 3 * 2048 // 5
@@ -93,9 +99,15 @@ def taken(board):
     board.uc.mem_write(TAKEN, b"\x01")
 
 
-def play(host, mishap, until_us, torn=(), first=None):
+def flipped(board):
+    """The last byte of the image has a wrong bit."""
+    board.traps.clear()
+    board.uc.mem_write(FLASH + len(IMAGE) - 1, bytes([IMAGE[-1] ^ 0x10]))
+
+
+def play(host, mishap, until_us, torn=(), first=None, random_number=None):
     """Injects `first` where the program begins. After the reset the flash is correct again; the memory keeps its content."""
-    board = Board(IMAGE, RTT, host, FULL_SCALE)
+    board = Board(IMAGE, RTT, host, FULL_SCALE, RANDOM if random_number is None else random_number)
     for at in torn:
         board.tear(at)
     ticks = 0
@@ -124,7 +136,8 @@ if __name__ == "__main__":
         IMAGE = file.read()
     TICK, PANIC, RTT, MAIN, TAKEN = (int(word, 0) for word in sys.argv[2:7])
     FULL_SCALE = float(sys.argv[7])
-    HOST = [(us, bytes.fromhex(frame)) for us, frame in json.loads(sys.argv[8])]
+    HOST, RECORDED = ([(us, bytes.fromhex(frame)) for us, frame in json.loads(arg)] for arg in sys.argv[8:10])
+    RANDOM = int(sys.argv[10], 0)
     print(json.dumps({
         "quiet": play([], None, 1_200_000),
         "host": play(HOST, stalled, 1_700_000),
@@ -134,11 +147,15 @@ if __name__ == "__main__":
         "torn": play([], None, 200_000, STORE),
         "dip": play(HOST, dip, 400_000),
         "button": play(HOST, pressed, 400_000),
-        "interlock": play(HOST, opened, 450_000),
-        "no voltage": play(HOST, shorted, 450_000),
-        "other amplifier": play(HOST, mistaken, 450_000) if FULL_SCALE < 1000 else None,
-        "current": play(HOST, arcing, 450_000),
+        "interlock": play(HOST, opened, 480_000),
+        "no voltage": play(HOST, shorted, 480_000),
+        "other amplifier": play(HOST, mistaken, 480_000) if FULL_SCALE < 1000 else None,
+        "supply of 3.6 V": play(HOST, oversupplied, 480_000),
+        "current": play(HOST, arcing, 480_000),
+        "replayed": play(RECORDED, None, 1_000_000),
+        "no random number": play(HOST, None, 200_000, random_number=0),
         "hang": play(HOST, broken(HANG), 500_000),
         "deaf": play(HOST, deaf, 500_000),
         "unguarded": play(HOST, None, 400_000, first=taken),
+        "wrong image": play(HOST, None, 400_000, first=flipped),
     }))

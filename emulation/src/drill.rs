@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::LONGEST_HANG_MS;
+use firmware::settings::WATCHDOG_MS;
 use host_sim::log::{Event, Line};
 use test_bench::script::{ARM_TICK, FAULT_TICK as MISHAP_TICK, FaultInjection as Mishap};
 
@@ -89,7 +90,7 @@ fn patience_us(mishap: Mishap) -> Option<u64> {
     match mishap {
         Mishap::Hang => Some(u64::from(LONGEST_HANG_MS) * 1000),
         // The hardware watchdog.
-        Mishap::Deaf => Some(100_000),
+        Mishap::Deaf => Some(u64::from(WATCHDOG_MS) * 1000),
         _ => None,
     }
 }

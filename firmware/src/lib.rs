@@ -19,9 +19,10 @@
 //! | [`store`] | Storage of a model in flash, safe against power cuts. |
 //! | [`task_watchdog`] | Check that every task is alive, before the hardware watchdog is fed. |
 //! | `crash_record` | Memory of the crash record. |
-//! | `guards` | Start of both guards. |
+//! | `guards` | Check of the image, and start of both guards. |
 //! | `hang_guard` | Stop of a control task that hangs. |
 //! | `host` | Communication with the host. |
+//! | `image_check` | Check of the image against its checksum. |
 //! | `log` | All log lines. |
 //! | `nucleo` | The board NUCLEO-G474RE. |
 //! | `stack_guard` | Detection of a stack overflow. |
@@ -54,6 +55,8 @@ pub mod guards;
 pub mod hang_guard;
 #[cfg(feature = "mcu")]
 pub mod host;
+#[cfg(feature = "mcu")]
+pub mod image_check;
 #[cfg(feature = "mcu")]
 pub mod log;
 #[cfg(feature = "nucleo-g474re")]

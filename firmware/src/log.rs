@@ -12,7 +12,7 @@ use embassy_sync::channel::Channel;
 use embassy_time::Instant;
 use link::Controller;
 use micromath::F32Ext;
-use model::supervisor::Fault;
+use model::supervisor::{Fault, Mismatch};
 use model::{Sensor, Volts};
 
 use crate::settings::{AMPLIFIER, RATE_HZ};
@@ -26,6 +26,8 @@ pub enum Event {
     State(&'static str, &'static str),
     /// A fault, and the tick that detected it.
     Fault(Fault, u32),
+    /// What disagreed with the output when the monitors became a fault, and the tick.
+    Mismatch(Mismatch, u32),
     /// Change of the active limits: the new ones as [`model::Limits::bits`], and the tick.
     Limits(u8, u32),
     /// Change of the stiffness sensor's diagnosis, and the tick.
@@ -110,6 +112,7 @@ pub fn event(event: Event) {
     match event {
         Event::State(from, to) => info!("state {=str} -> {=str}", from, to),
         Event::Fault(it, tick) => fault(it, tick),
+        Event::Mismatch(it, tick) => warn!("monitor {=str} tick={=u32}", it.name(), tick),
         Event::Limits(bits, tick) => warn!("limit bits={=u8} tick={=u32}", bits, tick),
         Event::Sensor(sensor, tick) => warn!("sensor {=str} tick={=u32}", sensor.name(), tick),
         Event::Summary(s) => info!(

@@ -11,6 +11,12 @@ pub const RATE_HZ: u32 = 1000;
 /// supervisor tolerates, so that a late control task still reports its overrun itself.
 pub const LONGEST_HANG_MS: u32 = 12;
 
+/// Time without a complete round of the task watchdog after which the output is disabled, in ms.
+pub const LONGEST_STALL_MS: u32 = 50;
+
+/// Period of the hardware watchdog, in ms. It resets the chip if it is not fed.
+pub const WATCHDOG_MS: u32 = 100;
+
 /// An amplifier for 1000 V, which the source report's requirement (97 % within 0.6 s) needs.
 pub const KILOVOLT: Amplifier = Amplifier::up_to(1000.0);
 /// The amplifier of this image.

@@ -10,13 +10,12 @@ use crate::board::{Amplifier, Board};
 use crate::control::{Control, Sensors, Source, Stopwatch, Tick};
 use crate::log::{self, EVENTS, Event, Summary, queue};
 use crate::pace::Pace;
-use crate::settings::RATE_HZ;
+use crate::settings::{LONGEST_STALL_MS, RATE_HZ};
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
 use crate::{crash_record, hang_guard, stop};
 
-/// Ticks without a complete round of the task watchdog after which the output is disabled: 50 ms. The hardware watchdog
-/// expires after 100 ms.
-const INCOMPLETE_TICKS: u32 = RATE_HZ / 20;
+/// Ticks without a complete round of the task watchdog after which the output is disabled.
+const INCOMPLETE_TICKS: u32 = RATE_HZ * LONGEST_STALL_MS / 1000;
 
 /// Runs control ticks until `source` ends. Returns the numbers of executed and of missed ticks.
 pub async fn control<B: Board>(
@@ -100,6 +99,9 @@ impl Report {
             crash_record::set(shown, standing);
             for fault in standing.except(self.standing).iter() {
                 queue(Event::Fault(fault, number));
+                if let (Fault::Monitor, Some(mismatch)) = (fault, supervisor.mismatch()) {
+                    queue(Event::Mismatch(mismatch, number));
+                }
             }
             self.standing = standing;
         }

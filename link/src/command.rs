@@ -69,6 +69,7 @@ impl Reason {
             Refusal::HostSilent => Self::HostSilent,
             Refusal::Live => Self::Live,
             Refusal::CausePresent => Self::CausePresent(fault),
+            Refusal::Reference => Self::Reference,
         }
     }
 }

@@ -30,6 +30,11 @@ impl Fault {
             None => "unknown",
         }
     }
+
+    /// What a person does about the fault before it is acknowledged; `None` without one and for an unknown code.
+    pub fn remedy(self) -> Option<&'static str> {
+        supervisor::Fault::from_code(self.0).map(supervisor::Fault::remedy)
+    }
 }
 
 impl From<supervisor::Fault> for Fault {

@@ -7,15 +7,16 @@
 //! | packet | Version, kind, sequence number, message and CRC-32C. |
 //! | message | A [`Request`] of the host or a [`Reply`] of the MCU, serialised with postcard. |
 //! | sequence number | 16-bit request counter modulo 65 536; a reply carries the number of its request. |
-//! | session | The exchange since the host's last `Hello`, which defines the first sequence number. |
+//! | session | At most 65 536 requests of one host after its `Hello`, each with the session's nonce. |
+//! | nonce | 32-bit number of a session, which the MCU gives: no other session has it. |
 //! | command | What one request changes in the control tick: [`Command`]. |
 //! | telemetry | Samples of the control loop that the MCU sends periodically once the host has requested them. |
 //!
 //! ```text
-//! frame = 0x00, COBS( version, kind, sequence (2 bytes, low first), postcard(message), CRC-32C (4 bytes, low first) ), 0x00
+//! frame = 0x00, COBS( version, kind, sequence (2 bytes), postcard(message), session (4 bytes), CRC-32C (4 bytes) ), 0x00
 //! ```
 //!
-//! The host sends requests, the MCU replies. Apart from replies the MCU sends only telemetry.
+//! The host sends requests, the MCU replies. Apart from replies the MCU sends telemetry on request, and reports of faults.
 //!
 //! | module | content |
 //! | --- | --- |
@@ -23,10 +24,11 @@
 //! | [`value`] | Voltages and desired stiffness in their wire format. |
 //! | [`wire_model`] | A spring's model in the format in which it is sent and stored. |
 //! | [`fault`], [`field`] | Numeric codes of the MCU's faults and of a model's fields. |
+//! | [`diagnosis`] | Numeric codes of what the amplifier's monitors and the sensor show. |
 //! | [`frame`] | Encoding of a message and decoding of a packet. |
 //! | [`checksum`](mod@checksum) | CRC-32C. |
 //! | [`receiver`] | Bytes in, packets with a correct CRC out; resynchronises after corrupted bytes. |
-//! | [`sequence`] | Order of sequence numbers. |
+//! | [`sequence`], [`nonce`] | Order of sequence numbers, and the numbers of sessions. |
 //! | [`command`] | Conversion of a request into a command for the control tick. |
 //! | [`session`] | Acceptance, repetition and rejection of requests, and the host's silence. |
 //! | [`server`] | The MCU's end of the link: bytes in, commands and replies out. |
@@ -38,9 +40,11 @@ extern crate std;
 
 pub mod checksum;
 pub mod command;
+pub mod diagnosis;
 pub mod fault;
 pub mod field;
 pub mod frame;
+pub mod nonce;
 pub mod reason;
 pub mod receiver;
 pub mod reply;
@@ -53,12 +57,14 @@ pub mod value;
 pub mod wire_model;
 
 pub use command::Command;
+pub use diagnosis::{Mismatch, Sensor};
 pub use fault::Fault;
 pub use field::Field;
 pub use frame::{Frame, Message, Packet, Unreadable};
+pub use nonce::{Nonce, Stamp};
 pub use reason::Reason;
 pub use receiver::Receiver;
-pub use reply::{Controller, Models, Reply, State, Status, Telemetry};
+pub use reply::{Controller, FaultReport, Models, Reply, State, Status, Telemetry};
 pub use request::Request;
 pub use sequence::Sequence;
 pub use server::{About, ModelUpdate, Server, Step, View};
@@ -67,4 +73,4 @@ pub use value::{Desired, WireVolts};
 pub use wire_model::{ModelId, WireModel};
 
 /// Version of the protocol. Any change of a golden frame in `tests/golden.rs` requires a new number.
-pub const VERSION: u8 = 4;
+pub const VERSION: u8 = 5;

@@ -29,7 +29,7 @@ pub enum Reason {
     BadVersion(u8),
     /// The MCU has received no `Hello` since its start; it may have restarted during the session.
     HelloFirst,
-    /// The sequence number is older than that of an accepted request.
+    /// The sequence number is older than that of an accepted request, or the session has used up all numbers.
     Stale {
         /// The newest accepted sequence number.
         newest: u16,
@@ -65,6 +65,10 @@ pub enum Reason {
     Live,
     /// The cause of the fault to be acknowledged is still there.
     CausePresent(Fault),
+    /// The request is of another session than the MCU's: a frame from earlier, or a second program.
+    OtherSession,
+    /// The supply of the converters is out of its range.
+    Reference,
 }
 
 impl Reason {
@@ -89,6 +93,8 @@ impl Reason {
             Self::NotStored => 15,
             Self::Live => 16,
             Self::CausePresent(_) => 17,
+            Self::OtherSession => 18,
+            Self::Reference => 19,
         }
     }
 }
@@ -118,6 +124,8 @@ impl fmt::Display for Reason {
             Self::NotStored => f.write_str("the flash could not be written; the previous model stays"),
             Self::Live => f.write_str("the amplifier is off, and its monitors still show a voltage or a current"),
             Self::CausePresent(fault) => write!(f, "the cause of the fault is still there: {fault}"),
+            Self::OtherSession => f.write_str("the MCU is in a session with another program"),
+            Self::Reference => f.write_str("the supply of the MCU's converters is out of its range"),
         }
     }
 }

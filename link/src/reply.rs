@@ -3,9 +3,10 @@
 use core::fmt;
 
 use model::Compensation;
-use model::supervisor::{self, Supervisor};
+use model::supervisor::{self, Faults, Supervisor};
 use serde::{Deserialize, Serialize};
 
+use crate::diagnosis::{Mismatch, Sensor};
 use crate::fault::Fault;
 use crate::reason::Reason;
 use crate::value::WireVolts;
@@ -31,6 +32,30 @@ pub enum Reply {
     Telemetry(Telemetry),
     /// The running and the stored model.
     Model(Models),
+    /// New faults; sent without a request, and again and again until the host has heard of them.
+    Fault(FaultReport),
+}
+
+/// Report of the faults that have come since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FaultReport {
+    /// Number of faults since the start, this one included; it saturates. The host names it when it has heard of them.
+    pub number: u32,
+    /// Tick in which the newest one was seen.
+    pub tick: u64,
+    /// The newest fault; of several in one tick the one with the lowest code.
+    pub fault: Fault,
+    /// All standing faults: bit 0 for the fault with code 1.
+    pub standing: u16,
+    /// What disagreed with the output.
+    pub mismatch: Mismatch,
+}
+
+impl FaultReport {
+    /// The standing faults.
+    pub fn faults(&self) -> impl Iterator<Item = Fault> {
+        Faults::from_bits(self.standing).iter().map(Fault::from)
+    }
 }
 
 /// The running and the stored model of an MCU.
@@ -81,7 +106,7 @@ pub struct Status {
     pub counters: Counters,
 }
 
-/// Counters of the received frames since the start. Each counter saturates.
+/// Counters of the frames since the start. Each counter saturates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Requests that were executed.
@@ -94,10 +119,12 @@ pub struct Counters {
     pub oversize: u32,
     /// Frames with a correct CRC but another protocol version.
     pub bad_version: u32,
-    /// Frames with a correct CRC that were rejected because of their sequence number.
+    /// Frames with a correct CRC that were rejected because of their session or sequence number.
     pub out_of_order: u32,
     /// Frames with a correct CRC that were not a request.
     pub unknown: u32,
+    /// Telemetry samples that were due and not sent completely, because the line was busy.
+    pub telemetry_dropped: u32,
 }
 
 /// Identity of the program on the MCU.
@@ -166,6 +193,10 @@ pub struct Telemetry {
     pub code: u16,
     /// Active limits as [`model::Limits::bits`]: upper 1, lower 2, slew 4, target 8.
     pub limits: u8,
+    /// What disagrees with the output; of a monitor fault, what it was found by.
+    pub mismatch: Mismatch,
+    /// Diagnosis of the stiffness sensor.
+    pub sensor: Sensor,
 }
 
 impl From<&Supervisor> for State {

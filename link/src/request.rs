@@ -11,7 +11,8 @@ use crate::wire_model::PART;
 /// The order of the variants defines their codes on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Request {
-    /// Starts a session: the sequence number of this frame becomes the reference, telemetry stops. The reply is the status.
+    /// Asks for a session. The reply is the status, stamped with the nonce of a new session, which begins with the first
+    /// request that carries it. A `Hello` alone has no effect: it is no sign of life, and the running session goes on.
     Hello,
     /// Reads the status.
     Status,
@@ -19,14 +20,14 @@ pub enum Request {
     Set(Desired),
     /// Enables the output with a target of 0 V.
     Arm,
-    /// Disables the output. Executed without a `Hello`, with any sequence number and from any protocol version. It does not
-    /// acknowledge a fault.
+    /// Disables the output. Executed in any session or none, with any sequence number and from any protocol version. It
+    /// does not acknowledge a fault.
     Disarm,
     /// Acknowledges the given fault; rejected if another fault is present.
     Acknowledge(Fault),
     /// Restarts the measurement of the host's silence and has no other effect.
     Heartbeat,
-    /// Starts periodic telemetry. It stops with `every_ticks` = 0, with `Hello`, and while the host is silent.
+    /// Starts periodic telemetry. It stops with `every_ticks` = 0, with a new session, and while the host is silent.
     Stream {
         /// Period of the samples, in ticks; 0 stops them.
         every_ticks: u16,
@@ -49,9 +50,16 @@ pub enum Request {
     },
     /// Restarts the MCU with the stored model. Rejected unless disarmed.
     Restart,
+    /// Tells the MCU that the report of faults with this number has arrived, so that it is not repeated. It acknowledges
+    /// no fault.
+    Heard {
+        /// Number of the report, see [`crate::FaultReport::number`].
+        number: u32,
+    },
 }
 
 impl Request {
-    /// Serialised [`Request::Disarm`]. It is the same in every protocol version, so that any host can disarm any MCU.
-    pub(crate) const DISARM: &'static [u8] = &[4];
+    /// First byte of a serialised [`Request::Disarm`]. It is the same in every protocol version, so that any host can disarm
+    /// any MCU.
+    pub(crate) const DISARM: u8 = 4;
 }

@@ -9,22 +9,26 @@
 //! | not a request (an echo) | dropped and counted |
 //! | of another protocol version | rejected, except `Disarm` |
 //! | unknown request | rejected |
-//! | `Hello` | executed; its sequence number becomes the reference, telemetry stops |
-//! | before the first `Hello` | rejected, except `Disarm` |
+//! | `Hello` | its reply offers a new session; a repeated `Hello` is offered the same one again |
+//! | with the nonce that was offered last | executed; the session begins with it, telemetry stops |
+//! | before the first session | rejected, except `Disarm` |
+//! | with any other nonce than the session's | rejected, except `Disarm` |
 //! | newer than the last accepted request | executed |
 //! | the last accepted request again | the same reply is sent again, the request is not executed again |
 //! | a different request with the same number | rejected, except `Disarm` |
 //! | older | rejected, except `Disarm` |
 //!
-//! `Hello`, newer and repeated requests end the host's silence; no other frame does.
+//! Requests that are executed as the first or a newer one of a session end the host's silence; no other frame does. As no
+//! nonce is offered twice and no number comes twice in a session, a recorded frame never does.
 
 use core::cmp::Ordering;
 
-use crate::frame::{Frame, Message, Packet, Unreadable};
+use crate::frame::{Frame, Packet, Unreadable};
+use crate::nonce::{Nonce, Nonces, Stamp};
 use crate::reason::Reason;
 use crate::receiver::Receiver;
 pub use crate::reply::Counters;
-use crate::reply::{Reply, Telemetry};
+use crate::reply::{FaultReport, Reply, Telemetry};
 use crate::request::Request;
 use crate::sequence::Sequence;
 
@@ -37,17 +41,39 @@ pub enum Action<'a> {
     Send(&'a [u8]),
 }
 
-/// Identity of the last request that was accepted in sequence.
+/// Identity of a request: its number and its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Accepted {
+struct Identity {
     sequence: Sequence,
     checksum: u32,
+}
+
+/// A session that a host may begin, and the `Hello` that asked for it.
+#[derive(Clone, Copy, Debug)]
+struct Offer {
+    nonce: Nonce,
+    hello: Identity,
+}
+
+/// The session that a host has begun.
+#[derive(Clone, Copy, Debug)]
+struct Running {
+    nonce: Nonce,
+    first: Sequence,
+    /// Last request that was accepted in sequence.
+    last: Identity,
 }
 
 /// Reaction to a frame with a correct CRC.
 enum Verdict {
     Drop,
-    Apply(Request),
+    Offer,
+    /// Executes the first request of the offered session.
+    Begin(Request),
+    /// Executes a newer request of the running session.
+    Follow(Request),
+    /// Executes a `Disarm` that is not a part of the session.
+    Intrude,
     Repeat,
     Reject(Reason),
 }
@@ -56,9 +82,11 @@ enum Verdict {
 #[derive(Clone, Debug)]
 pub struct Session {
     receiver: Receiver,
-    accepted: Option<Accepted>,
-    /// Number of the request whose reply is pending.
-    pending: Sequence,
+    nonces: Nonces,
+    offered: Option<Offer>,
+    running: Option<Running>,
+    /// Stamp of the pending reply.
+    pending: Stamp,
     /// The pending request is the last accepted one, so that its reply is stored for a repetition.
     stores_answer: bool,
     /// Reply to the last accepted request; empty while it is pending.
@@ -76,11 +104,14 @@ pub struct Session {
 
 impl Session {
     /// A session before its first `Hello`. The host is silent once `silence_limit_ticks` have passed without an accepted frame.
-    pub const fn new(silence_limit_ticks: u32) -> Self {
+    /// The nonces follow from `seed`, which has to be another one at every start.
+    pub const fn new(silence_limit_ticks: u32, seed: u32) -> Self {
         Self {
             receiver: Receiver::new(),
-            accepted: None,
-            pending: Sequence(0),
+            nonces: Nonces::new(seed),
+            offered: None,
+            running: None,
+            pending: Nonce::NONE.stamp(Sequence(0)),
             stores_answer: false,
             answer: Frame::EMPTY,
             outgoing: Frame::EMPTY,
@@ -92,6 +123,7 @@ impl Session {
                 bad_version: 0,
                 out_of_order: 0,
                 unknown: 0,
+                telemetry_dropped: 0,
             },
             silence_limit_ticks,
             heard_at: None,
@@ -105,9 +137,9 @@ impl Session {
     /// Processes a byte received at tick `now`. After [`Action::Apply`], call [`Session::answer`] before the next byte.
     pub fn on_byte(&mut self, byte: u8, now: u64) -> Option<Action<'_>> {
         let packet = self.receiver.on_byte(byte)?;
-        let sequence = packet.sequence;
-        let this = Accepted { sequence, checksum: packet.checksum };
-        match classify(&packet, self.accepted.as_ref()) {
+        let (sequence, session) = (packet.sequence, packet.session());
+        let this = Identity { sequence, checksum: packet.checksum };
+        match classify(&packet, self.offered.as_ref(), self.running.as_ref()) {
             Verdict::Drop => {
                 count(&mut self.counters.unknown);
                 None
@@ -118,35 +150,68 @@ impl Session {
                     Reason::UnknownRequest => &mut self.counters.unknown,
                     _ => &mut self.counters.out_of_order,
                 });
-                self.outgoing = Frame::new(sequence, &Reply::Refused(reason));
+                self.outgoing = Frame::new(self.nonce().stamp(sequence), &Reply::Refused(reason));
                 Some(Action::Send(self.outgoing.as_bytes()))
             }
             Verdict::Repeat => {
                 count(&mut self.counters.repeated);
-                self.heard_at = Some(now);
-                self.heard = true;
                 self.outgoing.clone_from(&self.answer);
                 // Empty while the request is being executed: its reply follows.
                 Some(Action::Send(self.outgoing.as_bytes())).filter(|_| self.answer != Frame::EMPTY)
             }
-            Verdict::Apply(request) => {
+            Verdict::Offer => {
                 count(&mut self.counters.accepted);
-                self.pending = sequence;
-                self.stores_answer = self.in_order(request, sequence);
-                if self.stores_answer {
-                    self.accepted = Some(this);
-                    self.answer = Frame::EMPTY;
-                    self.heard_at = Some(now);
-                    self.heard = true;
-                }
-                match request {
-                    Request::Hello => self.every_ticks = 0,
-                    Request::Stream { every_ticks } => (self.every_ticks, self.pushed_at) = (every_ticks, now),
-                    _ => {}
-                }
-                Some(Action::Apply(request))
+                let nonce = match self.offered {
+                    Some(Offer { nonce, hello }) if hello == this => nonce,
+                    _ => self.nonces.draw(),
+                };
+                self.offered = Some(Offer { nonce, hello: this });
+                (self.pending, self.stores_answer) = (nonce.stamp(sequence), false);
+                Some(Action::Apply(Request::Hello))
             }
+            Verdict::Intrude => {
+                count(&mut self.counters.accepted);
+                (self.pending, self.stores_answer) = (self.nonce().stamp(sequence), false);
+                Some(Action::Apply(Request::Disarm))
+            }
+            Verdict::Begin(request) => {
+                self.running = Some(Running { nonce: session, first: sequence, last: this });
+                self.offered = None;
+                self.every_ticks = 0;
+                Some(self.follow(request, this, now))
+            }
+            Verdict::Follow(request) => Some(self.follow(request, this, now)),
         }
+    }
+
+    /// Accepts a request of the running session.
+    fn follow(&mut self, request: Request, this: Identity, now: u64) -> Action<'static> {
+        count(&mut self.counters.accepted);
+        if let Some(running) = &mut self.running {
+            running.last = this;
+        }
+        (self.pending, self.stores_answer) = (self.nonce().stamp(this.sequence), true);
+        self.answer = Frame::EMPTY;
+        if self.host_silent(now) {
+            // No sample was due meanwhile.
+            self.pushed_at = now;
+        }
+        self.heard_at = Some(now);
+        self.heard = true;
+        if let Request::Stream { every_ticks } = request {
+            (self.every_ticks, self.pushed_at) = (every_ticks, now);
+        }
+        Action::Apply(request)
+    }
+
+    /// Nonce of the running session; [`Nonce::NONE`] before the first one.
+    fn nonce(&self) -> Nonce {
+        self.running.map_or(Nonce::NONE, |running| running.nonce)
+    }
+
+    /// True once a host has begun a session.
+    pub fn has_begun(&self) -> bool {
+        self.running.is_some()
     }
 
     /// Encodes the reply to the request of the last [`Action::Apply`].
@@ -174,9 +239,24 @@ impl Session {
     /// Encodes a telemetry sample at tick `now`. The next one is due on the same grid of periods; missed periods are skipped.
     pub fn telemetry(&mut self, sample: Telemetry, now: u64) -> &[u8] {
         let every = u64::from(self.every_ticks.max(1));
-        self.pushed_at += now.saturating_sub(self.pushed_at) / every * every;
+        let periods = now.saturating_sub(self.pushed_at) / every;
+        self.pushed_at += periods * every;
+        let dropped = u32::try_from(periods.saturating_sub(1)).unwrap_or(u32::MAX);
+        self.drop_telemetry(dropped);
         self.pushed = self.pushed.next();
-        self.outgoing = Frame::new(self.pushed, &Reply::Telemetry(sample));
+        self.outgoing = Frame::new(self.nonce().stamp(self.pushed), &Reply::Telemetry(sample));
+        self.outgoing.as_bytes()
+    }
+
+    /// Counts samples that were due and did not arrive on the line.
+    pub fn drop_telemetry(&mut self, samples: u32) {
+        self.counters.telemetry_dropped = self.counters.telemetry_dropped.saturating_add(samples);
+    }
+
+    /// Encodes a report of faults, whose sequence number is the low half of its own.
+    pub fn report(&mut self, report: FaultReport) -> &[u8] {
+        let stamp = self.nonce().stamp(Sequence(report.number as u16));
+        self.outgoing = Frame::new(stamp, &Reply::Fault(report));
         self.outgoing.as_bytes()
     }
 
@@ -204,38 +284,33 @@ impl Session {
     pub fn counters(&self) -> Counters {
         Counters { damaged: self.receiver.damaged(), oversize: self.receiver.oversize(), ..self.counters }
     }
-
-    /// False for a `Disarm` that is executed out of sequence: it must not change the reference.
-    fn in_order(&self, request: Request, sequence: Sequence) -> bool {
-        match self.accepted {
-            _ if request == Request::Hello => true,
-            None => false,
-            Some(last) => sequence.compare(last.sequence) == Ordering::Greater,
-        }
-    }
 }
 
-fn classify(packet: &Packet<'_>, last: Option<&Accepted>) -> Verdict {
+fn classify(packet: &Packet<'_>, offered: Option<&Offer>, running: Option<&Running>) -> Verdict {
     let request = match packet.read::<Request>() {
         Ok(request) => request,
         Err(Unreadable::Kind) => return Verdict::Drop,
-        Err(_) if packet.kind == Request::KIND && packet.message == Request::DISARM => Request::Disarm,
+        Err(Unreadable::Version(_)) if packet.content.first() == Some(&Request::DISARM) => Request::Disarm,
         Err(Unreadable::Version(_)) => return Verdict::Reject(Reason::BadVersion(crate::VERSION)),
         Err(Unreadable::Message) => return Verdict::Reject(Reason::UnknownRequest),
     };
-    let sequence = packet.sequence;
-    let verdict = match last {
-        _ if request == Request::Hello => Verdict::Apply(request),
-        None => Verdict::Reject(Reason::HelloFirst),
-        Some(last) => match sequence.compare(last.sequence) {
-            Ordering::Greater => Verdict::Apply(request),
+    if request == Request::Hello {
+        return Verdict::Offer;
+    }
+    let session = packet.session();
+    let verdict = match (offered, running) {
+        (Some(offer), _) if session == offer.nonce => Verdict::Begin(request),
+        (_, None) => Verdict::Reject(Reason::HelloFirst),
+        (_, Some(running)) if session != running.nonce => Verdict::Reject(Reason::OtherSession),
+        (_, Some(Running { first, last, .. })) => match packet.sequence.compare(last.sequence, *first) {
+            Ordering::Greater => Verdict::Follow(request),
             Ordering::Equal if packet.checksum == last.checksum => Verdict::Repeat,
             Ordering::Equal => Verdict::Reject(Reason::SequenceReused),
             Ordering::Less => Verdict::Reject(Reason::Stale { newest: last.sequence.0 }),
         },
     };
     match verdict {
-        Verdict::Reject(_) if request == Request::Disarm => Verdict::Apply(request),
+        Verdict::Reject(_) if request == Request::Disarm => Verdict::Intrude,
         verdict => verdict,
     }
 }

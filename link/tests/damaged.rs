@@ -7,15 +7,16 @@ use std::cell::Cell;
 
 use by_hand::by_hand;
 use link::frame::MAX_FRAME;
+use link::nonce::Nonces;
 use link::{Action, Frame, Packet, Receiver, Reply, Request, Sequence, Session, Status};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
-/// Version, kind, sequence number and message of a packet.
+/// Version, kind, sequence number, message and session of a packet.
 type Content = (u8, u8, u16, Vec<u8>);
 
 fn content(packet: &Packet<'_>) -> Content {
-    (packet.version, packet.kind, packet.sequence.0, packet.message.to_vec())
+    (packet.version, packet.kind, packet.sequence.0, packet.content.to_vec())
 }
 
 fn received(receiver: &mut Receiver, bytes: &[u8]) -> Vec<Content> {
@@ -138,15 +139,17 @@ fn ten_thousand_corrupted_streams_yield_only_packets_that_were_sent() {
 fn a_session_executes_only_requests_that_were_sent_in_ten_thousand_corrupted_streams() {
     runner()
         .run(&frames(), |sent| {
-            let mut session = Session::new(500);
-            let frames: Vec<Frame> =
-                sent.iter().map(|(sequence, request, _)| Frame::new(Sequence(*sequence), request)).collect();
+            let mut session = Session::new(500, 7);
             let hello = Frame::new(Sequence(0), &Request::Hello);
+            let nonce = Nonces::new(7).draw();
+            let stamped = |sequence, request| Frame::new(nonce.stamp(Sequence(sequence)), request);
+            let frames: Vec<Frame> = sent.iter().map(|(sequence, request, _)| stamped(*sequence, request)).collect();
             let mut wire = hello.as_bytes().to_vec();
+            wire.extend(stamped(0, &Request::Status).as_bytes());
             for (frame, (_, _, damage)) in frames.iter().zip(&sent) {
                 wire.extend(damaged(frame.as_bytes(), hello.as_bytes(), damage));
             }
-            wire.extend(Frame::new(Sequence(1), &Request::Disarm).as_bytes());
+            wire.extend(stamped(1, &Request::Disarm).as_bytes());
             let mut applied = Vec::new();
             for &byte in &wire {
                 if let Some(Action::Apply(request)) = session.on_byte(byte, 0) {
@@ -156,7 +159,10 @@ fn a_session_executes_only_requests_that_were_sent_in_ten_thousand_corrupted_str
             }
             for request in &applied {
                 let was_sent = sent.iter().any(|(_, known, _)| known == request);
-                prop_assert!(was_sent || matches!(request, Request::Hello | Request::Disarm), "{request:?}");
+                prop_assert!(
+                    was_sent || matches!(request, Request::Hello | Request::Status | Request::Disarm),
+                    "{request:?}"
+                );
             }
             prop_assert!(session.counters().accepted as usize == applied.len());
             // The final Disarm is executed unless an intact frame with the same number and content was executed before.
@@ -173,8 +179,8 @@ fn each_of_ten_thousand_valid_frames_with_arbitrary_content_causes_one_reaction(
     let content = (any::<u8>(), any::<u16>(), prop::collection::vec(any::<u8>(), 0..60));
     runner()
         .run(&content, |(version, sequence, bytes)| {
-            let frame = by_hand(version % 3, b'Q', sequence, &bytes);
-            let mut session = Session::new(500);
+            let frame = by_hand(3 + version % 4, b'Q', sequence, &bytes);
+            let mut session = Session::new(500, 7);
             let mut answers = 0;
             for byte in frame {
                 answers += usize::from(session.on_byte(byte, 0).is_some());

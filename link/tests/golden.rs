@@ -7,16 +7,17 @@ use by_hand::by_hand;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    Controller, Desired, Fault, Field, Frame, Message, ModelId, Models, Reason, Reply, Request, Sequence, State,
-    Status, Telemetry, WireVolts,
+    Controller, Desired, Fault, FaultReport, Field, Frame, Message, Mismatch, ModelId, Models, Nonce, Reason, Reply,
+    Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
 };
 
 fn check<M: Message>(message: &M, kind: u8, golden: &str) {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
-    let bytes: Vec<u8> =
+    let mut bytes: Vec<u8> =
         (0..golden.len() / 2).map(|at| u8::from_str_radix(&golden[2 * at..2 * at + 2], 16).unwrap()).collect();
     // Two different bytes, so that a swapped order is detected.
-    let frame = Frame::new(Sequence(0x0102), message);
+    let frame = Frame::new(Nonce(0x0304_0506).stamp(Sequence(0x0102)), message);
+    bytes.extend([6, 5, 4, 3]);
     assert_eq!(hex(frame.as_bytes()), hex(&by_hand(link::VERSION, kind, 0x0102, &bytes)), "expected message {golden}");
 }
 
@@ -37,6 +38,7 @@ fn requests() {
         (Request::ModelPart { number: 12, bytes: [0xa5; 32] }, &format!("090c{}", "a5".repeat(32))),
         (Request::ModelEnd { length: 300, checksum: 128 }, "0aac028001"),
         (Request::Restart, "0b"),
+        (Request::Heard { number: 300 }, "0cac02"),
     ] {
         check(&request, b'Q', golden);
     }
@@ -53,6 +55,8 @@ fn replies() {
         measured: None,
         code: 4095,
         limits: 9,
+        mismatch: Mismatch(3),
+        sensor: Sensor(4),
     };
     let status = Status {
         firmware: Firmware { major: 1, minor: 2, patch: 3, revision: 0x1234_5678, controller: Controller::Fast },
@@ -72,6 +76,7 @@ fn replies() {
             bad_version: 14,
             out_of_order: 15,
             unknown: 16,
+            telemetry_dropped: 17,
         },
     };
     for (reply, golden) in [
@@ -100,15 +105,33 @@ fn replies() {
         (Reply::Refused(Reason::NotStored), "010f"),
         (Reply::Refused(Reason::Live), "0110"),
         (Reply::Refused(Reason::CausePresent(Fault(5))), "011105"),
-        (Reply::Status(status), "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f090a0b0c0d0e0f10"),
-        (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f09"),
-        (Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }), "03f0a20401808080ac0201040106ff1f09"),
+        (Reply::Refused(Reason::OtherSession), "0112"),
+        (Reply::Refused(Reason::Reference), "0113"),
+        (
+            Reply::Status(status),
+            "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f0903040a0b0c0d0e0f1011",
+        ),
+        (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f090304"),
+        (
+            Reply::Telemetry(Telemetry { measured: Some(WireVolts(3)), ..sample }),
+            "03f0a20401808080ac0201040106ff1f090304",
+        ),
         (
             Reply::Model(Models {
                 active: ModelId { number: 1, format: 2, length: 300, checksum: 4 },
                 stored: ModelId { number: 5, format: 6, length: 7, checksum: 8 },
             }),
             "040102ac020405060708",
+        ),
+        (
+            Reply::Fault(FaultReport {
+                number: 300,
+                tick: 70_000,
+                fault: Fault(6),
+                standing: 0x24,
+                mismatch: Mismatch(3),
+            }),
+            "05ac02f0a204062403",
         ),
     ] {
         check(&reply, b'A', golden);
@@ -122,8 +145,8 @@ fn replies() {
 #[test]
 fn a_complete_frame() {
     let frame = Frame::new(Sequence(1), &Request::Hello);
-    assert_eq!(frame.as_bytes(), by_hand(link::VERSION, b'Q', 1, &[0]));
-    assert_eq!(frame.as_bytes(), [0, 4, 4, b'Q', 1, 1, 5, 0x99, 0x1e, 0xf1, 0x9f, 0]);
+    assert_eq!(frame.as_bytes(), by_hand(link::VERSION, b'Q', 1, &[0; 5]));
+    assert_eq!(frame.as_bytes(), [0, 4, 5, b'Q', 1, 1, 1, 1, 1, 1, 5, 0xb1, 0xef, 0x5d, 0x2e, 0]);
 }
 
 #[test]

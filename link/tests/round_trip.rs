@@ -6,16 +6,17 @@ use link::frame::MAX_FRAME;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    Controller, Desired, Fault, Frame, Message, Receiver, Reply, Request, Sequence, State, Status, Telemetry, WireVolts,
+    Controller, Desired, Fault, Frame, Message, Mismatch, Nonce, Receiver, Reply, Request, Sensor, Sequence, Stamp,
+    State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
-fn decode<M: Message>(frame: &Frame) -> Vec<(Sequence, M)> {
+fn decode<M: Message>(frame: &Frame) -> Vec<(Stamp, M)> {
     let mut receiver = Receiver::new();
     let mut decoded = Vec::new();
     for &byte in frame.as_bytes() {
         if let Some(packet) = receiver.on_byte(byte) {
-            decoded.push((packet.sequence, packet.read().unwrap()));
+            decoded.push((packet.session().stamp(packet.sequence), packet.read().unwrap()));
         }
     }
     decoded
@@ -25,18 +26,20 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn a_request_survives_a_round_trip(sequence: u16, request in common::request()) {
-        let frame = Frame::new(Sequence(sequence), &request);
+    fn a_request_survives_a_round_trip(sequence: u16, session: u32, request in common::request()) {
+        let stamp = Nonce(session).stamp(Sequence(sequence));
+        let frame = Frame::new(stamp, &request);
         prop_assert!(frame.as_bytes().len() <= MAX_FRAME);
-        prop_assert_eq!(decode(&frame), vec![(Sequence(sequence), request)]);
+        prop_assert_eq!(decode(&frame), vec![(stamp, request)]);
         prop_assert!(is_not_a_reply(&frame));
     }
 
     #[test]
-    fn a_reply_survives_a_round_trip(sequence: u16, reply in common::reply()) {
-        let frame = Frame::new(Sequence(sequence), &reply);
+    fn a_reply_survives_a_round_trip(sequence: u16, session: u32, reply in common::reply()) {
+        let stamp = Nonce(session).stamp(Sequence(sequence));
+        let frame = Frame::new(stamp, &reply);
         prop_assert!(!frame.as_bytes().is_empty());
-        prop_assert_eq!(decode(&frame), vec![(Sequence(sequence), reply)]);
+        prop_assert_eq!(decode(&frame), vec![(stamp, reply)]);
     }
 }
 
@@ -66,6 +69,8 @@ fn the_longest_message_fits_into_a_frame() {
         measured: Some(volts),
         code: u16::MAX,
         limits: u8::MAX,
+        mismatch: Mismatch(255),
+        sensor: Sensor(255),
     };
     let status = Status {
         firmware: Firmware { major: 255, minor: 255, patch: 255, revision: most, controller: Controller::Fast },
@@ -85,10 +90,11 @@ fn the_longest_message_fits_into_a_frame() {
             bad_version: most,
             out_of_order: most,
             unknown: most,
+            telemetry_dropped: most,
         },
     };
-    const { assert!(119 <= MAX_FRAME) };
+    const { assert!(130 <= MAX_FRAME) };
     let length = |reply| Frame::new(Sequence(u16::MAX), &reply).as_bytes().len();
-    assert_eq!(length(Reply::Status(status)), 119);
-    assert_eq!(length(Reply::Telemetry(sample)), 48);
+    assert_eq!(length(Reply::Status(status)), 130);
+    assert_eq!(length(Reply::Telemetry(sample)), 54);
 }

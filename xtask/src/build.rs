@@ -6,7 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::shell;
+use crate::{seal, shell};
 
 /// Goal of the optimiser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -92,7 +92,7 @@ pub fn example(name: &str, features: &str, opt: Opt) -> Result<PathBuf> {
     compile(Board::Mps2.package(), features, opt, ["--example", name], &format!("examples/{name}"), name)
 }
 
-/// Copies what cargo built to `image/NAME`: cargo itself uses one file name for every set of features.
+/// Copies what cargo built to `image/NAME`, an image with its checksum: cargo itself uses one file name for every set of features.
 fn compile(package: &str, features: &str, opt: Opt, what: [&str; 2], file: &str, name: &str) -> Result<PathBuf> {
     let folder = shell::target_directory()?.join(shell::MCU).join(opt.profile());
     let images = folder.join("image");
@@ -104,7 +104,11 @@ fn compile(package: &str, features: &str, opt: Opt, what: [&str; 2], file: &str,
     let (built, own) = (folder.join(file), images.join(name));
     // Replaces the old file instead of overwriting it: an emulator may be running it.
     let new = own.with_extension("new");
-    fs::copy(&built, &new).with_context(|| format!("cannot copy {}", built.display()))?;
+    let mut elf = read(&built)?;
+    if what[0] == "--bin" {
+        seal::seal(&mut elf).with_context(|| format!("in {}", built.display()))?;
+    }
+    fs::write(&new, elf).with_context(|| format!("cannot write {}", new.display()))?;
     fs::rename(&new, &own).with_context(|| format!("cannot write {}", own.display()))?;
     Ok(own)
 }

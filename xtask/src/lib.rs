@@ -5,6 +5,7 @@
 
 pub mod build;
 pub mod python;
+mod seal;
 pub mod segments;
 pub mod setup;
 pub mod shell;

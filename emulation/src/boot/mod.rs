@@ -12,6 +12,7 @@ use std::fs;
 
 use anyhow::{Context, Result, ensure};
 use model::Settings;
+use model::supervisor::Mismatch;
 use serde::Deserialize;
 use xtask::build::{self, Board, Opt};
 use xtask::variant::Variant;
@@ -63,7 +64,9 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
             .arg(&bin)
             .args([ticks[0].address, panic.address, rtt, main.address, taken].map(|address| format!("{address:#x}")))
             .arg(amplifier.full_scale_v.to_string())
-            .arg(host::frames().to_string()),
+            .arg(host::frames(host::RANDOM).to_string())
+            .arg(host::frames(!host::RANDOM).to_string())
+            .arg(format!("{:#x}", host::RANDOM)),
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
@@ -78,24 +81,29 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     ] {
         println!("{name}: {}", runs::stopped(&events(name)?, &bytes, within_us, log).context(name)?);
     }
-    for (name, within_us, fault) in [
-        ("interlock", PERIOD_US + JITTER_US, "name=interlock"),
-        ("no voltage", MONITOR_US + JITTER_US, "name=monitor"),
-        ("current", MONITOR_US + JITTER_US, "name=monitor"),
-        ("other amplifier", MONITOR_US + JITTER_US, "name=monitor"),
+    for (name, within_us, mismatch) in [
+        ("interlock", PERIOD_US + JITTER_US, None),
+        ("no voltage", MONITOR_US + JITTER_US, Some(Mismatch::Open)),
+        ("current", MONITOR_US + JITTER_US, Some(Mismatch::Leakage)),
+        ("other amplifier", MONITOR_US + JITTER_US, Some(Mismatch::Reference)),
+        ("supply of 3.6 V", MONITOR_US + JITTER_US, Some(Mismatch::Reference)),
     ] {
         // An amplifier below the image's limit has no such run: it is no danger.
         if output[name].is_null() {
             continue;
         }
-        println!("{name}: {}", runs::faulted(&events(name)?, &bytes, within_us, fault).context(name)?);
+        println!("{name}: {}", runs::faulted(&events(name)?, &bytes, within_us, mismatch).context(name)?);
     }
     println!("torn store: {}", runs::torn(&events("torn")?, &bytes).context("torn")?);
     for (name, cause) in [("dip", "reset=brown-out last_fault=8"), ("button", "reset=pin last_fault=4")] {
         println!("{name}: {}", runs::cut(&events(name)?, &bytes, cause).context(name)?);
     }
     println!("hang with interrupts off: {}", runs::deaf(&events("deaf")?, &bytes).context("deaf")?);
-    println!("no guards: {}", runs::unguarded(&events("unguarded")?, &bytes).context("unguarded")?);
+    println!("replayed: {}", runs::replayed(&events("replayed")?, &bytes).context("replayed")?);
+    println!("no random number: {}", runs::unrandom(&events("no random number")?, &bytes).context("no random number")?);
+    for (name, field) in [("unguarded", "guards"), ("wrong image", "image")] {
+        println!("{name}: {}", runs::refused(&events(name)?, &bytes, field).context(name)?);
+    }
     println!("{CANNOT_SHOW}");
     Ok(())
 }

@@ -1,11 +1,15 @@
 //! What each run without a host, or with a fault, must show. Every check returns a line for the report, or an error.
 
 use anyhow::{Context, Result, ensure};
-use firmware::settings::SUPERVISION;
+use firmware::settings::{SUPERVISION, WATCHDOG_MS};
+use link::frame::MAX_FRAME;
+use link::{FaultReport, Reply};
 use model::Amplifier;
+use model::supervisor::{Fault, Mismatch};
 use xtask::variant::Variant;
 
 use super::events::{Event, Events};
+use super::host;
 use crate::variant;
 
 /// Period of the control tick, in us.
@@ -14,9 +18,12 @@ pub(super) const PERIOD_US: f64 = 1000.0;
 /// interrupts briefly.
 pub(super) const JITTER_US: f64 = 20.0;
 /// Timeout of the watchdog, in us.
-const WATCHDOG_US: f64 = 100_000.0;
+const WATCHDOG_US: f64 = WATCHDOG_MS as f64 * 1000.0;
 /// Longest time that the amplifier's monitors may disagree with the command, plus the tick that detects it, in us.
 pub(super) const MONITOR_US: f64 = 1e6 * SUPERVISION.monitor_time_s + PERIOD_US;
+/// Longest time from a fault until its report begins to leave, in us: the longest frame may be on the line, and the
+/// server looks once per tick.
+const FRAME_US: f64 = MAX_FRAME as f64 * 1e7 / 115_200.0 + 2.0 * PERIOD_US;
 /// Longest time from a panic or fault to zero volts, in us. An instruction takes 1/170 us.
 pub(super) const KILL_US: f64 = 5.0;
 
@@ -78,9 +85,10 @@ pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str)
     Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
 }
 
-/// A run with a fault that the supervisor detects: the output is zero and disabled within `within_us`, and the ticks go
-/// on without voltage whatever the host sends.
-pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, fault: &str) -> Result<String> {
+/// A run with a fault that the supervisor detects, by a `mismatch` of the monitors or by the interlock: the output is
+/// zero and disabled within `within_us`, the ticks go on without voltage whatever the host sends, and the fault is
+/// reported on the line, again and again, because this host does not say that it has heard of it.
+pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, mismatch: Option<Mismatch>) -> Result<String> {
     let (_, after) = mishap(events)?;
     let last = after.0.iter().rposition(Event::drives).context("the voltage had gone before")?;
     let without = Events(after.0[last + 1..].to_vec());
@@ -88,8 +96,32 @@ pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, fault: &str
     ensure!(us <= within_us, "the voltage goes after {us:.0} us");
     ensure!(without.times("dac").len() > 50 && without.times("reset").is_empty(), "it does not go on");
     let log = after.log(image)?;
-    let line = log.iter().find(|line| line.contains(fault)).with_context(|| format!("no `{fault}` in {log:?}"))?;
-    Ok(format!("DAC zero and enable off {:.1} ms later; `{line}`", us / 1e3))
+    let (fault, said) = match mismatch {
+        None => (Fault::Interlock, "name=interlock".to_owned()),
+        Some(mismatch) => (Fault::Monitor, format!("monitor {}", mismatch.name())),
+    };
+    let line = log.iter().find(|line| line.contains(&said)).with_context(|| format!("no `{said}` in {log:?}"))?;
+
+    let (_, ticking) = events.split("watchdog started")?;
+    let reports: Vec<(f64, FaultReport)> = host::answers(&ticking)?
+        .into_iter()
+        .filter_map(|(us, _, reply)| if let Reply::Fault(report) = reply { Some((us, report)) } else { None })
+        .collect();
+    ensure!(reports.len() >= 2, "the fault is reported {} times: {reports:?}", reports.len());
+    let (first_us, first) = reports[0];
+    let expected = (1, link::Fault::from(fault), mismatch.into());
+    ensure!((first.number, first.fault, first.mismatch) == expected, "reported as {first:?}");
+    ensure!(reports.iter().all(|(_, report)| *report == first), "the reports differ: {reports:?}");
+    let late_us = first_us - (after.0[0].0 + us);
+    ensure!(late_us <= FRAME_US, "reported {late_us:.0} us after the voltage has gone");
+    let between = reports.windows(2).map(|pair| pair[1].0 - pair[0].0).fold(0.0, f64::max);
+    ensure!(between < 110_000.0, "{between:.0} us between two reports");
+    Ok(format!(
+        "DAC zero and enable off {:.1} ms later; `{line}`; reported {:.1} ms after that, {} times",
+        us / 1e3,
+        late_us / 1e3,
+        reports.len()
+    ))
 }
 
 /// A run with words of the store that a power cut left half written: uncorrectable errors there are accepted.
@@ -116,19 +148,42 @@ pub(super) fn deaf(events: &Events, image: &[u8]) -> Result<String> {
     Ok(format!("the voltage stays until the watchdog resets the chip {:.0} ms later; `{boot}`", us / 1e3))
 }
 
-/// A start without the guards of stack and control task: no tick runs, the log says so, and the watchdog resets the
-/// chip into a fault.
-pub(super) fn unguarded(events: &Events, image: &[u8]) -> Result<String> {
+/// A start that is refused because of `field`, the guards of stack and control task or the image: no tick runs, the log
+/// says so, and the watchdog resets the chip into a fault.
+pub(super) fn refused(events: &Events, image: &[u8], field: &str) -> Result<String> {
     events.safe()?;
     let log = events.log(image)?;
-    ensure!(log.iter().any(|line| line == "config refused field=guards"), "it does not say so: {log:?}");
+    let line = format!("config refused field={field}");
+    ensure!(log.contains(&line), "it does not say so: {log:?}");
     let (_, start) = events.split("watchdog started")?;
     let (refused, reborn) = start.split("reset")?;
-    ensure!(refused.times("dac").is_empty(), "it ticks without guards");
+    ensure!(refused.times("dac").is_empty(), "it ticks");
     let us = reborn.0[0].0 - start.0[0].0;
     ensure!(us <= WATCHDOG_US, "the watchdog waits for {us:.0} us");
     let boot = reborn_safe(&reborn, image, "reset=watchdog last_fault=7")?;
     Ok(format!("nothing starts, the log says so, and the watchdog resets the chip after {:.0} ms; `{boot}`", us / 1e3))
+}
+
+/// A run in which a recorded session is played to the chip: its frames are answered, and none arms it.
+pub(super) fn replayed(events: &Events, image: &[u8]) -> Result<String> {
+    events.safe()?;
+    let answered = events.times("sent").len();
+    ensure!(answered > 100, "{answered} bytes of answers show little");
+    ensure!(events.log(image)?.iter().all(|line| !line.contains("-> armed")), "it was armed");
+    ensure!(events.times("dac").len() > 500, "it does not tick");
+    Ok("a session recorded with another chip is answered and does not arm it; DAC zero and enable off throughout"
+        .into())
+}
+
+/// A run in which the random number generator delivers nothing: no session could be told from a recorded one, so that
+/// the chip does not talk.
+pub(super) fn unrandom(events: &Events, image: &[u8]) -> Result<String> {
+    events.safe()?;
+    let log = events.log(image)?;
+    ensure!(log.iter().any(|line| line == "config refused field=random"), "it does not say so: {log:?}");
+    ensure!(events.times("sent").is_empty(), "it talks");
+    ensure!(events.times("dac").len() > 50 && events.times("reset").len() == 1, "it does not tick");
+    Ok("the log says so, nothing is armed, DAC zero and enable off throughout".into())
 }
 
 /// The events before the injected fault and those from it on. An error if there was no voltage before it.

@@ -1,8 +1,8 @@
-//! Frames that the board must not follow: damaged, late, of another version, or noise.
+//! Frames that the board must not follow: damaged, late, recorded, of another version, or noise.
 
 use std::ops::Range;
 
-use link::{Desired, Frame, Reply, Request, Sequence, State, WireVolts};
+use link::{Desired, Frame, Nonce, Reply, Request, Sequence, State, WireVolts};
 
 /// Number of frames in a run.
 pub(super) const HOSTILE: u32 = 10_000;
@@ -31,12 +31,13 @@ fn tempting(dice: &mut Dice) -> Request {
     }
 }
 
-/// The frame of this index, which the board must not follow. `next` is the sequence number that it would accept.
-pub(super) fn hostile(dice: &mut Dice, index: u32, next: Sequence) -> Vec<u8> {
+/// The frame of this index, which the board must not follow. `next` is the sequence number that it would accept in its
+/// `session`.
+pub(super) fn hostile(dice: &mut Dice, index: u32, session: Nonce, next: Sequence) -> Vec<u8> {
     let request = tempting(dice);
-    let sound = Frame::new(next, &request).as_bytes().to_vec();
+    let sound = Frame::new(session.stamp(next), &request).as_bytes().to_vec();
     let inside = 1..sound.len() - 1;
-    match index % 8 {
+    match index % 9 {
         // Noise, partly longer than any frame.
         0 | 1 => {
             let length = dice.draw(1..200);
@@ -68,14 +69,23 @@ pub(super) fn hostile(dice: &mut Dice, index: u32, next: Sequence) -> Vec<u8> {
         // like.
         5 => {
             let version = link::VERSION.wrapping_add(dice.draw(1..255) as u8);
-            Frame::with_version(version, Sequence(next.0.wrapping_add(100)), &request).as_bytes().into()
+            Frame::with_version(version, session.stamp(Sequence(next.0.wrapping_add(100))), &request).as_bytes().into()
         }
         // An old sequence number.
-        6 => Frame::new(Sequence(next.0.wrapping_sub(dice.draw(2..30_000) as u16)), &request).as_bytes().into(),
+        6 => {
+            let old = Sequence(next.0.wrapping_sub(dice.draw(2..30_000) as u16));
+            Frame::new(session.stamp(old), &request).as_bytes().into()
+        }
+        // A frame of another session, a sign of life among them. Its number is not the next one either.
+        7 => {
+            let other = Nonce(session.0 ^ 1 << dice.draw(0..32));
+            let request = if dice.draw(0..2) == 0 { request } else { Request::Heartbeat };
+            Frame::new(other.stamp(Sequence(next.0.wrapping_add(100))), &request).as_bytes().into()
+        }
         // An echo of a reply.
         _ => {
             let target = WireVolts::from_f64(dice.draw(0..700) as f64);
-            Frame::new(next, &Reply::Ack { state: State::Armed, target }).as_bytes().into()
+            Frame::new(session.stamp(next), &Reply::Ack { state: State::Armed, target }).as_bytes().into()
         }
     }
 }
@@ -89,11 +99,12 @@ mod tests {
     fn no_hostile_frame_is_a_valid_request() {
         let mut dice = Dice(7);
         for index in 0..HOSTILE {
-            let next = Sequence(index as u16);
+            let (session, next) = (Nonce(77), Sequence(index as u16));
             let mut receiver = Receiver::new();
-            for byte in hostile(&mut dice, index, next) {
+            for byte in hostile(&mut dice, index, session, next) {
                 let Some(packet) = receiver.on_byte(byte) else { continue };
-                let followed = packet.read::<Request>().is_ok() && packet.sequence.0.wrapping_sub(next.0) < 1 << 15;
+                let newer = packet.sequence.0.wrapping_sub(next.0) < 1 << 15;
+                let followed = packet.read::<Request>().is_ok() && packet.session() == session && newer;
                 assert!(!followed, "{index}: {packet:?}");
             }
         }

@@ -10,7 +10,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use host_sim::link::{Client, Failure, Patience, Port};
 use host_sim::log::{Item, Level, Summary};
-use link::{Desired, Fault, Frame, ModelId, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts};
+use link::{
+    Desired, Fault, Frame, ModelId, Nonce, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts,
+};
 use simulation::plant_file;
 
 use xtask::build::{self, Board, Opt};
@@ -22,7 +24,7 @@ use hostile::{Dice, HOSTILE, hostile};
 /// Longest time for all hostile frames. They usually need a minute, because the emulated line transfers single bytes.
 const TIME: Duration = Duration::from_secs(300);
 /// Hostile frames between two valid ones, one of each kind. The valid ones keep the host's time-out from expiring.
-const BATCH: u32 = 8;
+const BATCH: u32 = 9;
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time since the last valid frame after which the host's time-out of 0.5 s may have expired on a busy machine. It is
@@ -52,8 +54,9 @@ pub(crate) fn run(elf: &Path) -> Result<String> {
         || {
             let polite = courtesy(&name)?;
             let (hostile, armed) = hostility(&name)?;
+            let old = recording(&name)?;
             let kept = model(&vsj, &name)?;
-            Ok((format!("{polite}; {hostile}; {kept}"), 2 + armed))
+            Ok((format!("{polite}; {hostile}; {old}; {kept}"), 4 + armed))
         },
     )?;
     let mut summary = Summary::default();
@@ -114,9 +117,8 @@ fn courtesy(name: &str) -> Result<String> {
 
 /// Hostile frames while the board is armed at a target. Returns the result and how often the board was armed.
 fn hostility(name: &str) -> Result<(String, usize)> {
-    let mut line = Line { port: open(name)?, receiver: Receiver::new(), next: Sequence(1000) };
-    // A hello restarts the sequence numbers, as after a restart of the host.
-    line.ask(&Request::Hello)?;
+    let mut line = Line::open(name)?;
+    line.greet()?;
     let before = line.status()?;
     expect(&before, State::Disarmed, 0.0)?;
     line.arm()?;
@@ -127,7 +129,7 @@ fn hostility(name: &str) -> Result<(String, usize)> {
     let mut bytes = 0;
     while sent < HOSTILE && begin.elapsed() < TIME {
         for _ in 0..BATCH {
-            let frame = hostile(&mut dice, sent, line.next);
+            let frame = hostile(&mut dice, sent, line.session, line.next);
             bytes += frame.len();
             line.port.write(&frame)?;
             sent += 1;
@@ -174,6 +176,35 @@ fn hostility(name: &str) -> Result<(String, usize)> {
         after.overruns
     );
     Ok((said, armed))
+}
+
+/// Plays the frames of an earlier session, and the last frame of the running one, while the board is armed and its host is
+/// silent: they keep nothing alive.
+fn recording(name: &str) -> Result<String> {
+    let mut line = Line::open(name)?;
+    line.greet()?;
+    line.arm()?;
+    ensure!(line.ask(&Request::Heartbeat)? == at_target(), "no heartbeat");
+    let recorded = std::mem::take(&mut line.sent);
+    line.ask(&Request::Disarm)?;
+    line.greet()?;
+    line.arm()?;
+    line.sent.clear();
+    ensure!(line.ask(&Request::Heartbeat)? == at_target(), "no heartbeat");
+    let (begin, mut played) = (Instant::now(), 0);
+    while begin.elapsed() < Duration::from_millis(1500) {
+        line.port.write(&recorded)?;
+        line.port.write(&line.sent)?;
+        played += 6;
+        thread::sleep(Duration::from_millis(50));
+    }
+    // Above the numbers of the answers that were not read.
+    (line.session, line.next) = (Nonce::NONE, Sequence(2000));
+    line.ask(&Request::Hello)?;
+    let status = line.status()?;
+    expect(&status, State::Disarmed, 0.0)?;
+    ensure!(status.sample.code == 0, "{status:?}");
+    Ok(format!("{played} recorded frames kept no silent host's voltage"))
 }
 
 /// Sends a model with `vsj link`, to a board without a file for its flash, as `cargo xtask emulate --link` starts it.
@@ -226,14 +257,31 @@ fn at_target() -> Reply {
 struct Line {
     port: Port,
     receiver: Receiver,
+    session: Nonce,
     next: Sequence,
+    /// Every frame that was sent.
+    sent: Vec<u8>,
 }
 
 impl Line {
+    fn open(name: &str) -> Result<Self> {
+        let (receiver, session, next) = (Receiver::new(), Nonce::NONE, Sequence(1000));
+        Ok(Self { port: open(name)?, receiver, session, next, sent: Vec::new() })
+    }
+
+    /// Asks for a session, as after a restart of the host.
+    fn greet(&mut self) -> Result<()> {
+        self.session = Nonce::NONE;
+        self.next = Sequence(1000);
+        self.ask(&Request::Hello).map(drop)
+    }
+
     fn ask(&mut self, request: &Request) -> Result<Reply> {
         let number = self.next;
         self.next = number.next();
-        self.port.write(Frame::new(number, request).as_bytes())?;
+        let frame = Frame::new(self.session.stamp(number), request);
+        self.sent.extend(frame.as_bytes());
+        self.port.write(frame.as_bytes())?;
         let begin = Instant::now();
         while begin.elapsed() < PATIENCE {
             let mut buffer = [0; 1024];
@@ -243,6 +291,9 @@ impl Line {
                 if let Some(packet) = self.receiver.on_byte(*byte)
                     && packet.sequence == number
                 {
+                    if *request == Request::Hello {
+                        self.session = packet.session();
+                    }
                     found = Some(packet.read::<Reply>().map_err(|error| anyhow!("{error:?}"))?);
                 }
             }

@@ -12,7 +12,7 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
-use firmware::nucleo::{Nucleo, clocks, reset, switch_amplifier_off};
+use firmware::nucleo::{Nucleo, clocks, random, reset, switch_amplifier_off};
 use firmware::settings::FLASHED;
 use firmware::store::Store;
 use firmware::tasks;
@@ -58,7 +58,11 @@ fn main() -> ! {
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
     let mut store = Store::new(flash);
-    match host::open(&FLASHED, &store, &cause) {
+    let seed = random::seed();
+    if seed.is_none() {
+        log::refused("random");
+    }
+    match host::open(&FLASHED, &store, &cause, seed.unwrap_or(0)) {
         // Impossible: this is the first call.
         Ok(None) => {}
         Ok(Some((control, server))) => {
@@ -66,8 +70,8 @@ fn main() -> ! {
                 low.spawn(housekeeping);
                 high.spawn(control);
             }
-            // Without a line the output cannot be enabled.
-            if let Some(talk) = line.and_then(|line| talk(line, server).ok()) {
+            // Without a line the output cannot be enabled. Without a random number a recorded session could enable it.
+            if let Some(talk) = line.filter(|_| seed.is_some()).and_then(|line| talk(line, server).ok()) {
                 low.spawn(talk);
             }
         }

@@ -68,8 +68,11 @@ impl Source for Host {
             measured: tick.measured.map(Into::into),
             code: tick.drive.code().0,
             limits: supervisor.limits(output).bits(),
+            mismatch: supervisor.mismatch().into(),
+            sensor: output.sensor.into(),
         };
-        let view = View { sample, state: self.state, refusal: supervisor.refusal(), overruns };
+        let (state, standing) = (self.state, supervisor.standing());
+        let view = View { sample, state, standing, refusal: supervisor.refusal(), overruns };
         with_mailbox(|mailbox| mailbox.show(view));
         if self.took_command {
             DONE.signal(view);

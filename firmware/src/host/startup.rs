@@ -13,7 +13,8 @@ use crate::settings::{RATE_HZ, SUPERVISION};
 use crate::start::{self, Start};
 use crate::store::{Pages, Store};
 
-/// Builds controller and server from the stored model; `None` from the second call on.
+/// Builds controller and server from the stored model; `None` from the second call on. The nonces of the link's sessions
+/// follow from `seed`, which has to be another one at every start.
 ///
 /// # Errors
 /// [`OutOfRange`] names the invalid setting.
@@ -21,18 +22,19 @@ pub fn open<P: Pages>(
     settings: &Settings,
     store: &Store<P>,
     cause: &Cause,
+    seed: u32,
 ) -> Result<Option<(&'static mut Control, &'static mut Server)>, OutOfRange> {
     let Some(place) = singleton!(: Option<Control> = None) else { return Ok(None) };
     let (control, start) = start::control(settings, store.newest(), cause, place)?;
     if let Some(field) = start.rejected {
         log::refused(field);
     }
-    Ok(server(&start, Controller::of(&settings.compensation))?.map(|server| (control, server)))
+    Ok(server(&start, Controller::of(&settings.compensation), seed)?.map(|server| (control, server)))
 }
 
 /// Builds the server. Not inlined, so that its stack frame is released.
 #[inline(never)]
-fn server(start: &Start, controller: Controller) -> Result<Option<&'static mut Server>, OutOfRange> {
+fn server(start: &Start, controller: Controller, seed: u32) -> Result<Option<&'static mut Server>, OutOfRange> {
     let amplifier = &start.amplifier;
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, amplifier.min_v, amplifier.max_v)?;
     let part = |text: &str| text.parse().unwrap_or(0);
@@ -51,6 +53,7 @@ fn server(start: &Start, controller: Controller) -> Result<Option<&'static mut S
         last_fault: start.last_fault.map_or(link::Fault::NONE, Into::into),
         model: start.model,
         stored: start.stored,
+        seed,
     };
     Ok(singleton!(: Server = Server::new(spring, about)))
 }

@@ -1,7 +1,7 @@
 //! The task that owns the line to the host.
 
 use embassy_time::{Duration, Timer, with_timeout};
-use link::{Server, Step};
+use link::{Server, Step, View};
 
 use super::model_store::update_model;
 use super::shared_mailbox::{hand_over, with_mailbox};
@@ -25,11 +25,13 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
         for byte in buffer.iter().take(count) {
             // None before the first tick: there is no state to report yet, and hosts repeat their requests.
             let Some(view) = with_mailbox(|mailbox| mailbox.view()) else { break };
+            report_faults(line, server, &view).await;
             match server.on_byte(*byte, &view) {
                 None => {}
-                Some(Step::Send(bytes)) => send(line, bytes).await,
+                Some(Step::Send(bytes)) => drop(send(line, bytes).await),
                 Some(Step::Command(command)) => {
                     let after = hand_over(command, view.state).await;
+                    report_faults(line, server, &after).await;
                     send(line, server.command_done(&after)).await;
                 }
                 Some(Step::UpdateModel(update)) => {
@@ -47,16 +49,27 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                 with_mailbox(|mailbox| mailbox.hear());
             }
         }
-        if let Some(view) = with_mailbox(|mailbox| mailbox.view())
-            && let Some(bytes) = server.telemetry(&view)
-        {
-            send(line, bytes).await;
+        if let Some(view) = with_mailbox(|mailbox| mailbox.view()) {
+            report_faults(line, server, &view).await;
+            if let Some(bytes) = server.telemetry(&view)
+                && !send(line, bytes).await
+            {
+                server.telemetry_lost();
+            }
         }
     }
 }
 
-async fn send(line: &mut impl Line, bytes: &[u8]) {
-    // After a timeout the frame is incomplete, and the host drops it.
-    let _ = with_timeout(WRITE_TIMEOUT, line.write(bytes)).await;
+/// Sends the report of new faults, ahead of everything else.
+async fn report_faults(line: &mut impl Line, server: &mut Server, view: &View) {
+    if let Some(bytes) = server.fault(view) {
+        send(line, bytes).await;
+    }
+}
+
+/// Sends a frame. False after a timeout: the frame is incomplete then, and the host drops it.
+async fn send(line: &mut impl Line, bytes: &[u8]) -> bool {
+    let sent = with_timeout(WRITE_TIMEOUT, line.write(bytes)).await.is_ok();
     TASK_WATCHDOG.check_in(Task::Link);
+    sent
 }

@@ -7,7 +7,7 @@
 #![allow(unsafe_code)]
 
 use embassy_stm32::Peri;
-use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};
+use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime, VrefInt};
 use embassy_stm32::dac::{DacChannel, Mode, Value};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::mode::Blocking;
@@ -25,6 +25,8 @@ const ENABLE_PIN: usize = 5;
 /// scale the monitor would agree with any amplifier. With a scale of its own it detects an amplifier for 1000 V behind an image
 /// for 700 V from 82 V on.
 const MONITOR_SCALE_V: i32 = 1000;
+/// Supply at which the manufacturer has measured the reference, in mV.
+const CALIBRATED_MV: u32 = 3000;
 /// Current at half of the ADC's range, in uA.
 const HALF_SCALE_UA: i32 = 5000;
 
@@ -35,6 +37,9 @@ pub struct Amplifier {
     adc: Adc<'static, ADC1>,
     voltage: AnyAdcChannel<'static, ADC1>,
     current: AnyAdcChannel<'static, ADC1>,
+    reference: VrefInt,
+    /// Reading of the reference at the supply [`CALIBRATED_MV`], measured by the chip's manufacturer.
+    calibrated: u16,
 }
 
 impl Amplifier {
@@ -54,7 +59,9 @@ impl Amplifier {
         dac.set(Value::Bit12Right(0));
         dac.enable();
         let adc = Adc::new(adc, AdcConfig::default());
-        Self { dac, enable, adc, voltage: voltage.degrade_adc(), current: current.degrade_adc() }
+        let reference = adc.enable_vrefint();
+        let (voltage, current) = (voltage.degrade_adc(), current.degrade_adc());
+        Self { dac, enable, adc, voltage, current, reference, calibrated: pac::VREFINTCAL.data().read() }
     }
 }
 
@@ -70,16 +77,21 @@ impl board::Amplifier for Amplifier {
         }
     }
 
-    /// Blocks for 2 us during both conversions.
+    /// Blocks for 8 us during the three conversions.
     fn monitors(&mut self) -> Option<Monitors> {
         let time = SampleTime::CYCLES24_5;
         let voltage = i32::from(self.adc.blocking_read(&mut self.voltage, time));
         let current = i32::from(self.adc.blocking_read(&mut self.current, time));
+        // The reference needs 4 us to be sampled.
+        let reference = u32::from(self.adc.blocking_read(&mut self.reference, SampleTime::CYCLES247_5));
+        // DAC and ADC share one supply: what it adds to the output, it takes from the voltage monitor's reading.
+        let supply_mv = CALIBRATED_MV * u32::from(self.calibrated) / reference.max(1);
         // 12 bits times 1000 V, in 2^-20 V: 42 bits.
         let bits = (i64::from(voltage * MONITOR_SCALE_V) << 20) >> 12;
         Some(Monitors {
             voltage: Volts(Signal::from_bits(bits as i32)),
             current_ua: (current - 2048) * HALF_SCALE_UA / 2048,
+            supply_mv: Some(supply_mv.min(u32::from(u16::MAX)) as u16),
         })
     }
 }

@@ -20,10 +20,12 @@
 //! | [`uart`] | Line to the host. |
 //! | [`flash`] | Two pages for the model store. |
 //! | [`reset`] | Source of the last reset. |
+//! | [`random`] | Random number generator. |
 
 pub mod amplifier;
 pub mod clocks;
 pub mod flash;
+pub mod random;
 pub mod reset;
 pub mod uart;
 
@@ -33,12 +35,10 @@ use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 
 use crate::board::Board;
+use crate::settings::WATCHDOG_MS;
 
 pub use amplifier::switch_amplifier_off;
 pub use reset::reset;
-
-/// Period of the hardware watchdog, in us.
-const WATCHDOG_US: u32 = 100_000;
 
 /// Hardware of the control task.
 pub struct Nucleo {
@@ -53,7 +53,7 @@ impl Nucleo {
     /// returned separately because other tasks own them.
     pub fn init(p: Peripherals) -> (Self, Option<uart::Uart>, flash::Flash) {
         let amplifier = amplifier::Amplifier::new(p.DAC1, p.PA4, p.PB5, p.ADC1, p.PA0, p.PA1);
-        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_MS * 1000);
         watchdog.unleash();
         let board = Self {
             amplifier,

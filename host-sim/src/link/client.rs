@@ -10,7 +10,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 use link::wire_model::PART;
 use link::{
-    Frame, ModelId, Models, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry, Unreadable, WireModel,
+    FaultReport, Frame, ModelId, Models, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry,
+    Unreadable, WireModel,
 };
 
 use crate::link::Port;
@@ -96,15 +97,27 @@ pub struct Client {
     patience: Patience,
     receiver: Receiver,
     sequence: Sequence,
+    session: Nonce,
+    /// Number of requests in the session.
+    requests: u16,
+    /// Period of the telemetry that was requested.
+    every_ticks: u16,
     /// Bytes received but not decoded yet.
     read: VecDeque<u8>,
     bytes: u64,
     samples: VecDeque<Telemetry>,
+    /// The last report of faults that the MCU has not been told of.
+    unheard: Option<FaultReport>,
+    reports: Vec<FaultReport>,
 }
+
+/// Requests after which a client begins a new session: a session has 65 536 numbers.
+const MOST_REQUESTS: u16 = 60_000;
 
 /// An answer of the MCU.
 struct Answer {
     sequence: Sequence,
+    session: Nonce,
     /// The reply, or the version of an unknown protocol.
     reply: Result<Reply, u8>,
 }
@@ -119,8 +132,24 @@ impl Client {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let sequence = Sequence((now.as_micros() as u16).wrapping_add(std::process::id() as u16));
         let (receiver, read, samples) = (Receiver::new(), VecDeque::new(), VecDeque::new());
-        let mut client = Self { port, patience, receiver, sequence, read, bytes: 0, samples };
-        let status = client.status_by(Request::Hello)?;
+        let (session, requests, every_ticks, unheard, reports) = (Nonce::NONE, 0, 0, None, Vec::new());
+        let mut client = Self {
+            port,
+            patience,
+            receiver,
+            sequence,
+            session,
+            requests,
+            every_ticks,
+            read,
+            bytes: 0,
+            samples,
+            unheard,
+            reports,
+        };
+        client.begin()?;
+        // The first request of the session begins it.
+        let status = client.status()?;
         // Telemetry sent before the greeting belongs to an earlier program.
         client.samples.clear();
         Ok((client, status))
@@ -136,7 +165,13 @@ impl Client {
     /// # Errors
     /// [`Failure`]
     pub fn status(&mut self) -> Result<Status, Failure> {
-        self.status_by(Request::Status)
+        status(self.ask(Request::Status)?)
+    }
+
+    /// Faults that the MCU has reported since the last call. The MCU repeats each report until the next request tells it
+    /// that this program has heard of it.
+    pub fn reports(&mut self) -> Vec<FaultReport> {
+        std::mem::take(&mut self.reports)
     }
 
     /// Sends a request that is answered with an acknowledgement; returns the state and target in it.
@@ -175,7 +210,7 @@ impl Client {
         }
         self.order(Request::ModelEnd { length: payload.len() as u16, checksum: link::frame::checksum(&payload) })?;
         self.order(Request::Restart)?;
-        self.status_by(Request::Hello)?;
+        self.begin()?;
         let models = self.models()?;
         let sent = ModelId::of(models.active.number, &payload);
         if models.active == ModelId::default() || models.active != sent {
@@ -195,23 +230,49 @@ impl Client {
         Ok(self.samples.drain(..))
     }
 
-    fn status_by(&mut self, request: Request) -> Result<Status, Failure> {
-        match self.ask(request)? {
-            Reply::Status(status) => Ok(status),
-            other => Err(Failure::Unexpected(Box::new(other))),
-        }
+    /// Asks for a new session; the next request begins it.
+    fn begin(&mut self) -> Result<(), Failure> {
+        self.session = Nonce::NONE;
+        status(self.exchange(Request::Hello)?)?;
+        self.requests = 0;
+        Ok(())
     }
 
+    /// Sends a request of the session, after what it needs: a new session when the numbers run out, and the word that the
+    /// reported faults were heard.
     fn ask(&mut self, request: Request) -> Result<Reply, Failure> {
+        if self.requests >= MOST_REQUESTS {
+            self.begin()?;
+            if self.every_ticks > 0 {
+                self.exchange(Request::Stream { every_ticks: self.every_ticks })?;
+            }
+        }
+        if let Request::Stream { every_ticks } = request {
+            self.every_ticks = every_ticks;
+        }
+        let reply = self.exchange(request);
+        if matches!(reply, Ok(_) | Err(Failure::Refused(_)))
+            && let Some(report) = self.unheard.take()
+        {
+            self.exchange(Request::Heard { number: report.number })?;
+        }
+        reply
+    }
+
+    fn exchange(&mut self, request: Request) -> Result<Reply, Failure> {
         self.sequence = self.sequence.next();
-        let frame = Frame::new(self.sequence, &request);
+        self.requests = self.requests.saturating_add(1);
+        let frame = Frame::new(self.session.stamp(self.sequence), &request);
         let before = self.bytes;
         for _ in 0..self.patience.tries {
             self.port.write(frame.as_bytes()).map_err(Failure::Port)?;
             let until = Instant::now() + self.patience.each;
-            while let Some(Answer { sequence, reply }) = self.next_answer(until)? {
+            while let Some(Answer { sequence, session, reply }) = self.next_answer(until)? {
                 if sequence != self.sequence {
                     continue;
+                }
+                if request == Request::Hello {
+                    self.session = session;
                 }
                 return match reply {
                     Err(version) => Err(Failure::Version(version)),
@@ -231,10 +292,15 @@ impl Client {
                 let Some(packet) = self.receiver.on_byte(byte) else { continue };
                 match packet.read::<Reply>() {
                     Ok(Reply::Telemetry(sample)) => self.samples.push_back(sample),
-                    Ok(reply) => return Ok(Some(Answer { sequence: packet.sequence, reply: Ok(reply) })),
-                    Err(Unreadable::Version(version)) => {
-                        return Ok(Some(Answer { sequence: packet.sequence, reply: Err(version) }));
+                    Ok(Reply::Fault(report)) => {
+                        // A repeated one.
+                        if self.reports.last() != Some(&report) && self.unheard != Some(report) {
+                            self.reports.push(report);
+                        }
+                        self.unheard = Some(report);
                     }
+                    Ok(reply) => return Ok(Some(answer(&packet, Ok(reply)))),
+                    Err(Unreadable::Version(version)) => return Ok(Some(answer(&packet, Err(version)))),
                     // An echo of our own frame, or a message unknown to this version.
                     Err(Unreadable::Kind | Unreadable::Message) => {}
                 }
@@ -247,5 +313,74 @@ impl Client {
             self.bytes += count as u64;
             self.read.extend(&buffer[..count]);
         }
+    }
+}
+
+fn answer(packet: &Packet<'_>, reply: Result<Reply, u8>) -> Answer {
+    Answer { sequence: packet.sequence, session: packet.session(), reply }
+}
+
+fn status(reply: Reply) -> Result<Status, Failure> {
+    match reply {
+        Reply::Status(status) => Ok(status),
+        other => Err(Failure::Unexpected(Box::new(other))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::{About, Server, Step, View};
+    use model::Spring;
+    use model::stiffness::{Cantilever, YoungsModulus};
+    use model::supervisor::{Faults, State};
+    use std::io::{Read, Write};
+    use std::os::unix::net::UnixListener;
+
+    /// A disarmed MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange.
+    fn mcu(listener: UnixListener) -> link::session::Counters {
+        let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
+        let mut server = Server::new(spring, About { silence_limit_ticks: 1000, rate_hz: 1000, ..About::default() });
+        let mut sample = Telemetry::default();
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut bytes = [0; 256];
+        loop {
+            let count = stream.read(&mut bytes).unwrap_or(0);
+            if count == 0 {
+                return server.counters();
+            }
+            sample.tick += 1;
+            let view = View { sample, state: State::Disarmed, standing: Faults::NONE, refusal: None, overruns: 0 };
+            for byte in &bytes[..count] {
+                if let Some(Step::Send(answer)) = server.on_byte(*byte, &view) {
+                    stream.write_all(answer).unwrap();
+                }
+            }
+            stream.write_all(server.telemetry(&view).unwrap_or_default()).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_client_whose_numbers_run_out_begins_another_session_and_keeps_its_telemetry() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mcu");
+        let listener = UnixListener::bind(&path).unwrap();
+        let thread = std::thread::spawn(move || mcu(listener));
+        let port = Port::open(&format!("unix:{}", path.display()), 115_200).unwrap();
+        let (mut client, _) = Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap();
+        let first = client.session;
+        client.order(Request::Stream { every_ticks: 1 }).unwrap();
+        client.requests = MOST_REQUESTS;
+        client.order(Request::Heartbeat).unwrap();
+        assert!(client.session != first && client.requests < 10, "{} requests", client.requests);
+        client.samples(Duration::ZERO).unwrap();
+        for _ in 0..3 {
+            client.order(Request::Heartbeat).unwrap();
+        }
+        let samples = client.samples(Duration::from_millis(20)).unwrap().count();
+        assert!(samples > 0, "the telemetry has stopped");
+        drop(client);
+        let counters = thread.join().unwrap();
+        assert_eq!((counters.out_of_order, counters.unknown), (0, 0));
     }
 }

@@ -26,6 +26,10 @@ pub struct Row {
     pub dac_code: u16,
     /// Names of the limits that acted.
     pub limits: Vec<&'static str>,
+    /// What disagrees with the output: `none`, `limit`, `open`, `short`, `leakage`, `reference` or `held`.
+    pub monitors: &'static str,
+    /// Diagnosis of the stiffness sensor: `none` without one, `trusted`, or its fault.
+    pub sensor: &'static str,
 }
 
 /// The status of the MCU.
@@ -85,6 +89,8 @@ impl Row {
             .filter(|(_, limit)| sample.limits & limit.bits() != 0)
             .map(|(name, _)| name)
             .collect(),
+            monitors: sample.mismatch.name(),
+            sensor: sample.sensor.name(),
         }
     }
 
@@ -129,21 +135,26 @@ impl StatusReport {
         let Self { firmware, protocol, rate_hz, silence_limit_s, overruns, fault, last_fault, sample, link, .. } = self;
         let Self { controller, lowest_v, highest_v, .. } = self;
         let measured = sample.measured_v.map_or_else(|| "no sensor".to_owned(), |volts| format!("{volts:.3} V"));
+        let remedy = link::Fault(self.fault_code).remedy().map(|remedy| format!("remedy     {remedy}\n"));
+        let remedy = remedy.unwrap_or_default();
         let limits = if sample.limits.is_empty() { "none".to_owned() } else { sample.limits.join(", ") };
         format!(
             "state      {}, fault {fault}, last reset's {last_fault}\n\
-             target     {:.3} V, in reach {lowest_v} to {highest_v} V\n\
+             {remedy}target     {:.3} V, in reach {lowest_v} to {highest_v} V\n\
              applied    {:.3} V, DAC code {}\n\
              stiffness  {:.3} V estimated; measured: {measured}\n\
-             limits     {limits}\n\
+             limits     {limits}; monitors: {}, sensor: {}\n\
              running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
              firmware   {firmware}, controller {controller}, protocol {protocol}, host may be silent for {silence_limit_s} s\n\
-             link       {} accepted, {} repeated, {} damaged, {} oversize, {} bad version, {} out of order, {} unknown\n",
+             link       {} accepted, {} repeated, {} damaged, {} oversize, {} bad version, {} out of order, {} unknown, \
+             {} samples dropped\n",
             sample.state,
             sample.target_v,
             sample.applied_v,
             sample.dac_code,
             sample.estimate_v,
+            sample.monitors,
+            sample.sensor,
             sample.time_s,
             sample.tick,
             link.accepted,
@@ -153,6 +164,7 @@ impl StatusReport {
             link.bad_version,
             link.out_of_order,
             link.unknown,
+            link.telemetry_dropped,
         )
     }
 }

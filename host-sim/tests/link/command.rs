@@ -74,11 +74,17 @@ fn an_open_interlock_and_its_fault() {
     mcu.with(|shared| shared.interlock_open = true);
     let kept = kept.wait_with_output().unwrap();
     assert_eq!(kept.status.code(), Some(1));
-    assert!(String::from_utf8(kept.stderr).unwrap().contains("no longer armed: faulted, fault interlock (4)"));
+    let remarks = String::from_utf8(kept.stderr).unwrap();
+    assert!(remarks.contains("no longer armed: faulted, fault interlock (4)"), "{remarks}");
+    assert_eq!(remarks.matches("fault interlock (4) at tick ").count(), 1, "the MCU's own report: {remarks}");
 
     assert!(bad(1, port, &["acknowledge", "interlock"]).contains("refused: the interlock is open"));
     mcu.with(|shared| (shared.interlock_open, shared.fault) = (false, Some(supervisor::Fault::Watchdog)));
-    assert!(bad(1, port, &["arm"]).contains("faulted: interlock (4)"));
+    let remarks = bad(1, port, &["arm"]);
+    assert!(remarks.contains("faulted: interlock (4)"), "{remarks}");
+    assert!(!remarks.contains("fault interlock (4) at tick "), "it was heard of: {remarks}");
+    let text = stdout(&run(port, &["status"]));
+    assert!(text.contains("remedy     close the safety circuit\n"), "{text}");
     assert_eq!(json(port, &["disarm"])["state"], "faulted", "a disarm does not acknowledge");
     assert!(bad(1, port, &["acknowledge", "panic"]).contains("a different fault is present: interlock (4)"));
     let output = run(port, &["acknowledge", "interlock"]);

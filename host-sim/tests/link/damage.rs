@@ -5,6 +5,7 @@ use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 use host_sim::link::{Client, Patience, Port};
+use link::nonce::Nonces;
 use link::{Command, Desired, Frame, Request, Sequence};
 use model::{Volts, supervisor};
 use proptest::prelude::Rng;
@@ -70,16 +71,19 @@ fn ten_thousand_damaged_frames_over_a_socket_apply_nothing_that_was_not_sent() {
     });
     let mut rng = TestRng::from_seed(RngAlgorithm::ChaCha, &[3; 32]);
     let mut random = move |below: usize| (rng.next_u64() % below as u64) as usize;
-    stream.write_all(Frame::new(Sequence(0), &Request::Hello).as_bytes()).unwrap();
-    stream.write_all(Frame::new(Sequence(1), &Request::Arm).as_bytes()).unwrap();
+    // The nonce of the first session after the first Hello of this MCU.
+    let nonce = mcu.with(|shared| Nonces::new(shared.seed).draw());
+    let frame = |number, request| Frame::new(nonce.stamp(Sequence(number)), &request);
+    stream.write_all(frame(0, Request::Hello).as_bytes()).unwrap();
+    stream.write_all(frame(1, Request::Arm).as_bytes()).unwrap();
     for number in 2..=10_001 {
-        let mut bytes = Frame::new(Sequence(number), &set(number)).as_bytes().to_vec();
+        let mut bytes = frame(number, set(number)).as_bytes().to_vec();
         let at = random(bytes.len());
         match random(4) {
             0 => bytes[at] ^= 1 << random(8),
             1 => bytes.truncate(at),
             2 => {
-                let other = Frame::new(Sequence(number + 1), &set(number + 1));
+                let other = frame(number + 1, set(number + 1));
                 bytes.truncate(at);
                 bytes.extend_from_slice(&other.as_bytes()[random(other.as_bytes().len())..]);
             }
@@ -88,7 +92,7 @@ fn ten_thousand_damaged_frames_over_a_socket_apply_nothing_that_was_not_sent() {
         stream.write_all(&bytes).unwrap();
     }
     // The first valid frame is accepted.
-    stream.write_all(Frame::new(Sequence(20_000), &Request::Disarm).as_bytes()).unwrap();
+    stream.write_all(frame(20_000, Request::Disarm).as_bytes()).unwrap();
     let disarm = Command { heard: true, arming: Some(supervisor::Command::Disarm), target: None };
     while mcu.with(|shared| shared.ordered.last() != Some(&disarm)) {
         std::thread::sleep(Duration::from_millis(1));

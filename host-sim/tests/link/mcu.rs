@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -56,6 +56,8 @@ pub(crate) struct Shared {
     pub(crate) fault: Option<supervisor::Fault>,
     /// True if the MCU is to restart at the next tick.
     pub(crate) restart: bool,
+    /// Seed of the nonces since the last start.
+    pub(crate) seed: u32,
     /// Memory that survives a restart.
     pub(crate) flash: Flash,
 }
@@ -96,6 +98,12 @@ pub(crate) struct Mcu {
     _folder: Option<tempfile::TempDir>,
     /// Keeps the pseudo-terminal open; it hangs up when nobody holds it.
     _terminal: Option<File>,
+}
+
+/// A seed that no other start has.
+fn next_seed() -> u32 {
+    static SEED: AtomicU32 = AtomicU32::new(0);
+    SEED.fetch_add(1 << 20, Ordering::Relaxed)
 }
 
 const POLL: Duration = Duration::from_micros(500);
@@ -163,7 +171,8 @@ impl Mcu {
     }
 
     fn new(port: String) -> Self {
-        let (shared, stop) = Default::default();
+        let stop = Arc::default();
+        let shared = Arc::new(Mutex::new(Shared { seed: next_seed(), ..Shared::default() }));
         Self { port, shared, stop, thread: None, _folder: None, _terminal: None }
     }
 
@@ -201,6 +210,7 @@ impl Mcu {
                 out.clear();
                 noise.spoil(&mut bytes[..count]);
                 if std::mem::take(&mut chip.shared.lock().unwrap().restart) {
+                    chip.shared.lock().unwrap().seed = next_seed();
                     (chip, start) = (Chip::new(setup, chip.shared), Instant::now());
                 }
                 while u128::from(chip.view.sample.tick) < start.elapsed().as_millis() {
@@ -209,6 +219,7 @@ impl Mcu {
                 for byte in &bytes[..count] {
                     chip.hear(*byte, &mut out);
                 }
+                out.extend_from_slice(chip.server.fault(&chip.view).unwrap_or_default());
                 out.extend_from_slice(chip.server.telemetry(&chip.view).unwrap_or_default());
             }
         }));
@@ -245,6 +256,7 @@ impl Chip {
         if let Some(found) = found {
             control.use_model(&Settings::PAPER, &found).unwrap();
         }
+        let seed = shared.lock().unwrap().seed;
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
         let about = About {
             firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd, controller: Controller::Paper },
@@ -253,9 +265,10 @@ impl Chip {
             last_fault: Fault::NONE,
             model,
             stored: model,
+            seed,
         };
-        let view =
-            View { sample: Telemetry::default(), state: supervisor::State::Disarmed, refusal: None, overruns: 0 };
+        let (state, standing) = (supervisor::State::Disarmed, supervisor::Faults::NONE);
+        let view = View { sample: Telemetry::default(), state, standing, refusal: None, overruns: 0 };
         let mut chip = Self { setup, shared, server: Server::new(spring, about), control, store, view };
         chip.tick(Command::default());
         chip
@@ -279,10 +292,13 @@ impl Chip {
             measured: self.setup.sensor.then_some(tick.output.stiffness.into()),
             code: tick.drive.code().0,
             limits: supervisor.limits(&tick.output).bits(),
+            mismatch: supervisor.mismatch().into(),
+            sensor: link::Sensor(u8::from(self.setup.sensor)),
         };
         let mut shared = self.shared.lock().unwrap();
         (shared.sample, shared.counters) = (sample, self.server.counters());
-        self.view = View { sample, state: supervisor.state(), refusal: supervisor.refusal(), overruns: 0 };
+        let (state, standing) = (supervisor.state(), supervisor.standing());
+        self.view = View { sample, state, standing, refusal: supervisor.refusal(), overruns: 0 };
     }
 
     fn hear(&mut self, byte: u8, out: &mut Vec<u8>) {
@@ -290,6 +306,7 @@ impl Chip {
             Some(Step::Command(command)) => {
                 self.shared.lock().unwrap().ordered.push(command);
                 self.tick(Command { heard: true, ..command });
+                out.extend_from_slice(self.server.fault(&self.view).unwrap_or_default());
                 out.extend_from_slice(self.server.command_done(&self.view));
             }
             Some(Step::Send(bytes)) => out.extend_from_slice(bytes),

@@ -7,12 +7,15 @@
 //!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::UpdateModel`]: likewise with the
 //!    model store and [`Server::model_updated`]. [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
-//! 3. Periodically send what [`Server::telemetry`] returns.
+//! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns.
+//! 4. Periodically send what [`Server::telemetry`] returns; [`Server::telemetry_lost`] if that does not succeed.
 //!
 //! A reply reports the result of the request because it is built from the view after the tick.
 
+mod reports;
+
 use model::Spring;
-use model::supervisor::{self, Refusal};
+use model::supervisor::{self, Faults, Refusal};
 
 use crate::command::Command;
 use crate::fault::Fault;
@@ -22,6 +25,7 @@ use crate::request::Request;
 use crate::session::{Action, Counters, Session};
 use crate::value::WireVolts;
 use crate::wire_model::{ModelId, PART};
+use reports::Reports;
 
 /// State of the control loop after a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +34,8 @@ pub struct View {
     pub sample: Telemetry,
     /// State of the supervisor.
     pub state: supervisor::State,
+    /// Standing faults of the supervisor.
+    pub standing: Faults,
     /// Why the supervisor refused the command of this tick, if it did.
     pub refusal: Option<Refusal>,
     /// Number of missed ticks since the start.
@@ -51,6 +57,8 @@ pub struct About {
     pub model: ModelId,
     /// Model that was stored at the start, even if its validation failed.
     pub stored: ModelId,
+    /// Number from which the nonces of the sessions follow: another one at every start.
+    pub seed: u32,
 }
 
 /// Reaction to a received byte.
@@ -89,12 +97,14 @@ pub struct Server {
     stored: ModelId,
     /// Request whose command is being executed.
     pending: Option<Request>,
+    reports: Reports,
 }
 
 impl Server {
     /// A server before its first frame; `spring` defines the range of the targets.
     pub const fn new(spring: Spring, about: About) -> Self {
-        Self { session: Session::new(about.silence_limit_ticks), spring, about, stored: about.stored, pending: None }
+        let session = Session::new(about.silence_limit_ticks, about.seed);
+        Self { session, spring, about, stored: about.stored, pending: None, reports: Reports::NEW }
     }
 
     /// Processes a received byte.
@@ -117,6 +127,10 @@ impl Server {
                 Request::ModelEnd { length, checksum } => {
                     return Some(Step::UpdateModel(ModelUpdate::End { length, checksum }));
                 }
+                Request::Heard { number } => {
+                    self.reports.hear(number);
+                    done(view)
+                }
                 Request::Restart => return Some(Step::Restart(self.session.answer(&done(view)))),
                 request => match Command::new(request, view.state, &self.spring) {
                     Err(reason) => Reply::Refused(reason),
@@ -134,6 +148,7 @@ impl Server {
 
     /// The reply to the request of the last [`Step::Command`]; `view` is that of the tick that has processed the command.
     pub fn command_done(&mut self, view: &View) -> &[u8] {
+        self.reports.see(view);
         let fault = Fault::of(view.state);
         let refused = match (self.pending.take(), view.state, view.refusal) {
             (
@@ -165,10 +180,26 @@ impl Server {
         self.session.answer(&reply)
     }
 
+    /// The report of faults to send ahead of everything else, if one is due: at once after a new fault, then ten times per
+    /// second until the host has heard of it. Nothing is due before the first session.
+    pub fn fault(&mut self, view: &View) -> Option<&[u8]> {
+        self.reports.see(view);
+        if !self.session.has_begun() {
+            return None;
+        }
+        let report = self.reports.due(view.sample.tick, u64::from(self.about.rate_hz / 10))?;
+        Some(self.session.report(report))
+    }
+
     /// The telemetry frame to send, if a sample is due.
     pub fn telemetry(&mut self, view: &View) -> Option<&[u8]> {
         let now = view.sample.tick;
         self.session.telemetry_due(now).then(|| self.session.telemetry(view.sample, now))
+    }
+
+    /// Counts the last telemetry frame as dropped: the line did not take all of it.
+    pub fn telemetry_lost(&mut self) {
+        self.session.drop_telemetry(1);
     }
 
     /// True once after each frame that ended the host's silence. A command carries this in [`Command::heard`] itself.

@@ -1,9 +1,11 @@
 //! Tests of the replies, and of the commands for the control tick.
 
 use super::*;
+use crate::diagnosis::{Mismatch, Sensor};
 use crate::frame::Frame;
+use crate::nonce::Nonce;
 use crate::receiver::Receiver;
-use crate::reply::State;
+use crate::reply::{FaultReport, State};
 use crate::sequence::Sequence;
 use crate::value::Desired;
 use model::stiffness::{Cantilever, YoungsModulus};
@@ -21,23 +23,49 @@ const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
 const fn view(state: supervisor::State, shown: State) -> View {
     let (volts, measured) = (WireVolts(7), None);
     let (target, applied, estimate) = (volts, volts, volts);
-    let sample = Telemetry { tick: 5, state: shown, target, applied, estimate, measured, code: 9, limits: 0 };
-    View { sample, state, refusal: None, overruns: 3 }
+    let (mismatch, sensor) = (Mismatch(0), Sensor(0));
+    let sample =
+        Telemetry { tick: 5, state: shown, target, applied, estimate, measured, code: 9, limits: 0, mismatch, sensor };
+    let standing = match state {
+        supervisor::State::Faulted(fault) => Faults::NONE.with(fault),
+        _ => Faults::NONE,
+    };
+    View { sample, state, standing, refusal: None, overruns: 3 }
 }
 
 fn reply(bytes: &[u8]) -> Reply {
+    stamped(bytes).1
+}
+
+fn stamped(bytes: &[u8]) -> (Nonce, Reply) {
     let mut receiver = Receiver::new();
-    bytes.iter().find_map(|&byte| receiver.on_byte(byte).map(|packet| packet.read().unwrap())).unwrap()
+    let read = |byte: &u8| receiver.on_byte(*byte).map(|packet| (packet.session(), packet.read().unwrap()));
+    bytes.iter().find_map(read).unwrap()
+}
+
+fn server() -> Server {
+    let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
+    let about = About { silence_limit_ticks: 500, rate_hz: 1000, stored: REJECTED, seed: 7, ..About::default() };
+    Server::new(spring, about)
+}
+
+/// The nonce that a Hello is offered.
+fn greet(server: &mut Server, view: &View) -> Nonce {
+    let hello = Frame::new(Sequence(0), &Request::Hello);
+    let answer = hello.as_bytes().iter().find_map(|&byte| match server.on_byte(byte, view) {
+        Some(Step::Send(bytes)) => Some(stamped(bytes)),
+        _ => None,
+    });
+    answer.unwrap().0
 }
 
 /// The command for the tick, and the reply if the tick changes the state from `before` to `after`.
 fn exchange(request: Request, before: &View, after: &View) -> (Option<Command>, Reply) {
-    let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
-    let mut server = Server::new(spring, About { silence_limit_ticks: 500, stored: REJECTED, ..About::default() });
-    let hello = Frame::new(Sequence(0), &Request::Hello);
-    let frame = Frame::new(Sequence(1), &request);
+    let mut server = server();
+    let nonce = greet(&mut server, before);
+    let frame = Frame::new(nonce.stamp(Sequence(1)), &request);
     let (mut command, mut answer) = (None, None);
-    for &byte in hello.as_bytes().iter().chain(frame.as_bytes()) {
+    for &byte in frame.as_bytes() {
         match server.on_byte(byte, before) {
             Some(Step::Command(given)) => {
                 assert!(given.heard);
@@ -70,6 +98,12 @@ fn the_reply_reports_the_state_after_the_tick() {
             Reply::Refused(Reason::InterlockOpen),
         ),
         (Request::Arm, DISARMED, View { refusal: Some(Refusal::Live), ..DISARMED }, Reply::Refused(Reason::Live)),
+        (
+            Request::Arm,
+            DISARMED,
+            View { refusal: Some(Refusal::Reference), ..DISARMED },
+            Reply::Refused(Reason::Reference),
+        ),
         (
             Request::Acknowledge(monitor),
             FAULTED,
@@ -134,4 +168,86 @@ fn commands_contain_the_transition_and_the_target() {
     assert_eq!(arming(Request::Arm, DISARMED), Some(supervisor::Command::Arm));
     assert_eq!(arming(Request::Disarm, ARMED), Some(supervisor::Command::Disarm));
     assert_eq!(exchange(SET, &ARMED, &ARMED).0.unwrap().target.map(|volts| volts.to_f64()), Some(300.0));
+}
+
+fn at(tick: u64, view: View) -> View {
+    View { sample: Telemetry { tick, ..view.sample }, ..view }
+}
+
+fn send(server: &mut Server, view: &View, nonce: Nonce, number: u16, request: Request) -> Reply {
+    let frame = Frame::new(nonce.stamp(Sequence(number)), &request);
+    let answer = frame.as_bytes().iter().find_map(|&byte| match server.on_byte(byte, view) {
+        Some(Step::Send(bytes)) => Some(reply(bytes)),
+        Some(Step::Command(_)) => Some(Reply::Refused(Reason::NotArmed)),
+        _ => None,
+    });
+    answer.unwrap()
+}
+
+#[test]
+fn a_report_of_a_fault_is_repeated_until_the_host_has_heard_of_it() {
+    let mut server = server();
+    assert_eq!(server.fault(&FAULTED), None, "nobody is there");
+    let nonce = greet(&mut server, &DISARMED);
+    send(&mut server, &DISARMED, nonce, 1, Request::Stream { every_ticks: 1 });
+    let Some(Reply::Fault(before)) = server.fault(&at(6, DISARMED)).map(reply) else { panic!() };
+    assert_eq!((before.number, before.tick, before.standing), (1, 5, 0), "it came and went before the session");
+    let first =
+        FaultReport { number: 2, tick: 7, fault: Cause::Monitor.into(), standing: 1 << 5, mismatch: Mismatch(0) };
+    let sent = |server: &mut Server, tick| server.fault(&at(tick, FAULTED)).map(reply);
+    for tick in 7..1000 {
+        let expected = (tick % 100 == 7).then_some(Reply::Fault(first));
+        assert_eq!(sent(&mut server, tick), expected, "{tick}");
+    }
+    let heard = |server: &mut Server, number, sequence| {
+        assert!(matches!(
+            send(server, &FAULTED, nonce, sequence, Request::Heard { number }),
+            Reply::Ack { state: State::Faulted, .. }
+        ));
+    };
+    heard(&mut server, 1, 2);
+    assert_eq!(sent(&mut server, 1007), Some(Reply::Fault(first)), "it heard of another one");
+    heard(&mut server, 2, 3);
+    for tick in 1008..3000 {
+        assert_eq!(sent(&mut server, tick), None, "{tick}");
+    }
+    // A second fault is reported at once, with both.
+    let both = View { standing: Faults::NONE.with(Cause::Monitor).with(Cause::Watchdog), ..FAULTED };
+    let Some(Reply::Fault(second)) = server.fault(&at(3000, both)).map(reply) else { panic!() };
+    assert_eq!((second.number, second.fault, second.standing), (3, Cause::Watchdog.into(), 0x30));
+    assert!(second.faults().eq([Fault::from(Cause::Watchdog), Cause::Monitor.into()]));
+}
+
+/// The acknowledged fault comes again before the next poll of the link: it is a new one.
+#[test]
+fn the_same_fault_is_reported_again_after_its_acknowledgement() {
+    let mut server = server();
+    let nonce = greet(&mut server, &FAULTED);
+    let monitor = Cause::Monitor.into();
+    send(&mut server, &FAULTED, nonce, 1, Request::Status);
+    let Some(Reply::Fault(first)) = server.fault(&FAULTED).map(reply) else { panic!() };
+    send(&mut server, &FAULTED, nonce, 2, Request::Heard { number: first.number });
+    send(&mut server, &FAULTED, nonce, 3, Request::Acknowledge(monitor));
+    server.command_done(&at(8, DISARMED));
+    let Some(Reply::Fault(again)) = server.fault(&at(9, FAULTED)).map(reply) else { panic!() };
+    assert_eq!((again.number, again.tick), (first.number + 1, 9));
+}
+
+#[test]
+fn telemetry_that_is_not_sent_is_counted() {
+    let mut server = server();
+    let nonce = greet(&mut server, &DISARMED);
+    send(&mut server, &DISARMED, nonce, 1, Request::Stream { every_ticks: 10 });
+    for (tick, due, dropped) in [(14, false, 0), (15, true, 0), (56, true, 3), (64, false, 3), (65, true, 3)] {
+        assert_eq!(server.telemetry(&at(tick, DISARMED)).is_some(), due, "{tick}");
+        assert_eq!(server.counters().telemetry_dropped, dropped, "{tick}");
+    }
+    server.telemetry_lost();
+    let Reply::Status(status) = send(&mut server, &at(70, DISARMED), nonce, 2, Request::Status) else { panic!() };
+    assert_eq!(status.counters.telemetry_dropped, 4);
+    // While the host is silent nothing is due, so that nothing is dropped.
+    assert!(server.telemetry(&at(5000, DISARMED)).is_none());
+    send(&mut server, &at(5003, DISARMED), nonce, 3, Request::Heartbeat);
+    assert!(server.telemetry(&at(5013, DISARMED)).is_some());
+    assert_eq!(server.counters().telemetry_dropped, 4);
 }

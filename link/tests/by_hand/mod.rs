@@ -1,9 +1,9 @@
 //! An independent implementation of the framing.
 
-/// Encodes a frame with any content: CRC-32C bit by bit, COBS for packets of less than 254 bytes.
-pub(crate) fn by_hand(version: u8, kind: u8, sequence: u16, message: &[u8]) -> Vec<u8> {
+/// Encodes a frame with any content, of a message and its session: CRC-32C bit by bit, COBS for packets of less than 254 bytes.
+pub(crate) fn by_hand(version: u8, kind: u8, sequence: u16, content: &[u8]) -> Vec<u8> {
     let mut packet = vec![version, kind, sequence as u8, (sequence >> 8) as u8];
-    packet.extend_from_slice(message);
+    packet.extend_from_slice(content);
     let mut crc = u32::MAX;
     for &byte in &packet {
         crc ^= u32::from(byte);

@@ -3,7 +3,8 @@
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    Controller, Desired, Fault, Field, ModelId, Models, Reason, Reply, Request, State, Status, Telemetry, WireVolts,
+    Controller, Desired, Fault, FaultReport, Field, Mismatch, ModelId, Models, Reason, Reply, Request, Sensor, State,
+    Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
@@ -36,6 +37,7 @@ pub(crate) fn request() -> impl Strategy<Value = Request> {
         any::<(u8, [u8; 32])>().prop_map(|(number, bytes)| Request::ModelPart { number, bytes }),
         any::<(u16, u32)>().prop_map(|(length, checksum)| Request::ModelEnd { length, checksum }),
         Just(Request::Restart),
+        any::<u32>().prop_map(|number| Request::Heard { number }),
     ]
 }
 
@@ -67,12 +69,15 @@ fn reason() -> impl Strategy<Value = Reason> {
         Just(Reason::NotStored),
         Just(Reason::Live),
         any::<u8>().prop_map(|code| Reason::CausePresent(Fault(code))),
+        Just(Reason::OtherSession),
+        Just(Reason::Reference),
     ]
 }
 
 fn telemetry() -> impl Strategy<Value = Telemetry> {
-    (any::<u64>(), state(), volts(), volts(), volts(), prop::option::of(volts()), any::<u16>(), any::<u8>()).prop_map(
-        |(tick, state, target, applied, estimate, measured, code, limits)| Telemetry {
+    let bytes = any::<[u8; 3]>();
+    (any::<u64>(), state(), volts(), volts(), volts(), prop::option::of(volts()), any::<u16>(), bytes).prop_map(
+        |(tick, state, target, applied, estimate, measured, code, [limits, mismatch, sensor])| Telemetry {
             tick,
             state,
             target,
@@ -81,6 +86,8 @@ fn telemetry() -> impl Strategy<Value = Telemetry> {
             measured,
             code,
             limits,
+            mismatch: Mismatch(mismatch),
+            sensor: Sensor(sensor),
         },
     )
 }
@@ -91,10 +98,10 @@ fn controller() -> impl Strategy<Value = Controller> {
 
 fn status() -> impl Strategy<Value = Status> {
     let program = (any::<[u8; 3]>(), controller());
-    (program, any::<[u32; 4]>(), volts(), volts(), fault(), fault(), telemetry(), any::<[u32; 7]>()).prop_map(
+    (program, any::<[u32; 4]>(), volts(), volts(), fault(), fault(), telemetry(), any::<[u32; 8]>()).prop_map(
         |(([major, minor, patch], controller), numbers, lowest, highest, fault, last_fault, sample, counts)| {
             let [revision, rate_hz, silence_limit_ticks, overruns] = numbers;
-            let [accepted, repeated, damaged, oversize, bad_version, out_of_order, unknown] = counts;
+            let [accepted, repeated, damaged, oversize, bad_version, out_of_order, unknown, telemetry_dropped] = counts;
             Status {
                 firmware: Firmware { major, minor, patch, revision, controller },
                 rate_hz,
@@ -105,7 +112,16 @@ fn status() -> impl Strategy<Value = Status> {
                 fault,
                 last_fault,
                 sample,
-                counters: Counters { accepted, repeated, damaged, oversize, bad_version, out_of_order, unknown },
+                counters: Counters {
+                    accepted,
+                    repeated,
+                    damaged,
+                    oversize,
+                    bad_version,
+                    out_of_order,
+                    unknown,
+                    telemetry_dropped,
+                },
             }
         },
     )
@@ -127,5 +143,9 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
         status().prop_map(Reply::Status),
         telemetry().prop_map(Reply::Telemetry),
         (model(), model()).prop_map(|(active, stored)| Reply::Model(Models { active, stored })),
+        any::<(u32, u64, u8, u16, u8)>().prop_map(|(number, tick, fault, standing, mismatch)| {
+            let (fault, mismatch) = (Fault(fault), Mismatch(mismatch));
+            Reply::Fault(FaultReport { number, tick, fault, standing, mismatch })
+        }),
     ]
 }

@@ -48,6 +48,11 @@ impl Sensor {
     pub const fn name(self) -> &'static str {
         match self {}
     }
+
+    /// Returns the number for frames; without the feature `feedback` it is never called.
+    pub const fn code(self) -> u8 {
+        match self {}
+    }
 }
 
 impl Config {

@@ -24,7 +24,8 @@ pub enum Fault {
 }
 
 impl Fault {
-    pub(super) const ALL: [Self; 8] = [
+    /// Every fault, in the order of the numbers.
+    pub const ALL: [Self; 8] = [
         Self::Panic,
         Self::HardFault,
         Self::Overrun,
@@ -51,6 +52,34 @@ impl Fault {
             Self::Monitor => "monitor",
             Self::Config => "config",
             Self::Supply => "supply",
+        }
+    }
+
+    /// Returns what detects the fault, for documents and displays.
+    pub const fn detection(self) -> &'static str {
+        match self {
+            Self::Panic => "the program's own checks",
+            Self::HardFault => "the processor: a bad access, a stack overflow, a word of flash with two wrong bits",
+            Self::Overrun => "the supervisor: more missed ticks than tolerated",
+            Self::Interlock => "the supervisor: the safety circuit is open",
+            Self::Watchdog => "the hang guard, the task watchdog or the chip's watchdog",
+            Self::Monitor => "the supervisor: voltage, current or the converters' supply disagree with the output",
+            Self::Config => "the start: rejected settings, a rejected model, no guards",
+            Self::Supply => "the chip's brown-out reset, with RAM that has kept its content",
+        }
+    }
+
+    /// Returns what a person does about the fault before it is acknowledged.
+    pub const fn remedy(self) -> &'static str {
+        match self {
+            Self::Panic => "read the location in the log and report it",
+            Self::HardFault => "read the log; flash the image again, and replace a chip that repeats it",
+            Self::Overrun => "wait for a second without a missed tick; if it comes again, stream less telemetry",
+            Self::Interlock => "close the safety circuit",
+            Self::Watchdog => "read the log; restart the chip if a task still does not check in",
+            Self::Monitor => "remove what the monitors name, and wait until the spring is discharged",
+            Self::Config => "send another model, or flash an image with valid settings",
+            Self::Supply => "check the supply, and let the spring settle",
         }
     }
 

@@ -42,7 +42,7 @@ mod settings;
 
 pub use fault::{Fault, Faults};
 pub use inputs::{Command, Inputs};
-pub use monitors::Monitors;
+pub use monitors::{Mismatch, Monitors};
 pub use settings::{Config, Settings};
 
 use monitors::MonitorCheck;
@@ -77,6 +77,8 @@ pub enum Refusal {
     Live = 4,
     /// The cause of the fault to be acknowledged is still there.
     CausePresent = 5,
+    /// The supply of the converters is out of its range.
+    Reference = 6,
 }
 
 /// What the controller has to do in this tick.
@@ -153,6 +155,8 @@ pub struct Supervisor {
     /// Missed ticks that are not forgotten yet, in ticks until they are; at most one of them while disabled.
     misses: u32,
     monitors: MonitorCheck,
+    /// What disagreed when the monitors became a fault.
+    found: Option<Mismatch>,
     refusal: Option<Refusal>,
 }
 
@@ -165,7 +169,7 @@ impl Supervisor {
             Some(fault) => (State::Faulted(fault), Faults::NONE.with(fault)),
         };
         let (ramp, monitors) = (None, MonitorCheck::NEW);
-        Self { config, state, standing, ramp, pursued: Volts::ZERO, misses: 0, monitors, refusal: None }
+        Self { config, state, standing, ramp, pursued: Volts::ZERO, misses: 0, monitors, found: None, refusal: None }
     }
 
     /// Returns the state after the last tick.
@@ -188,6 +192,12 @@ impl Supervisor {
         self.refusal
     }
 
+    /// Returns what disagrees with the output: while a monitor fault stands what it was found by, else what disagreed in
+    /// the last tick; `None` if the monitors agree.
+    pub fn mismatch(&self) -> Option<Mismatch> {
+        self.found.or(self.monitors.mismatch())
+    }
+
     /// First half of a tick: takes the inputs and returns what the controller has to do.
     #[inline]
     pub fn decide(&mut self, inputs: &Inputs) -> Decision {
@@ -202,6 +212,7 @@ impl Supervisor {
             self.fail(Fault::Interlock);
         }
         if disagreement {
+            self.found = self.found.or(self.monitors.mismatch());
             self.fail(Fault::Monitor);
         }
         if overrun {
@@ -254,13 +265,12 @@ impl Supervisor {
             State::Faulted(_) => Some(Refusal::Faulted),
             State::Disarmed if !inputs.interlock_closed => Some(Refusal::InterlockOpen),
             State::Disarmed if self.silent(inputs) => Some(Refusal::HostSilent),
-            State::Disarmed if self.monitors.disagree() => Some(Refusal::Live),
-            State::Disarmed => {
-                self.state = State::Armed;
-                self.misses = 0;
-                None
-            }
+            State::Disarmed => self.disagreement(),
         };
+        if self.state == State::Disarmed && self.refusal.is_none() {
+            self.state = State::Armed;
+            self.misses = 0;
+        }
     }
 
     /// Disables the output, or acknowledges the fault that is shown if its cause is gone.
@@ -272,14 +282,17 @@ impl Supervisor {
         self.refusal = self.cause(fault, inputs);
         if self.refusal.is_none() {
             self.standing = self.standing.without(fault);
+            if fault == Fault::Monitor {
+                self.found = None;
+            }
             self.state = self.standing.iter().next().map_or(State::Disarmed, State::Faulted);
         }
     }
 
     /// Returns what speaks against acknowledging `fault`; `None` if its cause is gone.
     fn cause(&self, fault: Fault, inputs: &Inputs) -> Option<Refusal> {
-        if self.monitors.disagree() {
-            return Some(Refusal::Live);
+        if let Some(refusal) = self.disagreement() {
+            return Some(refusal);
         }
         let present = match fault {
             Fault::Interlock if !inputs.interlock_closed => return Some(Refusal::InterlockOpen),
@@ -287,6 +300,14 @@ impl Supervisor {
             _ => false,
         };
         (present || inputs.fault == Some(fault)).then_some(Refusal::CausePresent)
+    }
+
+    /// Returns what the monitors have against arming and acknowledging.
+    fn disagreement(&self) -> Option<Refusal> {
+        self.monitors.mismatch().map(|mismatch| match mismatch {
+            Mismatch::Reference => Refusal::Reference,
+            _ => Refusal::Live,
+        })
     }
 
     /// Returns true if no frame came from the host within the host timeout.

@@ -4,7 +4,10 @@
 //!
 //! - *monitor*: an analog output of the amplifier that reads its own voltage or current.
 //! - *expected voltage*: what was put out; 0 V while the output is disabled.
-//! - *disagreement*: the voltage differs from the expected one by more than the tolerance, or the current is too large.
+//! - *disagreement*: the voltage differs from the expected one by more than the tolerance, the current is too large, or the
+//!   supply of the converters is out of its range ([`Mismatch`]).
+//! - *supply of the converters*: the voltage to which DAC and ADC both refer. If it is wrong, the output is wrong and the
+//!   monitors agree with it: only a reference of its own shows it.
 //!
 //! While the output is enabled a disagreement may last as long as the amplifier takes to settle; while it is disabled,
 //! as long as the spring takes to discharge.
@@ -19,6 +22,48 @@ pub struct Monitors {
     pub voltage: Volts,
     /// Current into the spring, in uA; negative while it discharges.
     pub current_ua: i32,
+    /// Supply of the converters, in mV, measured against a reference of its own; `None` without one.
+    pub supply_mv: Option<u16>,
+}
+
+/// What disagrees with the output. The numbers are used in frames and never change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mismatch {
+    /// The voltage is below the expected one, and the current is not too large: the amplifier is at a limit of its own.
+    Limit = 1,
+    /// There is neither a voltage nor a current: the amplifier, its monitor or the wire between is open or off.
+    Open = 2,
+    /// The voltage is below the expected one, and the current is too large.
+    Short = 3,
+    /// The voltage is the expected one, and the current is too large.
+    Leakage = 4,
+    /// The supply of the converters is out of its range, or the voltage is above the expected one: another scale.
+    Reference = 5,
+    /// The output is disabled, and there is a voltage or a current.
+    Held = 6,
+}
+
+impl Mismatch {
+    /// Every kind, in the order of the numbers.
+    pub const ALL: [Self; 6] = [Self::Limit, Self::Open, Self::Short, Self::Leakage, Self::Reference, Self::Held];
+
+    /// Returns the stable number, 1 to 255; zero stands for no disagreement.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// Returns the stable lower-case name for logs and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Limit => "limit",
+            Self::Open => "open",
+            Self::Short => "short",
+            Self::Leakage => "leakage",
+            Self::Reference => "reference",
+            Self::Held => "held",
+        }
+    }
 }
 
 /// Counter of the ticks for which the monitors have disagreed with the output.
@@ -27,11 +72,13 @@ pub(super) struct MonitorCheck {
     /// The voltage that was put out; `None` while the output is disabled.
     driven: Option<Volts>,
     ticks: u32,
+    /// What disagreed in the last tick.
+    mismatch: Option<Mismatch>,
 }
 
 impl MonitorCheck {
     /// The output is disabled, and no disagreement was seen.
-    pub(super) const NEW: Self = Self { driven: None, ticks: 0 };
+    pub(super) const NEW: Self = Self { driven: None, ticks: 0, mismatch: None };
 
     /// Sets the voltage with which the next readings are compared; `None` if the output is disabled. The counter
     /// restarts when the output is enabled or disabled.
@@ -44,17 +91,34 @@ impl MonitorCheck {
 
     /// Compares the readings of one tick; returns true if they have disagreed for too long.
     pub(super) fn update(&mut self, config: &Config, monitors: Option<Monitors>) -> bool {
-        let disagree = monitors.is_some_and(|monitors| {
-            let expected = self.driven.unwrap_or(Volts::ZERO);
-            let difference = monitors.voltage.0.saturating_sub(expected.0).saturating_abs();
-            difference > config.tolerance || monitors.current_ua.saturating_abs() > config.max_current_ua
-        });
-        self.ticks = if disagree { self.ticks.saturating_add(1) } else { 0 };
+        self.mismatch = monitors.and_then(|monitors| self.compare(config, &monitors));
+        self.ticks = if self.mismatch.is_some() { self.ticks.saturating_add(1) } else { 0 };
         self.ticks > if self.driven.is_some() { config.monitor_ticks } else { config.discharge_ticks }
     }
 
-    /// Returns true if the last readings disagreed.
-    pub(super) fn disagree(&self) -> bool {
-        self.ticks > 0
+    /// Returns what disagreed in the last tick.
+    pub(super) fn mismatch(&self) -> Option<Mismatch> {
+        self.mismatch
+    }
+
+    fn compare(&self, config: &Config, monitors: &Monitors) -> Option<Mismatch> {
+        let (lowest, highest) = config.supply_mv;
+        if monitors.supply_mv.is_some_and(|supply| supply < lowest || supply > highest) {
+            return Some(Mismatch::Reference);
+        }
+        let excess = |expected: Volts| monitors.voltage.0.saturating_sub(expected.0);
+        let far = |expected| excess(expected).saturating_abs() > config.tolerance;
+        let current = monitors.current_ua.saturating_abs() > config.max_current_ua;
+        let Some(driven) = self.driven else {
+            return (far(Volts::ZERO) || current).then_some(Mismatch::Held);
+        };
+        match (far(driven), current) {
+            (false, false) => None,
+            (false, true) => Some(Mismatch::Leakage),
+            (true, true) => Some(Mismatch::Short),
+            (true, false) if excess(driven) > config.tolerance => Some(Mismatch::Reference),
+            (true, false) if far(Volts::ZERO) => Some(Mismatch::Limit),
+            (true, false) => Some(Mismatch::Open),
+        }
     }
 }

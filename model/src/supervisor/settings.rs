@@ -19,6 +19,10 @@ pub struct Settings {
     pub monitor_tolerance_v: f64,
     /// Largest magnitude of the current monitor, 1e-6 to 1 A.
     pub max_current_a: f64,
+    /// Lowest supply of the converters, 1 to 5 V.
+    pub lowest_supply_v: f64,
+    /// Highest supply of the converters, 1 to 5 V.
+    pub highest_supply_v: f64,
     /// Time for which a monitor may disagree while the output is enabled, one sample time to 10 s; longer than the
     /// amplifier takes to settle.
     pub monitor_time_s: f64,
@@ -30,7 +34,7 @@ pub struct Settings {
 impl Settings {
     /// Host timeout 0.5 s, then a ramp of 700 V/s; five missed ticks, one forgotten per second; a monitor may disagree
     /// by more than 35 V (5 % of the source report's range) or 2 mA for 50 ms, and for 1 s while the output is
-    /// disabled.
+    /// disabled; the converters' supply may differ from 3.3 V by 5 %, which changes the output by as much.
     pub const DEFAULT: Self = Self {
         host_timeout_s: 0.5,
         ramp_v_per_s: 700.0,
@@ -38,6 +42,8 @@ impl Settings {
         forget_missed_s: 1.0,
         monitor_tolerance_v: 35.0,
         max_current_a: 2e-3,
+        lowest_supply_v: 3.135,
+        highest_supply_v: 3.465,
         monitor_time_s: 0.05,
         discharge_time_s: 1.0,
     };
@@ -54,6 +60,7 @@ impl Settings {
     pub fn validate(&self, sample_time: SampleTime) -> Result<Validated<'_, Self>, OutOfRange> {
         let Self { host_timeout_s, ramp_v_per_s, missed_ticks_allowed, forget_missed_s, .. } = *self;
         let Self { monitor_tolerance_v, max_current_a, monitor_time_s, discharge_time_s, .. } = *self;
+        let Self { lowest_supply_v, highest_supply_v, .. } = *self;
         let seconds = sample_time.seconds();
         OutOfRange::check("host_timeout_s", host_timeout_s, 0.01..=60.0, "s")?;
         OutOfRange::check("ramp_v_per_s", ramp_v_per_s, 10.0..=1e5, "V/s")?;
@@ -61,6 +68,8 @@ impl Settings {
         OutOfRange::check("forget_missed_s", forget_missed_s, seconds..=60.0, "s")?;
         OutOfRange::check("monitor_tolerance_v", monitor_tolerance_v, 1.0..=1000.0, "V")?;
         OutOfRange::check("max_current_a", max_current_a, 1e-6..=1.0, "A")?;
+        OutOfRange::check("lowest_supply_v", lowest_supply_v, 1.0..=5.0, "V")?;
+        OutOfRange::check("highest_supply_v", highest_supply_v, lowest_supply_v..=5.0, "V")?;
         OutOfRange::check("monitor_time_s", monitor_time_s, seconds..=10.0, "s")?;
         OutOfRange::check("discharge_time_s", discharge_time_s, seconds..=60.0, "s")?;
         Ok(Validated::new(self, sample_time))
@@ -80,10 +89,16 @@ impl Validated<'_, Settings> {
             miss_limit: forget.saturating_mul(settings.missed_ticks_allowed),
             tolerance: signal(settings.monitor_tolerance_v),
             max_current_ua: steps(settings.max_current_a, 1e6) as i32,
+            supply_mv: (millivolts(settings.lowest_supply_v), millivolts(settings.highest_supply_v)),
             monitor_ticks: ticks(settings.monitor_time_s),
             discharge_ticks: ticks(settings.discharge_time_s),
         }
     }
+}
+
+/// Returns a voltage in mV, rounded to the nearest.
+fn millivolts(volts: f64) -> u16 {
+    steps(volts, 1000.0) as u16
 }
 
 /// Returns a time in ticks, rounded to the nearest.
@@ -102,6 +117,8 @@ pub struct Config {
     pub(super) miss_limit: u32,
     pub(super) tolerance: Signal,
     pub(super) max_current_ua: i32,
+    /// Lowest and highest supply of the converters.
+    pub(super) supply_mv: (u16, u16),
     pub(super) monitor_ticks: u32,
     pub(super) discharge_ticks: u32,
 }
@@ -121,6 +138,8 @@ mod tests {
             ("forget_missed_s", Settings { forget_missed_s: 61.0, ..good }),
             ("monitor_tolerance_v", Settings { monitor_tolerance_v: 0.0, ..good }),
             ("max_current_a", Settings { max_current_a: 2.0, ..good }),
+            ("lowest_supply_v", Settings { lowest_supply_v: 0.9, ..good }),
+            ("highest_supply_v", Settings { highest_supply_v: 3.1, ..good }),
             ("monitor_time_s", Settings { monitor_time_s: 0.0, ..good }),
         ] {
             assert_eq!(wrong.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap_err().field, field, "{wrong:?}");

@@ -1,6 +1,7 @@
 //! Tests of every transition between the states.
 
 mod any_order;
+mod every_pair;
 mod misses;
 mod monitors;
 mod silence;

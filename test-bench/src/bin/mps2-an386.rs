@@ -80,7 +80,7 @@ fn main() -> ! {
         semihosting::exit(EXIT_NO_SPRING);
     }
     let mut store = Store::new(Flash::init());
-    let (control, server) = match host::open(settings, &store, &cause) {
+    let (control, server) = match host::open(settings, &store, &cause, semihosting::seed()) {
         Ok(Some(both)) => both,
         Ok(None) => semihosting::exit(1),
         Err(error) => {

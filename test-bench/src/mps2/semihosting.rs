@@ -8,6 +8,8 @@ const OPEN: u32 = 0x01;
 const WRITE: u32 = 0x05;
 const READ: u32 = 0x06;
 const SEEK: u32 = 0x0a;
+const CLOCK: u32 = 0x10;
+const TIME: u32 = 0x11;
 const GET_COMMAND_LINE: u32 = 0x15;
 const EXIT_EXTENDED: u32 = 0x20;
 const APPLICATION_EXIT: u32 = 0x2_0026;
@@ -58,6 +60,12 @@ impl File {
     pub fn read(&mut self, bytes: &mut [u8]) -> bool {
         call(READ, [self.0, bytes.as_mut_ptr() as u32, bytes.len() as u32].as_ptr() as u32) == 0
     }
+}
+
+/// A number that differs from start to start: the time of the machine that the emulator runs on, in s, and that since the
+/// emulator's start, in 10 ms.
+pub fn seed() -> u32 {
+    call(TIME, 0).wrapping_mul(1 << 12).wrapping_add(call(CLOCK, 0))
 }
 
 /// Ends the emulator with this exit code.

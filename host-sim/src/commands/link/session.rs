@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use host_sim::link::{Client, Failure, StatusReport};
-use host_sim::output::terminal::{json, print};
+use host_sim::output::terminal::{json, print, remark};
 use link::{Desired, Reason, Request, Status, WireVolts};
 use serde::Serialize;
 use simulation::bad_input;
@@ -47,6 +47,20 @@ impl Session {
         Ok(self.status)
     }
 
+    /// Names on stderr the faults that the MCU has reported.
+    fn show_reports(&mut self) {
+        for report in self.client.reports() {
+            let name = self.client.name();
+            let standing: Vec<String> = report.faults().map(|fault| fault.to_string()).collect();
+            let standing = if standing.is_empty() { "none".to_owned() } else { standing.join(", ") };
+            let monitors = match report.mismatch.name() {
+                "none" => String::new(),
+                mismatch => format!(", monitors: {mismatch}"),
+            };
+            remark(&format!("{name}: fault {} at tick {}{monitors}; standing: {standing}", report.fault, report.tick));
+        }
+    }
+
     pub(super) fn show_status(&self) -> Result<()> {
         let report = StatusReport::new(&self.status);
         print(&if self.json { json(&report)? } else { report.text() })
@@ -76,6 +90,7 @@ impl Session {
     pub(super) fn still_armed(&mut self, state: link::State) -> Result<()> {
         if !matches!(state, link::State::Armed | link::State::Ramping) {
             self.refresh()?;
+            self.show_reports();
             bail!("{}: no longer armed: {state}, fault {}", self.client.name(), self.status.fault);
         }
         Ok(())

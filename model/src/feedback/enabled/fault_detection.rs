@@ -85,6 +85,18 @@ impl Sensor {
             Self::Failed(Fault::OutOfRange) => "out-of-range",
         }
     }
+
+    /// Returns the stable number for frames, 1 to 255.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Trusted => 1,
+            Self::Failed(Fault::Absent) => 2,
+            Self::Failed(Fault::Stale) => 3,
+            Self::Failed(Fault::Stuck) => 4,
+            Self::Failed(Fault::Jumping) => 5,
+            Self::Failed(Fault::OutOfRange) => 6,
+        }
+    }
 }
 
 /// Fault of the stiffness sensor; the module's table states how each is detected.

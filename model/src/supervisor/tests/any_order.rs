@@ -7,7 +7,8 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
     let command = prop_oneof![
         6 => Just(None), 3 => Just(Some(Command::Arm)), 1 => Just(Some(Command::Disarm))
     ];
-    let monitors = prop_oneof![3 => Just(None), 1 => (any::<i32>(), any::<i32>()).prop_map(Some)];
+    let supply = prop_oneof![3 => Just(None), 2 => Just(Some(3300)), 1 => any::<u16>().prop_map(Some)];
+    let monitors = prop_oneof![3 => Just(None), 1 => (any::<i32>(), any::<i32>(), supply).prop_map(Some)];
     let fault = prop_oneof![30 => Just(None), 1 => (0..8usize).prop_map(|i| Some(Fault::ALL[i]))];
     (command, any::<i32>(), prop_oneof![0..1000u32, any::<u32>()], 0..20u8, 0..40u32, monitors, fault).prop_map(
         |(command, target, ticks_since_host, interlock, missed, monitors, fault)| Inputs {
@@ -16,8 +17,11 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
             ticks_since_host,
             interlock_closed: interlock > 0,
             missed_ticks: missed.saturating_sub(37),
-            monitors: monitors
-                .map(|(v, current_ua)| Monitors { voltage: Volts(Signal::from_bits(v)), current_ua: current_ua >> 12 }),
+            monitors: monitors.map(|(v, current, supply_mv)| Monitors {
+                voltage: Volts(Signal::from_bits(v)),
+                current_ua: current >> 12,
+                supply_mv,
+            }),
             fault,
         },
     )
@@ -34,7 +38,10 @@ proptest! {
             let (before, stood) = (supervisor.state(), supervisor.standing());
             let (decision, drive) = tick(&mut supervisor, inputs);
             let armed = supervisor.state() == State::Armed;
-            let live = inputs.monitors.is_some_and(|it| it.voltage > volts(35.0) || it.current_ua.abs() > 2000);
+            let live = inputs.monitors.is_some_and(|it| {
+                let supply = it.supply_mv.is_none_or(|mv| (3135..=3465).contains(&mv));
+                it.voltage > volts(35.0) || it.current_ua.abs() > 2000 || !supply
+            });
             prop_assert_eq!(drive.enabled(), armed);
             prop_assert_eq!(decision == Decision::Rest, !armed);
             prop_assert!(armed || drive == Drive::SAFE);

@@ -4,7 +4,7 @@ use super::*;
 
 /// Adds these readings of the monitors to the inputs.
 fn reading(voltage_v: f64, current_ua: i32, inputs: Inputs) -> Inputs {
-    Inputs { monitors: Some(Monitors { voltage: volts(voltage_v), current_ua }), ..inputs }
+    Inputs { monitors: Some(Monitors { voltage: volts(voltage_v), current_ua, supply_mv: None }), ..inputs }
 }
 
 /// Runs ticks with the same inputs; returns the state after them.
@@ -87,4 +87,55 @@ fn readings_at_the_tolerance_agree() {
     for (voltage_v, current_ua) in [(335.0, 2000), (265.0, -2000)] {
         assert_eq!(ticks(&mut supervisor, 100, reading(voltage_v, current_ua, good())), State::Armed);
     }
+}
+
+#[test]
+fn what_disagrees_is_named_and_stays_named_until_it_is_acknowledged() {
+    for (voltage_v, current_ua, supply_mv, name) in [
+        (200.0, 0, 3300, Some(Mismatch::Limit)),
+        (20.0, 0, 3300, Some(Mismatch::Open)),
+        (20.0, 2001, 3300, Some(Mismatch::Short)),
+        (300.0, 2001, 3300, Some(Mismatch::Leakage)),
+        (428.6, 0, 3300, Some(Mismatch::Reference)),
+        (300.0, 0, 3600, Some(Mismatch::Reference)),
+        (300.0, 0, 3466, Some(Mismatch::Reference)),
+        (300.0, 0, 3134, Some(Mismatch::Reference)),
+        (300.0, 0, 3465, None),
+        (300.0, 0, 3135, None),
+    ] {
+        let monitors = Some(Monitors { voltage: volts(voltage_v), current_ua, supply_mv: Some(supply_mv) });
+        let mut supervisor = armed();
+        tick(&mut supervisor, Inputs { monitors, ..good() });
+        assert_eq!(supervisor.mismatch(), name, "{voltage_v} V {current_ua} uA {supply_mv} mV");
+        ticks(&mut supervisor, 50, Inputs { monitors, ..good() });
+        let state = if name.is_some() { State::Faulted(Fault::Monitor) } else { State::Armed };
+        assert_eq!(supervisor.state(), state, "{voltage_v} V {current_ua} uA {supply_mv} mV");
+        if name.is_some() {
+            ticks(&mut supervisor, 1100, reading(400.0, 0, good()));
+            assert_eq!(supervisor.mismatch(), name, "the amplifier is off and holds a voltage for too long as well");
+            ticks(&mut supervisor, 10, reading(0.0, 0, good()));
+            assert_eq!(supervisor.mismatch(), name, "the amplifier is off, and the name stays");
+            assert_eq!(ticks(&mut supervisor, 1, reading(0.0, 0, disarm())), State::Disarmed);
+            assert_eq!(supervisor.mismatch(), None);
+        }
+    }
+    let mut supervisor = Supervisor::new(config(), None);
+    ticks(&mut supervisor, 1001, reading(500.0, 0, good()));
+    assert_eq!(supervisor.mismatch(), Some(Mismatch::Held));
+}
+
+/// With a supply of 3.6 V for DAC and ADC, 764 V read back as 700 V.
+#[test]
+fn a_wrong_supply_of_the_converters_is_a_fault_in_every_state_and_nothing_is_armed() {
+    let wrong = |inputs| Inputs {
+        monitors: Some(Monitors { voltage: volts(0.0), current_ua: 0, supply_mv: Some(3600) }),
+        ..inputs
+    };
+    let mut supervisor = Supervisor::new(config(), None);
+    assert_eq!(tick(&mut supervisor, wrong(arm())).1, Drive::SAFE);
+    assert_eq!((supervisor.state(), supervisor.refusal()), (State::Disarmed, Some(Refusal::Reference)));
+    assert_eq!(ticks(&mut supervisor, 1000, wrong(good())), State::Faulted(Fault::Monitor));
+    assert_eq!(supervisor.mismatch(), Some(Mismatch::Reference));
+    tick(&mut supervisor, wrong(disarm()));
+    assert_eq!((supervisor.state(), supervisor.refusal()), (State::Faulted(Fault::Monitor), Some(Refusal::Reference)));
 }
