@@ -1,4 +1,4 @@
-//! Turns of the voltage that the rows of a record miss.
+//! Intervals between the rows of a record, and turns of the voltage that fall into long ones.
 
 use super::Row;
 
@@ -7,13 +7,23 @@ const GAP: f64 = 1.5;
 /// Part of the rows that must follow each other regularly for a longer interval to be a gap.
 const REGULAR: f64 = 0.9;
 
+/// Times between neighbouring rows, in s.
+fn intervals(rows: &[Row]) -> impl Iterator<Item = f64> {
+    rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s)
+}
+
+/// Median time between neighbouring rows, in s; `None` with fewer than two rows.
+pub fn median_interval(rows: &[Row]) -> Option<f64> {
+    let mut intervals: Vec<f64> = intervals(rows).collect();
+    let middle = intervals.len() / 2;
+    (!intervals.is_empty()).then(|| *intervals.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// Number of gaps in an otherwise regular record between which the voltage turns, up to down or down to up: its extreme value
 /// lies between two rows and is not in the record.
 pub fn missed_turns(rows: &[Row]) -> usize {
-    let intervals: Vec<f64> = rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
-    let mut sorted = intervals.clone();
-    sorted.sort_by(f64::total_cmp);
-    let Some(median) = sorted.get(sorted.len() / 2) else { return 0 };
+    let intervals: Vec<f64> = intervals(rows).collect();
+    let Some(median) = median_interval(rows) else { return 0 };
     let is_gap = |interval: f64| interval > GAP * median;
     if intervals.iter().filter(|interval| !is_gap(**interval)).count() < (REGULAR * intervals.len() as f64) as usize {
         return 0;
