@@ -12,9 +12,9 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Number of damaged copies of each file of a corpus.
-const COPIES: usize = 40;
+const COPIES: usize = 400;
 /// Number of inputs of random bytes for each format.
-const RANDOM: u32 = 300;
+const RANDOM: u32 = 3000;
 
 /// The files of a format's corpus.
 fn corpus(target: &str) -> Vec<Vec<u8>> {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use host_sim::log::{Decoder, Formats, Summary, silence_the_decoder};
-use host_sim::output::log::{Format, Printer};
+use host_sim::output::log::{Format, MOST_IN_JSON, Printer};
 use host_sim::signals::on_ctrl_c;
 use simulation::bad_input;
 use simulation::bounded_file::read;
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     /// Print CSV with the columns time_s,level,event,message, and the summary as comments
     #[arg(long, conflicts_with = "json")]
     csv: bool,
-    /// One JSON object on stdout, at the end
+    /// One JSON object on stdout, at the end; for at most 1 000 000 lines
     #[arg(long)]
     json: bool,
 }
@@ -99,6 +99,10 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) ->
         for item in decoder.feed(&buffer[..read]) {
             summary.add(&item);
             printer.item(item);
+        }
+        if printer.is_full() {
+            let name = name(&arguments.file);
+            bad_input!("{name}: more than {MOST_IN_JSON} lines; expected at most that with --json, or --csv");
         }
     }
     if let Some(item) = decoder.finish() {

@@ -160,6 +160,21 @@ fn damaged_packed_logs_are_read_as_far_as_possible() {
 }
 
 #[test]
+fn a_log_of_many_lines_is_printed_as_a_table_but_not_kept_for_json() {
+    let mut class = Class::new("long logs");
+    let firmware = firmware("rzcobs");
+    let elf = class.file("fw.elf", firmware.elf());
+    let log = class.file("log.bin", firmware.frame(STRINGS[5].1, 1, &[]).repeat(1_000_001));
+    let (elf, log) = (elf.to_str().expect("UTF-8"), log.to_str().expect("UTF-8"));
+    class.add_ending("more than 1000000 lines; expected at most that with --json", ["log", elf, log, "--json"], &[2]);
+    class.add_ending("", ["log", elf, log, "--csv"], &[0]);
+    class.run(|expected, output| {
+        let said = text(&output.stderr);
+        (!said.contains(expected)).then(|| format!("`{expected}` is missing in: {said:.300}"))
+    });
+}
+
+#[test]
 fn a_format_string_with_a_number_beyond_any_frame_is_refused_by_name() {
     let mut class = Class::new("format strings");
     for (number, (string, expected)) in [

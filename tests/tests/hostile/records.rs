@@ -98,3 +98,25 @@ fn a_record_whose_rows_miss_turns_of_the_voltage_is_diagnosed_with_a_warning() {
         );
     }
 }
+
+#[test]
+fn a_record_that_is_too_long_for_its_rows_is_refused_with_its_row() {
+    let folder = tempfile::tempdir().expect("there is room");
+    for (first_s, second_s, last_s, accepted) in [
+        (0.0, 0.1, 1e9, true),
+        (0.0, 0.1, 1e12, false),
+        (0.0, 0.1, 1e100, false),
+        (0.0, 0.1, 1e308, false),
+        (-1e308, 1.0, 1e308, false),
+        (0.0, 1e-9, 1e12, false),
+    ] {
+        let rows: String =
+            (0..40).map(|row| format!("{},{row},{row}\n", second_s * (1.0 + 0.1 * f64::from(row)))).collect();
+        let table = format!("time_s,voltage_v,stiffness\n{first_s:e},0,0\n{rows}{last_s:e},5,5\n");
+        std::fs::write(folder.path().join("r.csv"), table).expect("there is room");
+        let output = run(folder.path(), &["diagnose", "r.csv", "--effort", "quick"]);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(if accepted { 0 } else { 2 }), "{last_s:e}: {said}");
+        assert_eq!(said.contains("s after the first row; expected at most"), !accepted, "{last_s:e}: {said}");
+    }
+}
