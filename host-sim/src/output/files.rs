@@ -31,7 +31,7 @@ impl Files {
     /// [`simulation::bad_input::BadInput`] if the folder cannot be created or written.
     pub fn new(folder: &Path) -> Result<Self> {
         // Who may not write to a folder may not replace it either.
-        let is_writable = || TemporaryFolder::new_in(folder).map(drop);
+        let is_writable = || tempfile::tempfile_in(folder).map(drop);
         let stage = fs::create_dir_all(folder).and_then(|()| is_writable()).and_then(|()| match beside(folder) {
             Some(stage) => Ok(stage),
             None => TemporaryFolder::new_in(folder),

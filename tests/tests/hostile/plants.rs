@@ -82,10 +82,16 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
+/// A short record, since what is hostile is the plant.
+fn small_record() -> String {
+    let row = |row: u32| format!("{row},{},{}\n", 100 * (row / 15), 9 * (row / 15) + row % 15 * 3);
+    format!("time_s,voltage_v,stiffness\n{}", (0..90).map(row).collect::<String>())
+}
+
 #[test]
 fn damaged_plant_files_are_refused_or_simulated() {
     let mut class = Class::new("plant files");
-    let record = class.file("record.csv", include_bytes!("../../../data/sample_hysteresis.csv"));
+    let record = class.file("record.csv", small_record());
     let record = record.to_str().expect("UTF-8").to_owned();
     for (number, (name, content)) in files().into_iter().enumerate() {
         let file = class.file(&format!("{number}.toml"), content);
@@ -93,10 +99,7 @@ fn damaged_plant_files_are_refused_or_simulated() {
         class.add(format!("stair {name}"), ["stair", "--plant", file]);
         class.add(format!("stair fast {name}"), ["stair", "--plant", file, "--controller", "fast", "--input", "step"]);
         class.add(format!("joint {name}"), ["joint", "--plant", file]);
-        class.add(
-            format!("diagnose {name}"),
-            ["diagnose", "--effort", "quick", "--within", "2", "--plant", file, &record],
-        );
+        class.add(format!("diagnose {name}"), ["diagnose", "--effort", "quick", "--plant", file, &record]);
         class.add_ending(format!("link {name}"), ["link", "unix:/nowhere", "model", file], &[2]);
     }
     class.run(|_, _| None);
@@ -107,9 +110,11 @@ fn a_file_without_end_is_read_up_to_a_bound_that_the_error_names() {
     let mut class = Class::new("files without end");
     let large = class.path("large");
     std::fs::File::create(&large).and_then(|file| file.set_len(600 << 20)).expect("holes take no room");
+    let record = class.file("record.csv", small_record());
+    let record = record.to_str().expect("UTF-8").to_owned();
     for file in ["/dev/zero", large.to_str().expect("UTF-8")] {
         class.add_ending("larger than 1 MiB", ["stair", "--plant", file], &[2]);
-        class.add_ending("larger than 1 MiB", ["diagnose", "--plant", file, file], &[2]);
+        class.add_ending("larger than 1 MiB", ["diagnose", "--plant", file, &record], &[2]);
         class.add_ending("larger than 1 MiB", ["link", "unix:/nowhere", "model", file], &[2]);
         class.add_ending("larger than 64 MiB", ["plan", file], &[2]);
         class.add_ending("larger than 256 MiB", ["log", file, "/dev/null"], &[2]);

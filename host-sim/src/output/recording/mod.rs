@@ -7,7 +7,8 @@
 //! Each row is written in one piece as soon as it arrives: however the recording ends, by Ctrl-C, a lost connection or
 //! a full disk, the file ends with a complete row.
 
-use std::cmp::Ordering;
+mod turns;
+
 use std::fs::File;
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -19,24 +20,8 @@ use serde::Serialize;
 use simulation::bad_input;
 use simulation::record::{ESTIMATE, MEASURED};
 
-/// How often the MCU sends a sample, and how often one becomes a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Every {
-    /// Ticks between two samples.
-    pub sample_ticks: u16,
-    /// Ticks between two rows, a multiple of `sample_ticks`.
-    pub row_ticks: u16,
-}
-
-impl Every {
-    /// The shortest time between samples that divides the time between rows and is at least `line_ticks`, which a line needs
-    /// for a sample.
-    pub fn new(row_ticks: u16, line_ticks: u16) -> Self {
-        let divides = |ticks: &u16| row_ticks.is_multiple_of(*ticks);
-        let sample_ticks = (line_ticks.max(1)..row_ticks).find(divides).unwrap_or(row_ticks);
-        Self { sample_ticks, row_ticks }
-    }
-}
+pub use turns::Every;
+use turns::{Turn, Turns};
 
 /// A recording in progress.
 pub struct Recording {
@@ -54,18 +39,8 @@ pub struct Recording {
     last_row: u64,
     /// The last sample that arrived.
     last: Option<Telemetry>,
-    /// The last change of the voltage.
-    change: Change,
+    turns: Turns,
     summary: Summary,
-}
-
-/// A change of the voltage.
-#[derive(Clone, Copy)]
-struct Change {
-    /// Up or down; equal before the first one.
-    direction: Ordering,
-    /// True if samples are missing in it.
-    has_gap: bool,
 }
 
 /// Totals of a recording.
@@ -113,7 +88,7 @@ impl Recording {
             first_tick: None,
             last_row: 0,
             last: None,
-            change: Change { direction: Ordering::Equal, has_gap: false },
+            turns: Turns::default(),
             summary: Summary { stiffness, ..Summary::default() },
         };
         let (source, column) = if measured {
@@ -145,30 +120,18 @@ impl Recording {
             // Up to half a period is jitter, not a loss.
             let lost = ((sample.tick - last.tick + self.sample_ticks / 2) / self.sample_ticks).saturating_sub(1);
             self.summary.lost += lost;
-            self.follow(&last, sample, lost > 0)?;
+            if let Some(Turn { has_gap }) = self.turns.next(last.applied, sample.applied, lost > 0) {
+                self.summary.turns += 1;
+                self.summary.missed_turns += u64::from(has_gap);
+                if last.tick > self.last_row {
+                    self.row(&last, first)?;
+                }
+            }
         }
         self.last = Some(*sample);
         let period = |tick: u64| (tick - first) / self.row_ticks;
         if self.summary.rows == 0 || period(sample.tick) > period(self.last_row) {
             self.row(sample, first)?;
-        }
-        Ok(())
-    }
-
-    /// Follows the voltage from one sample to the next, and writes the former if the voltage turns there.
-    fn follow(&mut self, last: &Telemetry, sample: &Telemetry, has_gap: bool) -> Result<()> {
-        let direction = sample.applied.0.cmp(&last.applied.0);
-        if direction == Ordering::Equal {
-            self.change.has_gap |= has_gap;
-            return Ok(());
-        }
-        let before = std::mem::replace(&mut self.change, Change { direction, has_gap });
-        if before.direction == direction.reverse() {
-            self.summary.turns += 1;
-            self.summary.missed_turns += u64::from(before.has_gap || has_gap);
-            if last.tick > self.last_row {
-                self.row(last, self.first_tick.unwrap_or_default())?;
-            }
         }
         Ok(())
     }
@@ -289,15 +252,6 @@ mod tests {
         }
         let Summary { turns, missed_turns, .. } = recording.summary();
         assert_eq!((*turns, *missed_turns), (3, 2));
-    }
-
-    #[test]
-    fn samples_arrive_as_often_as_the_line_permits_and_fall_on_every_row() {
-        for (row_ticks, line_ticks, sample_ticks) in
-            [(10, 4, 5), (10, 1, 1), (4, 4, 4), (7, 4, 7), (1, 4, 1), (100, 4, 4)]
-        {
-            assert_eq!(Every::new(row_ticks, line_ticks), Every { sample_ticks, row_ticks }, "{row_ticks}");
-        }
     }
 
     #[test]
