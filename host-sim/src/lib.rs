@@ -5,7 +5,9 @@
 //! | [`output`] | terminal, CSV, plots, report page |
 //! | [`log`] | the log that the firmware writes, decoded |
 //! | [`mod@link`] | the host's side of the serial link to the MCU |
+//! | [`signals`] | what Ctrl-C and other signals do |
 
 pub mod link;
 pub mod log;
 pub mod output;
+pub mod signals;

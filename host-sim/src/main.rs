@@ -8,6 +8,7 @@ use anyhow::Result;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use host_sim::output::terminal::{has_reader, remark};
+use host_sim::signals;
 use simulation::bad_input::BadInput;
 
 /// Simulates the variable-stiffness spring and its controller, with the code that runs in the amplifier's MCU.
@@ -45,6 +46,9 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
+    if let Err(error) = signals::handle() {
+        remark(&format!("signals cannot be handled: {error}"));
+    }
     let done = match cli.command {
         Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
         Some(Command::Compare(arguments)) => commands::compare::run(&arguments),

@@ -6,6 +6,7 @@
 //! | [`schedule`], [`record`] | the commanded voltage over time: the report's stair, or a file |
 //! | [`units`] | units in which a user reads times, voltages and readings |
 //! | [`csv_table`], [`mod@bad_input`] | CSV tables, and errors that name what was expected |
+//! | [`bounded_file`] | other files, up to a bound on their size |
 //! | [`plant_file`] | the spring as a file |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
@@ -16,6 +17,7 @@
 
 pub mod bad_input;
 pub mod bound;
+pub mod bounded_file;
 pub mod comparison;
 pub mod csv_table;
 pub mod experiment;

@@ -16,7 +16,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
+use crate::bounded_file::read_text;
 use crate::units::UnitNames;
+
+/// Largest size of a plant file, in MiB: some ten thousand times that of the longest that a diagnosis writes.
+const MOST_MIB: usize = 1;
+/// Largest number of play operators, and of points of a law, that a host simulates; the tick has fewer.
+const MOST_LISTED: usize = 1000;
 
 /// A plant file, in SI units. Each optional table adds an effect to the plain spring.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -332,6 +338,14 @@ impl PlantFile {
         if self.modes.len() > Self::MOST_MODES {
             return refused("mode", self.modes.len() as f64, 0.0, Self::MOST_MODES as f64, "oscillations");
         }
+        for (field, values) in [
+            ("memory.thresholds_v", memory.map(|memory| &memory.thresholds_v)),
+            ("law.voltage_v", law.map(|law| &law.voltage_v)),
+        ] {
+            if let Some(count) = values.map(Vec::len).filter(|count| *count > MOST_LISTED) {
+                return refused(field, count as f64, 0.0, MOST_LISTED as f64, "values");
+            }
+        }
         let most = model::extended::lags::MAX_LAGS;
         if tau_s.is_empty() || tau_s.len() > most {
             return refused("relaxation.tau_s", tau_s.len() as f64, 1.0, most as f64, "time constants");
@@ -411,13 +425,7 @@ fn load_checked(plant: &str, check: Check) -> Result<PlantFile> {
     if plant == "paper" {
         return Ok(Plant::PAPER.into());
     }
-    let unreadable = |error| BadInput(format!("{plant}: cannot be read: {error}; expected `paper` or a plant file"));
-    let text = String::from_utf8(std::fs::read(Path::new(plant)).map_err(unreadable)?).map_err(|error| {
-        let end = error.utf8_error().valid_up_to();
-        let before = String::from_utf8_lossy(&error.as_bytes()[..end]);
-        BadInput(format!("{}: not UTF-8; expected a text in UTF-8", place::line_and_column(plant, &before, end)))
-    })?;
-    parse_checked(plant, &text, check)
+    parse_checked(plant, &read_text(Path::new(plant), MOST_MIB, "`paper` or a plant file")?, check)
 }
 
 /// Loads like [`load`], but accepts the plain spring only.

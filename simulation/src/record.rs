@@ -2,6 +2,7 @@
 //! columns and units are opened by [`Format`].
 
 pub mod columns_file;
+pub mod gaps;
 mod measured;
 mod names;
 mod times;
@@ -54,6 +55,9 @@ const MOST_READING: f64 = 1e15;
 
 /// Column of the voltage across the spring, in files that lack the commanded voltage.
 pub const APPLIED: &str = "applied_v";
+
+/// Column of the controller's own estimate of the stiffness, recorded where the MCU has no sensor: no measurement.
+pub const ESTIMATE: &str = "estimate";
 
 /// Default name of the measured column.
 pub const MEASURED: &str = "stiffness";

@@ -25,8 +25,13 @@ pub enum Value<'a> {
 }
 
 impl Firmware {
-    /// ELF file with the format strings and without code.
+    /// ELF file with the format strings and without code; times are in microseconds.
     pub fn elf(&self) -> Vec<u8> {
+        self.elf_stamped("{=u64:us}")
+    }
+
+    /// The same, with the format string of the times.
+    pub fn elf_stamped(&self, timestamp: &str) -> Vec<u8> {
         let mut elf = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
         let section = elf.add_section(Vec::new(), b".defmt".to_vec(), SectionKind::Metadata);
         elf.append_section_data(section, &vec![0; self.strings.len() + 1], 1);
@@ -44,7 +49,7 @@ impl Firmware {
         };
         add("_defmt_version_ = 4".to_owned(), 0, SymbolSection::Absolute);
         add(format!("_defmt_encoding_ = {}", self.encoding), 0, SymbolSection::Absolute);
-        let strings = self.strings.iter().copied().chain([("timestamp", "{=u64:us}")]);
+        let strings = self.strings.iter().copied().chain([("timestamp", timestamp)]);
         for (number, (tag, text)) in strings.enumerate() {
             let symbol = json!({"package": "firmware", "disambiguator": number.to_string(), "tag": format!("defmt_{tag}"),
                 "data": text, "crate_name": "firmware"});

@@ -7,6 +7,7 @@ mod check;
 mod deny;
 mod emulation;
 mod flash;
+mod fuzz;
 mod image;
 mod mutants;
 mod reproducible;
@@ -42,6 +43,7 @@ Examples:
   cargo xtask emulate          the firmware on the report's stair, under QEMU
   cargo xtask image            the MCU's images: ELF, bin, hex; --controller fast, --limit-v 1000 for others
   cargo xtask boot             that image on register models: safe at boot and after a fault?
+  cargo xtask fuzz             every file format and frame, a minute each
   cargo xtask bench --json     speed compared with Python, as JSON
 
 Exit codes: 0 success, 1 the work failed, 2 bad arguments."
@@ -147,6 +149,16 @@ Examples:
   cargo xtask reproducible
   cargo xtask reproducible --controller fast --limit-v 1000")]
     Reproducible(Variant),
+    /// Fuzz every file format and frame, with sanitizers, on a nightly compiler
+    ///
+    /// Installs the compiler and cargo-fuzz if they are missing. The properties are in tests/src/fuzz/, the corpora in
+    /// fuzz/corpus/; `cargo xtask test` checks a share of both. Prints inputs and edges for each format; a finding is an
+    /// error, and its input is in fuzz/artifacts/.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "Examples:\n  cargo xtask fuzz                       each format for a minute\n  cargo xtask fuzz csv elf --seconds 600"
+    )]
+    Fuzz(fuzz::Args),
     /// Measure how long a build takes: first result, xtask, check
     #[command(after_help = times::EXAMPLES)]
     Times(times::Args),
@@ -183,8 +195,8 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Drill, Emulate, Flash, Image, Mutants, Proof, Setup, Size, Soak, Story, Talk};
-    use Command::{Deny, Reproducible, Sanitize, Test, Times};
+    use Command::{Bench, Boot, Check, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Reproducible};
+    use Command::{Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -192,6 +204,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Flash(variant) => flash::run(variant),
         Image(variant) => image::run(variant),
         Bench(args) => bench::run(&args),
+        Fuzz(args) => fuzz::run(&args),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),
         Sanitize(args) => sanitize::run(&args),

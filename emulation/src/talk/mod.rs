@@ -224,7 +224,7 @@ fn model(vsj: &Path, name: &str) -> Result<String> {
 pub(crate) fn open(name: &str) -> Result<Port> {
     let begin = Instant::now();
     loop {
-        match Port::open(name, 115_200) {
+        match Port::open(name, 115_200, Duration::from_secs(5)) {
             Ok(port) => return Ok(port),
             // The emulator is still starting.
             Err(error) if begin.elapsed() > PATIENCE => return Err(error),

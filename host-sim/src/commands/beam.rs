@@ -13,6 +13,7 @@ use paper::beam::readings;
 use paper::beam::report::{self, Setup};
 use paper::beam::slip::tips;
 use paper::beam::stack::{self, ORDER, Stack, TABLE2};
+use simulation::bad_input;
 use simulation::csv_table::read;
 
 use super::option_names::named;
@@ -27,7 +28,8 @@ Examples:
   vsj beam --experiment readings.csv --layers layers.csv
   vsj beam --stack PET,aluminium,nylon,PVdF,aluminium,PET")]
 pub(crate) struct Arguments {
-    /// Readings of a beam experiment, with columns displacement_mm and force_un_<V>v; default: the report's Table 1
+    /// Readings of a beam experiment, with columns displacement_mm and force_un_<V>v, at most 100 voltages and 100 000
+    /// readings; default: the report's Table 1
     #[arg(long, value_name = "FILE.csv")]
     experiment: Option<PathBuf>,
     /// Free length of the beam of one material, in mm
@@ -51,7 +53,7 @@ pub(crate) struct Arguments {
     /// Gravity, downwards, in m/s2; 0 neglects the weight
     #[arg(long, default_value_t = 9.8, value_name = "M/S2", allow_negative_numbers = true)]
     gravity: f64,
-    /// Places along the beam, in mm from the clamp; default: every quarter of the length
+    /// Places along the beam, in mm from the clamp, at most 1000; default: every quarter of the length
     #[arg(long, value_name = "MM", value_delimiter = ',', allow_negative_numbers = true)]
     at_mm: Vec<f64>,
     /// Error of the linear theory that is tolerated, as part of the largest displacement
@@ -79,6 +81,9 @@ pub(crate) struct Arguments {
     #[arg(long)]
     json: bool,
 }
+
+/// Largest number of places along the beam; each is a line of the answer.
+const MOST_PLACES: usize = 1000;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
@@ -113,6 +118,9 @@ fn setup(arguments: &Arguments) -> Result<Setup> {
         youngs_modulus_pa: 1e9 * arguments.modulus_gpa,
         density_kg_per_m3: arguments.density,
     };
+    if arguments.at_mm.len() > MOST_PLACES {
+        bad_input!("--at-mm: {} places; expected at most {MOST_PLACES}", arguments.at_mm.len());
+    }
     let load = Load { tip_n: 1e-6 * arguments.force_un, gravity_m_per_s2: arguments.gravity };
     let readings = match &arguments.experiment {
         None => readings::table1()?,

@@ -5,6 +5,7 @@ use clap::Args;
 use host_sim::output::compare::text;
 use host_sim::output::terminal::{json, print};
 use model::Amplifier;
+use simulation::bad_input;
 use simulation::comparison::compare;
 use simulation::plant_file;
 
@@ -18,10 +19,10 @@ Examples:
   vsj compare --limit-v 850 --slew-v-per-s 500
   vsj compare --plant spring.toml --json  on another spring")]
 pub(crate) struct Arguments {
-    /// The spring: `paper`, or a plant file; its recorded amplifier applies where it is stricter
+    /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
-    /// Highest voltages of the amplifier, in V
+    /// Highest voltages of the amplifier, in V; at most 16
     #[arg(long, default_values_t = [700.0, 1000.0], value_delimiter = ',', value_name = "V,V", allow_negative_numbers = true)]
     limit_v: Vec<f64>,
     /// Slew limit of the amplifier, in V/s; default: none
@@ -35,8 +36,14 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+/// Largest number of amplifiers; each takes a second.
+const MOST_AMPLIFIERS: usize = 16;
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.limit_v.len() > MOST_AMPLIFIERS {
+        bad_input!("--limit-v: {} amplifiers; expected at most {MOST_AMPLIFIERS}", arguments.limit_v.len());
+    }
     let file = plant_file::load(&arguments.plant)?;
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();

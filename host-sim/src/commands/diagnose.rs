@@ -10,6 +10,7 @@ use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
 use host_sim::output::terminal::{json, print, print_error, wrote};
+use host_sim::signals::on_ctrl_c;
 use identify::plant::base::Base;
 use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -55,7 +56,8 @@ pub(crate) struct Arguments {
     record: RecordArguments,
     /// The simulation to compare with: `paper`, `identify` for what `vsj identify` finds in the records, or a plant
     /// file. Parts of the file (memory, law, leakage, amplifier, further time constants) that the spring does not have
-    /// are named in a sentence and in the field `take_out` of the JSON, and omitted from the extended spring
+    /// are named in a sentence and in the field `take_out` of the JSON, and omitted from the extended spring. A plant file has
+    /// at most 1 MiB
     #[arg(long, default_value = "paper", value_name = "paper|identify|FILE.toml")]
     plant: String,
     /// Write report.html, diagnosis.json, residuals.csv, the plots and the extended spring (plant.toml) to this folder
@@ -139,22 +141,16 @@ fn with_progress(records: &[Record], options: &Options, lines: bool) -> Result<D
 }
 
 /// Returns a stop after the time that the user allows, and at Ctrl-C; a second Ctrl-C ends the program.
-fn stop(within: Option<Duration>) -> Result<Stop> {
+fn stop(within: Option<Duration>) -> Stop {
     let stop = within.map_or_else(Stop::default, Stop::after);
     let interrupted = stop.clone();
-    let mut before = false;
-    ctrlc::set_handler(move || {
-        if std::mem::replace(&mut before, true) {
-            std::process::exit(130);
-        }
-        interrupted.request();
-    })?;
-    Ok(stop)
+    on_ctrl_c(move || interrupted.request());
+    stop
 }
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let stop = stop(arguments.within)?;
+    let stop = stop(arguments.within);
     let (measured, input) = arguments.record.open()?;
     let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
     if input == Input::Stair {

@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     /// Slew limit of the amplifier, in V/s; default: none
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
-    /// The spring's relaxation: `paper`, or a plant file
+    /// The spring's relaxation: `paper`, or a plant file of at most 1 MiB
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// Write joint.json and joint.txt to this folder

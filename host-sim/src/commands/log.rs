@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::log::{Decoder, Formats, Summary};
-use host_sim::output::log::{Format, Printer};
+use host_sim::log::{Decoder, Formats, Summary, silence_the_decoder};
+use host_sim::output::log::{Format, MOST_IN_JSON, Printer};
+use host_sim::signals::on_ctrl_c;
 use simulation::bad_input;
+use simulation::bounded_file::read;
 
 /// Decode the firmware's log into a table and a summary, from a file or while it arrives
 #[derive(Args, Debug)]
@@ -21,7 +23,7 @@ Examples:
 
 Exit codes: 0 decoded completely, 1 damaged or cut off, with the readable part printed, 2 not the log of this ELF file.")]
 pub(crate) struct Arguments {
-    /// The ELF file of the build that wrote the log
+    /// The ELF file of the build that wrote the log, at most 256 MiB
     #[arg(value_name = "ELF")]
     elf: PathBuf,
     /// The log as sent by the MCU; `-` is stdin
@@ -30,18 +32,18 @@ pub(crate) struct Arguments {
     /// Print CSV with the columns time_s,level,event,message, and the summary as comments
     #[arg(long, conflicts_with = "json")]
     csv: bool,
-    /// One JSON object on stdout, at the end
+    /// One JSON object on stdout, at the end; for at most 1 000 000 lines
     #[arg(long)]
     json: bool,
 }
 
+/// Largest size of an ELF file, in MiB; one of the firmware has 2 to 20 with its debug information.
+const MOST_ELF_MIB: usize = 256;
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let elf = match std::fs::read(&arguments.elf) {
-        Ok(elf) => elf,
-        Err(error) => bad_input!("{}: cannot be read: {error}; expected an ELF file", arguments.elf.display()),
-    };
-    let formats = match Formats::parse(&elf) {
+    silence_the_decoder();
+    let formats = match Formats::parse(&read(&arguments.elf, MOST_ELF_MIB, "an ELF file")?) {
         Ok(formats) => formats,
         Err(error) => bad_input!("{}: {error:#}", arguments.elf.display()),
     };
@@ -55,12 +57,7 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
             bad_input!("stdin is a terminal; expected a FILE, or a log from a pipe");
         }
         // Ctrl-C reaches the whole pipeline: the writer ends first, then this program prints its summary. A second one ends it.
-        let mut before = false;
-        ctrlc::set_handler(move || {
-            if std::mem::replace(&mut before, true) {
-                std::process::exit(130);
-            }
-        })?;
+        on_ctrl_c(|| ());
         return Ok(Box::new(io::stdin()));
     }
     // A folder can be opened like a file and fails only when it is read.
@@ -102,6 +99,10 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) ->
         for item in decoder.feed(&buffer[..read]) {
             summary.add(&item);
             printer.item(item);
+        }
+        if printer.is_full() {
+            let name = name(&arguments.file);
+            bad_input!("{name}: more than {MOST_IN_JSON} lines; expected at most that with --json, or --csv");
         }
     }
     if let Some(item) = decoder.finish() {

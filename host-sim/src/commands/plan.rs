@@ -9,6 +9,7 @@ use host_sim::output::plan::{self as output, SCHEDULE_FILE, text};
 use host_sim::output::terminal::{json, print, wrote};
 use identify::plan::{Basis, Request, plan};
 use simulation::bad_input;
+use simulation::bounded_file::read_text;
 
 use super::diagnose::command_line;
 
@@ -29,7 +30,7 @@ Examples:
   vsj link /dev/ttyACM0 record next.csv --input out/plan/schedule.csv --arm
   vsj diagnose next.csv                         the decision")]
 pub(crate) struct Arguments {
-    /// The diagnosis: what `vsj diagnose --json` prints, or diagnosis.json of its --out
+    /// The diagnosis: what `vsj diagnose --json` prints, or diagnosis.json of its --out; at most 64 MiB
     #[arg(value_name = "DIAGNOSIS.json")]
     diagnosis: PathBuf,
     /// Duration of the experiment, in minutes; default: 4 for the report's spring, as many time constants for another
@@ -49,13 +50,13 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+/// Largest size of a diagnosis, in MiB; one of a record of a million rows has less.
+const MOST_MIB: usize = 64;
+
 /// Reads the parts of a diagnosis that a plan needs.
 fn read(path: &Path) -> Result<Basis> {
     let name = path.display();
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(error) => bad_input!("{name}: cannot be read: {error}; expected the JSON of `vsj diagnose`"),
-    };
+    let text = read_text(path, MOST_MIB, "the JSON of `vsj diagnose`")?;
     match serde_json::from_str(&text) {
         Ok(basis) => Ok(basis),
         Err(error) => {

@@ -8,6 +8,7 @@ use host_sim::output::terminal::remark;
 use identify::Input;
 use simulation::bad_input;
 use simulation::csv_table::dialect::{Decimal, Separator};
+use simulation::record::gaps::missed_turns;
 use simulation::record::{Format, MeasuredRecord, columns_file};
 
 use super::choice::{INPUT, one_of};
@@ -15,7 +16,8 @@ use super::choice::{INPUT, one_of};
 /// The records and how their files are written.
 #[derive(Args, Debug)]
 pub(crate) struct RecordArguments {
-    /// The records: tables with a header, separated by commas, semicolons, tabs or blanks
+    /// The records: tables with a header, separated by commas, semicolons, tabs or blanks, of at most 1 000 000 rows and
+    /// 512 MiB
     #[arg(value_name = "DATA.csv", required = true)]
     data: Vec<PathBuf>,
     /// Column of the time and its unit: ns, us, ms, s, min, h or d; or a column of ISO 8601 time stamps; default: time_s
@@ -62,6 +64,16 @@ impl RecordArguments {
         }
         for text in records.iter().flat_map(|record| &record.remarks) {
             remark(text);
+        }
+        for MeasuredRecord { record, .. } in &records {
+            let turns = missed_turns(&record.rows);
+            if turns > 0 {
+                remark(&format!(
+                    "{}: the voltage turns in {turns} gap(s) between the rows; what it did there is not in the record and may be \
+                     taken for a property of the spring",
+                    record.name
+                ));
+            }
         }
         Ok((records, input))
     }

@@ -35,7 +35,8 @@ pub(crate) struct Arguments {
     /// Controller whose steps, CSV and voltage are shown
     #[arg(long, value_enum, default_value_t = Controller::Paper)]
     controller: Controller,
-    /// The spring: `paper`, or a plant file; its recorded limit and slew apply where they are stricter than the options
+    /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded limit and slew apply where they are stricter than
+    /// the options
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns

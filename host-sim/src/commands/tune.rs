@@ -23,7 +23,7 @@ Examples:
   vsj tune --plant spring.toml --out out/tune  with plots over model errors
   vsj tune --json | jq .fast")]
 pub(crate) struct Arguments {
-    /// The spring: `paper`, or a plant file; its recorded amplifier applies where it is stricter
+    /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// Highest voltage of the amplifier, in V

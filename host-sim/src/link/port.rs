@@ -3,6 +3,8 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
+use std::sync::mpsc::channel;
+use std::thread;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -20,23 +22,21 @@ pub struct Port {
     stream: Box<dyn Stream>,
 }
 
-trait Stream: Read + Write {}
-impl<T: Read + Write> Stream for T {}
+trait Stream: Read + Write + Send {}
+impl<T: Read + Write + Send> Stream for T {}
 
 impl Port {
-    /// Opens a port by its name; `baud` (bit/s) applies to serial devices only.
+    /// Opens a port by its name, for `timeout` at most; `baud` (bit/s) applies to serial devices only.
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] if it cannot be opened.
-    pub fn open(name: &str, baud: u32) -> Result<Self> {
-        let opened = if let Some(path) = name.strip_prefix("unix:") {
-            unix(path)
-        } else if let Some(address) = name.strip_prefix("tcp:") {
-            tcp(address)
-        } else {
-            serial(name, baud)
-        };
-        match opened {
+    pub fn open(name: &str, baud: u32, timeout: Duration) -> Result<Self> {
+        // Resolving a name, connecting to it and opening a device have no bound on their time.
+        let (sender, receiver) = channel();
+        let port = name.to_owned();
+        thread::spawn(move || sender.send(connect(&port, baud)));
+        let late = || io::Error::new(ErrorKind::TimedOut, format!("no connection within {} s", timeout.as_secs_f64()));
+        match receiver.recv_timeout(timeout).unwrap_or_else(|_| Err(late())) {
             Ok(stream) => Ok(Self { name: name.to_owned(), stream }),
             Err(error) => {
                 bad_input!("{name}: cannot be opened: {error}; expected a serial device, unix:PATH or tcp:HOST:PORT")
@@ -71,6 +71,16 @@ impl Port {
     /// If they are not taken within a second, or the other side has closed the connection.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.stream.write_all(bytes)
+    }
+}
+
+fn connect(name: &str, baud: u32) -> io::Result<Box<dyn Stream>> {
+    if let Some(path) = name.strip_prefix("unix:") {
+        unix(path)
+    } else if let Some(address) = name.strip_prefix("tcp:") {
+        tcp(address)
+    } else {
+        serial(name, baud)
     }
 }
 

@@ -1,7 +1,8 @@
 //! The format strings of a firmware image, which define the meaning of its frames.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 
 use anyhow::Result;
 use defmt_decoder::{DecodeError, Table};
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::log::line::Line;
 use crate::log::shape::{Formatted, Shape, Stop, Walk};
 use simulation::bad_input;
+use simulation::bad_input::{BadInput, excerpt};
 
 /// Encoding of the frames, as recorded in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -28,6 +30,20 @@ pub struct Formats {
     encoding: Encoding,
     timestamp: Option<Shape>,
     formatted: BTreeMap<u16, Formatted>,
+}
+
+thread_local! {
+    static DECODING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Keeps the panics of defmt's decoder, which are caught and reported as damage, off stderr.
+pub fn silence_the_decoder() {
+    let report = take_hook();
+    set_hook(Box::new(move |panic| {
+        if !DECODING.get() {
+            report(panic);
+        }
+    }));
 }
 
 /// The used part of a defmt symbol's name.
@@ -73,6 +89,9 @@ impl Formats {
         let is_defmt = |name: &str| name == ".defmt" || name.starts_with(".defmt.");
         let sections: Vec<_> =
             elf.sections().filter(|s| s.name().is_ok_and(is_defmt)).map(|section| section.index()).collect();
+        let bounded = |name: &str, error: BadInput| {
+            BadInput(format!("symbol `{}`: {error}, as in the ELF file of a firmware", excerpt(name)))
+        };
         for symbol in elf.symbols() {
             let (Ok(name), Some(section)) = (symbol.name(), symbol.section_index()) else { continue };
             if !sections.contains(&section) {
@@ -81,10 +100,11 @@ impl Formats {
             // Symbols of the linker script are not format strings.
             let Ok(Symbol { tag, data }) = serde_json::from_str(name) else { continue };
             match (tag.as_str(), u16::try_from(symbol.address())) {
-                ("defmt_timestamp", _) => self.timestamp = Shape::of(&data),
+                ("defmt_timestamp", _) => self.timestamp = Shape::of(&data).map_err(|error| bounded(name, error))?,
                 ("defmt_bitflags_value", _) | (_, Err(_)) => {}
                 (tag, Ok(index)) => {
-                    self.formatted.insert(index, Formatted::new(tag, data));
+                    let formatted = Formatted::new(tag, data).map_err(|error| bounded(name, error))?;
+                    self.formatted.insert(index, formatted);
                 }
             }
         }
@@ -95,14 +115,16 @@ impl Formats {
     pub(super) fn decode(&self, bytes: &[u8]) -> Result<(Line, usize), Stop> {
         // The decoder allocates and recurses as the frame says, so the frame is checked first: it may be damaged.
         self.walk(bytes)?;
+        DECODING.set(true);
         let decoded = catch_unwind(AssertUnwindSafe(|| {
             let (frame, length) = self.table.decode(bytes)?;
             Ok((Line::new(&frame), length))
         }));
+        DECODING.set(false);
         match decoded {
             Ok(Ok(decoded)) => Ok(decoded),
             Ok(Err(DecodeError::UnexpectedEof)) => Err(Stop::More),
-            // A panic: a value that the decoder cannot format, such as a date beyond the year 9999.
+            // A panic: a value that the decoder cannot format.
             Ok(Err(DecodeError::Malformed)) | Err(_) => Err(Stop::Damaged),
         }
     }

@@ -32,7 +32,7 @@ mod text;
 
 pub use decoder::{Decoder, Item};
 pub use event::{Boot, Done, Event};
-pub use formats::{Encoding, Formats};
+pub use formats::{Encoding, Formats, silence_the_decoder};
 pub use line::{Level, Line};
 pub use summary::{Fault, LimitLines, Summary};
 pub use text::{

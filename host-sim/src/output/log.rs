@@ -9,6 +9,9 @@ use crate::log::{
     summary_text, table_row,
 };
 
+/// Largest number of lines and damaged parts in one JSON object: a few hundred MiB.
+pub const MOST_IN_JSON: usize = 1_000_000;
+
 /// How a log is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -84,6 +87,11 @@ impl Printer {
         let row = if self.format == Format::Csv { csv_row(&item) } else { table_row(&item) };
         self.text += &row;
         self.text.push('\n');
+    }
+
+    /// True if JSON, which is printed at the end, would hold more than [`MOST_IN_JSON`] lines and damaged parts.
+    pub fn is_full(&self) -> bool {
+        self.lines.len() + self.damaged.len() > MOST_IN_JSON
     }
 
     /// Prints what has been added, since a log may be followed live; returns false if the reader of stdout has closed the pipe.

@@ -14,7 +14,7 @@ use proptest::test_runner::{RngAlgorithm, TestRng};
 use crate::mcu::{Mcu, Setup};
 
 fn greet(mcu: &Mcu) -> Client {
-    let port = Port::open(&mcu.port, 115_200).unwrap();
+    let port = Port::open(&mcu.port, 115_200, Duration::from_secs(5)).unwrap();
     Client::greet(port, Patience { each: Duration::from_millis(20), tries: 100 }).unwrap().0
 }
 

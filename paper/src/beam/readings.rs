@@ -20,6 +20,11 @@ pub struct Reading {
 /// Columns that messages expect in a header.
 const COLUMNS: &str = "displacement_mm, force_un_0v, force_un_400v, ...";
 
+/// Largest number of voltages: each adds a curve to the answer and its plot.
+const MOST_VOLTAGES: usize = 100;
+/// Largest number of readings.
+const MOST_READINGS: usize = 100_000;
+
 /// Parses a table with the columns `displacement_mm` and `force_un_<V>v`, one for each voltage.
 ///
 /// # Errors
@@ -36,8 +41,18 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
     if voltages.is_empty() {
         return Err(table.lacks("force_un_<V>v", COLUMNS).into());
     }
+    if voltages.len() > MOST_VOLTAGES {
+        bad_input!(
+            "{name}, line {}: {} columns of forces; expected at most {MOST_VOLTAGES}",
+            table.header_line(),
+            voltages.len()
+        );
+    }
     let mut readings = Vec::new();
     while let Some(row) = table.next_row()? {
+        if readings.len() >= MOST_READINGS {
+            bad_input!("{name}, line {}: more than {MOST_READINGS} readings; expected at most that", row.line);
+        }
         let displacement_mm = row.number(displacement)?;
         for &(column, voltage_v) in &voltages {
             readings.push(Reading { voltage_v, displacement_mm, force_un: row.number(column)? });

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use super::gaps::median_interval;
 use super::names::{Column, ColumnNames, Columns};
 use super::times::{Clock, Time};
 use super::{MOST_READING, MOST_V, Record, Row};
@@ -57,6 +58,11 @@ impl MeasuredRecord {
         Ok(())
     }
 }
+
+/// Longest record, in s: beyond, squares of times approach the end of the doubles.
+const LONGEST_S: f64 = 1e15;
+/// Longest record, in median intervals between its rows: doubles then still resolve a thousandth of an interval.
+const LONGEST_INTERVALS: f64 = 1e12;
 
 /// Name of the unit of a reading without unit.
 const NO_UNIT: &str = "units";
@@ -117,8 +123,20 @@ impl Format {
         let first = timed.first().map_or(0.0, |(time, _)| time.since_first);
         let time_of = |time: Time| if from_first { time.since_first - first } else { time.value };
         let rows = timed.into_iter().map(|(time, row)| Row { time_s: time_of(time) * units.time.si, ..row });
+        let rows: Vec<Row> = rows.collect();
+        let start_s = rows.first().map_or(0.0, |row| row.time_s);
+        let longest_s = LONGEST_S.min(LONGEST_INTERVALS * median_interval(&rows).unwrap_or(LONGEST_S));
+        let is_late = |row: &&Row| row.time_s - start_s > longest_s || !row.time_s.is_finite();
+        if let Some(Row { line, time_s, .. }) = rows.iter().find(is_late) {
+            let column = excerpt(table()?.column(columns.time.index)).replace(['\n', '\r'], " ");
+            let (after_s, longest_s) = (number(time_s - start_s), number(longest_s));
+            bad_input!(
+                "{name}, line {line}, column {column}: {after_s} s after the first row; expected at most {longest_s} s for rows \
+                 as close as these"
+            );
+        }
         let column = table()?.column(columns.reading.index).to_owned();
-        let record = Record { name, rows: rows.collect() };
+        let record = Record { name, rows };
         Ok(MeasuredRecord { record, units, column, remarks })
     }
 

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::{APPLIED, MEASURED};
+use super::{APPLIED, ESTIMATE, MEASURED};
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt};
 use crate::csv_table::{Table, plain};
@@ -92,6 +92,20 @@ impl ColumnNames {
             Some((_, column)) => column,
             None => role.contract().iter().find_map(|name| Column::named(table, name)),
         });
+        let is_asked = asked(Role::Reading).is_some();
+        let has_estimates = |column: &Option<Column>| match column {
+            Some(column) => {
+                table.columns().eq(["time_s", "voltage_v", ESTIMATE]) && table.column(column.index) == ESTIMATE
+            }
+            None => !is_asked && table.columns().any(|name| name == ESTIMATE),
+        };
+        if has_estimates(&found[Role::Reading as usize]) {
+            bad_input!(
+                "{}, line {}: column `{ESTIMATE}` is the controller's own estimate, recorded without a sensor, and follows its                  model whatever the spring does; expected a column of readings",
+                table.name(),
+                table.header_line()
+            );
+        }
         for role in Role::ALL {
             if found[role as usize].is_none() && asked(role).is_none() {
                 found[role as usize] = Self::guess(table, role, &found);
@@ -291,11 +305,16 @@ mod tests {
             ("time_s,pump_v,level_v\n", "--time time_s:s --voltage one of pump_v:V, level_v:V"),
             ("T,U,x_mm\n", "--time T --voltage U --reading x_mm:mm"),
             ("time_s,voltage_v,strain\n", "no column `stiffness`"),
+            ("time_s,voltage_v,estimate\n", "r, line 1: column `estimate` is the controller's own estimate"),
             ("time_s,volts,stiffness\n", "no column `voltage_v`"),
         ] {
             let error = found(header, &none).unwrap_err();
             assert!(error.contains(expected), "{header}: {error}");
         }
+        let estimate = ColumnNames { reading: Some("estimate".into()), ..ColumnNames::default() };
+        assert!(found("time_s,voltage_v,estimate\n", &estimate).unwrap_err().contains("the controller's own estimate"));
+        assert!(found("time_s,voltage_v,estimate,remark\n", &estimate).is_ok(), "not a recording of this program");
+        assert!(found("time_s,voltage_v,stiffness,estimate\n", &none).is_ok());
     }
 
     #[test]

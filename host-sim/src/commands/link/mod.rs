@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     /// Baud rate of a serial device, in bit/s
     #[arg(long, global = true, default_value_t = 115_200, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     baud: u32,
-    /// How long to wait for an answer, in s
+    /// How long to wait for the port to open, and for an answer, in s
     #[arg(long, global = true, default_value_t = 1.0, value_name = "S", allow_negative_numbers = true)]
     timeout: f64,
     /// One JSON object on stdout
@@ -104,7 +104,8 @@ enum Unit {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let json = arguments.json;
-    let patience = Patience::of(seconds("--timeout", arguments.timeout, 3600.0)?);
+    let timeout = seconds("--timeout", arguments.timeout, 3600.0)?;
+    let patience = Patience::of(timeout);
     // The arguments are checked before anything is sent.
     let fault = match &arguments.command {
         Command::Acknowledge { fault } => parse_fault(fault)?,
@@ -132,7 +133,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         _ => None,
     };
 
-    let port = Port::open(&arguments.port, arguments.baud)?;
+    let port = Port::open(&arguments.port, arguments.baud, timeout)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
     let mut session = Session { client, status, json };
     match &arguments.command {
@@ -166,7 +167,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             session.show(done)
         }
         Command::Watch(arguments) => watch::run(&mut session, arguments),
-        Command::Record(arguments) => record::run(&mut session, arguments),
+        Command::Record(record) => record::run(&mut session, record, arguments.baud),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
     }
 }

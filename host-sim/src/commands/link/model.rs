@@ -14,7 +14,7 @@ const SETTLED_V: f64 = 1.0;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// A plant file, such as `vsj diagnose --out` writes, or `paper`
+    /// A plant file, such as `vsj diagnose --out` writes, at most 1 MiB, or `paper`
     #[arg(value_name = "FILE.toml|paper")]
     plant: Option<String>,
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::output::recording::Recording;
+use host_sim::output::recording::{Every, Recording};
 use host_sim::output::terminal::{print, remark};
 use indicatif::{ProgressBar, ProgressStyle};
 use link::{Desired, Request};
@@ -18,6 +18,8 @@ use simulation::schedule::{Between, Schedule};
 use super::session::{Session, seconds, stop_on_interrupt, stopped};
 use crate::commands::choice::{BETWEEN, one_of};
 
+/// Bits of the line that a sample takes, start and stop bits included: the longest frame and a share for the answers.
+const SAMPLE_BITS: f64 = 460.0;
 /// Longest accepted input, in s; much more cannot be expressed as a [`Duration`].
 const LONGEST_S: f64 = 1e9;
 
@@ -29,7 +31,8 @@ pub(super) struct Arguments {
     /// Stop after this many seconds; default: at the end of --input, or with Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Samples per second; 115 200 bit/s suffice for about 250
+    /// Rows per second; 115 200 bit/s suffice for about 250. Where the voltage turns between two rows, a further one is
+    /// written
     #[arg(long, default_value_t = 100.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
     /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v that
@@ -77,7 +80,7 @@ impl Arguments {
     }
 }
 
-pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
+pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Result<()> {
     let schedule = arguments.schedule()?;
     if schedule.is_some() && !arguments.arm && session.status.sample.state != link::State::Armed {
         bail!("{}: not armed ({}); expected --arm with --input", session.client.name(), session.status.sample.state);
@@ -90,12 +93,14 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let whole = arguments.time()?.or(length);
     let ticks = f64::from(session.status.rate_hz) / arguments.rate_hz;
     let every_ticks = ticks.round().clamp(1.0, f64::from(u16::MAX)) as u16;
-    stop_on_interrupt()?;
-    let mut recording = Recording::new(&arguments.file, arguments.force, &session.status, every_ticks)?;
+    stop_on_interrupt();
+    let line_ticks = (f64::from(session.status.rate_hz) * SAMPLE_BITS / f64::from(baud)).ceil();
+    let every = Every::new(every_ticks, line_ticks.clamp(1.0, f64::from(u16::MAX)) as u16);
+    let mut recording = Recording::new(&arguments.file, arguments.force, &session.status, every)?;
     if arguments.arm {
         session.order(Request::Arm)?;
     }
-    session.order(Request::Stream { every_ticks })?;
+    session.order(Request::Stream { every_ticks: every.sample_ticks })?;
     let done = follow(session, schedule.as_ref(), whole, &mut recording);
     // The MCU would also stop by itself once the host is silent.
     let stopped = session.order(Request::Stream { every_ticks: 0 });
@@ -103,7 +108,13 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     done.with_context(|| format!("{file} contains {} rows", summary.rows))?;
     stopped?;
     if summary.stiffness == "estimate" {
-        remark("no sensor: the column stiffness is the controller's own estimate, not a measurement");
+        remark("no sensor: the column estimate is the controller's own, not a measurement; it cannot be diagnosed");
+    }
+    if summary.missed_turns > 0 {
+        remark(&format!(
+            "{file}: samples are missing at {} of {} turns of the voltage: its extreme values there are not in the record",
+            summary.missed_turns, summary.turns
+        ));
     }
     if session.json {
         let mut report = serde_json::to_value(summary)?;

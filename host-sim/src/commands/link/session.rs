@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use host_sim::link::{Client, Failure, StatusReport};
 use host_sim::output::terminal::{json, print, remark};
+use host_sim::signals::on_ctrl_c;
 use link::{Desired, Reason, Request, Status, WireVolts};
 use serde::Serialize;
 use simulation::bad_input;
@@ -99,7 +100,7 @@ impl Session {
     /// Stays connected for `time`; returns an error if the MCU is no longer armed.
     fn keep(&mut self, time: Option<Duration>) -> Result<()> {
         let Some(time) = time else { return Ok(()) };
-        stop_on_interrupt()?;
+        stop_on_interrupt();
         let (start, pause) = (Instant::now(), self.heartbeat());
         while start.elapsed() < time && !stopped() {
             let (state, _) = self.order(Request::Heartbeat)?;
@@ -113,12 +114,8 @@ impl Session {
 static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Makes Ctrl-C set the flag read by [`stopped`]; a second Ctrl-C ends the program.
-pub(super) fn stop_on_interrupt() -> Result<()> {
-    Ok(ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })?)
+pub(super) fn stop_on_interrupt() {
+    on_ctrl_c(|| STOP.store(true, Ordering::Relaxed));
 }
 
 pub(super) fn stopped() -> bool {

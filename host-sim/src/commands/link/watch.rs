@@ -44,7 +44,7 @@ struct Watched {
 
 pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let (every, whole) = arguments.times()?;
-    stop_on_interrupt()?;
+    stop_on_interrupt();
     let mut screen = Screen::new(session.json);
     let (start, heartbeat) = (Instant::now(), session.heartbeat());
     let (mut samples, mut next) = (0, start);

@@ -1,7 +1,13 @@
-//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness`, which a [`simulation::record::Record`] is read from.
+//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness`, which a [`simulation::record::Record`] is read from; without
+//! a sensor the last one is `estimate`, which no diagnosis takes for a measurement.
+//!
+//! Rows follow each other at a fixed number of ticks. Between them stand the samples at which the voltage turns, up to down or
+//! down to up, so that no extreme value is lost.
 //!
 //! Each row is written in one piece as soon as it arrives: however the recording ends, by Ctrl-C, a lost connection or
 //! a full disk, the file ends with a complete row.
+
+mod turns;
 
 use std::fs::File;
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
@@ -12,6 +18,10 @@ use link::{Status, Telemetry};
 use serde::Serialize;
 
 use simulation::bad_input;
+use simulation::record::{ESTIMATE, MEASURED};
+
+pub use turns::Every;
+use turns::{Turn, Turns};
 
 /// A recording in progress.
 pub struct Recording {
@@ -20,10 +30,16 @@ pub struct Recording {
     /// Number of bytes up to the end of the last complete row.
     complete: u64,
     rate_hz: f64,
-    every_ticks: u64,
+    /// Ticks between two samples that the MCU sends.
+    sample_ticks: u64,
+    /// Ticks between two rows.
+    row_ticks: u64,
     measured: bool,
     first_tick: Option<u64>,
-    last_tick: u64,
+    last_row: u64,
+    /// The last sample that arrived.
+    last: Option<Telemetry>,
+    turns: Turns,
     summary: Summary,
 }
 
@@ -38,6 +54,10 @@ pub struct Summary {
     pub lost: u64,
     /// Number of rows with `-`, for which the sensor gave no reading.
     pub without_reading: u64,
+    /// Number of rows at which the voltage turns, up to down or down to up.
+    pub turns: u64,
+    /// Number of turns whose extreme value may be among the lost samples.
+    pub missed_turns: u64,
     /// `measured` if the MCU has a sensor, otherwise the controller's `estimate`.
     pub stiffness: &'static str,
 }
@@ -47,7 +67,7 @@ impl Recording {
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] if the file exists or cannot be created.
-    pub fn new(path: &Path, replace: bool, status: &Status, every_ticks: u16) -> Result<Self> {
+    pub fn new(path: &Path, replace: bool, status: &Status, every: Every) -> Result<Self> {
         let file = match File::options().write(true).create_new(!replace).create(replace).truncate(replace).open(path) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
@@ -62,21 +82,24 @@ impl Recording {
             file,
             complete: 0,
             rate_hz: f64::from(status.rate_hz.max(1)),
-            every_ticks: u64::from(every_ticks.max(1)),
+            sample_ticks: u64::from(every.sample_ticks.max(1)),
+            row_ticks: u64::from(every.row_ticks.max(1)),
             measured,
             first_tick: None,
-            last_tick: 0,
+            last_row: 0,
+            last: None,
+            turns: Turns::default(),
             summary: Summary { stiffness, ..Summary::default() },
         };
-        let source = if measured {
-            "as measured by the sensor"
+        let (source, column) = if measured {
+            ("as measured by the sensor", MEASURED)
         } else {
-            "as estimated by the controller, without a sensor: no measurement"
+            ("as estimated by the controller, without a sensor: no measurement", ESTIMATE)
         };
         let rate = status.rate_hz;
         recording.put(&format!(
             "# recorded over the serial link, control at {rate} Hz; voltage_v across the spring; stiffness {source}\n\
-             time_s,voltage_v,stiffness\n"
+             time_s,voltage_v,{column}\n"
         ))?;
         Ok(recording)
     }
@@ -90,14 +113,30 @@ impl Recording {
         if sample.tick < first {
             bail!("the MCU restarted after {} rows; {} ends there", self.summary.rows, self.path.display());
         }
-        if self.summary.rows > 0 {
-            if sample.tick <= self.last_tick {
+        if let Some(last) = self.last {
+            if sample.tick <= last.tick {
                 return Ok(());
             }
             // Up to half a period is jitter, not a loss.
-            let periods = (sample.tick - self.last_tick + self.every_ticks / 2) / self.every_ticks;
-            self.summary.lost += periods.saturating_sub(1);
+            let lost = ((sample.tick - last.tick + self.sample_ticks / 2) / self.sample_ticks).saturating_sub(1);
+            self.summary.lost += lost;
+            if let Some(Turn { has_gap }) = self.turns.next(last.applied, sample.applied, lost > 0) {
+                self.summary.turns += 1;
+                self.summary.missed_turns += u64::from(has_gap);
+                if last.tick > self.last_row {
+                    self.row(&last, first)?;
+                }
+            }
         }
+        self.last = Some(*sample);
+        let period = |tick: u64| (tick - first) / self.row_ticks;
+        if self.summary.rows == 0 || period(sample.tick) > period(self.last_row) {
+            self.row(sample, first)?;
+        }
+        Ok(())
+    }
+
+    fn row(&mut self, sample: &Telemetry, first: u64) -> Result<()> {
         let stiffness = if self.measured { sample.measured } else { Some(sample.estimate) };
         self.summary.without_reading += u64::from(stiffness.is_none());
         let stiffness = stiffness.map_or("-".into(), |stiffness| format!("{:.6}", stiffness.to_f64()));
@@ -105,7 +144,7 @@ impl Recording {
         // Nine decimals hide floating-point errors of decimal times.
         let time = (time_s * 1e9).round() / 1e9;
         self.put(&format!("{time},{:.6},{stiffness}\n", sample.applied.to_f64()))?;
-        self.last_tick = sample.tick;
+        self.last_row = sample.tick;
         self.summary.rows += 1;
         self.summary.seconds = time;
         Ok(())
@@ -133,7 +172,9 @@ impl Recording {
 mod tests {
     use super::*;
     use link::WireVolts;
-    use simulation::record::{MEASURED, Record};
+    use simulation::record::Record;
+
+    const TEN: Every = Every { sample_ticks: 10, row_ticks: 10 };
 
     fn status(measured: bool) -> Status {
         let sample = Telemetry { measured: measured.then_some(WireVolts(0)), ..Telemetry::default() };
@@ -147,7 +188,7 @@ mod tests {
 
     fn start(folder: &Path, measured: bool) -> (PathBuf, Recording) {
         let path = folder.join("r.csv");
-        let recording = Recording::new(&path, false, &status(measured), 10).unwrap();
+        let recording = Recording::new(&path, false, &status(measured), TEN).unwrap();
         (path, recording)
     }
 
@@ -176,7 +217,41 @@ mod tests {
         recording.add(&sample(1)).unwrap();
         recording.add(&sample(11)).unwrap();
         assert!(std::fs::read_to_string(&path).unwrap().contains("no measurement"));
-        assert_eq!(Record::open(&path, MEASURED).unwrap().rows[0].measured, Some(9.0));
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("\ntime_s,voltage_v,estimate\n") && text.ends_with(",9.000000\n"), "{text}");
+        assert_eq!(Record::open(&path, MEASURED).unwrap().rows[0].measured, None);
+    }
+
+    #[test]
+    fn rows_at_a_fixed_rate_contain_every_turn_of_the_voltage() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.csv");
+        let mut recording =
+            Recording::new(&path, false, &status(true), Every { sample_ticks: 1, row_ticks: 10 }).unwrap();
+        for tick in (0..=40).filter(|tick| *tick != 35) {
+            let volts = match tick {
+                0..=13 => tick,
+                14..=27 => 26 - tick,
+                _ => tick - 28,
+            };
+            recording.add(&Telemetry { applied: WireVolts(volts << 20), ..sample(tick as u64) }).unwrap();
+        }
+        let read = Record::open(&path, MEASURED).unwrap();
+        let times: Vec<i64> = read.rows.iter().map(|row| (row.time_s * 1e3).round() as i64).collect();
+        assert_eq!(times, [0, 10, 13, 20, 27, 30, 40]);
+        let Summary { rows, lost, turns, missed_turns, .. } = recording.summary();
+        assert_eq!((*rows, *lost, *turns, *missed_turns), (7, 1, 2, 0));
+    }
+
+    #[test]
+    fn a_turn_next_to_lost_samples_is_counted_as_missed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (_, mut recording) = start(folder.path(), true);
+        for (tick, volts) in [(0, 1), (10, 2), (40, 2), (50, 1), (60, 2), (100, 1)] {
+            recording.add(&Telemetry { applied: WireVolts(volts << 20), ..sample(tick) }).unwrap();
+        }
+        let Summary { turns, missed_turns, .. } = recording.summary();
+        assert_eq!((*turns, *missed_turns), (3, 2));
     }
 
     #[test]
@@ -193,16 +268,16 @@ mod tests {
     fn a_file_that_exists_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let (path, _) = start(folder.path(), true);
-        let error = Recording::new(&path, false, &status(true), 10).err().unwrap();
+        let error = Recording::new(&path, false, &status(true), TEN).err().unwrap();
         assert!(error.is::<simulation::bad_input::BadInput>() && error.to_string().contains("--force"), "{error}");
-        Recording::new(&path, true, &status(true), 10).unwrap();
+        Recording::new(&path, true, &status(true), TEN).unwrap();
     }
 
     /// A device that is always full stands for a full disk.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_full_disk_is_reported() {
-        let error = Recording::new(Path::new("/dev/full"), true, &status(true), 10).err().unwrap();
+        let error = Recording::new(Path::new("/dev/full"), true, &status(true), TEN).err().unwrap();
         assert!(error.to_string().contains("/dev/full cannot be written"), "{error}");
     }
 }

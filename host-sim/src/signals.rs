@@ -1,0 +1,117 @@
+//! Signals that end the program: Ctrl-C, SIGTERM and SIGHUP.
+//!
+//! In: what the first Ctrl-C does, and the temporary folders that exist. Out: a program that ends with the code 128 plus the
+//! signal's number, leaves no temporary folder, and is not ended while results are moved to their places.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Temporary folders that exist. Whoever holds the lock is not interrupted.
+static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// What the next Ctrl-C does instead of ending the program.
+static ON_CTRL_C: Mutex<Option<Box<dyn FnOnce() + Send>>> = Mutex::new(None);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes the next Ctrl-C call `action`; the one after it ends the program.
+pub fn on_ctrl_c(action: impl FnOnce() + Send + 'static) {
+    *lock(&ON_CTRL_C) = Some(Box::new(action));
+}
+
+/// Runs `work` without being ended by a signal.
+pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
+    let _held = lock(&FOLDERS);
+    work()
+}
+
+/// A temporary folder that is removed when it is dropped or the program is ended by a signal.
+#[derive(Debug)]
+pub struct TemporaryFolder {
+    path: PathBuf,
+}
+
+impl TemporaryFolder {
+    /// Creates a folder with a name of its own, hidden, in `folder`.
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    pub fn new_in(folder: &Path) -> io::Result<Self> {
+        let mut folders = lock(&FOLDERS);
+        let path = tempfile::Builder::new().prefix(".vsj-").tempdir_in(folder)?.keep();
+        folders.insert(path.clone());
+        Ok(Self { path })
+    }
+
+    /// Path of the folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        let mut folders = lock(&FOLDERS);
+        // It may have become the folder of the results.
+        let _ = fs::remove_dir_all(&self.path);
+        folders.remove(&self.path);
+    }
+}
+
+/// Ends the program without leaving a temporary folder.
+#[cfg(unix)]
+fn end(signal: i32) -> ! {
+    let folders = lock(&FOLDERS);
+    for path in folders.iter() {
+        let _ = fs::remove_dir_all(path);
+    }
+    std::process::exit(128 + signal)
+}
+
+/// Handles the signals from now on, in a thread of its own. A signal that is ignored, as under nohup, stays so.
+///
+/// # Errors
+/// If the thread cannot be started.
+#[cfg(unix)]
+pub fn handle() -> io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let ignored = ignored();
+    let handled = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored & (1 << (signal - 1)) == 0);
+    let mut signals = signal_hook::iterator::Signals::new(handled)?;
+    let handle = move || {
+        for signal in signals.forever() {
+            let action = if signal == SIGINT { lock(&ON_CTRL_C).take() } else { None };
+            match action {
+                Some(action) => action(),
+                None => end(signal),
+            }
+        }
+    };
+    std::thread::Builder::new().name("signals".to_owned()).spawn(handle).map(drop)
+}
+
+/// The set of the signals that the program was started with to ignore, bit `n - 1` for signal `n`; empty where the kernel
+/// does not say.
+#[cfg(unix)]
+fn ignored() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+}
+
+/// Handles Ctrl-C from now on.
+///
+/// # Errors
+/// If the handler cannot be installed.
+#[cfg(not(unix))]
+pub fn handle() -> io::Result<()> {
+    let handler = || match lock(&ON_CTRL_C).take() {
+        Some(action) => action(),
+        None => std::process::exit(130),
+    };
+    ctrlc::set_handler(handler).map_err(io::Error::other)
+}

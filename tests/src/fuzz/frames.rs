@@ -1,0 +1,49 @@
+//! Frames on the serial link, and models of the spring in them.
+
+use link::{Action, Frame, Message, Packet, Receiver, Reply, Request, Session, Unreadable, WireModel};
+
+/// Bytes on the line: what is read is the message that was sent, and a session survives everything.
+pub(super) fn wire(bytes: &[u8]) {
+    let mut receiver = Receiver::new();
+    for &byte in bytes {
+        if let Some(packet) = receiver.on_byte(byte) {
+            check_message::<Request>(&packet);
+            check_message::<Reply>(&packet);
+        }
+    }
+    let mut session = Session::new(100);
+    for (now, &byte) in (0..).zip(bytes) {
+        if let Some(Action::Apply(_)) = session.on_byte(byte, now) {
+            let reply = Reply::Telemetry(link::Telemetry { tick: now, ..link::Telemetry::default() });
+            assert!(!session.answer(&reply).is_empty());
+        }
+        if session.telemetry_due(now) {
+            assert!(!session.telemetry(link::Telemetry::default(), now).is_empty());
+        }
+    }
+    // The payload of a model, which the MCU gets in parts.
+    if let Some(model) = WireModel::read(bytes)
+        && let Some(payload) = model.payload()
+    {
+        let again = WireModel::read(&payload).expect("a payload is read");
+        assert_eq!(format!("{again:?}"), format!("{model:?}"), "the model changes on the wire");
+    }
+}
+
+/// A readable message is the same after it was sent once more.
+fn check_message<M: Message + std::fmt::Debug>(packet: &Packet<'_>) {
+    let message = match packet.read::<M>() {
+        Ok(message) => message,
+        Err(Unreadable::Kind | Unreadable::Message | Unreadable::Version(_)) => return,
+    };
+    let frame = Frame::new(packet.sequence, &message);
+    let mut receiver = Receiver::new();
+    let again =
+        frame.as_bytes().iter().find_map(|&byte| receiver.on_byte(byte).and_then(|packet| packet.read::<M>().ok()));
+    // Compared as text, since NaN is a possible value.
+    assert_eq!(
+        again.map(|again| format!("{again:?}")),
+        Some(format!("{message:?}")),
+        "the message changes on the wire"
+    );
+}
