@@ -62,6 +62,7 @@
 pub mod adequacy;
 pub mod answer;
 pub mod dimension;
+pub mod equation;
 pub mod effects;
 pub mod examine;
 pub mod fit;

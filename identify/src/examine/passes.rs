@@ -20,6 +20,7 @@ use simulation::record::Record;
 
 use crate::answer::{Nominal, Report, SearchReport, Verdict};
 use crate::effects::index_of;
+use crate::examine::hypothesis::hypothesise;
 use crate::examine::options::Options;
 use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
@@ -52,7 +53,9 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
     let records = std::slice::from_ref(record);
     let mut found = joint(records, options, None, &mut progress)?;
-    compare(&mut found, best_linear(records, options.input));
+    let linear = best_linear(records, options.input);
+    compare(&mut found, linear.as_ref());
+    hypothesise(&mut found, record, options, linear.as_ref());
     Ok(found)
 }
 

@@ -76,7 +76,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    compare(&mut joint, best_linear(records, input));
+    compare(&mut joint, best_linear(records, input).as_ref());
     Ok(joint)
 }
 
