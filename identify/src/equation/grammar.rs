@@ -44,8 +44,13 @@ pub(super) fn edits(parent: &Fitted, problem: &Problem) -> Vec<Edit> {
     edits.extend(grammar.in_parallel());
     edits.extend(grammar.within_branches());
     edits.extend(grammar.terms(parent, problem));
-    edits.extend(grammar.taken_out());
+    edits.extend(grammar.taken_out().into_iter().map(|smaller| vec![smaller]));
     edits
+}
+
+/// Returns the structures that lack one part of a fitted equation.
+pub(super) fn taken_out(parent: &Fitted, problem: &Problem) -> Vec<Structure> {
+    Grammar { scale: &problem.scale, parent: weighted(parent) }.taken_out()
 }
 
 /// Returns the structure with the fitted weights of its last sum.
@@ -156,10 +161,10 @@ impl Grammar<'_> {
         let sum = self.parent.sum_at();
         let mut edits = Vec::new();
         if sum < MOST_IN_SERIES {
-            let linear = [self.at_times(Kind::Lag, 5.0, &[]), self.seconds(), self.delays(), self.slews()];
-            let all = linear.into_iter().chain(self.curves()).chain(self.memories()).chain(self.products());
-            let all: Vec<_> = all.collect();
-            for starts in all {
+            for starts in [self.at_times(Kind::Lag, 5.0, &[]), self.seconds(), self.delays(), self.slews()] {
+                edits.push(self.inserted(sum, starts));
+            }
+            for starts in [self.curves(), self.memories(), self.products()].concat() {
                 // Curves and memories in front of other operators differ from those behind them.
                 for at in if sum > 0 { vec![0, sum] } else { vec![0] } {
                     edits.push(self.inserted(at, starts.clone()));
@@ -172,6 +177,8 @@ impl Grammar<'_> {
             let behind = behind.into_iter().chain(self.gains(parent, problem));
             let behind: Vec<_> = behind.collect();
             edits.extend(behind.into_iter().map(|starts| self.inserted(end, starts)));
+            let by_direction = [0.7, -0.7].map(|a| self.at_times(Kind::Varying(By::Direction), 4.0, &[a]));
+            edits.push(self.inserted(end, by_direction.concat()));
             if end > sum + 1 {
                 edits.push(self.inserted(end, self.at_times(Kind::Lag, 5.0, &[])));
             }
@@ -265,14 +272,14 @@ impl Grammar<'_> {
         ]
     }
 
-    /// Edits that make the equation smaller.
-    fn taken_out(&self) -> Vec<Edit> {
+    /// Structures that lack one part.
+    fn taken_out(&self) -> Vec<Structure> {
         let mut smaller = Vec::new();
         for (index, operator) in self.parent.chain.iter().enumerate() {
             if operator.kind != Kind::Parallel {
                 let mut structure = self.parent.clone();
                 structure.chain.remove(index);
-                smaller.push(vec![structure]);
+                smaller.push(structure);
                 continue;
             }
             for branch in 0..operator.chains.len() {
@@ -280,7 +287,7 @@ impl Grammar<'_> {
                     let mut structure = self.parent.clone();
                     structure.chain[index].chains.remove(branch);
                     structure.chain[index].point.remove(branch);
-                    smaller.push(vec![structure]);
+                    smaller.push(structure);
                 }
                 for (inner, of) in operator.chains[branch].iter().enumerate() {
                     let mut structure = self.parent.clone();
@@ -292,14 +299,14 @@ impl Grammar<'_> {
                         Kind::Curve(_) => drop(structure.chain[index].chains[branch].remove(inner)),
                         _ => continue,
                     }
-                    smaller.push(vec![structure]);
+                    smaller.push(structure);
                 }
             }
         }
         for term in 0..self.parent.terms.len() {
             let mut structure = self.parent.clone();
             structure.terms.remove(term);
-            smaller.push(vec![structure]);
+            smaller.push(structure);
         }
         smaller
     }

@@ -12,7 +12,8 @@ pub enum By {
     State,
     /// The input: `tau (1 + a input / full scale)`, at least a twentieth of `tau`.
     Input,
-    /// The distance that is left: `tau exp(-a |input - state| / full scale)`.
+    /// The distance that is left, as in Eyring's law of flow: `tau z / sinh(z)` with `z = a (input - state) / full scale`, and the
+    /// reciprocal of that factor for a negative `a`.
     Distance,
 }
 
@@ -40,7 +41,7 @@ pub(super) fn varying(signal: &mut Signal, tau_s: f64, by: By, a: f64, scale: &S
             let exponent = match by {
                 By::Direction => a * (input - state).signum(),
                 By::State => a * part(state),
-                By::Distance => -a * part(input - state).abs(),
+                By::Distance => -a.signum() * ln_sinh_ratio(a * part(input - state)),
                 By::Input => (1.0 + a * part(input)).max(LEAST_FACTOR).ln(),
             };
             let tau_s = tau_s * exponent.clamp(-MOST_EXPONENT, MOST_EXPONENT).exp();
@@ -50,6 +51,16 @@ pub(super) fn varying(signal: &mut Signal, tau_s: f64, by: By, a: f64, scale: &S
         }
         (before, state)
     });
+}
+
+/// Returns `ln(sinh(z) / z)`.
+fn ln_sinh_ratio(z: f64) -> f64 {
+    let size = z.abs();
+    match size {
+        ..1e-3 => size * size / 6.0,
+        ..20.0 => (size.sinh() / size).ln(),
+        _ => size - (2.0 * size).ln(),
+    }
 }
 
 /// Passes a signal through a second order of unit gain with an undamped frequency in Hz and any damping ratio.

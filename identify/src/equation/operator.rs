@@ -180,6 +180,7 @@ impl Operator {
         match self.kind {
             Kind::Lag => vec![tau("tau_s")],
             Kind::Varying(By::Input) => vec![tau("tau_s"), Coordinate::plain("change", -0.95, LARGEST)],
+            Kind::Varying(By::Distance) => vec![tau("tau_s"), plain("steepness", LARGEST)],
             Kind::Varying(_) => vec![tau("tau_s"), plain("exponent", 5.0)],
             Kind::Second => {
                 vec![freq(), Coordinate::log("zeta", DAMPINGS.0, DAMPINGS.1, Dimension::Ratio)]

@@ -7,23 +7,23 @@
 //! The best structure that is among the best [`BEAM`] and was not yet edited is edited next. Of the edits, all are fitted by a few
 //! steps, the best of these to the end, and those are predicted on held-out segments.
 
-use crate::equation::grammar::{edits, weighted};
+use crate::equation::grammar::{edits, taken_out, weighted};
 use crate::equation::operator::{Kind, Operator};
 use crate::equation::problem::{Fitted, Problem};
 use crate::equation::structure::Structure;
 use crate::noise::Noise;
 use crate::stats::thresholds::probability::RIVAL_ODDS;
 
-/// Number of best structures that are edited.
+/// Number of best structures that are edited, beside the starts.
 const BEAM: usize = 3;
 /// Number of structures that are edited at most.
-const MOST_EDITED: usize = 10;
-/// Edits that are fitted to the end.
-const FITTED: usize = 8;
-/// Rounds of a first fit, of a fit to the end, and of a fit without a fold.
-const ROUNDS: (usize, usize, usize) = (3, 14, 3);
-/// A first edit that gains less in likelihood, in nats, is no improvement of the beam.
-const LEAST_GAIN: f64 = 2.0;
+const MOST_EDITED: usize = 12;
+/// Edits that are fitted by a few steps, and to the end.
+const FITTED: (usize, usize) = (20, 8);
+/// Rounds of a fit: of every edit, of the better ones, to the end, and without a fold.
+const ROUNDS: (usize, usize, usize, usize) = (1, 3, 14, 3);
+/// Share of the work for the search; the rest is for taking out what the best equation does not need.
+const SHARE_OF_SEARCH: f64 = 0.85;
 
 /// An equation with its held-out prediction.
 #[derive(Clone, Debug)]
@@ -37,69 +37,114 @@ pub struct Scored {
     edited: bool,
 }
 
-/// Returns the equation with the fewest parameters among those that cannot be told from the best one, from several structures;
-/// `None` if the work was used up before one was fitted.
+/// Returns the best equation without what it does not need, from several structures that are all edited first; `None` if the work
+/// was used up before one was fitted.
 pub(super) fn search(problem: &Problem, starts: Vec<Structure>) -> Option<Scored> {
-    let used = problem.used(None);
-    let rows = problem.reading.len() as f64;
-    let price = 0.5 * rows.max(2.0).ln();
-    let mean = problem.reading.iter().sum::<f64>() / rows;
+    problem.budget.grant(SHARE_OF_SEARCH);
+    let search = Search::new(problem);
+    let mean = problem.reading.iter().sum::<f64>() / problem.reading.len() as f64;
     let near: Vec<f64> = problem.reading.iter().map(|reading| reading - mean).collect();
-    let scored = |fit: Fitted| {
-        let held_out = problem.held_out(&fit, ROUNDS.2);
-        let log_likelihood = Noise::robust(&problem.observed.uncensored(&problem.observed.errors(&held_out)))
-            .log_likelihood(&held_out, problem.observed);
-        let score = log_likelihood - price * fit.structure.parameters(&problem.scale) as f64;
-        Scored { fit, held_out, score, edited: false }
-    };
-    let mut pool: Vec<Scored> =
-        starts.into_iter().map(|start| scored(problem.fit(start, &used, &near, ROUNDS.1))).collect();
-    for _ in 0..MOST_EDITED {
+    let fitted = starts.into_iter().map(|start| search.scored(problem.fit(start, &search.used, &near, ROUNDS.2)));
+    let mut pool: Vec<Scored> = fitted.collect();
+    let starts: Vec<String> = pool.iter().map(|of| signature(&of.fit.structure)).collect();
+    for edited in 0..MOST_EDITED {
         pool.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let Some(parent) = pool.iter_mut().take(BEAM).find(|of| !of.edited) else { break };
-        if problem.budget.is_over() {
-            break;
-        }
+        let next = match starts.get(edited) {
+            Some(start) => pool.iter_mut().find(|of| signature(&of.fit.structure) == *start),
+            None => pool.iter_mut().take(BEAM).find(|of| !of.edited),
+        };
+        let Some(parent) = next.filter(|_| !problem.budget.is_over()) else { break };
         parent.edited = true;
         let parent = parent.fit.clone();
-        let worth = |fit: &Fitted| fit.value - price * fit.structure.parameters(&problem.scale) as f64;
+        search.edit(&parent, &mut pool);
+    }
+    pool.retain(|of| of.score.is_finite());
+    let best = pool.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
+    problem.budget.grant(1.0);
+    Some(search.without_needless(best))
+}
+
+struct Search<'p, 'a> {
+    problem: &'p Problem<'a>,
+    used: Vec<bool>,
+    /// Price of one parameter, in nats.
+    price: f64,
+}
+
+impl<'p, 'a> Search<'p, 'a> {
+    fn new(problem: &'p Problem<'a>) -> Self {
+        let price = 0.5 * (problem.reading.len().max(2) as f64).ln();
+        Self { problem, used: problem.used(None), price }
+    }
+
+    fn cost(&self, fit: &Fitted) -> f64 {
+        self.price * fit.structure.parameters(&self.problem.scale) as f64
+    }
+
+    /// Log-likelihood of the rows that were fitted, less the price of the parameters.
+    fn worth(&self, fit: &Fitted) -> f64 {
+        fit.value - self.cost(fit)
+    }
+
+    fn scored(&self, fit: Fitted) -> Scored {
+        let observed = self.problem.observed;
+        let held_out = self.problem.held_out(&fit, ROUNDS.3);
+        let law = Noise::robust(&observed.uncensored(&observed.errors(&held_out)));
+        let score = law.log_likelihood(&held_out, observed) - self.cost(&fit);
+        Scored { fit, held_out, score, edited: false }
+    }
+
+    fn refined(&self, fit: &Fitted, rounds: usize) -> Fitted {
+        self.problem.fit(weighted(fit), &self.used, &fit.residual, rounds)
+    }
+
+    /// Adds the best edits of an equation to the pool.
+    fn edit(&self, parent: &Fitted, pool: &mut Vec<Scored>) {
+        let problem = self.problem;
         let mut tried: Vec<Fitted> = Vec::new();
-        for edit in edits(&parent, problem) {
+        for edit in edits(parent, problem) {
             if problem.budget.is_over() {
-                break;
+                return;
             }
-            let evaluated = edit.into_iter().map(|start| problem.evaluate(start, &used, &parent.residual).0);
-            let Some(best) = evaluated.max_by(|a, b| a.value.total_cmp(&b.value)) else { continue };
-            tried.push(problem.fit(weighted(&best), &used, &parent.residual, ROUNDS.0));
+            let evaluated = edit.into_iter().map(|start| problem.evaluate(start, &self.used, &parent.residual).0);
+            if let Some(best) = evaluated.max_by(|a, b| a.value.total_cmp(&b.value)) {
+                tried.push(self.refined(&best, ROUNDS.0));
+            }
         }
-        tried.retain(|fit| worth(fit) > worth(&parent) + LEAST_GAIN || is_smaller(fit, &parent, problem));
-        tried.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
-        tried.truncate(FITTED);
+        for (count, rounds) in [(FITTED.0, ROUNDS.1), (FITTED.1, ROUNDS.2)] {
+            tried.sort_by(|a, b| self.worth(b).total_cmp(&self.worth(a)));
+            tried.truncate(count);
+            tried = tried.iter().map(|fit| self.refined(fit, rounds)).collect();
+        }
+        tried.retain(|fit| self.worth(fit) > self.worth(parent));
         for fit in tried {
             if problem.budget.is_over() {
-                break;
+                return;
             }
-            let near = fit.residual.clone();
-            let fit = problem.fit(weighted(&fit), &used, &near, ROUNDS.1);
-            let found = scored(fit);
-            let known = pool.iter_mut().find(|of| signature(&of.fit.structure) == signature(&found.fit.structure));
+            let key = signature(&fit.structure);
+            let known = pool.iter_mut().find(|of| signature(&of.fit.structure) == key);
             match known {
-                Some(known) if known.score < found.score => *known = Scored { edited: known.edited, ..found },
-                Some(_) => (),
-                None => pool.push(found),
+                Some(known) if known.fit.value >= fit.value => (),
+                Some(known) => *known = Scored { edited: known.edited, ..self.scored(fit) },
+                None => pool.push(self.scored(fit)),
             }
         }
     }
-    pool.retain(|of| of.score.is_finite());
-    let best = pool.iter().map(|of| of.score).max_by(f64::total_cmp)?;
-    let near_best = pool.into_iter().filter(|of| of.score >= best - RIVAL_ODDS);
-    near_best.min_by_key(|of| of.fit.structure.parameters(&problem.scale))
-}
 
-fn is_smaller(fit: &Fitted, parent: &Fitted, problem: &Problem) -> bool {
-    let parameters = |of: &Fitted| of.structure.parameters(&problem.scale) as f64;
-    let (fewer, lost) = (parameters(parent) - parameters(fit), parent.value - fit.value);
-    fewer > 0.0 && lost < 0.5 * (problem.reading.len() as f64).ln() * fewer
+    /// Takes out, one after the other, what an equation predicts as well without.
+    fn without_needless(&self, mut best: Scored) -> Scored {
+        loop {
+            let smaller = taken_out(&best.fit, self.problem).into_iter().map(|structure| {
+                let near = &best.fit.residual;
+                self.scored(self.problem.fit(structure, &self.used, near, ROUNDS.2))
+            });
+            let smaller = smaller.max_by(|a, b| a.score.total_cmp(&b.score));
+            match smaller.filter(|of| of.score > best.score - RIVAL_ODDS && !self.problem.budget.is_over()) {
+                Some(smaller) => best = smaller,
+                None => return best,
+            }
+        }
+    }
 }
 
 /// The kinds of the operators in their places, which tell two structures apart.

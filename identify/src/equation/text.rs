@@ -119,7 +119,7 @@ fn function(operator: &Operator, x: &str, names: &mut Names, definitions: &mut V
         }
         Kind::Varying(By::Distance) => (
             format!("lagx({x}, {}, {})", name("T"), name("a")),
-            "lagx(x, T, a) = w, T exp(-a |x - w|/F) dw/dt = x - w",
+            "lagx(x, T, a) = w, T dw/dt = (F/a) sinh(a (x - w)/F); for a < 0 the reciprocal of that factor on T",
         ),
         Kind::Second => (
             format!("second({x}, {}, {})", name("f"), name("z")),
