@@ -95,7 +95,8 @@ impl Grammar<'_> {
         let full_v = self.scale.full_v;
         let parts = |parts: &[f64]| parts.iter().map(|part| vec![part * full_v]).collect::<Vec<_>>();
         let starts = |curve| match curve {
-            Curve::Square | Curve::Cube | Curve::Even => vec![vec![SMALL]],
+            Curve::Square | Curve::Cube => vec![vec![0.2], vec![-0.2]],
+            Curve::Even => vec![vec![SMALL], vec![1.0]],
             Curve::Power => vec![vec![0.9], vec![1.1]],
             Curve::Tanh => vec![vec![0.5], vec![1.0]],
             Curve::Limit => parts(&[0.6, 0.8, 0.9]),
@@ -118,8 +119,8 @@ impl Grammar<'_> {
     fn products(&self) -> Vec<Vec<Operator>> {
         let squared = self.operator(Kind::Curve(Curve::Even), &[1.0]);
         let times = |before: &[Operator]| {
-            let of = |lag| Operator::times(SMALL, [before, &[lag]].concat());
-            self.at_times(Kind::Lag, 4.0, &[]).into_iter().map(of).collect()
+            let of = |lag: Operator| [SMALL, -SMALL].map(|a| Operator::times(a, [before, &[lag.clone()]].concat()));
+            self.at_times(Kind::Lag, 4.0, &[]).into_iter().flat_map(of).collect()
         };
         vec![times(&[]), times(&[squared])]
     }
@@ -135,7 +136,17 @@ impl Grammar<'_> {
             problem.reading.iter().zip(&parent.residual).map(|(reading, left)| reading - left).collect();
         let of_residual: Vec<f64> = parent.residual.iter().zip(&response).map(|(left, of)| left * of).collect();
         let squares: Vec<f64> = response.iter().map(|of| of * of).collect();
-        let swing = |freq_hz: f64| self.operator(Kind::Swing, &[freq_hz, 0.01, 0.01]);
+        let swing = |freq_hz: f64| {
+            // Amplitudes as if the two oscillations were orthogonal.
+            let power = 0.5 * squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+            let turn = TAU * freq_hz;
+            let part = |of: fn(f64) -> f64| {
+                let start_s = problem.data.time_s[0];
+                let each = of_residual.iter().zip(&problem.data.time_s);
+                each.map(|(value, time_s)| value * of(turn * (time_s - start_s))).sum::<f64>() / power
+            };
+            self.operator(Kind::Swing, &[freq_hz, part(f64::cos), part(f64::sin)])
+        };
         vec![
             self.frequencies(&of_residual, problem).into_iter().map(swing).collect(),
             self.each(Kind::Grow, &[&[SMALL]]),

@@ -15,7 +15,7 @@ use crate::noise::Noise;
 use crate::record::data::Data;
 use crate::record::observed::Observed;
 use crate::stats::scale::root_mean_square;
-use crate::stats::segments::{SEGMENTS, is_worse};
+use crate::stats::segments::SEGMENTS;
 use crate::stats::thresholds::empirical::{FINEST_V, WORSE_THAN_LINEAR};
 use crate::stats::thresholds::probability::RIVAL_ODDS;
 use simulation::plant_file::PlantFile;
@@ -47,7 +47,7 @@ pub fn equation(data: &Data, observed: &Observed, rivals: &Rivals, budget: &Budg
     let [ours, extended, linear] =
         [&best.held_out[..], rivals.extended_residual, rivals.linear_residual].map(|of| observed.errors(of));
     let finest = root_mean_square(&extended) <= FINEST_V.get();
-    let beats = |theirs: &[f64]| is_worse(theirs, &ours, WORSE_THAN_LINEAR.get());
+    let beats = |theirs: &[f64]| root_mean_square(theirs) > WORSE_THAN_LINEAR.get() * root_mean_square(&ours);
     if finest || !beats(&extended) || !beats(&linear) {
         return None;
     }

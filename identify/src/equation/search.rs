@@ -4,8 +4,9 @@
 //! score = log-likelihood of held-out readings - price per parameter,      price = ln(rows) / 2      [nats]
 //! ```
 //!
-//! The best structure that is among the best [`BEAM`] and was not yet edited is edited next. Of the edits, all are fitted by a few
-//! steps, the best of these to the end, and those are predicted on held-out segments.
+//! The best structure that is among the best [`BEAM`] and was not yet edited is edited next, in turn among all structures and among
+//! those that were made from the first start, the simulation as it is given. Of the edits, all are fitted by a few steps, the best of
+//! these to the end, and those are predicted on held-out segments.
 
 use crate::equation::grammar::{edits, taken_out, weighted};
 use crate::equation::operator::{Kind, Operator};
@@ -22,6 +23,9 @@ const MOST_EDITED: usize = 12;
 const FITTED: (usize, usize) = (20, 8);
 /// Rounds of a fit: of every edit, of the better ones, to the end, and without a fold.
 const ROUNDS: (usize, usize, usize, usize) = (1, 3, 14, 3);
+/// Nats that a part of an equation has to gain beyond its price to stay: the odds against an equal rival, and the logarithm of the
+/// number of edits among which it was chosen, about 80.
+const NEEDED: f64 = RIVAL_ODDS + 4.4;
 /// Share of the work for the search; the rest is for taking out what the best equation does not need.
 const SHARE_OF_SEARCH: f64 = 0.85;
 
@@ -35,10 +39,12 @@ pub struct Scored {
     /// Held-out log-likelihood less the price of the parameters, in nats.
     pub score: f64,
     edited: bool,
+    /// True if it was made from the first start.
+    of_first_start: bool,
 }
 
-/// Returns the best equation without what it does not need, from several structures that are all edited first; `None` if the work
-/// was used up before one was fitted.
+/// Returns the best equation that edits of several structures lead to, without what it does not need; `None` if no structure could be
+/// fitted.
 pub(super) fn search(problem: &Problem, starts: Vec<Structure>) -> Option<Scored> {
     problem.budget.grant(SHARE_OF_SEARCH);
     let search = Search::new(problem);
@@ -46,17 +52,24 @@ pub(super) fn search(problem: &Problem, starts: Vec<Structure>) -> Option<Scored
     let near: Vec<f64> = problem.reading.iter().map(|reading| reading - mean).collect();
     let fitted = starts.into_iter().map(|start| search.scored(problem.fit(start, &search.used, &near, ROUNDS.2)));
     let mut pool: Vec<Scored> = fitted.collect();
-    let starts: Vec<String> = pool.iter().map(|of| signature(&of.fit.structure)).collect();
+    if let Some(first) = pool.first_mut() {
+        first.of_first_start = true;
+    }
     for edited in 0..MOST_EDITED {
         pool.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let next = match starts.get(edited) {
-            Some(start) => pool.iter_mut().find(|of| signature(&of.fit.structure) == *start),
-            None => pool.iter_mut().take(BEAM).find(|of| !of.edited),
+        let best = |of: &&mut Scored| !of.edited;
+        let next = match edited % 2 {
+            0 => pool.iter_mut().filter(|of| of.of_first_start).take(BEAM).find(best),
+            _ => None,
+        };
+        let next = match next {
+            Some(next) => Some(next),
+            None => pool.iter_mut().take(BEAM).find(best),
         };
         let Some(parent) = next.filter(|_| !problem.budget.is_over()) else { break };
         parent.edited = true;
-        let parent = parent.fit.clone();
-        search.edit(&parent, &mut pool);
+        let (parent, of_first_start) = (parent.fit.clone(), parent.of_first_start);
+        search.edit(&parent, of_first_start, &mut pool);
     }
     pool.retain(|of| of.score.is_finite());
     let best = pool.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
@@ -91,7 +104,7 @@ impl<'p, 'a> Search<'p, 'a> {
         let held_out = self.problem.held_out(&fit, ROUNDS.3);
         let law = Noise::robust(&observed.uncensored(&observed.errors(&held_out)));
         let score = law.log_likelihood(&held_out, observed) - self.cost(&fit);
-        Scored { fit, held_out, score, edited: false }
+        Scored { fit, held_out, score, edited: false, of_first_start: false }
     }
 
     fn refined(&self, fit: &Fitted, rounds: usize) -> Fitted {
@@ -99,7 +112,7 @@ impl<'p, 'a> Search<'p, 'a> {
     }
 
     /// Adds the best edits of an equation to the pool.
-    fn edit(&self, parent: &Fitted, pool: &mut Vec<Scored>) {
+    fn edit(&self, parent: &Fitted, of_first_start: bool, pool: &mut Vec<Scored>) {
         let problem = self.problem;
         let mut tried: Vec<Fitted> = Vec::new();
         for edit in edits(parent, problem) {
@@ -125,8 +138,11 @@ impl<'p, 'a> Search<'p, 'a> {
             let known = pool.iter_mut().find(|of| signature(&of.fit.structure) == key);
             match known {
                 Some(known) if known.fit.value >= fit.value => (),
-                Some(known) => *known = Scored { edited: known.edited, ..self.scored(fit) },
-                None => pool.push(self.scored(fit)),
+                Some(known) => {
+                    let of_first_start = of_first_start || known.of_first_start;
+                    *known = Scored { edited: known.edited, of_first_start, ..self.scored(fit) };
+                }
+                None => pool.push(Scored { of_first_start, ..self.scored(fit) }),
             }
         }
     }
@@ -139,7 +155,7 @@ impl<'p, 'a> Search<'p, 'a> {
                 self.scored(self.problem.fit(structure, &self.used, near, ROUNDS.2))
             });
             let smaller = smaller.max_by(|a, b| a.score.total_cmp(&b.score));
-            match smaller.filter(|of| of.score > best.score - RIVAL_ODDS && !self.problem.budget.is_over()) {
+            match smaller.filter(|of| of.score > best.score - NEEDED && !self.problem.budget.is_over()) {
                 Some(smaller) => best = smaller,
                 None => return best,
             }
