@@ -23,16 +23,8 @@ pub enum Curve {
 
 impl Curve {
     /// All curves that a search tries.
-    pub const ALL: [Self; 8] = [
-        Self::Square,
-        Self::Cube,
-        Self::Even,
-        Self::Power,
-        Self::Tanh,
-        Self::Limit,
-        Self::Floor,
-        Self::DeadBand,
-    ];
+    pub const ALL: [Self; 8] =
+        [Self::Square, Self::Cube, Self::Even, Self::Power, Self::Tanh, Self::Limit, Self::Floor, Self::DeadBand];
 
     /// Returns the value of the curve at `x` V for its parameter, with the full scale in V.
     pub fn at(self, x: f64, parameter: f64, full_v: f64) -> f64 {

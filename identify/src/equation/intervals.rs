@@ -9,7 +9,8 @@ use nalgebra::DMatrix;
 use crate::answer::Parameter;
 use crate::dimension::Dimension;
 use crate::equation::clock::Term;
-use crate::equation::problem::{Fitted, Problem};
+use crate::equation::fitted::Fitted;
+use crate::equation::problem::Problem;
 use crate::equation::text::Text;
 use crate::fit::normal_equations::{Jacobian, normal_equations};
 use crate::noise::Noise;
@@ -104,8 +105,7 @@ fn deviations(fit: &Fitted, problem: &Problem, columns: Vec<Vec<f64>>, noise: &N
         }
         white
     };
-    let jacobian =
-        Jacobian { places: (0..columns.len()).collect(), columns: columns.iter().map(whitened).collect() };
+    let jacobian = Jacobian { places: (0..columns.len()).collect(), columns: columns.iter().map(whitened).collect() };
     let (normal, _) = normal_equations(&jacobian, &terms);
     let scale: Vec<f64> = (0..columns.len()).map(|i| 1.0 / normal[(i, i)].max(1e-300).sqrt()).collect();
     let scaled = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {

@@ -3,78 +3,11 @@
 use crate::dimension::Dimension;
 use crate::equation::clock::{modulate, swing};
 use crate::equation::curve::Curve;
+use crate::equation::kind::Kind;
 use crate::equation::lag::{self, By};
 use crate::equation::memory;
 use crate::equation::scale::Scale;
 use crate::record::signal::Signal;
-
-/// The kind of an operator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A lag of constant time constant.
-    Lag,
-    /// A lag whose time constant varies.
-    Varying(By),
-    /// A second order of any damping.
-    Second,
-    /// Creep as a power of the time.
-    Creep,
-    /// A play operator on a part of the signal.
-    Play,
-    /// A lag over the travelled distance on a part of the signal.
-    Travel,
-    /// A gain that depends on the direction.
-    Direction,
-    /// A static curve.
-    Curve(Curve),
-    /// A delay.
-    Delay,
-    /// A bounded rate of change.
-    Slew,
-    /// A gain that swings with time.
-    Swing,
-    /// A gain that grows with time.
-    Grow,
-    /// A gain that steps at a time.
-    Step,
-    /// The product with one plus a chain: `x (1 + a chain(x) / full scale)`.
-    Times,
-    /// The weighted sum of chains: `sum_i a_i chain_i(x)`.
-    Parallel,
-}
-
-impl Kind {
-    /// Returns the code of the kind in reports.
-    pub fn code(self) -> &'static str {
-        match self {
-            Self::Lag => "lag",
-            Self::Varying(By::Direction) => "lag-by-direction",
-            Self::Varying(By::State) => "lag-by-state",
-            Self::Varying(By::Input) => "lag-by-input",
-            Self::Varying(By::Distance) => "lag-by-distance",
-            Self::Second => "second-order",
-            Self::Creep => "creep",
-            Self::Play => "play",
-            Self::Travel => "drag",
-            Self::Direction => "direction-gain",
-            Self::Curve(Curve::Square) => "square",
-            Self::Curve(Curve::Cube) => "cube",
-            Self::Curve(Curve::Even) => "even",
-            Self::Curve(Curve::Power) => "power",
-            Self::Curve(Curve::Tanh) => "soft-limit",
-            Self::Curve(Curve::Limit) => "limit",
-            Self::Curve(Curve::Floor) => "floor",
-            Self::Curve(Curve::DeadBand) => "dead-band",
-            Self::Delay => "delay",
-            Self::Slew => "slew",
-            Self::Swing => "periodic-gain",
-            Self::Grow => "growing-gain",
-            Self::Step => "stepping-gain",
-            Self::Times => "product",
-            Self::Parallel => "sum",
-        }
-    }
-}
 
 /// A bounded coordinate of an operator's point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -172,10 +105,8 @@ impl Operator {
     pub fn coordinates(&self, scale: &Scale) -> Vec<Coordinate> {
         let Scale { full_v, sample_s, duration_s } = *scale;
         let tau = |name| Coordinate::log(name, TAUS.0 * sample_s, TAUS.1 * duration_s, Dimension::Time);
-        let freq =
-            || Coordinate::log("freq_hz", FEWEST_PERIODS / duration_s, 0.5 / sample_s, Dimension::Frequency);
-        let volts =
-            |name| Coordinate::log(name, THRESHOLDS.0 * full_v, THRESHOLDS.1 * full_v, Dimension::Voltage);
+        let freq = || Coordinate::log("freq_hz", FEWEST_PERIODS / duration_s, 0.5 / sample_s, Dimension::Frequency);
+        let volts = |name| Coordinate::log(name, THRESHOLDS.0 * full_v, THRESHOLDS.1 * full_v, Dimension::Voltage);
         let plain = |name, most: f64| Coordinate::plain(name, -most, most);
         match self.kind {
             Kind::Lag => vec![tau("tau_s")],
@@ -204,7 +135,11 @@ impl Operator {
             Kind::Swing => vec![freq(), plain("cosine", 0.9), plain("sine", 0.9)],
             Kind::Grow => vec![plain("growth", 0.95)],
             Kind::Step => {
-                let at = Coordinate { fitted: false, dimension: Dimension::TimePoint, ..Coordinate::plain("from_s", 0.0, duration_s) };
+                let at = Coordinate {
+                    fitted: false,
+                    dimension: Dimension::TimePoint,
+                    ..Coordinate::plain("from_s", 0.0, duration_s)
+                };
                 vec![at, plain("change", 0.95)]
             }
             Kind::Times | Kind::Parallel => vec![plain("weight", LARGEST); self.point.len()],

@@ -6,8 +6,9 @@
 
 use crate::equation::curve::Curve;
 use crate::equation::lag::By;
-use crate::equation::operator::{Kind, Operator};
-use crate::equation::problem::Fitted;
+use crate::equation::kind::Kind;
+use crate::equation::operator::Operator;
+use crate::equation::fitted::Fitted;
 use crate::equation::scale::Scale;
 use simulation::plant_file::{Amplifier, Law, Memory, Mode, PlantFile, Relaxation};
 
@@ -21,7 +22,8 @@ pub(super) fn plant(fit: &Fitted, base: &PlantFile, output: f64, scale: &Scale) 
     if !fit.structure.terms.is_empty() {
         return Err("a term that follows the clock");
     }
-    let mut file = PlantFile { memory: None, law: None, leakage: None, amplifier: None, modes: Vec::new(), ..base.clone() };
+    let mut file =
+        PlantFile { memory: None, law: None, leakage: None, amplifier: None, modes: Vec::new(), ..base.clone() };
     let mut amplifier = Amplifier::default();
     let mut curve = None;
     for operator in &fit.structure.chain[..fit.structure.chain.len() - 1] {
@@ -69,7 +71,8 @@ pub(super) fn plant(fit: &Fitted, base: &PlantFile, output: f64, scale: &Scale) 
         return Err("no relaxation with a positive gain");
     }
     modes.iter_mut().for_each(|mode| mode.weight /= gain);
-    let weights = if lags.len() == 1 && modes.is_empty() { Vec::new() } else { lags.iter().map(|lag| lag.1 / gain).collect() };
+    let weights =
+        if lags.len() == 1 && modes.is_empty() { Vec::new() } else { lags.iter().map(|lag| lag.1 / gain).collect() };
     file.relaxation = Relaxation {
         share: share / gain,
         tau_s: lags.iter().map(|lag| lag.0).collect(),

@@ -5,6 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::equation::fitted::Fitted;
 use crate::equation::response::{Response, Source};
 use crate::equation::scale::Scale;
 use crate::equation::structure::Structure;
@@ -42,19 +43,6 @@ pub struct Problem<'a> {
     /// Reading plus what a converter cut off.
     pub(super) reading: Vec<f64>,
     pub(super) budget: &'a Budget,
-}
-
-/// An equation fitted to a record, or to a part of its rows.
-#[derive(Clone, Debug)]
-pub struct Fitted {
-    /// Structure with the values of its coordinates.
-    pub structure: Structure,
-    /// Linear coefficients: zero, weights of the last sum, amplitudes of terms, free responses.
-    pub coefficients: Vec<f64>,
-    /// Reading minus prediction of every row.
-    pub residual: Vec<f64>,
-    /// Log-likelihood of the rows that were fitted, under robust noise, in nats.
-    pub value: f64,
 }
 
 impl<'a> Problem<'a> {

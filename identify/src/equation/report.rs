@@ -4,7 +4,8 @@ use crate::answer::{Equation, HeldOutErrors};
 use crate::dimension::Dimension;
 use crate::equation::intervals;
 use crate::equation::plant::plant;
-use crate::equation::problem::{Fitted, Problem};
+use crate::equation::fitted::Fitted;
+use crate::equation::problem::Problem;
 use crate::equation::search::{Scored, search};
 use crate::equation::starts;
 use crate::equation::structure::Structure;
@@ -67,10 +68,9 @@ pub fn equation(data: &Data, observed: &Observed, rivals: &Rivals, budget: &Budg
 fn starting_structures(problem: &Problem, rivals: &Rivals) -> Vec<Structure> {
     let second_s = problem.data.scales().second_s;
     let mut starts = vec![starts::of_plant(rivals.nominal, &problem.scale)];
-    for start in [
-        starts::of_plant(rivals.extended, &problem.scale),
-        starts::of_linear(rivals.poles, second_s, &problem.scale),
-    ] {
+    for start in
+        [starts::of_plant(rivals.extended, &problem.scale), starts::of_linear(rivals.poles, second_s, &problem.scale)]
+    {
         if !starts.contains(&start) {
             starts.push(start);
         }

@@ -8,9 +8,12 @@
 //! those that were made from the first start, the simulation as it is given. Of the edits, all are fitted by a few steps, the best of
 //! these to the end, and those are predicted on held-out segments.
 
-use crate::equation::grammar::{edits, taken_out, weighted};
-use crate::equation::operator::{Kind, Operator};
-use crate::equation::problem::{Fitted, Problem};
+use crate::equation::grammar::edits;
+use crate::equation::kind::Kind;
+use crate::equation::operator::Operator;
+use crate::equation::fitted::Fitted;
+use crate::equation::problem::Problem;
+use crate::equation::smaller::taken_out;
 use crate::equation::structure::Structure;
 use crate::noise::Noise;
 use crate::stats::thresholds::probability::RIVAL_ODDS;
@@ -27,7 +30,7 @@ const ROUNDS: (usize, usize, usize, usize) = (1, 3, 14, 3);
 /// number of edits among which it was chosen, about 80.
 const NEEDED: f64 = RIVAL_ODDS + 4.4;
 /// Share of the work for the search; the rest is for taking out what the best equation does not need.
-const SHARE_OF_SEARCH: f64 = 0.85;
+const SHARE_OF_SEARCH: f64 = 0.75;
 
 /// An equation with its held-out prediction.
 #[derive(Clone, Debug)]
@@ -108,7 +111,7 @@ impl<'p, 'a> Search<'p, 'a> {
     }
 
     fn refined(&self, fit: &Fitted, rounds: usize) -> Fitted {
-        self.problem.fit(weighted(fit), &self.used, &fit.residual, rounds)
+        self.problem.fit(fit.weighted(), &self.used, &fit.residual, rounds)
     }
 
     /// Adds the best edits of an equation to the pool.
@@ -129,7 +132,8 @@ impl<'p, 'a> Search<'p, 'a> {
             tried.truncate(count);
             tried = tried.iter().map(|fit| self.refined(fit, rounds)).collect();
         }
-        tried.retain(|fit| self.worth(fit) > self.worth(parent));
+        let needed = |fit: &Fitted| if self.cost(fit) > self.cost(parent) { NEEDED } else { -NEEDED };
+        tried.retain(|fit| self.worth(fit) > self.worth(parent) + needed(fit));
         for fit in tried {
             if problem.budget.is_over() {
                 return;
@@ -150,12 +154,15 @@ impl<'p, 'a> Search<'p, 'a> {
     /// Takes out, one after the other, what an equation predicts as well without.
     fn without_needless(&self, mut best: Scored) -> Scored {
         loop {
+            if self.problem.budget.is_over() {
+                return best;
+            }
             let smaller = taken_out(&best.fit, self.problem).into_iter().map(|structure| {
                 let near = &best.fit.residual;
                 self.scored(self.problem.fit(structure, &self.used, near, ROUNDS.2))
             });
             let smaller = smaller.max_by(|a, b| a.score.total_cmp(&b.score));
-            match smaller.filter(|of| of.score > best.score - NEEDED && !self.problem.budget.is_over()) {
+            match smaller.filter(|of| of.score > best.score - NEEDED) {
                 Some(smaller) => best = smaller,
                 None => return best,
             }

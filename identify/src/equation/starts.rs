@@ -1,7 +1,8 @@
 //! The structures from which a search starts: the simulation as it is given, and the best linear model.
 
 use crate::equation::curve::Curve;
-use crate::equation::operator::{Kind, Operator};
+use crate::equation::kind::Kind;
+use crate::equation::operator::Operator;
 use crate::equation::scale::Scale;
 use crate::equation::structure::Structure;
 use crate::linear::{Poles, Section};

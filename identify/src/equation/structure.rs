@@ -7,7 +7,8 @@
 //! A sum at the end of the chain has linear weights, which a fit solves for; all other numbers are coordinates that it moves.
 
 use crate::equation::clock::Term;
-use crate::equation::operator::{Coordinate, Kind, Operator};
+use crate::equation::kind::Kind;
+use crate::equation::operator::{Coordinate, Operator};
 use crate::equation::scale::Scale;
 
 /// The structure of an equation with the values of its coordinates.

@@ -3,7 +3,8 @@
 use crate::equation::clock::Term;
 use crate::equation::curve::Curve;
 use crate::equation::lag::By;
-use crate::equation::operator::{Kind, Operator};
+use crate::equation::kind::Kind;
+use crate::equation::operator::Operator;
 use crate::equation::structure::Structure;
 
 /// An equation in words of mathematics.
@@ -133,14 +134,12 @@ fn function(operator: &Operator, x: &str, names: &mut Names, definitions: &mut V
             format!("play({x}, {}, {})", name("r"), name("a")),
             "play(x, r, a) = (1 - a) x + a w, w the play operator of half-width r",
         ),
-        Kind::Travel => (
-            format!("drag({x}, {}, {})", name("r"), name("a")),
-            "drag(x, r, a) = (1 - a) x + a w, r dw = (x - w) |dx|",
-        ),
-        Kind::Direction => (
-            format!("way({x}, {})", name("a")),
-            "way(x, a) = x (1 + a) after a rise, x (1 - a) after a fall",
-        ),
+        Kind::Travel => {
+            (format!("drag({x}, {}, {})", name("r"), name("a")), "drag(x, r, a) = (1 - a) x + a w, r dw = (x - w) |dx|")
+        }
+        Kind::Direction => {
+            (format!("way({x}, {})", name("a")), "way(x, a) = x (1 + a) after a rise, x (1 - a) after a fall")
+        }
         Kind::Curve(curve) => match curve {
             Curve::Square => (format!("square({x}, {})", name("a")), "square(x, a) = x + a x (|x|/F - 1)"),
             Curve::Cube => (format!("cube({x}, {})", name("a")), "cube(x, a) = x + a x ((x/F)^2 - 1)"),

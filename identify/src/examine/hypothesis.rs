@@ -15,16 +15,12 @@ use crate::verdict::diagnosis::Diagnosis;
 /// Adds the best equation to the diagnosis of a record that is `unexplained`, if one predicts better than the extended simulation
 /// and the best linear model. It may do as much work as the diagnosis; none with [`Effort::Quick`]. Of a long record it takes a part
 /// of the rows.
-pub(super) fn hypothesise(
-    diagnosis: &mut Diagnosis,
-    record: &Record,
-    options: &Options,
-    linear: Option<&BestLinear>,
-) {
+pub(super) fn hypothesise(diagnosis: &mut Diagnosis, record: &Record, options: &Options, linear: Option<&BestLinear>) {
     let Some(linear) = linear else { return };
     let rows = diagnosis.data.rows();
     let asked = diagnosis.report.verdict == Verdict::Unexplained && options.effort != Effort::Quick;
-    if !asked || options.stop.requested() || linear.held_out.len() != rows || diagnosis.held_out_in_place.len() != rows {
+    if !asked || options.stop.requested() || linear.held_out.len() != rows || diagnosis.held_out_in_place.len() != rows
+    {
         return;
     }
     let every = if rows > LONG_RECORD_ROWS.count() { rows.div_ceil(ROWS_TO_SEARCH.count()) } else { 1 };
@@ -47,7 +43,9 @@ pub(super) fn hypothesise(
         linear_residual: &normalised(&linear.held_out),
     };
     let budget = Budget::new(options.effort, data.rows(), options.stop.clone());
-    let Some((fit, found)) = equation(&data, &observed, &rivals, &budget) else { return };
+    let found = equation(&data, &observed, &rivals, &budget);
+    diagnosis.report.complete &= !budget.is_stopped();
+    let Some((fit, found)) = found else { return };
     diagnosis.report.equation = Some(found.text.clone());
     diagnosis.report.equation_details = Some(found);
     diagnosis.equation = Some(fit);

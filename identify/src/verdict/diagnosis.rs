@@ -6,7 +6,7 @@ use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
 use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, SearchReport, Verdict};
 use crate::dimension::Dimension;
 use crate::effects::model::Model;
-use crate::equation::problem::Fitted;
+use crate::equation::fitted::Fitted;
 use crate::fit::engine::{Engine, Fit};
 use crate::plant::base::Base;
 use crate::record::data::Data;

@@ -16,8 +16,8 @@ use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
 use validation::campaign::{
-    answer_table, criteria, equation, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps, tables,
-    unforeseen,
+    answer_table, criteria, equation, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps,
+    tables, unforeseen,
 };
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};

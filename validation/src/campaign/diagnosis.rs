@@ -10,9 +10,9 @@ use identify::plan::{Basis, Request, plan};
 use identify::plant::base::Base;
 use identify::record::data::Data;
 use identify::record::observed::Observed;
+use identify::stats::scale::root_mean_square;
 #[cfg(feature = "sensitivity")]
 pub use identify::stats::thresholds::vary;
-use identify::stats::scale::root_mean_square;
 pub use identify::stats::thresholds::{Threshold, empirical::ALL as THRESHOLDS};
 use identify::{Options, examine};
 use serde_json::Value;
@@ -131,9 +131,8 @@ pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3
     let linear = whole.map(|linear| linear.error.last_40_percent_rmse);
     let equation = identified.equation.as_ref().map(|fit| {
         let normalisation = &identified.data.normalisation;
-        let prepared = |record: &Record| {
-            Data::thinned(&normalisation.record(record), identify::Input::Hold, 1, normalisation)
-        };
+        let prepared =
+            |record: &Record| Data::thinned(&normalisation.record(record), identify::Input::Hold, 1, normalisation);
         let first = Record { name: record.name.clone(), rows: record.rows[..rows].to_vec() };
         let (first, data) = (prepared(&first), prepared(record));
         let observed = Observed::new(&data);

@@ -17,8 +17,8 @@ use serde::Serialize;
 use super::diagnosis::{Hypothesis, hypothesis, hypothesis_beyond};
 use super::equation_blocks::true_blocks;
 use super::out_of_model;
-use super::rivals::{Answer, identification};
 use super::part::seed;
+use super::rivals::{Answer, identification};
 use crate::ground_truth::{self, LabelledRecord};
 use crate::markdown::table;
 use simulation::record::Record;
@@ -71,16 +71,17 @@ pub struct Row {
 
 /// `count` records of every law of both sets.
 pub fn cases(first: u64, count: usize) -> Vec<Case> {
-    let forms = out_of_model::jobs(&ground_truth::out_of_model::all(), first, count).into_iter().map(|(form, seed)| Case {
-        set: "out of model",
-        law: form.name.to_owned(),
-        seed,
-        draw: Box::new(move |seed| {
-            let hidden = form.draw(seed);
-            let record = hidden.record();
-            (hidden, record)
-        }),
-    });
+    let forms =
+        out_of_model::jobs(&ground_truth::out_of_model::all(), first, count).into_iter().map(|(form, seed)| Case {
+            set: "out of model",
+            law: form.name.to_owned(),
+            seed,
+            draw: Box::new(move |seed| {
+                let hidden = form.draw(seed);
+                let record = hidden.record();
+                (hidden, record)
+            }),
+        });
     let laws = ground_truth::unforeseen::all().into_iter().flat_map(|law| std::iter::repeat_n(law, count));
     let laws = laws.enumerate().map(|(index, (_, law))| Case {
         set: "unforeseen",
@@ -106,11 +107,11 @@ fn row(case: &Case, progress: &ProgressBar) -> Result<Row> {
     let Hypothesis { verdict, equation, blocks, held_out } = hypothesis(&record)?;
     let seconds = start.elapsed().as_secs_f64();
     let truth = true_blocks(&case.law);
-    let is_true = (equation.is_some() && !truth.is_empty()).then(|| blocks.iter().any(|of| truth.contains(&of.as_str())));
+    let is_true =
+        (equation.is_some() && !truth.is_empty()).then(|| blocks.iter().any(|of| truth.contains(&of.as_str())));
     let learnt = (LEARN * record.rows.len() as f64) as usize;
     let beyond = if verdict == "unexplained" { hypothesis_beyond(&record, learnt)? } else { [None; 3] };
-    let left: Vec<f64> =
-        hidden.readings.read.iter().zip(&hidden.readings.expected).map(|(read, y)| read - y).collect();
+    let left: Vec<f64> = hidden.readings.read.iter().zip(&hidden.readings.expected).map(|(read, y)| read - y).collect();
     progress.inc(1);
     Ok(Row {
         set: case.set,
@@ -178,7 +179,8 @@ have a block that is true of the law.
     text += "\nFree run over the last 40 % by what was found on the first 60 %, of all unexplained records. `equation` is the extended \
              simulation where the first 60 % have no equation. `diverged` counts as above twice the floor.\n\n";
     let names = ["extended simulation", "best linear model", "equation", "PySINDy", "SysIdentPy"];
-    let lines = names.iter().enumerate().filter(|(place, _)| unexplained.iter().any(|row| row.beyond[*place].is_some()));
+    let lines =
+        names.iter().enumerate().filter(|(place, _)| unexplained.iter().any(|row| row.beyond[*place].is_some()));
     let lines = lines.map(|(place, name)| {
         let error = |row: &&Row| row.beyond[place].map_or(f64::INFINITY, |error| error / row.floor_beyond);
         counts(name, unexplained.iter().map(error).collect())
@@ -187,7 +189,10 @@ have a block that is true of the law.
     let mut seconds: Vec<f64> = unexplained.iter().map(|row| row.seconds).collect();
     seconds.sort_by(f64::total_cmp);
     if let (Some(median), Some(most)) = (seconds.get(seconds.len() / 2), seconds.last()) {
-        let _ = write!(text, "\nCPU time of the diagnosis of an unexplained record: median {median:.1} s, at most {most:.1} s.\n\n");
+        let _ = write!(
+            text,
+            "\nCPU time of the diagnosis of an unexplained record: median {median:.1} s, at most {most:.1} s.\n\n"
+        );
     }
     let line = |row: &&Row| {
         let number = |of: Option<f64>| of.map_or("-".to_owned(), |of| format!("{of:.2}"));
@@ -204,8 +209,20 @@ have a block that is true of the law.
     };
     text += "\n`-` under `true`: no equation, or a law that the grammar cannot hold. Errors in V.\n\n";
     let header = [
-        "law", "true", "blocks", "floor", "held out: extended", "linear", "equation", "last 40 %: floor", "extended", "linear",
-        "equation", "PySINDy", "SysIdentPy", "equation",
+        "law",
+        "true",
+        "blocks",
+        "floor",
+        "held out: extended",
+        "linear",
+        "equation",
+        "last 40 %: floor",
+        "extended",
+        "linear",
+        "equation",
+        "PySINDy",
+        "SysIdentPy",
+        "equation",
     ];
     text + &table(&header, unexplained.iter().map(line))
 }
