@@ -13,6 +13,7 @@ use identify::record::data::Data;
 use identify::record::normalisation::Normalisation;
 use identify::record::observed::Observed;
 use identify::{Input, Options, Stop, Verdict, answer::Equation, diagnose};
+use simulation::plant_file::Reading;
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
@@ -44,7 +45,9 @@ fn record(seed: u64, mut law: impl FnMut(f64, f64, f64) -> f64) -> Record {
         let (time_s, voltage_v) = (ROW_S * row as f64, command(row));
         let dt = ROW_S / PARTS as f64;
         if row > 0 {
-            (1..=PARTS).for_each(|part| drop(law(before, time_s - ROW_S + dt * part as f64, dt)));
+            for part in 1..=PARTS {
+                law(before, time_s - ROW_S + dt * part as f64, dt);
+            }
         }
         before = voltage_v;
         Row { line: row + 2, time_s, voltage_v, measured: Some(law(voltage_v, time_s, 0.0) + noise()) }
@@ -58,9 +61,8 @@ fn spring(state: &mut f64, voltage_v: f64, tau_s: f64, dt: f64) -> f64 {
     voltage_v / 11.0 + *state * 10.0 / 11.0
 }
 
-/// The equation of a record compared with the paper's spring, whatever the verdict would be.
-fn found(record: &Record, effort: Effort, stop: Stop) -> (Option<(Fitted, Equation)>, Budget) {
-    let base = Base::paper();
+/// The equation of a record compared with a spring, whatever the verdict would be.
+fn found(record: &Record, base: &Base, effort: Effort, stop: Stop) -> (Option<(Fitted, Equation)>, Budget) {
     let normalisation = Normalisation::of(record, base.file(), Input::Hold, Units::default());
     let base = base.normalised(&normalisation);
     let data = Data::thinned(&normalisation.record(record), Input::Hold, 1, &normalisation);
@@ -81,7 +83,7 @@ fn found(record: &Record, effort: Effort, stop: Stop) -> (Option<(Fitted, Equati
 }
 
 fn of(record: &Record) -> Option<Equation> {
-    found(record, Effort::Normal, Stop::default()).0.map(|(_, equation)| equation)
+    found(record, &Base::paper(), Effort::Normal, Stop::default()).0.map(|(_, equation)| equation)
 }
 
 fn value(equation: &Equation, name: &str) -> f64 {
@@ -211,14 +213,18 @@ fn records_without_a_departure_have_no_equation() {
     }
 }
 
-/// The same record in other units has the same equation, with its parameters in these units.
+/// The same record and spring in milliseconds and 10 mV have the same equation, with its parameters in these units.
 #[test]
 fn scales_of_time_voltage_and_reading_change_no_equation() {
     let plain = by_direction(7);
     let row = |row: &Row| Row { time_s: 1e-3 * row.time_s, voltage_v: 0.01 * row.voltage_v, ..*row };
     let scaled = Record { name: plain.name.clone(), rows: plain.rows.iter().map(row).collect() };
     let plain_equation = of(&plain).expect("an equation");
-    let equation = of(&scaled).expect("an equation");
+    let mut file = Base::paper().file().clone();
+    file.relaxation.tau_s = vec![5.5e-3];
+    file.reading = Some(Reading { gain: 100.0, zero: 0.0 });
+    let base = Base::new(file).expect("a spring");
+    let (_, equation) = found(&scaled, &base, Effort::Normal, Stop::default()).0.expect("an equation");
     assert_eq!((&equation.text, &equation.blocks), (&plain_equation.text, &plain_equation.blocks));
     let ratio = |name: &str| value(&equation, name) / value(&plain_equation, name);
     for (name, expected) in [("T1", 1e-3), ("a1", 1.0), ("c1", 100.0), ("c2", 100.0)] {
@@ -237,11 +243,11 @@ fn work_is_bounded_and_a_stop_ends_it() {
         spring(&mut state, v + level * v / 100.0, 5.5, dt)
     };
     let wild = record(8, law);
-    let (_, budget) = found(&wild, Effort::Normal, Stop::default());
+    let (_, budget) = found(&wild, &Base::paper(), Effort::Normal, Stop::default());
     assert!(budget.spent() < budget.total() * 11 / 10, "{} of {}", budget.spent(), budget.total());
     let stop = Stop::default();
     stop.request();
-    let (none, budget) = found(&wild, Effort::Normal, stop);
+    let (none, budget) = found(&wild, &Base::paper(), Effort::Normal, stop);
     assert!(none.is_none() && budget.spent() < budget.total() / 20, "{}", budget.spent());
 }
 

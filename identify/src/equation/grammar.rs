@@ -15,10 +15,10 @@ use std::f64::consts::TAU;
 use crate::equation::candidates::{Candidates, SMALL};
 use crate::equation::clock::Term;
 use crate::equation::curve::Curve;
-use crate::equation::lag::By;
-use crate::equation::kind::Kind;
-use crate::equation::operator::Operator;
 use crate::equation::fitted::Fitted;
+use crate::equation::kind::Kind;
+use crate::equation::lag::By;
+use crate::equation::operator::Operator;
 use crate::equation::problem::Problem;
 use crate::equation::scale::Scale;
 use crate::equation::smaller::taken_out;
@@ -100,7 +100,12 @@ impl Grammar<'_> {
         let sum = self.parent.sum_at();
         let mut edits = Vec::new();
         if sum < MOST_IN_SERIES {
-            for starts in [self.candidates.at_times(Kind::Lag, 5.0, &[]), self.candidates.seconds(), self.candidates.delays(), self.candidates.slews()] {
+            for starts in [
+                self.candidates.at_times(Kind::Lag, 5.0, &[]),
+                self.candidates.seconds(),
+                self.candidates.delays(),
+                self.candidates.slews(),
+            ] {
                 edits.push(self.inserted(sum, starts));
             }
             for starts in [self.candidates.curves(), self.candidates.memories(), self.candidates.products()].concat() {
@@ -112,7 +117,13 @@ impl Grammar<'_> {
         }
         let end = self.parent.chain.len();
         if end - sum <= MOST_IN_SERIES {
-            let behind = [vec![self.candidates.slews()], self.candidates.curves(), self.candidates.memories(), self.candidates.products()].concat();
+            let behind = [
+                vec![self.candidates.slews()],
+                self.candidates.curves(),
+                self.candidates.memories(),
+                self.candidates.products(),
+            ]
+            .concat();
             let behind = behind.into_iter().chain(self.gains(parent, problem));
             let behind: Vec<_> = behind.collect();
             edits.extend(behind.into_iter().map(|starts| self.inserted(end, starts)));
@@ -134,7 +145,8 @@ impl Grammar<'_> {
         let lags = self.candidates.at_times(Kind::Lag, 7.0, &[]);
         let behind = |first: &Operator| lags.iter().map(|lag| vec![first.clone(), lag.clone()]).collect::<Vec<_>>();
         let full_v = self.scale.full_v;
-        let dead_bands = [0.15, 0.4].map(|part| self.candidates.operator(Kind::Curve(Curve::DeadBand), &[part * full_v]));
+        let dead_bands =
+            [0.15, 0.4].map(|part| self.candidates.operator(Kind::Curve(Curve::DeadBand), &[part * full_v]));
         let play = |part: f64| vec![self.candidates.operator(Kind::Play, &[part * full_v, 1.0])];
         let travel = |part: f64| vec![self.candidates.operator(Kind::Travel, &[part * full_v, 1.0])];
         let chains: Vec<Vec<Vec<Operator>>> = vec![

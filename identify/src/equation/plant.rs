@@ -5,10 +5,10 @@
 //! ```
 
 use crate::equation::curve::Curve;
-use crate::equation::lag::By;
-use crate::equation::kind::Kind;
-use crate::equation::operator::Operator;
 use crate::equation::fitted::Fitted;
+use crate::equation::kind::Kind;
+use crate::equation::lag::By;
+use crate::equation::operator::Operator;
 use crate::equation::scale::Scale;
 use simulation::plant_file::{Amplifier, Law, Memory, Mode, PlantFile, Relaxation};
 

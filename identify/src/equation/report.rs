@@ -2,9 +2,9 @@
 
 use crate::answer::{Equation, HeldOutErrors};
 use crate::dimension::Dimension;
+use crate::equation::fitted::Fitted;
 use crate::equation::intervals;
 use crate::equation::plant::plant;
-use crate::equation::fitted::Fitted;
 use crate::equation::problem::Problem;
 use crate::equation::search::{Scored, search};
 use crate::equation::starts;

@@ -8,10 +8,10 @@
 //! those that were made from the first start, the simulation as it is given. Of the edits, all are fitted by a few steps, the best of
 //! these to the end, and those are predicted on held-out segments.
 
+use crate::equation::fitted::Fitted;
 use crate::equation::grammar::edits;
 use crate::equation::kind::Kind;
 use crate::equation::operator::Operator;
-use crate::equation::fitted::Fitted;
 use crate::equation::problem::Problem;
 use crate::equation::smaller::taken_out;
 use crate::equation::structure::Structure;

@@ -1,8 +1,8 @@
 //! Edits that make an equation smaller.
 
+use crate::equation::fitted::Fitted;
 use crate::equation::kind::Kind;
 use crate::equation::operator::Operator;
-use crate::equation::fitted::Fitted;
 use crate::equation::problem::Problem;
 use crate::equation::structure::Structure;
 

@@ -2,8 +2,8 @@
 
 use crate::equation::clock::Term;
 use crate::equation::curve::Curve;
-use crate::equation::lag::By;
 use crate::equation::kind::Kind;
+use crate::equation::lag::By;
 use crate::equation::operator::Operator;
 use crate::equation::structure::Structure;
 

@@ -26,9 +26,11 @@ pub(super) fn text(equation: Option<&Equation>, scales: &Scales) -> String {
     match (&equation.plant, &equation.no_plant) {
         (Some(plant), _) => {
             let _ = writeln!(text, "  as a plant file:");
-            plant.lines().for_each(|line| drop(writeln!(text, "    {line}")));
+            plant.lines().for_each(|line| text += &format!("    {line}\n"));
         }
-        (None, Some(reason)) => drop(writeln!(text, "  no plant file: {reason}")),
+        (None, Some(reason)) => {
+            let _ = writeln!(text, "  no plant file: {reason}");
+        }
         (None, None) => (),
     }
     text
