@@ -44,6 +44,12 @@ pub struct Report {
     /// The best linear model of order 1 to 4 on the same held-out segments; `None` if the voltage or the reading never changes, or
     /// under the report's stair.
     pub linear: Option<LinearError>,
+    /// The equation that predicts held-out segments best where no set of causes explains the record, in ASCII mathematics; `None` if
+    /// the record is explained, or no equation predicts better than the extended simulation and every linear model. A hypothesis,
+    /// no finding.
+    pub equation: Option<String>,
+    /// What is known of the equation.
+    pub equation_details: Option<Equation>,
     /// Structure in the residual that no cause explains, in one sentence.
     pub leftover: Option<String>,
     /// Parameters of the noise of the extended simulation.
@@ -91,6 +97,47 @@ pub struct LinearError {
     pub held_out_rmse: f64,
     /// The same on the last 40 % of each record, by a fit to the first 60 %.
     pub last_40_percent_rmse: f64,
+}
+
+/// An equation with its parameters and errors.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Equation {
+    /// The equation in ASCII mathematics, with the names of its parameters.
+    #[serde(skip)]
+    pub text: String,
+    /// Codes of what it has beyond a feedthrough and one lag, each once: `series-lag`, `play`, ...
+    pub blocks: Vec<&'static str>,
+    /// What each function and symbol in it is.
+    pub definitions: Vec<String>,
+    /// Its parameters with their names.
+    #[serde(serialize_with = "by_name")]
+    pub parameters: Vec<(String, Parameter)>,
+    /// Root mean square error in free run, in the reading's unit.
+    pub rmse: f64,
+    /// Root mean square errors on the same held-out segments, in the reading's unit.
+    pub held_out: HeldOutErrors,
+    /// By how much its log-likelihood on these segments exceeds that of the extended simulation, in nats, under the law of its own
+    /// noise.
+    pub nats_over_extended: f64,
+    /// The same over the best linear model.
+    pub nats_over_linear: f64,
+    /// The equation as a plant file, if the tick simulates all of it.
+    pub plant: Option<String>,
+    /// Why there is no plant file.
+    pub no_plant: Option<String>,
+}
+
+/// Root mean square errors of four models on the same held-out segments, in the reading's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct HeldOutErrors {
+    /// The simulation as it is given.
+    pub nominal: f64,
+    /// The simulation extended by the named causes.
+    pub extended: f64,
+    /// The best linear model.
+    pub linear: f64,
+    /// The equation.
+    pub equation: f64,
 }
 
 /// The conclusion on a record.

@@ -53,6 +53,7 @@
 //! | [`noise`] | residuals | the likelihood of readings |
 //! | [`effects`] | | what may be wrong, one file an effect, and sets of effects as models |
 //! | [`fit`] | a model, a record | the likeliest parameters, their intervals, held-out predictions |
+//! | [`equation`] | a record, models to beat | the equation that predicts best where no cause fits |
 //! | [`adequacy`] | a fit | what is left that no effect explains, and where |
 //! | [`search`] | a record | which effects |
 //! | [`verdict`] | a search | what is reported |
@@ -63,6 +64,7 @@ pub mod adequacy;
 pub mod answer;
 pub mod dimension;
 pub mod effects;
+pub mod equation;
 pub mod examine;
 pub mod fit;
 pub mod hypotheses;

@@ -3,6 +3,7 @@
 //! In comes a record with [`Options`], out comes a [`Diagnosis`](crate::verdict::diagnosis::Diagnosis). [`passes`] holds the
 //! passes over the record, in the order in which they run; `several` diagnoses several records of one spring.
 
+mod hypothesis;
 mod options;
 pub mod passes;
 mod several;

@@ -20,6 +20,7 @@ use simulation::record::Record;
 
 use crate::answer::{Nominal, Report, SearchReport, Verdict};
 use crate::effects::index_of;
+use crate::examine::hypothesis::hypothesise;
 use crate::examine::options::Options;
 use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
@@ -53,8 +54,10 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
     let records = std::slice::from_ref(record);
     let mut found = joint(records, options, None, Rivals::Reported, &mut progress)?;
-    compare(&mut found, linear(records, options));
+    let linear = linear(records, options);
+    compare(&mut found, linear.as_ref());
     credibility::unlikely_to_suspects(&mut found.report);
+    hypothesise(&mut found, record, options, linear.as_ref());
     Ok(found)
 }
 

@@ -91,7 +91,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    compare(&mut joint, linear);
+    compare(&mut joint, linear.as_ref());
     credibility::unlikely_to_suspects(&mut joint.report);
     Ok(joint)
 }

@@ -199,6 +199,8 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
 /// The best linear model of some records.
 #[derive(Clone, Debug)]
 pub struct BestLinear {
+    /// Its denominator and delay.
+    pub poles: Poles,
     /// Its order and errors.
     pub error: LinearError,
     /// Readings less predictions by fits without the segment, in the reading's unit.
@@ -219,7 +221,7 @@ pub fn best_linear(records: &[Record], input: Input) -> Option<BestLinear> {
     let (order, held_out_rmse, held_out, fit) = fits.map(with_error).min_by(|a, b| a.1.total_cmp(&b.1))?;
     let last_40_percent_rmse = last_part(&problem, &fit.poles);
     let error = LinearError { order, rmse: root_mean_square(&fit.residual), held_out_rmse, last_40_percent_rmse };
-    Some(BestLinear { error, held_out })
+    Some(BestLinear { poles: fit.poles, error, held_out })
 }
 
 fn check(record: &Record) -> Result<()> {

@@ -6,6 +6,7 @@ use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
 use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, SearchReport, Verdict};
 use crate::dimension::Dimension;
 use crate::effects::model::Model;
+use crate::equation::fitted::Fitted;
 use crate::fit::engine::{Engine, Fit};
 use crate::plant::base::Base;
 use crate::record::data::Data;
@@ -45,6 +46,8 @@ pub struct Diagnosis {
     pub held_out: [Vec<f64>; 2],
     /// The best sets of causes with their scores and errors, the best first.
     pub ranking: Vec<RankedCauses>,
+    /// The equation of the report, fitted in the coordinates of the search; `None` without one.
+    pub equation: Option<Fitted>,
     /// Zero offset of each of several records, in V; empty for a single record.
     pub(crate) zero_offsets: Vec<f64>,
     /// How each reading was taken: exact or at a bound, on a quantisation grid, cut off.
@@ -163,6 +166,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         would_show,
         alternatives,
         linear: None,
+        equation: None,
+        equation_details: None,
         leftover: match spoiling.first() {
             _ if structured => left(),
             Some(spoils) => Some(spoils.sentence(data.scales())),
@@ -182,6 +187,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         plant: export.file,
         held_out,
         ranking,
+        equation: None,
         zero_offsets: engine.zero_offsets(extended),
         observed: observed.clone(),
         held_out_in_place,
@@ -253,6 +259,8 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
             tick_refuses: None,
         },
         linear: None,
+        equation: None,
+        equation_details: None,
         leftover: reason.leftover(),
         noise: noise_report(&baseline.noise),
         residual: residual_report(data, &baseline),
@@ -270,6 +278,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         held_out_in_place: held_out.clone(),
         held_out: [held_out.clone(), held_out],
         ranking: Vec::new(),
+        equation: None,
         zero_offsets: vec![0.0; data.parts.len()],
         observed: engine.observed.clone(),
         base: engine.base().clone(),

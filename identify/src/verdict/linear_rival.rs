@@ -20,7 +20,7 @@ use crate::verdict::diagnosis::Diagnosis;
 const COEFFICIENTS: usize = 4;
 
 /// Adds the best linear model to a diagnosis, which explains nothing if that predicts better.
-pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<BestLinear>) {
+pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
     let Some(linear) = linear else { return };
     let report = &mut diagnosis.report;
     report.linear = Some(linear.error);

@@ -16,8 +16,8 @@ use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
 use validation::campaign::{
-    answer_table, criteria, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps, tables,
-    unforeseen,
+    answer_table, criteria, equation, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps,
+    tables, unforeseen,
 };
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
@@ -41,6 +41,7 @@ Examples:
   cargo campaign --write out/hidden --cause hysteresis --seed 3
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
   cargo campaign rivals                      comparison with PySINDy and SysIdentPy
+  cargo campaign equation                    the same on records that nothing explains
   cargo campaign real FOLDER                 measured records: FOLDER/NAME.csv, with an optional NAME.toml
   cargo campaign instruments                 the same on simulated instruments in their own units
   RAYON_NUM_THREADS=1 cargo campaign speed   CPU time by rows and noise, one record at a time
@@ -56,7 +57,7 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
-    /// unforeseen), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each of two sets
+    /// unforeseen, equation), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each of two sets
     /// (plan), in total (nulls, triples), or times 55 (thresholds) or 455 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
@@ -171,6 +172,8 @@ enum Part {
     Scales,
     /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 8 records of each cause
     Plants,
+    /// Equations of unexplained records, compared with PySINDy and SysIdentPy: 1 record of each law of out-of-model and unforeseen
+    Equation,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
     Rivals,
     /// Six other instruments, simulated, in their own units
@@ -358,6 +361,14 @@ impl Cli {
                     json: json!({"records": outcomes}),
                     figure: None,
                 })
+            }
+            Part::Equation => {
+                let cases = equation::cases(first, self.count(1));
+                let bar = bar("equation", cases.len())?;
+                let rows = equation::run(&cases, true, &bar)?;
+                bar.finish_and_clear();
+                let markdown = equation::page(&rows);
+                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
             }
             Part::Rivals => {
                 let bar = bar("rivals", rivals::RECORDS)?;

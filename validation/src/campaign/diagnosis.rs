@@ -2,11 +2,15 @@
 
 use anyhow::Result;
 use identify::Diagnosis;
+use identify::equation::problem::Problem;
+use identify::equation::scale::Scale;
+use identify::fit::budget::UNLIMITED;
 use identify::fit::engine::Engine;
 use identify::plan::{Basis, Request, plan};
 use identify::plant::base::Base;
 use identify::record::data::Data;
 use identify::record::observed::Observed;
+use identify::stats::scale::root_mean_square;
 #[cfg(feature = "sensitivity")]
 pub use identify::stats::thresholds::vary;
 pub use identify::stats::thresholds::{Threshold, empirical::ALL as THRESHOLDS};
@@ -83,6 +87,61 @@ pub fn predict(hidden: &LabelledRecord, rows: usize) -> Result<(Vec<f64>, Vec<&'
         predicted.iter_mut().for_each(|y| *y = if limit > middle { y.min(limit) } else { y.max(limit) });
     }
     Ok((predicted, identified.report.findings.iter().map(|finding| finding.cause).collect()))
+}
+
+/// What a diagnosis says of a record that it does not explain.
+pub struct Hypothesis {
+    /// Verdict.
+    pub verdict: String,
+    /// The equation; `None` if there is none.
+    pub equation: Option<String>,
+    /// Codes of its blocks.
+    pub blocks: Vec<String>,
+    /// Held-out errors of the extended simulation, the best linear model and the equation, in V.
+    pub held_out: [Option<f64>; 3],
+}
+
+/// The hypothesis of a diagnosis of a record.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn hypothesis(record: &Record) -> Result<Hypothesis> {
+    let report = identify::examine::diagnose(record, &Options::default())?;
+    let details = report.equation_details.as_ref();
+    let extended = details.map_or(report.extended.quality.held_out_rmse, |of| of.held_out.extended);
+    let linear = report.linear.map(|linear| linear.held_out_rmse);
+    let blocks = details.map_or(&[][..], |of| &of.blocks);
+    Ok(Hypothesis {
+        verdict: serde_json::to_value(report.verdict)?.as_str().unwrap_or_default().to_owned(),
+        blocks: blocks.iter().map(|&code| code.to_owned()).collect(),
+        held_out: [Some(extended), linear, details.map(|of| of.held_out.equation)],
+        equation: report.equation,
+    })
+}
+
+/// Root mean square errors beyond the first `rows` rows of a record of what was found on these: of the extended simulation, of the
+/// best linear model, and of the equation, or of the extended simulation if there is none; `None` if a free run diverged.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3]> {
+    let (mut left, identified) = residual(record, rows, &Options::default())?;
+    let extended = root_mean_square(&left.split_off(rows));
+    let whole = identify::nominal::best_linear(std::slice::from_ref(record), identify::Input::Hold);
+    let linear = whole.map(|linear| linear.error.last_40_percent_rmse);
+    let equation = identified.equation.as_ref().map(|fit| {
+        let normalisation = &identified.data.normalisation;
+        let prepared =
+            |record: &Record| Data::thinned(&normalisation.record(record), identify::Input::Hold, 1, normalisation);
+        let first = Record { name: record.name.clone(), rows: record.rows[..rows].to_vec() };
+        let (first, data) = (prepared(&first), prepared(record));
+        let observed = Observed::new(&data);
+        let mut problem = Problem::new(&data, &observed, &UNLIMITED);
+        problem.scale = Scale::of(&first);
+        root_mean_square(&problem.residual(fit).split_off(rows)) * normalisation.scales.reading.abs()
+    });
+    let finite = |error: f64| Some(error).filter(|error| error.is_finite());
+    Ok([finite(extended), linear.and_then(finite), finite(equation.unwrap_or(extended))])
 }
 
 /// Readings less predictions beyond the first `rows` rows of a record, by the model identified on these, in the reading's unit. An

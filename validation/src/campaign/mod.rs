@@ -24,6 +24,7 @@
 //! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made |
 //! | [`reliability`] | stated probabilities compared with frequencies, over all sets |
 //! | [`plan`] | minutes of the next experiment until the diagnosis is right, by schedule |
+//! | [`equation`], [`equation_blocks`] | equations of records that nothing explains, compared with other tools |
 //! | [`rivals`] | other identification tools on the same records |
 //! | [`criteria`], [`tables`] | acceptance criteria; results as Markdown |
 
@@ -34,6 +35,8 @@ pub mod cramer_rao;
 pub mod criteria;
 pub mod detectable;
 pub mod diagnosis;
+pub mod equation;
+pub mod equation_blocks;
 pub mod isolable;
 pub mod mixture;
 pub mod out_of_model;

@@ -8,6 +8,7 @@ use crate::output::files::Files;
 use figures::{Figure, figures};
 use identify::Diagnosis;
 
+mod equation;
 mod extension;
 pub(super) mod figures;
 pub(super) mod number;

@@ -2,6 +2,7 @@
 
 use maud::{Markup, PreEscaped, html};
 
+use crate::output::diagnosis::equation;
 use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::origin::Origin;
@@ -26,6 +27,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         h2 { "Causes" }
         (tables::findings(&report.findings, scales))
         (suspects::section(&report.suspects, scales))
+        (equation::section(report.equation_details.as_ref(), scales))
         (records::section(&report.records, scales))
         h2 { "Readings and simulations" }
         @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }

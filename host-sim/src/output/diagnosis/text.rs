@@ -9,6 +9,7 @@ use identify::effects::{EFFECTS, index_of};
 use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
+use crate::output::diagnosis::equation;
 use crate::output::diagnosis::number::{self, shown_name};
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
@@ -30,6 +31,7 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
         }
     }
     text += &suspects::text(&report.suspects, scales);
+    text += &equation::text(report.equation_details.as_ref(), scales);
     text += &records::text(&report.records, scales);
     let (before, after) = (&report.baseline, &report.extended.quality);
     let extends = !report.findings.is_empty() || !report.take_out.is_empty();
@@ -359,6 +361,8 @@ mod tests {
                 tick_refuses: None,
             },
             linear: None,
+            equation: None,
+            equation_details: None,
             leftover: None,
             noise: NoiseReport { sigma: 1.0, tail: None, memory_rows: 0 },
             residual: ResidualReport { autocorrelation: Vec::new(), input_correlation: Vec::new(), band: 0.0 },
