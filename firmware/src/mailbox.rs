@@ -58,7 +58,7 @@ mod tests {
     use crate::control::{Control, Sensors, Untimed};
     use crate::settings::{SETTINGS, SUPERVISION};
     use link::Telemetry;
-    use model::supervisor;
+    use model::supervisor::{self, Faults};
 
     const DISARM: Command = Command { heard: true, arming: Some(supervisor::Command::Disarm), target: None };
     const ARM: Command =
@@ -117,7 +117,13 @@ mod tests {
         let mut mailbox = Mailbox::EMPTY;
         assert_eq!(mailbox.view(), None);
         for overruns in [3, 4] {
-            let view = View { sample: Telemetry::default(), state: State::Disarmed, refusal: None, overruns };
+            let view = View {
+                sample: Telemetry::default(),
+                state: State::Disarmed,
+                standing: Faults::default(),
+                refusal: None,
+                overruns,
+            };
             mailbox.show(view);
             assert_eq!(mailbox.view(), Some(view));
             assert_eq!(mailbox.take(State::Disarmed), (Command::default(), false), "a view is no command");

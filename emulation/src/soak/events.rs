@@ -159,9 +159,9 @@ impl Events {
     fn monitors(&mut self, wrong: bool) -> Option<Monitors> {
         if wrong {
             let voltage = Volts(Signal::from_bits(self.random.random()));
-            return Some(Monitors { voltage, current_ua: self.random.random() });
+            return Some(Monitors { voltage, current_ua: self.random.random(), supply_mv: self.random.random() });
         }
-        Some(Monitors { voltage: self.applied, current_ua: 0 })
+        Some(Monitors { voltage: self.applied, current_ua: 0, supply_mv: Some(3300) })
     }
 
     fn reading(&mut self, noise: i32) -> Option<Volts> {

@@ -131,7 +131,7 @@ impl Models {
     fn best(&self) -> Option<BestLinear> {
         let errors = self.errors().into_iter().zip(self.fits.iter().skip(1));
         let (error, model) = errors.min_by(|(a, _), (b, _)| a.held_out_rmse.total_cmp(&b.held_out_rmse))?;
-        Some(BestLinear { error, held_out: model.held_out.clone() })
+        Some(BestLinear { poles: model.fit.poles.clone(), error, held_out: model.held_out.clone() })
     }
 
     fn held_out_rmse(&self) -> f64 {

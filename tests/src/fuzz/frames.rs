@@ -11,7 +11,7 @@ pub(super) fn wire(bytes: &[u8]) {
             check_message::<Reply>(&packet);
         }
     }
-    let mut session = Session::new(100);
+    let mut session = Session::new(100, 7);
     for (now, &byte) in (0..).zip(bytes) {
         if let Some(Action::Apply(_)) = session.on_byte(byte, now) {
             let reply = Reply::Telemetry(link::Telemetry { tick: now, ..link::Telemetry::default() });
@@ -36,7 +36,7 @@ fn check_message<M: Message + std::fmt::Debug>(packet: &Packet<'_>) {
         Ok(message) => message,
         Err(Unreadable::Kind | Unreadable::Message | Unreadable::Version(_)) => return,
     };
-    let frame = Frame::new(packet.sequence, &message);
+    let frame = Frame::new(packet.session().stamp(packet.sequence), &message);
     let mut receiver = Receiver::new();
     let again =
         frame.as_bytes().iter().find_map(|&byte| receiver.on_byte(byte).and_then(|packet| packet.read::<M>().ok()));

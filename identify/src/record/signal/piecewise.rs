@@ -71,11 +71,6 @@ impl Signal {
         self.pieces.windows(2).filter(differ).count()
     }
 
-    /// Returns the pieces in order of time.
-    pub fn pieces(&self) -> &[Piece] {
-        &self.pieces
-    }
-
     /// Returns the duration of each piece, in s.
     pub fn durations_s(&self) -> impl Iterator<Item = f64> {
         self.pieces.iter().map(|piece| piece.duration_s)
