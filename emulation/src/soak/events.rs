@@ -159,7 +159,7 @@ impl Events {
     fn monitors(&mut self, wrong: bool) -> Option<Monitors> {
         if wrong {
             let voltage = Volts(Signal::from_bits(self.random.random()));
-            return Some(Monitors { voltage, current_ua: self.random.random(), supply_mv: self.random.random() });
+            return Some(Monitors { voltage, current_ua: self.random.random(), supply_mv: Some(self.random.random()) });
         }
         Some(Monitors { voltage: self.applied, current_ua: 0, supply_mv: Some(3300) })
     }
