@@ -366,7 +366,7 @@ mod tests {
         let path = folder.path().join("mcu");
         let listener = UnixListener::bind(&path).unwrap();
         let thread = std::thread::spawn(move || mcu(listener));
-        let port = Port::open(&format!("unix:{}", path.display()), 115_200).unwrap();
+        let port = Port::open(&format!("unix:{}", path.display()), 115_200, Duration::from_secs(1)).unwrap();
         let (mut client, _) = Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap();
         let first = client.session;
         client.order(Request::Stream { every_ticks: 1 }).unwrap();
