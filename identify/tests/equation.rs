@@ -154,25 +154,21 @@ fn flow_that_is_fast_under_a_large_stress_is_recovered() {
     assert!(at_floor(&equation) && (value(&equation, "a1") - 500.0 / 150.0).abs() < 0.3, "{equation:?}");
 }
 
-/// A play and a curve in front of the relaxation are parts that the tick simulates.
 #[test]
-fn equation_of_the_ticks_own_parts_has_a_plant_file() {
+fn play_in_front_of_the_relaxation_becomes_a_plant_file() {
     let (mut state, mut play) = (0.0, 0.0f64);
     let law = move |v: f64, _: f64, dt: f64| {
         play = play.clamp(v - 40.0, v + 40.0);
-        let x = 0.4 * v + 0.6 * play;
-        spring(&mut state, 500.0 * (x / 500.0).powf(1.4), 5.5, dt)
+        spring(&mut state, 0.4 * v + 0.6 * play, 5.5, dt)
     };
     let equation = of(&record(5, law)).expect("an equation");
-    assert!(at_floor(&equation), "{equation:?}");
-    assert!(equation.blocks.contains(&"play") || equation.blocks.contains(&"drag"), "{equation:?}");
-    if let Some(text) = &equation.plant {
-        let file: simulation::plant_file::PlantFile = toml::from_str(text).expect("a plant file");
-        file.check().expect("a spring that the tick accepts");
-        assert!(file.law.is_some(), "{text}");
-    } else {
-        assert!(equation.no_plant.is_some());
-    }
+    assert_eq!(equation.blocks, ["play"], "{equation:?}");
+    assert!(at_floor(&equation) && (value(&equation, "r1") - 40.0).abs() < 2.0, "{equation:?}");
+    let text = equation.plant.as_ref().expect("a plant file");
+    let file: simulation::plant_file::PlantFile = toml::from_str(text).expect("a plant file");
+    file.check().expect("a spring that the tick accepts");
+    let memory = file.memory.expect("a memory");
+    assert!((memory.weights[0] - 0.6).abs() < 0.05 && (memory.direct + memory.weights[0] - 1.0).abs() < 1e-9, "{text}");
 }
 
 #[test]

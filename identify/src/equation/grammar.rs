@@ -8,6 +8,7 @@
 //! | let a time constant vary | each lag |
 //! | multiply by one plus a chain | in front of the first sum, or behind it |
 //! | add a term | to the readings |
+//! | replace | an operator with memory by another one, a curve or product by a curve |
 //! | take out | each operator, branch or term |
 
 use std::f64::consts::TAU;
@@ -47,6 +48,7 @@ pub(super) fn edits(parent: &Fitted, problem: &Problem) -> Vec<Edit> {
     edits.extend(grammar.in_parallel());
     edits.extend(grammar.within_branches());
     edits.extend(grammar.terms(parent, problem));
+    edits.extend(grammar.replaced());
     edits.extend(taken_out(parent, problem).into_iter().map(|smaller| vec![smaller]));
     edits
 }
@@ -132,6 +134,26 @@ impl Grammar<'_> {
             if end > sum + 1 {
                 edits.push(self.inserted(end, self.candidates.at_times(Kind::Lag, 5.0, &[])));
             }
+        }
+        edits
+    }
+
+    /// Other operators with memory, and other curves, in the place of one.
+    fn replaced(&self) -> Vec<Edit> {
+        let mut edits = Vec::new();
+        for (index, operator) in self.parent.chain.iter().enumerate() {
+            let others = match operator.kind {
+                Kind::Play | Kind::Travel | Kind::Direction => self.candidates.memories(),
+                Kind::Curve(_) | Kind::Times => self.candidates.curves(),
+                _ => continue,
+            };
+            let with = |other: Operator| {
+                let mut structure = self.parent.clone();
+                structure.chain[index] = other;
+                structure
+            };
+            let others = others.into_iter().filter(|starts| starts.iter().all(|other| other.kind != operator.kind));
+            edits.extend(others.map(|starts| starts.into_iter().map(with).collect()));
         }
         edits
     }

@@ -56,7 +56,7 @@ pub fn equation(data: &Data, observed: &Observed, rivals: &Rivals, budget: &Budg
     let value = |residual: &[f64]| law.rescaled(residual, observed).1;
     let over = |residual: &[f64]| value(&best.held_out) - value(residual);
     let nats = [over(rivals.extended_residual), over(rivals.linear_residual)];
-    let price = 0.5 * (rows as f64).ln() * best.fit.structure.parameters(&problem.scale) as f64;
+    let price = 0.5 * (rows as f64).ln() * best.fit.structure.priced(&problem.scale) as f64;
     if nats.iter().any(|nats| *nats < RIVAL_ODDS + price) {
         return None;
     }

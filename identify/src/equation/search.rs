@@ -94,7 +94,7 @@ impl<'p, 'a> Search<'p, 'a> {
     }
 
     fn cost(&self, fit: &Fitted) -> f64 {
-        self.price * fit.structure.parameters(&self.problem.scale) as f64
+        self.price * fit.structure.priced(&self.problem.scale) as f64
     }
 
     /// Log-likelihood of the rows that were fitted, less the price of the parameters.

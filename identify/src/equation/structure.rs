@@ -100,6 +100,14 @@ impl Structure {
         self.linear() + steps + self.coordinates(scale).len()
     }
 
+    /// Returns the number of parameters for the price, in which a frequency or a time of a step that was found among as many as there
+    /// are rows counts as two further ones.
+    pub fn priced(&self, scale: &Scale) -> usize {
+        let in_chain = self.chain.iter().filter(|of| matches!(of.kind, Kind::Swing | Kind::Step)).count();
+        let in_terms = self.terms.iter().filter(|term| !matches!(term, Term::Ramp)).count();
+        self.parameters(scale) + 2 * (in_chain + in_terms)
+    }
+
     /// Returns the codes of what the equation has beyond a feedthrough and one lag, each once. A lag outside of sums is a
     /// `series-lag`, each but the first in a sum a `further-lag`.
     pub fn blocks(&self) -> Vec<&'static str> {
