@@ -373,7 +373,7 @@ mod tests {
         client.requests = MOST_REQUESTS;
         client.order(Request::Heartbeat).unwrap();
         assert!(client.session != first && client.requests < 10, "{} requests", client.requests);
-        drop(client.samples(Duration::ZERO).unwrap());
+        client.samples(Duration::ZERO).unwrap().for_each(drop);
         for _ in 0..3 {
             client.order(Request::Heartbeat).unwrap();
         }
