@@ -68,7 +68,9 @@ impl Candidates<'_> {
     pub(super) fn products(&self) -> Vec<Vec<Operator>> {
         let squared = self.operator(Kind::Curve(Curve::Even), &[1.0]);
         let times = |before: &[Operator]| {
-            let of = |lag: Operator| [SMALL, -SMALL].map(|a| Operator::times(a, [before, &[lag.clone()]].concat()));
+            let of = |lag: Operator| {
+                [SMALL, -SMALL].map(|a| Operator::times(a, [before, std::slice::from_ref(&lag)].concat()))
+            };
             self.at_times(Kind::Lag, 4.0, &[]).into_iter().flat_map(of).collect()
         };
         vec![times(&[]), times(&[squared])]
