@@ -13,8 +13,8 @@ use crate::stats::thresholds::empirical::{LONG_RECORD_ROWS, ROWS_TO_SEARCH};
 use crate::verdict::diagnosis::Diagnosis;
 
 /// Adds the best equation to the diagnosis of a record that is `unexplained`, if one predicts better than the extended simulation
-/// and the best linear model. It may do as much work as the diagnosis; none with [`Effort::Quick`]. Of a long record it takes a part
-/// of the rows.
+/// and the best linear model. It may do the work that the diagnosis has left; none with [`Effort::Quick`]. Of a long record it takes a
+/// part of the rows.
 pub(super) fn hypothesise(diagnosis: &mut Diagnosis, record: &Record, options: &Options, linear: Option<&BestLinear>) {
     let Some(linear) = linear else { return };
     let rows = diagnosis.data.rows();
@@ -42,7 +42,8 @@ pub(super) fn hypothesise(diagnosis: &mut Diagnosis, record: &Record, options: &
         poles: &linear.poles,
         linear_residual: &normalised(&linear.held_out),
     };
-    let budget = Budget::new(options.effort, data.rows(), options.stop.clone());
+    let spent = diagnosis.report.search.work;
+    let budget = Budget::left(options.effort, rows, spent, data.rows(), options.stop.clone());
     let found = equation(&data, &observed, &rivals, &budget);
     diagnosis.report.complete &= !budget.is_stopped();
     let Some((fit, found)) = found else { return };

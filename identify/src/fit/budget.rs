@@ -54,6 +54,11 @@ const SCARCE: f64 = 0.5;
 /// Ratio of the work that a diagnosis may do once a model leaves nothing but noise to the work that it may do if nothing fits.
 const EXTENSION: f64 = 1.15;
 
+/// Work that an effort allows for a record.
+fn work(effort: Effort, rows: usize) -> f64 {
+    WORK * effort.ratio() * (rows as f64 / ROWS).powf(GROWTH).max(1.0)
+}
+
 /// The work that was done and that may be done.
 #[derive(Debug)]
 pub struct Budget {
@@ -90,8 +95,13 @@ impl Budget {
 
     /// Returns the budget for a record with a number of rows; `stop` ends it early.
     pub fn new(effort: Effort, rows: usize, stop: Stop) -> Self {
-        let total = WORK * effort.ratio() * (rows as f64 / ROWS).powf(GROWTH).max(1.0);
-        Self::of(total as u64, Some(stop))
+        Self::of(work(effort, rows) as u64, Some(stop))
+    }
+
+    /// Returns what a diagnosis that has spent some work on a record leaves for a further search, on `rows_searched` of its rows.
+    pub fn left(effort: Effort, rows: usize, spent: u64, rows_searched: usize, stop: Stop) -> Self {
+        let left = (EXTENSION * work(effort, rows)) as u64;
+        Self::of(left.saturating_sub(spent).min(work(effort, rows_searched) as u64), Some(stop))
     }
 
     /// Counts work.
