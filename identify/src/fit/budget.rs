@@ -43,7 +43,7 @@ impl Effort {
 }
 
 /// Work for a record of at most [`ROWS`] rows at the normal effort.
-const WORK: f64 = 530e6;
+const WORK: f64 = 700e6;
 /// Rows up to which the work is constant.
 const ROWS: f64 = 4000.0;
 /// Exponent of the growth with the rows.

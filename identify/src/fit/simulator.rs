@@ -69,7 +69,7 @@ const AMPLIFIER: u64 = 2;
 const STATIC_RESPONSE: u64 = 3;
 const RELAXATION: u64 = 1;
 const RESPONSE: u64 = 4;
-const INITIAL_STATE: u64 = 9;
+const INITIAL_STATE: u64 = 14;
 /// Further work of a piece that is not as long as the one before it.
 const IRREGULAR: f64 = 3.0;
 
