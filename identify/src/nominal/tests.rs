@@ -124,12 +124,12 @@ fn other_laws_of_one_sign_stay_linear() {
 /// Static, mixed and purely delayed springs, of microseconds to days, that follow voltage, magnitude or square.
 #[test]
 fn any_share_any_time_constant_and_any_law_are_identified() {
-    let laws: [(InputLaw, fn(f64) -> f64); 3] = [
-        (InputLaw::Linear, |voltage| voltage),
-        (InputLaw::Even, f64::abs),
-        (InputLaw::Square, |voltage| voltage * voltage / 100.0),
-    ];
-    for (law, of_voltage) in laws {
+    for law in [InputLaw::Linear, InputLaw::Even, InputLaw::Square] {
+        let of_voltage = move |voltage: f64| match law {
+            InputLaw::Linear => voltage,
+            InputLaw::Even => voltage.abs(),
+            InputLaw::Square => voltage * voltage / 100.0,
+        };
         for share in [0.0, 0.3, 0.8, 1.0] {
             for tau_s in [1e-6, 5.5, 3.0 * 86400.0] {
                 let Identified { report, plant, .. } = found(&[of_law(of_voltage, true, share, tau_s)]);

@@ -47,9 +47,7 @@ impl NorFlash for Flash {
     const ERASE_SIZE: usize = PAGE;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        for page in from as usize / PAGE..to as usize / PAGE {
-            Pages::erase(self, SIDES[page])?;
-        }
+        SIDES[from as usize / PAGE..to as usize / PAGE].iter().try_for_each(|side| Pages::erase(self, *side))?;
         Ok(())
     }
 
