@@ -4,7 +4,7 @@
 //! score = log-likelihood of held-out readings - price per parameter,      price = ln(rows) / 2      [nats]
 //! ```
 //!
-//! The best structure that is among the best [`BEAM`] and was not yet edited is edited next, in turn among all structures and among
+//! The best structure that is among the best `BEAM` and was not yet edited is edited next, in turn among all structures and among
 //! those that were made from the first start, the simulation as it is given. Of the edits, all are fitted by a few steps, the best of
 //! these to the end, and those are predicted on held-out segments.
 
