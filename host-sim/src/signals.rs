@@ -72,15 +72,15 @@ fn end(signal: i32) -> ! {
     std::process::exit(128 + signal)
 }
 
-/// Handles the signals from now on, in a thread of its own. A signal that is ignored, as under nohup, stays so.
+/// Handles the signals from now on, in a thread of its own. A SIGHUP that is ignored, as under nohup, stays so.
 ///
 /// # Errors
 /// If the thread cannot be started.
 #[cfg(unix)]
 pub fn handle() -> io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let ignored = ignored();
-    let handled = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored & (1 << (signal - 1)) == 0);
+    let hang_up = (ignored() & (1 << (SIGHUP - 1)) == 0).then_some(SIGHUP);
+    let handled = [SIGINT, SIGTERM].into_iter().chain(hang_up);
     let mut signals = signal_hook::iterator::Signals::new(handled)?;
     let handle = move || {
         for signal in signals.forever() {

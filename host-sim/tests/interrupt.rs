@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use std::fmt::Write;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -29,12 +30,13 @@ fn start(folder: &Path) -> Child {
     let record = folder.join("record.csv");
     write_record(&record);
     let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
-    command.arg("diagnose").arg(&record).args(["--effort", "thorough", "--json", "--out"]).arg(folder.join("out"));
-    let diagnosis = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // The folder is created just before the search.
-    while !folder.join("out").exists() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    command.arg("diagnose").arg(&record).args(["--effort", "thorough", "--progress", "--json", "--out"]);
+    let mut diagnosis = command.arg(folder.join("out")).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut first = String::new();
+    let mut lines = BufReader::new(diagnosis.stderr.take().unwrap());
+    assert!(lines.read_line(&mut first).unwrap() > 0, "no progress is shown");
+    // What follows is read, so that the pipe never fills.
+    std::thread::spawn(move || lines.lines().for_each(drop));
     diagnosis
 }
 
@@ -73,5 +75,5 @@ fn second_ctrl_c_ends_the_program_and_leaves_nothing() {
     let Output { status, stdout, .. } = diagnosis.wait_with_output().unwrap();
     // The report of what was found takes longer than that.
     assert_eq!((status.code(), stdout.len()), (Some(130), 0));
-    assert!(files(&folder.path().join("out")).is_empty());
+    assert_eq!(files(folder.path()), ["record.csv"]);
 }
