@@ -103,7 +103,7 @@ fn a_cause_too_small_for_any_record_alone_is_found_in_all_of_them() {
         names.iter().enumerate().map(|(first, name)| record(name, gain, 5.5, &test(first))).collect();
     for record in &records {
         let alone = diagnose(record, &Options::default()).unwrap();
-        assert!(alone.findings.iter().all(|finding| finding.cause == "reading-offset"), "{:?}", alone.findings);
+        assert!(alone.findings.iter().all(|finding| finding.cause != "gain-error"), "{:?}", alone.findings);
     }
     let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
     assert_eq!((causes(&several), several.report.verdict), (vec!["gain-error"], Verdict::Explained));
