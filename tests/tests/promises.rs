@@ -164,7 +164,7 @@ fn within(fault: Fault) -> String {
         ),
         Fault::Monitor => format!("{driven} ms, {off} ms while the output is off"),
         Fault::Config => "nothing was enabled".into(),
-        Fault::Supply => "at once, by the reset".into(),
+        Fault::Supply => "immediately, by the reset".into(),
     }
 }
 
