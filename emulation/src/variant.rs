@@ -1,5 +1,7 @@
 //! What the image of a variant runs.
 
+use std::ops::RangeInclusive;
+
 use firmware::settings::{self, KILOVOLT};
 use model::{Amplifier, Settings};
 use xtask::variant::{Controller, Limit, Variant};
@@ -13,6 +15,14 @@ pub(crate) const fn settings(variant: Variant) -> Settings {
     match variant.controller {
         Controller::Paper => settings::paper(amplifier),
         Controller::Fast => settings::fast(amplifier),
+    }
+}
+
+/// The number of instructions that a control tick of the image may need, at least and at most, supervisor included.
+pub(crate) const fn instructions(variant: Variant) -> RangeInclusive<u64> {
+    match (variant.controller, variant.limit_v) {
+        (Controller::Paper, _) => 300..=400,
+        (Controller::Fast, _) => 300..=800,
     }
 }
 

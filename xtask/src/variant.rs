@@ -57,9 +57,13 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Two variants that together cover every controller and every amplifier.
-    pub const BOOTED: [Self; 2] =
-        [Self::of(Controller::Paper), Self { controller: Controller::Fast, limit_v: Limit::Kilovolt }];
+    /// Every variant.
+    pub const ALL: [Self; 4] = [
+        Self::of(Controller::Paper),
+        Self { controller: Controller::Paper, limit_v: Limit::Kilovolt },
+        Self::of(Controller::Fast),
+        Self { controller: Controller::Fast, limit_v: Limit::Kilovolt },
+    ];
 
     /// The variant with this controller and the report's amplifier of 700 V.
     pub const fn of(controller: Controller) -> Self {
@@ -68,8 +72,7 @@ impl Variant {
 
     /// Every variant but this one.
     pub fn others(self) -> impl Iterator<Item = Self> {
-        let each = |controller| Limit::ALL.map(|limit_v| Self { controller, limit_v });
-        Controller::ALL.into_iter().flat_map(each).filter(move |other| *other != self)
+        Self::ALL.into_iter().filter(move |other| *other != self)
     }
 
     /// Features of the package `firmware` that the variant needs.
