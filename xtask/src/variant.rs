@@ -106,9 +106,9 @@ mod tests {
     }
 
     #[test]
-    fn booted_variants_cover_every_controller_and_amplifier() {
-        let booted = |choice: &dyn Fn(Variant) -> bool| Variant::BOOTED.into_iter().any(choice);
-        assert!(Controller::ALL.into_iter().all(|controller| booted(&|it| it.controller == controller)));
-        assert!(Limit::ALL.into_iter().all(|limit_v| booted(&|it| it.limit_v == limit_v)));
+    fn every_controller_has_a_variant_for_every_amplifier() {
+        let each = |controller| Limit::ALL.map(|limit_v| Variant { controller, limit_v });
+        assert!(Controller::ALL.into_iter().flat_map(each).eq(Variant::ALL));
+        assert_eq!(Variant::ALL[1].others().count(), 3);
     }
 }
