@@ -34,6 +34,7 @@ def broken(code):
     """Replaces the tick's first instruction."""
 
     def inject(board):
+        board.traps.clear()
         board.uc.mem_write(TICK, code)
         board.uc.ctl_remove_cache(TICK, TICK + 4)
 
@@ -155,7 +156,6 @@ def play(host, fault, until_us, torn=(), before=None, first=None, random_number=
         nonlocal ticks
         ticks += 1
         if fault and ticks == FAULT_TICK:
-            board.traps.clear()
             board.note("injected", ticks)
             return fault(board)
         begin, entries, back = board.now, board.entries, board.uc.reg_read(UC_ARM_REG_LR) & ~1
