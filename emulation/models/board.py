@@ -94,7 +94,7 @@ class Board:
         self.candidate = None
         self.watchdog = None
         self.outside, self.output, self.read_to = None, None, 0
-        self.wants_reset = self.sleeping = False
+        self.wants_reset = self.sleeping = self.trapped = self.sprung = False
         self.cut = None
         self.fault = None
         self.note("reset", cause)

@@ -21,11 +21,11 @@ UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 
 def panic(board):
-    """Calls `panic("injected")` at `injected.rs:7`, its arguments at the end of the stack."""
-    text = b"injected.rs\0injected"
-    board.uc.mem_write(RAM + 0x40, text)
-    board.uc.mem_write(RAM + 0x20, struct.pack("<4I", RAM + 0x40, 11, 7, 1))
-    for reg, value in ((UC_ARM_REG_R0, RAM + 0x4C), (UC_ARM_REG_R1, 8), (UC_ARM_REG_R2, RAM + 0x20)):
+    """Calls `panic("injected")` at `injected.rs:7`, its arguments in memory that the program does not use."""
+    text, place = RAM + 0x1_0000, RAM + 0x1_0020
+    board.uc.mem_write(text, b"injected.rs\0injected")
+    board.uc.mem_write(place, struct.pack("<4I", text, 11, 7, 1))
+    for reg, value in ((UC_ARM_REG_R0, text + 12), (UC_ARM_REG_R1, 8), (UC_ARM_REG_R2, place)):
         board.uc.reg_write(reg, value)
     board.pc = PANIC
 
