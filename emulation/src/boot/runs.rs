@@ -257,7 +257,8 @@ pub(super) fn wrong_clock(events: &Events, image: &[u8], seen_hz: u32) -> Result
     let answers = answers(events)?;
     let refused = Reply::Refused(Reason::Faulted(Fault::SelfTest.into()));
     ensure!(answers.contains(&refused), "arming is not refused: {answers:?}");
-    let reported = |reply: &Reply| matches!(reply, Reply::Fault(report) if report.fault == Fault::SelfTest.into());
+    let reported =
+        |reply: &Reply| matches!(reply, Reply::Fault(report) if report.fault == link::Fault::from(Fault::SelfTest));
     ensure!(answers.iter().any(reported), "the host does not hear of it: {answers:?}");
     Ok(format!("`{line}`; reported on the line, arming is refused, DAC zero and enable off throughout"))
 }
