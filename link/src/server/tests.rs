@@ -211,7 +211,7 @@ fn a_report_of_a_fault_is_repeated_until_the_host_has_heard_of_it() {
     for tick in 1008..3000 {
         assert_eq!(sent(&mut server, tick), None, "{tick}");
     }
-    // A second fault is reported at once, with both.
+    // A second fault is reported immediately, with both.
     let both = View { standing: Faults::NONE.with(Cause::Monitor).with(Cause::Watchdog), ..FAULTED };
     let Some(Reply::Fault(second)) = server.fault(&at(3000, both)).map(reply) else { panic!() };
     assert_eq!((second.number, second.fault, second.standing), (3, Cause::Watchdog.into(), 0x30));

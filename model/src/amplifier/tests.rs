@@ -153,7 +153,7 @@ fn a_limit_is_reported_only_when_it_holds_the_voltage_back() {
     assert_eq!(config.clamp_target(Volts(lowest.0 - step)), (lowest, true));
 }
 
-/// A slew that crosses the whole range in one tick is none; the range alone is reported, in the same tick.
+/// A slew that crosses the whole range in one tick is not a limit; the range alone is reported, in the same tick.
 #[test]
 fn a_jump_over_the_whole_range_is_held_by_its_end_and_not_by_the_slew() {
     // 0.125 V per code, 511.875 V in one tick.
