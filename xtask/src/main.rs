@@ -10,6 +10,7 @@ mod flash;
 mod fuzz;
 mod image;
 mod mutants;
+mod nightly;
 mod reproducible;
 mod sanitize;
 mod sbom;

@@ -7,6 +7,8 @@
 use anyhow::{Context, Result};
 use xtask::shell;
 
+use crate::nightly;
+
 /// Tests of millions of ticks, which Miri would need hours for; their code is reached by others.
 const LONG: &[&str] = &[
     "a_step_response",
@@ -41,9 +43,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let chosen = |name: &str| args.only.as_deref().is_none_or(|only| only == name);
     let target = shell::target_directory()?;
     if chosen("miri") {
-        nightly("miri")?;
+        nightly::install("miri")?;
         for packages in INTERPRETED {
-            let mut command = rustup_cargo();
+            let mut command = nightly::cargo();
             command.args(["miri", "test"]).args(*packages).arg("--");
             LONG.iter().for_each(|name| _ = command.args(["--skip", name]));
             command.env("PROPTEST_CASES", CASES).env("MIRIFLAGS", "-Zmiri-disable-isolation");
@@ -51,35 +53,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         }
     }
     if chosen("address") {
-        nightly("rust-src")?;
+        nightly::install("rust-src")?;
         let host = host()?;
-        let mut command = rustup_cargo();
+        let mut command = nightly::cargo();
         command.args(["test", "-p", "model", "-p", "link", "-p", "firmware", "--tests", "--target", &host]);
         command.env("RUSTFLAGS", "-Zsanitizer=address").env("CARGO_TARGET_DIR", target.join("sanitize"));
         shell::run(&mut command)?;
     }
     println!("no undefined behaviour, no overflow, no invalid access");
     Ok(())
-}
-
-/// Cargo of the nightly toolchain. The one that started this command must not choose the toolchain.
-fn rustup_cargo() -> std::process::Command {
-    let mut command = shell::command("rustup");
-    command.args(["run", "nightly", "cargo"]).env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO").env_remove("RUSTC");
-    command
-}
-
-/// Installs the nightly toolchain with a component if that is missing.
-fn nightly(component: &str) -> Result<()> {
-    let list = ["component", "list", "--installed", "--toolchain", "nightly"];
-    let installed = shell::output(shell::command("rustup").args(list)).unwrap_or_default();
-    if installed.lines().any(|line| line.starts_with(component)) {
-        return Ok(());
-    }
-    eprintln!("sanitize: {component} of the nightly toolchain is missing, installing it");
-    let install = ["toolchain", "install", "nightly", "--profile", "minimal", "--no-self-update", "--component"];
-    shell::run(shell::command("rustup").args(install).args([component, "rust-src"]))
-        .context("a nightly toolchain with Miri is needed")
 }
 
 /// The host's target triple.
