@@ -11,6 +11,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use xtask::shell;
+use xtask::tally::Tally;
 use xtask::tool::Tool;
 
 const TOOL: Tool = Tool { name: "cargo-mutants", version: "26.0.0" };
@@ -68,6 +69,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         }
         let outcomes = Outcomes::read(&out)?;
         println!("{package:<10} {}", outcomes.counts);
+        if args.file.is_empty() {
+            Tally::now(outcomes.counts.named())?.write(&format!("mutants-{package}"))?;
+        }
         all = all.and(&outcomes.counts);
         for missed in outcomes.missed {
             if !listed.contains_key(&missed.key) {
@@ -140,6 +144,17 @@ impl Counts {
             timeout: self.timeout + other.timeout,
             unviable: self.unviable + other.unviable,
         }
+    }
+
+    /// The counts with their names, for `cargo xtask counts`.
+    fn named(&self) -> [(String, u64); 4] {
+        [
+            ("caught", self.caught),
+            ("caught by the time limit", self.timeout),
+            ("not caught", self.missed),
+            ("do not compile", self.unviable),
+        ]
+        .map(|(what, count)| (format!("changes: {what}"), count))
     }
 
     /// Share of the changes that the tests notice; 1 if there are none.

@@ -138,6 +138,7 @@ fn a_power_cut_preserves_the_old_or_the_new_model() {
         }
         before = after;
     }
+    std::println!("count: {cuts} power cuts while a model is written, the old or the new one found each time");
     assert!(cuts > 400 && new_ones >= 3 && old_ones > new_ones, "{cuts} {old_ones} {new_ones}");
 }
 

@@ -339,7 +339,7 @@ fn every_state_and_event_leads_where_the_tables_say_and_only_armed_has_a_voltage
             driven += u32::from(armed);
         }
     }
-    std::println!("{pairs} pairs of state and event, {driven} of them with a voltage");
+    std::println!("count: {pairs} pairs of state and event\ncount: {driven} pairs with a voltage");
     assert_eq!(pairs, 12 * (4 + 1024) * 1296, "a pair is missing");
     assert!(driven > 500, "{driven} pairs with a voltage show little");
 }
