@@ -139,6 +139,7 @@ Examples:
     /// Check licences, duplicates, sources and advisories of all dependencies
     ///
     /// As deny.toml says. Installs cargo-deny under the target directory unless it is there.
+    /// The advisories need RustSec's database from GitHub; without it the rest is checked, and what is missing is said.
     #[command(verbatim_doc_comment)]
     Deny {
         /// Fail if the database of advisories cannot be had
