@@ -87,6 +87,22 @@ mod tests {
         assert_ne!(Nonces::new(u32::MAX).draw(), Nonce::NONE, "the one that would be 0 is left out");
     }
 
+    /// Over many seeds every bit of the nonce changes in half of them, whichever bit of the seed does.
+    #[test]
+    fn each_bit_of_a_seed_changes_each_bit_of_the_nonce_in_half_of_all_seeds() {
+        const SEEDS: u32 = 1000;
+        for bit in 0..32 {
+            let mut changed = [0; 32];
+            for seed in (0..SEEDS).map(|index| index.wrapping_mul(0x9e37_79b9)) {
+                let differ = mixed(seed) ^ mixed(seed ^ 1 << bit);
+                changed.iter_mut().enumerate().for_each(|(at, count)| *count += differ >> at & 1);
+            }
+            // 6 standard deviations of a fair coin, and as much for the function's own bias.
+            let fair = SEEDS * 3 / 10..=SEEDS * 7 / 10;
+            assert!(changed.iter().all(|count| fair.contains(count)), "bit {bit}: {changed:?}");
+        }
+    }
+
     #[test]
     fn seeds_that_differ_by_little_give_other_nonces() {
         let first = |seed| Nonces::new(seed).draw().0;
