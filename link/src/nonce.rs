@@ -77,6 +77,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn no_nonce_repeats_and_none_is_zero() {
         for seed in [0, 7, u32::MAX, u32::MAX - 1000] {
             let mut nonces = Nonces::new(seed);
@@ -89,6 +90,7 @@ mod tests {
 
     /// Over many seeds every bit of the nonce changes in half of them, whichever bit of the seed does.
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn each_bit_of_a_seed_changes_each_bit_of_the_nonce_in_half_of_all_seeds() {
         const SEEDS: u32 = 1000;
         for bit in 0..32 {

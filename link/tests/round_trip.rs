@@ -28,6 +28,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_request_survives_a_round_trip(sequence: u16, session: u32, request in common::request()) {
         let stamp = Nonce(session).stamp(Sequence(sequence));
         let frame = Frame::new(stamp, &request);
@@ -37,6 +38,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_reply_survives_a_round_trip(sequence: u16, session: u32, reply in common::reply()) {
         let stamp = Nonce(session).stamp(Sequence(sequence));
         let frame = Frame::new(stamp, &reply);

@@ -1,28 +1,13 @@
 //! `cargo xtask sanitize`: the tests of the code that the MCU runs, under Miri and under the address sanitizer.
 //!
 //! Both need a nightly toolchain. Miri interprets the program and stops at undefined behaviour: it is some hundred times
-//! slower, so property tests draw few cases and tests of millions of ticks are left out. The address sanitizer runs all
-//! tests. Overflow checks are on in both, as in every test.
+//! slower, so property tests draw few cases, and tests of very many ticks or frames have the attribute
+//! `cfg_attr(miri, ignore)`. The address sanitizer runs all tests. Overflow checks are on in both, as in every test.
 
 use anyhow::{Context, Result};
 use xtask::shell;
 
 use crate::nightly;
-
-/// Tests of millions of ticks, which Miri would need hours for; their code is reached by others.
-const LONG: &[&str] = &[
-    "a_step_response",
-    "the_charge_and_its_mean",
-    "a_lag_of_one_millivolt",
-    "the_gain_is_that_of_the_steady",
-    "an_oscillation",
-    "crossing",
-    "the_mean_slew",
-    "power_cut",
-    "both_stores",
-    "without_an_error",
-    "overflow",
-];
 
 /// Cases of a property test under Miri.
 const CASES: &str = "4";
@@ -46,8 +31,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         nightly::install("miri")?;
         for packages in INTERPRETED {
             let mut command = nightly::cargo();
-            command.args(["miri", "test"]).args(*packages).arg("--");
-            LONG.iter().for_each(|name| _ = command.args(["--skip", name]));
+            command.args(["miri", "test"]).args(*packages);
             command.env("PROPTEST_CASES", CASES).env("MIRIFLAGS", "-Zmiri-disable-isolation");
             shell::run(command.env("CARGO_TARGET_DIR", target.join("miri")))?;
         }

@@ -316,6 +316,7 @@ fn expected(before: &Before, event: &Event) -> (State, Faults, Option<Refusal>) 
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn every_state_and_event_leads_where_the_tables_say_and_only_armed_has_a_voltage() {
     let events = Event::all();
     let (mut pairs, mut driven) = (0, 0);
