@@ -273,6 +273,14 @@ mod tests {
     }
 
     #[test]
+    fn the_page_shows_every_survivor() {
+        let page = fs::read_to_string(shell::root().join("docs/counts.md")).unwrap();
+        for change in listed().unwrap().keys() {
+            assert!(page.contains(&format!("`{change}`")), "{change}");
+        }
+    }
+
+    #[test]
     fn a_change_that_runs_into_the_time_limit_counts_as_caught() {
         let counts = Counts { caught: 94, timeout: 1, missed: 5, unviable: 7 };
         assert_eq!(counts.share(), 0.95);
