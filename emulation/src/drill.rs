@@ -41,7 +41,8 @@ pub(crate) fn all(elf: &Path, bless: bool) -> Result<()> {
         one(elf, fault, bless).with_context(|| format!("drill {name}"))?;
         eprintln!("drill {name}: voltage gone, log as approved");
     }
-    let faults = ("faults injected under QEMU, the voltage gone each time".to_owned(), Mishap::ALL.len() as u64);
+    let faults =
+        ("faults injected under QEMU, the voltage gone each time".to_owned(), FaultInjection::ALL.len() as u64);
     Tally::now([faults])?.write("drill")
 }
 
