@@ -39,6 +39,7 @@ enum Command {
     Reproduce(commands::reproduce::Arguments),
     Stair(commands::stair::Arguments),
     Tune(commands::tune::Arguments),
+    Watch(commands::watch::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -62,6 +63,7 @@ fn main() -> ExitCode {
         Some(Command::Reproduce(arguments)) => commands::reproduce::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
         Some(Command::Tune(arguments)) => commands::tune::run(&arguments),
+        Some(Command::Watch(arguments)) => commands::watch::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),
     };
     exit_code(done)

@@ -15,3 +15,4 @@ mod record_arguments;
 pub(crate) mod reproduce;
 pub(crate) mod stair;
 pub(crate) mod tune;
+pub(crate) mod watch;
