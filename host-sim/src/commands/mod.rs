@@ -3,6 +3,7 @@
 pub(crate) mod beam;
 mod choice;
 pub(crate) mod compare;
+pub(crate) mod completions;
 pub(crate) mod diagnose;
 pub(crate) mod dynamics;
 pub(crate) mod identify;
