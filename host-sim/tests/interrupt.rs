@@ -69,7 +69,7 @@ fn second_ctrl_c_ends_the_program_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let diagnosis = start(folder.path());
     interrupt(&diagnosis);
-    // Two signals at once would be one.
+    // Two signals that arrive together would be one.
     std::thread::sleep(Duration::from_millis(2));
     interrupt(&diagnosis);
     let Output { status, stdout, .. } = diagnosis.wait_with_output().unwrap();

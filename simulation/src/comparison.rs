@@ -1,18 +1,34 @@
 //! All controllers on the same steps, compared with the lower bound for any controller.
 
 use anyhow::Result;
-use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Settings};
+use model::{Amplifier, Approach, Compensation, ExtendedPlant, Feedback, Gains, Settings};
 use serde::Serialize;
 
-use crate::experiment::{Experiment, HasReference, StartsFrom, with_plant};
+use crate::bad_input::BadInput;
+use crate::experiment::{Experiment, HasReference, Run, StartsFrom, with_plant};
 use crate::plant_file::PlantFile;
-use crate::response::Response;
-use crate::response::responses;
-use crate::schedule::Schedule;
+use crate::response::{Response, from_present, measure, responses};
+use crate::schedule::{Change, Schedule};
+use crate::spring_error::{DifferingSpring, SpringError};
+
+/// The spring and its sensor, where they differ from the controllers' model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Actual {
+    /// Relative errors of the spring's parameters.
+    pub spring_error: SpringError,
+    /// Standard deviation of the white noise on a stiffness sensor's readings, one in each tick, in V; `None` without a sensor.
+    pub sensor_noise_v: Option<f64>,
+}
 
 /// The answer of `vsj compare --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
+    /// Relative errors of the spring's parameters; `None` if the spring is the controllers' model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spring_error: Option<SpringError>,
+    /// Standard deviation of the noise on a sensor's readings, in V; `None` without a sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor_noise_v: Option<f64>,
     /// Initial state of the spring for each `bound_t97_s`.
     pub bound_from: StartsFrom,
     /// One entry per amplifier.
@@ -46,11 +62,21 @@ impl Step {
     }
 }
 
-/// Runs the stair of ideal steps on a spring behind each of the amplifiers.
+/// Runs the stair of ideal steps behind each of the amplifiers, on the controllers' model of the spring or on an actual spring. There
+/// each step is measured from the stiffness at its start.
 ///
 /// # Errors
-/// [`crate::bad_input::BadInput`] for settings that the controller rejects.
-pub fn compare(file: &PlantFile, rate_hz: f64, amplifiers: &[Amplifier]) -> Result<Comparison> {
+/// [`BadInput`] for settings that the controller rejects, and for a spring that cannot be.
+pub fn compare(
+    file: &PlantFile,
+    rate_hz: f64,
+    amplifiers: &[Amplifier],
+    actual: Option<&Actual>,
+) -> Result<Comparison> {
+    let differing = actual.map(|actual| DifferingSpring::new(file, &actual.spring_error));
+    differing.iter().try_for_each(DifferingSpring::check)?;
+    let sensor_noise_v = actual.and_then(|actual| actual.sensor_noise_v);
+    let on = differing.as_ref().map(|spring| (spring, sensor_noise_v));
     let settings = |amplifier| Settings {
         rate_hz,
         plant: file.extended(),
@@ -63,25 +89,65 @@ pub fn compare(file: &PlantFile, rate_hz: f64, amplifiers: &[Amplifier]) -> Resu
         // As in `vsj stair`: where the range ends below the limit, only the sampled reference accepts targets at its
         // end.
         let steps = match settings.plant.plain().filter(|_| settings.amplifier.max_v == amplifier.max_v) {
-            Some(plant) => steps(with_plant(&settings, plant))?,
-            None => steps(settings)?,
+            Some(plant) => steps(with_plant(&settings, plant), on)?,
+            None => steps(settings, on)?,
         };
         Ok(AtLimit { limit_v: settings.amplifier.max_v, steps })
     });
     let bound_from = ExtendedPlant::bounds_from(&settings(Amplifier::PAPER));
-    Ok(Comparison { bound_from, limits: limits.collect::<Result<_>>()? })
+    let limits = limits.collect::<Result<_>>()?;
+    Ok(Comparison { spring_error: actual.map(|actual| actual.spring_error), sensor_noise_v, bound_from, limits })
 }
 
-fn steps<P: HasReference>(settings: Settings<P>) -> Result<Vec<Step>> {
+/// A spring that differs from the model, and the noise of its sensor in V, if it has one.
+type On<'a> = (&'a DifferingSpring, Option<f64>);
+
+fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>) -> Result<Vec<Step>> {
     let of = |compensation| {
         let settings = Settings { compensation, ..settings };
         let experiment =
             Experiment { name: "the stair of ideal steps".to_owned(), schedule: Schedule::ideal_stair(), settings };
         let run = experiment.run(|_, _| ())?;
-        Ok::<_, anyhow::Error>((responses(&experiment, &run, &run.with), responses(&experiment, &run, &run.without)))
+        Ok::<_, anyhow::Error>(match on {
+            None => (responses(&experiment, &run, &run.with), responses(&experiment, &run, &run.without)),
+            Some((spring, sensor_noise_v)) => {
+                let without = Experiment {
+                    settings: Settings { compensation: Compensation::None, ..settings },
+                    ..experiment.clone()
+                };
+                (on_spring(&experiment, &run, (spring, sensor_noise_v))?, on_spring(&without, &run, (spring, None))?)
+            }
+        })
     };
     let (paper, none) = of(Compensation::ProportionalIntegral(Gains::PAPER))?;
     let (fast, _) = of(Compensation::TimeOptimal(Approach::DEAD_BEAT))?;
     let together = none.into_iter().zip(paper).zip(fast);
     Ok(together.map(|((none, paper), fast)| Step { none, paper, fast }).collect())
+}
+
+/// Responses of the controller of an experiment on a spring that differs from its model; `run` has the times.
+fn on_spring<P: HasReference>(
+    experiment: &Experiment<P>,
+    run: &Run,
+    (actual, sensor_noise_v): On,
+) -> Result<Vec<Response>> {
+    let Experiment { schedule, settings, .. } = experiment;
+    let interval_s = 1.0 / settings.rate_hz;
+    let feedback = sensor_noise_v.map(|noise_v| Feedback { noise_v, interval_s, ..Feedback::TYPICAL });
+    let settings = Settings { feedback, ..*settings };
+    let config = settings.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
+    let targets = schedule.at_ticks(settings.rate_hz);
+    let samples = actual.closed_loop(&config, &targets, interval_s, sensor_noise_v)?;
+    let changes = schedule.changes();
+    let moved: Vec<Change> = changes.iter().map(|change| from_present(run, &samples, change)).collect();
+    // The bound is that of the spring without its gain.
+    let less = |v: f64| v / actual.gain;
+    let scaled: Vec<Change> =
+        moved.iter().map(|of| Change { from_v: less(of.from_v), to_v: less(of.to_v), ..*of }).collect();
+    let bounds = ExtendedPlant::bounds(&with_plant(&settings, actual.file.extended()), run, &samples, &scaled);
+    let each = changes.iter().zip(&moved).zip(bounds).map(|((change, moved), bound)| {
+        let (from_v, to_v) = (change.from_v, change.to_v);
+        Response { from_v, to_v, ..measure(run, &samples, moved, bound) }
+    });
+    Ok(each.collect())
 }

@@ -13,6 +13,7 @@
 //! | [`run`], [`has_reference`], [`experiment`] | fixed point and reference over a schedule |
 //! | [`open_loop`] | the fixed-point spring alone over a record |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the shortest possible t97 |
+//! | [`spring_error`] | the tick on a spring that differs from its model, with a sensor or without |
 //! | [`comparison`], [`tune`] | controllers compared on the same steps; gains for a spring and the cost of a model error |
 
 pub mod bad_input;
@@ -30,6 +31,7 @@ pub mod response;
 pub mod run;
 pub mod sampled;
 pub mod schedule;
+pub mod spring_error;
 pub mod tune;
 pub mod units;
 

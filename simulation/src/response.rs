@@ -62,6 +62,13 @@ pub fn measure(run: &Run, samples: &[Sample], change: &Change, bound_t97_s: Opti
     }
 }
 
+/// Returns the change from the stiffness that a loop has reached when the target changes, instead of from the old target.
+pub fn from_present(run: &Run, samples: &[Sample], change: &Change) -> Change {
+    // The tick before the target changes.
+    let from_v = samples[run.tick_at(change.start_s).saturating_sub(1)].stiffness.to_f64();
+    Change { from_v, to_v: from_v + change.to_v - change.from_v, ..*change }
+}
+
 /// Responses of one loop of a run to all changes of its target.
 pub fn responses<P: HasReference>(experiment: &Experiment<P>, run: &Run, samples: &[Sample]) -> Vec<Response> {
     let changes = experiment.schedule.changes();

@@ -95,6 +95,38 @@ fn tuned_settings_do_what_is_said_of_them() {
     }
 }
 
+/// Slowest t97 in s, a dash if a step does not reach 97 %, and largest overshoot in percent, of the fast controller up to 1000 V.
+fn fast_on(folder: &Path, options: &[&str]) -> (Option<f64>, f64) {
+    let report = json(folder, &[&["compare", "--limit-v", "1000", "--json"], options].concat());
+    let steps = report["limits"][0]["steps"].as_array().expect("steps");
+    let t97_s: Option<Vec<f64>> = steps.iter().map(|step| step["fast"]["t97_s"].as_f64()).collect();
+    let overshoot = steps.iter().map(|step| number(&step["fast"], "overshoot_percent")).fold(0.0, f64::max);
+    (t97_s.map(|times| times.into_iter().fold(0.0, f64::max)), overshoot)
+}
+
+/// The table of docs/fast-controller.md is what the command computes today; a sensor keeps all steps but those of a weaker spring, which
+/// no controller drives faster, within 0.6 s.
+#[test]
+fn the_documentation_shows_what_an_error_of_the_model_costs_and_a_sensor_saves() {
+    let folder = tempdir().unwrap();
+    let page = fs::read_to_string(docs().join("fast-controller.md")).unwrap();
+    for key in ["tau", "gain", "share"] {
+        for percent in ["10", "-10"] {
+            let error = format!("{key}={percent}");
+            let without = fast_on(folder.path(), &["--spring-error", &error]);
+            let with = fast_on(folder.path(), &["--spring-error", &error, "--sensor-noise", "0.2"]);
+            let cells = |(t97_s, overshoot): (Option<f64>, f64)| {
+                format!("{} | {overshoot:.2}", t97_s.map_or("-".to_owned(), |t97_s| format!("{t97_s:.3}")))
+            };
+            let row = format!("| `{error}` | {} | {} |", cells(without), cells(with));
+            assert!(page.contains(&row), "docs/fast-controller.md lacks: {row}");
+            let limit_s = if error == "gain=-10" { 0.67 } else { 0.6 };
+            assert!(with.0.is_some_and(|t97_s| t97_s < limit_s), "{error}: {with:?}");
+            assert!(with.1 <= without.1.max(2.0), "{error}: {with:?}, without {without:?}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_run_is_one_line_and_exit_code_2() {
     let folder = tempdir().unwrap();
@@ -110,6 +142,10 @@ fn what_cannot_be_run_is_one_line_and_exit_code_2() {
         (&["compare", "--limit-v", "400"], "expected 0 to 400 V"),
         (&["tune", "--plant", "falling.toml"], "--plant: law.stiffness = 250 is not allowed"),
         (&["tune", "--plant", "no.toml"], "no.toml: cannot be read"),
+        (&["compare", "--spring-error", "mass=3"], "`mass=3`: expected tau, gain or share, then `=` and -90 to 900"),
+        (&["compare", "--spring-error", "tau=inf"], "`tau=inf`: expected tau, gain or share"),
+        (&["compare", "--spring-error", "tau=1", "--spring-error", "tau=2"], "time constant twice"),
+        (&["compare", "--sensor-noise", "0"], "--sensor-noise 0: expected 0.001 to 10"),
         (&["compare", "--limit-v", "nan"], "--limit-v: full_scale_v = NaN is not allowed"),
         (&["compare", "--slew-v-per-s", "0"], "--slew-v-per-s: slew_v_per_s = 0 is not allowed"),
         (&["tune", "--limit-v", "2000"], "--limit-v: full_scale_v = 2000 is not allowed"),

@@ -175,7 +175,7 @@ pub(super) fn replayed(events: &Events, image: &[u8]) -> Result<String> {
         .into())
 }
 
-/// A run in which the random number generator delivers nothing: no session could be told from a recorded one, so that
+/// A run in which the random number generator delivers nothing: no session could be distinguished from a recorded one, so that
 /// the chip does not talk.
 pub(super) fn unrandom(events: &Events, image: &[u8]) -> Result<String> {
     events.safe()?;

@@ -191,7 +191,7 @@ impl Watch {
         ensure((voltage_v - applied_v).abs() < 0.51 * amplifier.volts_per_code() + ROUNDING_V, || {
             format!("{voltage_v} V rounded to {applied_v} V")
         })?;
-        // The range wins over the slew: from 0 V its lower end is reached at once.
+        // The range wins over the slew: from 0 V its lower end is reached in one tick.
         let below = (amplifier.min_v + amplifier.volts_per_code() - self.voltage_v).max(0.0);
         let most_v = self.step_v.max(below) + ROUNDING_V;
         ensure((voltage_v - self.voltage_v).abs() <= most_v, || {

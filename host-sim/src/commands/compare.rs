@@ -1,13 +1,17 @@
 //! `vsj compare`: every controller on the same steps.
 
+use std::str::FromStr;
+
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::compare::text;
 use host_sim::output::terminal::{json, print};
 use model::Amplifier;
 use simulation::bad_input;
-use simulation::comparison::compare;
+use simulation::bad_input::{BadInput, excerpt};
+use simulation::comparison::{Actual, compare};
 use simulation::plant_file;
+use simulation::spring_error::{Parameter, SpringError};
 
 use super::option_names::{SETTINGS, named};
 
@@ -17,7 +21,9 @@ use super::option_names::{SETTINGS, named};
 Examples:
   vsj compare                             none, paper, fast at 700 V and 1000 V
   vsj compare --limit-v 850 --slew-v-per-s 500
-  vsj compare --plant spring.toml --json  on another spring")]
+  vsj compare --plant spring.toml --json  on another spring
+  vsj compare --spring-error tau=10       on a spring whose time constant is 10 % larger than the model's
+  vsj compare --spring-error gain=-5 --sensor-noise 0.2  with a stiffness sensor")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
@@ -31,6 +37,12 @@ pub(crate) struct Arguments {
     /// Ticks per second, 100 to 10 000
     #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
+    /// The spring differs from the controllers' model: `tau`, `gain` or `share` is larger by this, -90 to 900 %; repeatable
+    #[arg(long, value_name = "KEY=PERCENT", allow_hyphen_values = true)]
+    spring_error: Vec<ErrorOf>,
+    /// A stiffness sensor is read in each tick, with white noise of this standard deviation in percent of 500 V, 0.001 to 10
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    sensor_noise: Option<f64>,
     /// One JSON object on stdout
     #[arg(long)]
     json: bool,
@@ -38,6 +50,58 @@ pub(crate) struct Arguments {
 
 /// Largest number of amplifiers; each takes a second.
 const MOST_AMPLIFIERS: usize = 16;
+
+/// Voltage of which the noise of a sensor is a percentage: the highest target of the stair.
+const FULL_SCALE_V: f64 = 500.0;
+/// Smallest and largest noise of a sensor, in percent.
+const NOISE_PERCENT: (f64, f64) = (0.001, 10.0);
+/// Smallest and largest error of a parameter, in percent.
+const ERROR_PERCENT: (f64, f64) = (-90.0, 900.0);
+
+/// An error of one parameter of the spring.
+#[derive(Clone, Copy, Debug)]
+struct ErrorOf {
+    parameter: Parameter,
+    error: f64,
+}
+
+impl FromStr for ErrorOf {
+    type Err = BadInput;
+
+    fn from_str(text: &str) -> Result<Self, BadInput> {
+        let refused = || BadInput(format!("`{}`: expected tau, gain or share, then `=` and -90 to 900", excerpt(text)));
+        let (key, percent) = text.split_once('=').ok_or_else(refused)?;
+        let parameter = match key {
+            "tau" => Parameter::TimeConstant,
+            "gain" => Parameter::Gain,
+            "share" => Parameter::Share,
+            _ => return Err(refused()),
+        };
+        let percent: f64 = percent.parse().map_err(|_| refused())?;
+        let allowed = (ERROR_PERCENT.0..=ERROR_PERCENT.1).contains(&percent);
+        if allowed { Ok(Self { parameter, error: percent / 100.0 }) } else { Err(refused()) }
+    }
+}
+
+impl Arguments {
+    /// The spring and its sensor, where they differ from the model.
+    fn actual(&self) -> Result<Option<Actual>> {
+        let mut spring_error = SpringError::default();
+        for ErrorOf { parameter, error } in &self.spring_error {
+            let known = spring_error.of(*parameter);
+            if *known != 0.0 {
+                bad_input!("--spring-error: {} twice; expected each parameter once", parameter.name());
+            }
+            *known = *error;
+        }
+        let sensor_noise_v = self.sensor_noise.map(|percent| percent / 100.0 * FULL_SCALE_V);
+        if let Some(percent) = self.sensor_noise.filter(|of| !(NOISE_PERCENT.0..=NOISE_PERCENT.1).contains(of)) {
+            bad_input!("--sensor-noise {percent}: expected {} to {}", NOISE_PERCENT.0, NOISE_PERCENT.1);
+        }
+        let differs = !self.spring_error.is_empty() || sensor_noise_v.is_some();
+        Ok(differs.then_some(Actual { spring_error, sensor_noise_v }))
+    }
+}
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
@@ -47,6 +111,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
-    let comparison = compare(&file, arguments.rate_hz, &amplifiers).map_err(|error| named(error, SETTINGS))?;
+    let actual = arguments.actual()?;
+    let comparison =
+        compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref()).map_err(|error| named(error, SETTINGS))?;
     print(&if arguments.json { json(&comparison)? } else { text(&comparison) })
 }

@@ -112,7 +112,7 @@ pub struct Client {
     read: VecDeque<u8>,
     bytes: u64,
     samples: VecDeque<Telemetry>,
-    /// The last report of faults that the MCU has not been told of.
+    /// The last report of faults whose receipt the MCU does not know of yet.
     unheard: Option<FaultReport>,
     reports: Vec<FaultReport>,
 }

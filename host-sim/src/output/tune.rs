@@ -6,7 +6,7 @@ use crate::output::cells::{line, optional};
 use crate::output::figure;
 use crate::output::files::Files;
 use paper::figure::Figure;
-use simulation::tune::trade::Parameter;
+use simulation::spring_error::Parameter;
 use simulation::tune::{Margins, Trade, Tuning, Worst};
 
 /// Settings, their performance, and the responses under some model errors.

@@ -70,6 +70,11 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Returns the price of an equation's parameters, in nats: half the logarithm of the number of rows for each.
+    pub(super) fn price(&self, structure: &Structure) -> f64 {
+        0.5 * (self.data.rows().max(2) as f64).ln() * structure.priced(&self.scale) as f64
+    }
+
     fn respond(&self, structure: &Structure) -> Response {
         let response = Response::of(structure, self.source());
         self.budget.spend(response.work);
@@ -104,7 +109,8 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the weights of the rows in a least-squares step around a residual, in 1/V^2; 0 for rows that are not used.
-    fn weights(&self, residual: &[f64], used: &[bool], law: &Noise) -> Vec<f64> {
+    fn weights(&self, residual: &[f64], used: &[bool]) -> Vec<f64> {
+        let (law, _) = self.likelihood(residual, used);
         let even = self.observed.weights.as_deref();
         let weight = |row: usize| {
             let size = even.map_or(1.0, |even| even[row]);
@@ -117,14 +123,17 @@ impl<'a> Problem<'a> {
     /// Evaluates a structure at its coordinates, with the most likely linear coefficients, from the residual of a similar one.
     pub(super) fn evaluate(&self, structure: Structure, used: &[bool], near: &[f64]) -> (Fitted, Response) {
         let response = self.respond(&structure);
-        let (law, _) = self.likelihood(near, used);
-        let weights = self.weights(near, used, &law);
-        let coefficients = self.solve(&response, &weights);
+        (self.solved(structure, &response, used, near), response)
+    }
+
+    /// Returns the equation with the linear coefficients that are most likely for rows weighted as their residual `near` says.
+    fn solved(&self, structure: Structure, response: &Response, used: &[bool], near: &[f64]) -> Fitted {
+        let coefficients = self.solve(response, &self.weights(near, used));
         let prediction = response.prediction(&coefficients);
         let residual: Vec<f64> = self.reading.iter().zip(&prediction).map(|(reading, of)| reading - of).collect();
         let (_, value) = self.likelihood(&residual, used);
         let value = if value.is_finite() { value } else { f64::NEG_INFINITY };
-        (Fitted { structure, coefficients, residual, value }, response)
+        Fitted { structure, coefficients, residual, value }
     }
 
     /// Solves for the linear coefficients by weighted least squares.
@@ -178,8 +187,10 @@ impl<'a> Problem<'a> {
     /// Refines a structure by at most `rounds` steps on the rows that are used.
     pub fn fit(&self, structure: Structure, used: &[bool], near: &[f64], rounds: usize) -> Fitted {
         let (mut fit, mut response) = self.evaluate(structure, used, near);
-        // Robust weights of the fit itself.
-        (fit, response) = self.better_coefficients(fit, response, used);
+        let reweighted = self.solved(fit.structure.clone(), &response, used, &fit.residual);
+        if reweighted.value > fit.value {
+            fit = reweighted;
+        }
         let mut damping = 1e-3;
         for _ in 0..rounds {
             if self.budget.is_over() || !fit.value.is_finite() {
@@ -189,8 +200,7 @@ impl<'a> Problem<'a> {
             if places.is_empty() {
                 break;
             }
-            let (law, _) = self.likelihood(&fit.residual, used);
-            let weights = self.weights(&fit.residual, used, &law);
+            let weights = self.weights(&fit.residual, used);
             let (normal, gradient) = self.projected(&jacobian, &response.columns, &weights, &fit.residual);
             let coordinates = fit.structure.coordinates(&self.scale);
             let mut gained = 0.0;
@@ -220,17 +230,6 @@ impl<'a> Problem<'a> {
             }
         }
         fit
-    }
-
-    /// Solves for the linear coefficients again, with the weights of the fit's own residual.
-    fn better_coefficients(&self, fit: Fitted, response: Response, used: &[bool]) -> (Fitted, Response) {
-        let (law, _) = self.likelihood(&fit.residual, used);
-        let weights = self.weights(&fit.residual, used, &law);
-        let coefficients = self.solve(&response, &weights);
-        let prediction = response.prediction(&coefficients);
-        let residual: Vec<f64> = self.reading.iter().zip(&prediction).map(|(reading, of)| reading - of).collect();
-        let (_, value) = self.likelihood(&residual, used);
-        if value > fit.value { (Fitted { coefficients, residual, value, ..fit }, response) } else { (fit, response) }
     }
 
     /// Returns the normal equations of the coordinates after the linear coefficients are eliminated.

@@ -39,8 +39,7 @@ pub struct Rivals<'a> {
 
 /// Searches the best equation of a normalised record; `None` if none beats both rivals beyond chance, or the work was used up.
 pub fn equation(data: &Data, observed: &Observed, rivals: &Rivals, budget: &Budget) -> Option<(Fitted, Equation)> {
-    let rows = data.rows();
-    if rows < SEGMENTS || data.is_joined() {
+    if data.rows() < SEGMENTS || data.is_joined() {
         return None;
     }
     let problem = Problem::new(data, observed, budget);
@@ -56,8 +55,8 @@ pub fn equation(data: &Data, observed: &Observed, rivals: &Rivals, budget: &Budg
     let value = |residual: &[f64]| law.rescaled(residual, observed).1;
     let over = |residual: &[f64]| value(&best.held_out) - value(residual);
     let nats = [over(rivals.extended_residual), over(rivals.linear_residual)];
-    let price = 0.5 * (rows as f64).ln() * best.fit.structure.priced(&problem.scale) as f64;
-    if nats.iter().any(|nats| *nats < RIVAL_ODDS + price) {
+    let needed = RIVAL_ODDS + problem.price(&best.fit.structure);
+    if nats.iter().any(|nats| *nats < needed) {
         return None;
     }
     let report = reported(&problem, &best, rivals, nats);

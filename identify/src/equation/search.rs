@@ -83,30 +83,23 @@ pub(super) fn search(problem: &Problem, starts: Vec<Structure>) -> Option<Scored
 struct Search<'p, 'a> {
     problem: &'p Problem<'a>,
     used: Vec<bool>,
-    /// Price of one parameter, in nats.
-    price: f64,
 }
 
 impl<'p, 'a> Search<'p, 'a> {
     fn new(problem: &'p Problem<'a>) -> Self {
-        let price = 0.5 * (problem.reading.len().max(2) as f64).ln();
-        Self { problem, used: problem.used(None), price }
-    }
-
-    fn cost(&self, fit: &Fitted) -> f64 {
-        self.price * fit.structure.priced(&self.problem.scale) as f64
+        Self { problem, used: problem.used(None) }
     }
 
     /// Log-likelihood of the rows that were fitted, less the price of the parameters.
     fn worth(&self, fit: &Fitted) -> f64 {
-        fit.value - self.cost(fit)
+        fit.value - self.problem.price(&fit.structure)
     }
 
     fn scored(&self, fit: Fitted) -> Scored {
         let observed = self.problem.observed;
         let held_out = self.problem.held_out(&fit, ROUNDS.3);
         let law = Noise::robust(&observed.uncensored(&observed.errors(&held_out)));
-        let score = law.log_likelihood(&held_out, observed) - self.cost(&fit);
+        let score = law.log_likelihood(&held_out, observed) - self.problem.price(&fit.structure);
         Scored { fit, held_out, score, edited: false, of_first_start: false }
     }
 
@@ -132,7 +125,8 @@ impl<'p, 'a> Search<'p, 'a> {
             tried.truncate(count);
             tried = tried.iter().map(|fit| self.refined(fit, rounds)).collect();
         }
-        let needed = |fit: &Fitted| if self.cost(fit) > self.cost(parent) { NEEDED } else { -NEEDED };
+        let price = |fit: &Fitted| problem.price(&fit.structure);
+        let needed = |fit: &Fitted| if price(fit) > price(parent) { NEEDED } else { -NEEDED };
         tried.retain(|fit| self.worth(fit) > self.worth(parent) + needed(fit));
         for fit in tried {
             if problem.budget.is_over() {

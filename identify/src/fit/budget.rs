@@ -51,7 +51,8 @@ const GROWTH: f64 = 0.55;
 /// Fraction of a search's budget after which it only follows the most promising extensions.
 const SCARCE: f64 = 0.5;
 
-/// Ratio of the work that a diagnosis may do once a model leaves nothing but noise to the work that it may do if nothing fits.
+/// Ratio of the largest work on a record to the work that a diagnosis may do if nothing fits: the rest is for a diagnosis once a
+/// model leaves nothing but noise, or for the search of an equation (see [`Budget::left`]).
 const EXTENSION: f64 = 1.15;
 
 /// Work that an effort allows for a record.

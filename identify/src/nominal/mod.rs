@@ -118,12 +118,7 @@ impl Models {
 
     /// Errors of the best model of each order from 1.
     fn errors(&self) -> Vec<LinearError> {
-        let error = |(order, model): (usize, &Model)| LinearError {
-            order,
-            rmse: root_mean_square(&model.fit.residual),
-            held_out_rmse: root_mean_square(&model.held_out),
-            last_40_percent_rmse: model.last_part,
-        };
+        let error = |(order, model): (usize, &Model)| error(order, &model.fit, &model.held_out, model.last_part);
         self.fits.iter().enumerate().skip(1).map(error).collect()
     }
 
@@ -136,6 +131,15 @@ impl Models {
 
     fn held_out_rmse(&self) -> f64 {
         root_mean_square(&self.fits[self.chosen].held_out)
+    }
+}
+
+fn error(order: usize, fit: &Fit, held_out: &[f64], last_part: f64) -> LinearError {
+    LinearError {
+        order,
+        rmse: root_mean_square(&fit.residual),
+        held_out_rmse: root_mean_square(held_out),
+        last_40_percent_rmse: last_part,
     }
 }
 
@@ -214,13 +218,10 @@ pub fn best_linear(records: &[Record], input: Input) -> Option<BestLinear> {
     }
     let problem = Problem::new(records.iter().map(|record| Series::new(record, input)).collect());
     let fits = best_of_each_order(&problem).into_iter().enumerate().skip(1);
-    let with_error = |(order, fit): (usize, Fit)| {
-        let held_out = held_out_residual(&problem, &fit);
-        (order, root_mean_square(&held_out), held_out, fit)
-    };
-    let (order, held_out_rmse, held_out, fit) = fits.map(with_error).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let last_40_percent_rmse = last_part(&problem, &fit.poles);
-    let error = LinearError { order, rmse: root_mean_square(&fit.residual), held_out_rmse, last_40_percent_rmse };
+    let with_error = |(order, fit): (usize, Fit)| (order, held_out_residual(&problem, &fit), fit);
+    let square = |of: &[f64]| dot(of, of);
+    let (order, held_out, fit) = fits.map(with_error).min_by(|a, b| square(&a.1).total_cmp(&square(&b.1)))?;
+    let error = error(order, &fit, &held_out, last_part(&problem, &fit.poles));
     Some(BestLinear { poles: fit.poles, error, held_out })
 }
 

@@ -131,6 +131,7 @@ pub(crate) fn subtract_estimate(
     subtract(&start_v, kernels, residual);
     0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * dot(&start_v, &start_v) / reach_v.powi(2)
 }
+
 fn subtract(start: &[f64], kernels: &[Vec<f64>], from: &mut [f64]) {
     for (start, kernel) in start.iter().zip(kernels) {
         from.iter_mut().zip(kernel).for_each(|(left, kernel)| *left -= start * kernel);

@@ -63,8 +63,8 @@ fn suspect(search: &mut Search<Engine>, best: &Scored, effect: usize, set: &Scor
         return None;
     }
     let engine = search.evaluator();
-    let judge = if engine.held_out_informs(&set.fit, effect) { Judge::HeldOut } else { Judge::LeaveOneOut };
-    let [rmse_before, rmse_after] = [&without, set].map(|scored| error(engine, &scored.fit, judge));
+    let informs = engine.held_out_informs(&set.fit, effect);
+    let [rmse_before, rmse_after] = [&without, set].map(|scored| error(engine, &scored.fit, informs));
     let others = effects(&set.fit.model).into_iter().filter(|other| *other != effect);
     Some(Suspect {
         cause: EFFECTS[effect].cause(),
@@ -73,7 +73,7 @@ fn suspect(search: &mut Search<Engine>, best: &Scored, effect: usize, set: &Scor
         rmse_before,
         rmse_after,
         nats_short: (best.score - set.score).max(0.0),
-        judge,
+        judge: if informs { Judge::HeldOut } else { Judge::LeaveOneOut },
         probability: None,
     })
 }
@@ -85,12 +85,8 @@ fn is_seen(without: &Fit, with: &Fit) -> bool {
     gain.max(with.white_noise_log_likelihood - without.white_noise_log_likelihood) > NATS_WITHIN_INTERVAL
 }
 
-/// Root mean square error of a fit as a judge measures it, in V.
-fn error(engine: &mut Engine, fit: &Fit, judge: Judge) -> f64 {
-    let residual = match judge {
-        Judge::HeldOut => engine.held_out_residual(fit),
-        Judge::LeaveOneOut => engine.leave_one_out_residual(fit),
-        Judge::Fit => fit.residual.clone(),
-    };
+/// Root mean square error of a fit in V, of held-out segments or of single readings.
+fn error(engine: &mut Engine, fit: &Fit, of_segments: bool) -> f64 {
+    let residual = if of_segments { engine.held_out_residual(fit) } else { engine.leave_one_out_residual(fit) };
     rms(engine.observed, &residual)
 }

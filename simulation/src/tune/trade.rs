@@ -8,36 +8,11 @@ use serde::Serialize;
 
 use crate::experiment::{Run, Sample};
 use crate::plant_file::PlantFile;
-use crate::response::measure;
-use crate::sampled::{self, Spring};
-use crate::schedule::{Change, Schedule};
+use crate::response::{from_present, measure};
+use crate::sampled;
+use crate::schedule::Schedule;
+use crate::spring_error::{DifferingSpring, Parameter, SpringError};
 use crate::tune::worst::Worst;
-
-/// A parameter of the spring that differs from the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Parameter {
-    /// The instantaneous share, at constant settled value.
-    Share,
-    /// All time constants.
-    TimeConstant,
-    /// The gain of the whole response.
-    Gain,
-}
-
-impl Parameter {
-    /// All parameters.
-    pub const ALL: [Self; 3] = [Self::Share, Self::TimeConstant, Self::Gain];
-
-    /// Name for texts and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Share => "share",
-            Self::TimeConstant => "time constant",
-            Self::Gain => "gain",
-        }
-    }
-}
 
 /// Both controllers on a spring that differs from their model.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -67,64 +42,20 @@ pub(super) fn over_model_errors(file: &PlantFile, with_gains: Option<&Run>, fast
 
 /// Worst response when the voltages of `run` drive a spring that differs from the file's.
 fn with_model_error(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> Worst {
-    let (spring, gain) = differing_spring(file, parameter, 1.0 + error);
+    let mut errors = SpringError::default();
+    *errors.of(parameter) = error;
+    let differing = DifferingSpring::new(file, &errors);
     let times: Vec<f64> = (0..run.with.len()).map(|tick| run.time_s(tick)).collect();
     let volts: Vec<f64> = run.with.iter().map(|sample| sample.applied.to_f64()).collect();
-    let stiffness = sampled::simulate(&spring, &times, &volts);
+    let stiffness = sampled::simulate(&differing.spring(), &times, &volts);
     let answered = |(sample, stiffness): (&Sample, f64)| Sample {
-        stiffness: ScaledStiffness(model::units::Signal::saturating_from_num(gain * stiffness)),
+        stiffness: ScaledStiffness(model::units::Signal::saturating_from_num(differing.gain * stiffness)),
         ..*sample
     };
     let samples: Vec<Sample> = run.with.iter().zip(stiffness).map(answered).collect();
     let each = Schedule::ideal_stair().changes().into_iter().map(|change| {
-        // The tick before the target changes.
-        let from_v = samples[run.tick_at(change.start_s).saturating_sub(1)].stiffness.to_f64();
-        let moved = Change { from_v, to_v: from_v + change.to_v - change.from_v, ..change };
-        let response = measure(run, &samples, &moved, None);
+        let response = measure(run, &samples, &from_present(run, &samples, &change), None);
         (response.t97_s, response.overshoot_percent)
     });
     Worst::of(each)
-}
-
-/// A spring whose `parameter` is `factor` times the file's, and the gain of its response.
-fn differing_spring(file: &PlantFile, parameter: Parameter, factor: f64) -> (Spring, f64) {
-    let mut file = file.clone();
-    let relaxation = &mut file.relaxation;
-    match parameter {
-        Parameter::Gain => return (Spring::from(file.extended()), factor),
-        Parameter::TimeConstant => {
-            relaxation.tau_s.iter_mut().chain(&mut relaxation.tau_high_s).for_each(|tau| *tau *= factor);
-        }
-        Parameter::Share => {
-            let share = relaxation.share * factor;
-            let later: f64 = relaxation.weights.iter().sum();
-            if later != 0.0 {
-                let left = (later + relaxation.share - share) / later;
-                relaxation.weights.iter_mut().for_each(|weight| *weight *= left);
-            }
-            relaxation.share = share;
-        }
-    }
-    (Spring::from(file.extended()), 1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use model::Plant;
-
-    /// The settled value is independent of share and time constants.
-    #[test]
-    fn share_and_time_constant_do_not_change_the_settled_value() {
-        let text = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = [2.0, 9.0]\nweights = [0.5, 0.3]\n";
-        for file in [PlantFile::from(Plant::PAPER), crate::plant_file::parse("two lags", text).unwrap()] {
-            let settled = |spring: &Spring| sampled::simulate(spring, &[0.0, 1e4], &[100.0, 100.0])[1];
-            let nominal = settled(&Spring::from(file.extended()));
-            for parameter in Parameter::ALL {
-                let (spring, gain) = differing_spring(&file, parameter, 1.4);
-                let expected = if parameter == Parameter::Gain { 1.4 * nominal } else { nominal };
-                assert!((gain * settled(&spring) - expected).abs() < 1e-6, "{parameter:?}");
-            }
-        }
-    }
 }

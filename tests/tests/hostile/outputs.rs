@@ -147,7 +147,7 @@ fn a_signal_at_any_moment_leaves_old_results_or_new_ones_and_no_temporary_file()
             let path = folder.path().join(&out);
             fs::create_dir(&path).expect("there is room");
             for result in results {
-                // Marked, to be told from what the run writes.
+                // Marked, to be distinguished from what the run writes.
                 let copy = [&fs::read(old.join(result)).expect("it is written")[..], b"\n"].concat();
                 fs::write(path.join(result), copy).expect("there is room");
             }

@@ -42,8 +42,13 @@ impl Factors {
     }
 
     fn differ_from(&self, duration_s: f64) -> bool {
-        (duration_s - self.duration_s).abs() > SAME_DURATION * duration_s
+        differ(duration_s, self.duration_s)
     }
+}
+
+/// True if pieces of two durations, in s, need different factors.
+fn differ(duration_s: f64, known_s: f64) -> bool {
+    (duration_s - known_s).abs() > SAME_DURATION * duration_s
 }
 
 impl Lag {
@@ -120,10 +125,9 @@ fn pass_bank<const N: usize>(pieces: &mut [Piece], share: f64, lags: &[(f64, Lag
     for pieces in pieces.chunks_mut(PIECES_TO_CHECK) {
         for piece in pieces {
             let Piece { duration_s, from, to } = *piece;
-            let differs = |known_s: f64| (duration_s - known_s).abs() > SAME_DURATION * duration_s;
-            if differs(known[last].0) {
+            if differ(duration_s, known[last].0) {
                 last ^= 1;
-                if differs(known[last].0) {
+                if differ(duration_s, known[last].0) {
                     known[last] = (duration_s, BankFactors::of(duration_s, lags));
                 }
             }
@@ -194,6 +198,7 @@ mod tests {
         assert!((signal.pieces[10].from - 2.0 * f64::exp(-10.0 / 3.0)).abs() < 1e-12);
         assert_eq!((signal.pieces[999].from, signal.pieces[999].to), (0.0, 0.0));
     }
+
     #[test]
     fn lag_is_exact_for_steps_and_ramps() {
         let mut lag = Lag::at(5.5, 0.0);
