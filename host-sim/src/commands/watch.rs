@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use host_sim::output::terminal::{print, remark};
 use host_sim::signals;
@@ -105,7 +105,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if let Some(board) = &board {
         settings.port.clone_from(&board.port);
     }
-    let connection = settings.connect().with_context(|| settings.port.clone())?;
+    let connection = settings.connect()?;
     let (lowest_v, highest_v) = (connection.1.lowest.to_f64(), connection.1.highest.to_f64());
     if arguments.input != "stair" {
         settings.schedule.1.check_range(&arguments.input, lowest_v, highest_v)?;

@@ -13,9 +13,9 @@
 //! | --- | --- |
 //! | [`message`] | what the worker reports, and what it is told |
 //! | [`worker`] | the thread that owns the connection: requests, telemetry, schedule, reconnection |
-//! | [`recorder`] | the files that are written meanwhile |
-//! | [`history`] | the samples of the last minutes, and those of them that a plot shows |
-//! | [`view`], [`keys`] | the state of the screen: events and keys in, orders out; no clock, no port, no terminal |
+//! | `recorder` | the files that are written meanwhile |
+//! | `history` | the samples of the last minutes, and those of them that a plot shows |
+//! | [`view`], `keys` | the state of the screen: events and keys in, orders out; no clock, no port, no terminal |
 //! | [`draw`] | the state as text and plots, for any size of the terminal |
 //! | [`terminal`] | the full screen, and how it is left, also after a panic |
 //! | [`session`] | the loop that joins them, on a full screen or line by line |

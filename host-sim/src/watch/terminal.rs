@@ -9,7 +9,9 @@ use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::cursor::Show;
 use ratatui::crossterm::execute;
-use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
+use ratatui::crossterm::terminal::{
+    Clear, ClearType, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
+};
 
 use crate::signals;
 
@@ -41,7 +43,8 @@ impl FullScreen {
         IS_FULL.store(true, Ordering::SeqCst);
         // From here on dropping it restores the terminal.
         let screen = Self { terminal: Terminal::new(CrosstermBackend::new(stdout()))? };
-        execute!(stdout(), EnterAlternateScreen)?;
+        // A terminal without a second screen would still show what was on it before.
+        execute!(stdout(), EnterAlternateScreen, Clear(ClearType::All))?;
         Ok(screen)
     }
 

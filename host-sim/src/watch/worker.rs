@@ -4,7 +4,7 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use link::{Desired, Reason, Request, State, Status};
 use simulation::schedule::{Reader, Schedule};
 
@@ -46,7 +46,7 @@ impl Settings {
     /// [`simulation::BadInput`] if the port cannot be opened, [`Failure`] if the MCU does not answer.
     pub fn connect(&self) -> Result<(Client, Status)> {
         let port = Port::open(&self.port, self.baud, self.timeout)?;
-        Ok(Client::greet(port, Patience::of(self.timeout))?)
+        Client::greet(port, Patience::of(self.timeout)).with_context(|| self.port.clone())
     }
 }
 
