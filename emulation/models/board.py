@@ -2,7 +2,8 @@
 
 Registers and bits are those that the hardware library uses, as far as the image does; exceptions are ARMv7-M's. Every
 instruction takes one cycle of 170 MHz, a sleeping core skips to the next interrupt; a started clock, a calibration and
-a conversion are ready immediately. No MPU, no flash wait states, no analogue; the core itself stays in thread mode.
+a conversion are ready immediately. The MPU has one region, without access. No flash wait states, no analogue; the core
+itself stays in thread mode.
 """
 
 import random
@@ -12,7 +13,7 @@ from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn import UC_HOOK_BLOCK, UC_HOOK_CODE, UC_HOOK_INTR, UC_HOOK_MEM_READ, UC_HOOK_MEM_WRITE
 from unicorn.arm_const import *
 
-from peripherals import SysTick, Timer, Uart
+from peripherals import Capture, SysTick, Timer, Uart
 
 HZ = 170_000_000
 FLASH, RAM, RAM_SIZE = 0x0800_0000, 0x2000_0000, 128 * 1024
@@ -27,13 +28,17 @@ RNG, VREFINT_CAL = 0x5006_0800, 0x1FFF_75AA
 RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0800, 0x5000_0000
 GPIO = 0x4800_0000
 TIM15, TIM15_IRQ = 0x4001_4000, 24  # Used by the time driver.
+TIM16 = 0x4001_4400
 LPUART1_IRQ = 91
 SCS = 0xE000_E000
 SYSTICK_IRQ = -1  # Exception 15.
 NMI_IRQ = -14  # Exception 2.
 BAUD = 115_200  # Baud rate of the host.
 VREFINT = 1.212  # Volts of the internal reference.
+LSI = 32_000  # Hz.
+BROWN_OUT = 4  # Level of the brown-out reset, FLASH_OPTR.BOR_LEV.
 MONITOR_SCALE = 1000  # Volts of the amplifier at the ADC's full range.
+MPU = 0xE000_ED90
 ENABLE, INTERLOCK = (1, 5), (1, 10)  # Port and pin.
 
 
@@ -51,7 +56,9 @@ class Board:
         self.traps, self.trapped, self.sprung = {}, False, False
         self.closed, self.monitors, self.full_scale = True, {}, full_scale
         self.random_number, self.supply = random_number, 3.3
+        self.lsi, self.brown_out = LSI, BROWN_OUT
         self.now, self.end, self.deadline = 0, 0, 0
+        self.guard, self.entries = None, 0
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M4)
         uc.mem_map(FLASH, 512 * 1024)
@@ -76,7 +83,9 @@ class Board:
     def reset(self, cause):
         """Resets the chip. `cause` is the flag in RCC_CSR. The memory keeps its content."""
         # Two banks of flash, as the chip is delivered: FLASH_OPTR.DBANK.
-        self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF, FLASH_OPTR: 1 << 22}
+        options = 1 << 22 | self.brown_out << 8
+        self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF, FLASH_OPTR: options}
+        self.capture = Capture(self.lsi and HZ / self.lsi, lambda: self.regs.get(RCC + 0x94, 0) & 1 and self.regs.get(RCC + 0x60, 0) >> 17 & 1)
         self.timer = Timer()
         self.timer.at = self.now
         self.systick = SysTick()
@@ -85,7 +94,7 @@ class Board:
         self.candidate = None
         self.watchdog = None
         self.outside, self.output, self.read_to = None, None, 0
-        self.wants_reset = self.sleeping = False
+        self.wants_reset = self.sleeping = self.trapped = self.sprung = False
         self.cut = None
         self.fault = None
         self.note("reset", cause)
@@ -137,6 +146,31 @@ class Board:
     def tear(self, at):
         """From now on a word of the flash has two wrong bits."""
         self.uc.hook_add(UC_HOOK_MEM_READ, lambda *_: self.two_wrong_bits(), begin=at, end=at + 7)
+
+    def stick(self, at, bit):
+        """From now on a bit of the RAM's word at `at` reads as zero."""
+
+        def read(uc, *_):
+            word, = struct.unpack("<I", uc.mem_read(at, 4))
+            uc.mem_write(at, struct.pack("<I", word & ~(1 << bit)))
+
+        self.uc.hook_add(UC_HOOK_MEM_READ, read, begin=at, end=at + 3)
+
+    def couple(self, at, victim, bit):
+        """From now on a bit of the RAM's word at `at` that changes from 0 to 1 sets the same bit of the word `victim`."""
+
+        def write(uc, access, address, size, value, _):
+            before, = struct.unpack("<I", uc.mem_read(at, 4))
+            if value & ~before & 1 << bit:
+                word, = struct.unpack("<I", uc.mem_read(victim, 4))
+                uc.mem_write(victim, struct.pack("<I", word | 1 << bit))
+
+        self.uc.hook_add(UC_HOOK_MEM_WRITE, write, begin=at, end=at + 3)
+
+    def depth(self, end, start):
+        """Bytes from the top of the stack, `start`, to its lowest word above `end` that is not zero."""
+        words = struct.unpack(f"<{(start - end) // 4}I", self.uc.mem_read(end, start - end))
+        return start - end - 4 * next((i for i, word in enumerate(words) if word), len(words))
 
     def two_wrong_bits(self):
         """Called when such a word is read: sets FLASH_ECCR.ECCD and raises the non-maskable interrupt."""
@@ -219,6 +253,7 @@ class Board:
         table = self.regs.get(0xE000_ED08, 0) or FLASH
         self.pc = struct.unpack("<I", uc.mem_read(table + 4 * number, 4))[0] & ~1
         self.active.append((number, priority))
+        self.entries += 1
         self.pending.discard(number - 16)
         self._choose()
 
@@ -240,6 +275,19 @@ class Board:
         self.pc &= ~1
         self.active.pop()
         self._settle()
+
+    def _protect(self):
+        """Applies the region of the MPU, if it has no access rights, while the MPU is enabled."""
+        base, rasr = (self.regs.get(MPU + offset, 0) for offset in (0x0C, 0x10))
+        if self.guard is None and self.regs.get(MPU + 4, 0) & 1 and rasr & 1 and rasr >> 24 & 7 == 0:
+            base, size = base & ~0x1F, 2 << (rasr >> 1 & 0x1F)
+            self.guard = self.uc.hook_add(UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, self._guarded, begin=base, end=base + size - 1)
+
+    def _guarded(self, uc, access, at, *_):
+        # Without HFNMIENA the hard fault and the NMI run without it.
+        if self.regs.get(MPU + 4, 0) & 1 and all(priority >= 0 for _, priority in self.active):
+            self.fault = f"access to {at:#x}, which the MPU guards"
+            uc.emu_stop()
 
     def _hard_fault(self, why):
         self.note("fault", why)
@@ -285,6 +333,8 @@ class Board:
             value = self.uart.get(at - LPUART1)
             self._settle()
             return value
+        if at & ~0x3FF == TIM16:
+            return self.capture.get(at - TIM16, self.now)
         if at == RCC:  # HSI, HSE and PLL are ready as soon as they are enabled.
             return value | (value & 1 << 8) << 2 | (value & (1 << 16 | 1 << 24)) << 1
         if at == RCC + 0x08:
@@ -347,6 +397,8 @@ class Board:
             self.uart.run(self.now)
             self.uart.write(at - LPUART1, value, self.now)
             return self._settle()
+        if at & ~0x3FF == TIM16:
+            return self.capture.write(at - TIM16, value, self.now)
         if at in (SCS + 0x10, SCS + 0x14, SCS + 0x18):
             self.systick.write(at - SCS, value, self.now)
             return self._settle()
@@ -377,6 +429,8 @@ class Board:
             on, off = (value & 0xFFFF, value >> 16) if at & 0x3FF == 0x18 else (0, value & 0xFFFF)
             at, value = odr, self.regs.get(odr, 0) & ~off | on
         self.regs[at] = value
+        if at == MPU + 4:
+            self._protect()
         if at == DAC1 + 0x08:
             self.note("dac", value & 0xFFF)
         self._look_outside()
@@ -406,7 +460,10 @@ class Board:
     # --- Log ---
 
     def _logged(self, uc, access, at, size, write, _):
-        """Called before the ring's write index moves: reads the new bytes as a debugger would."""
+        """Called before the ring's write index moves: reads the new bytes as a debugger would. The RAM's test overwrites the
+        mark by which a debugger finds the ring."""
+        if uc.mem_read(self.rtt, 10) != b"SEGGER RTT":
+            return
         _, buffer, length = struct.unpack("<3I", uc.mem_read(self.rtt + 24, 12))
         start, self.read_to = self.read_to, write
         if start != write:

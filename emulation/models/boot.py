@@ -1,7 +1,7 @@
-"""Boots an image, injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN VOLTS HOST RECORDED RANDOM prints the events as JSON.
+"""Boots an image, injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN STACK VOLTS HOST RECORDED RANDOM prints the events as JSON.
 
 TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's, MAIN that of the
-program's first function after start-up, TAKEN that of `cortex_m::peripheral::TAKEN`. VOLTS is the full scale of its
+program's first function after start-up, TAKEN that of `cortex_m::peripheral::TAKEN`, STACK the top of the stack. VOLTS is the full scale of its
 amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each, and RECORDED the same of another chip. RANDOM
 is what the random number generator delivers.
 """
@@ -10,21 +10,22 @@ import json
 import struct
 import sys
 
-from unicorn.arm_const import UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2
+from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_SP
 
-from board import BUTTON, FLASH, HZ, POWER_ON, RAM, Board
+from board import BUTTON, FLASH, HZ, LSI, POWER_ON, RAM, Board
 
-MISHAP_TICK = 300
+FAULT_TICK = 300
+GUARD = 256  # Bytes at the end of the stack.
 STORE = [FLASH + 0x7F000 + page * 0x800 for page in range(2)]  # First word of each page, half written at a power cut.
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 
 def panic(board):
-    """Calls `panic("injected")` at `injected.rs:7`, its arguments at the end of the stack."""
-    text = b"injected.rs\0injected"
-    board.uc.mem_write(RAM + 0x40, text)
-    board.uc.mem_write(RAM + 0x20, struct.pack("<4I", RAM + 0x40, 11, 7, 1))
-    for reg, value in ((UC_ARM_REG_R0, RAM + 0x4C), (UC_ARM_REG_R1, 8), (UC_ARM_REG_R2, RAM + 0x20)):
+    """Calls `panic("injected")` at `injected.rs:7`, its arguments in memory that the program does not use."""
+    text, place = RAM + 0x1_0000, RAM + 0x1_0020
+    board.uc.mem_write(text, b"injected.rs\0injected")
+    board.uc.mem_write(place, struct.pack("<4I", text, 11, 7, 1))
+    for reg, value in ((UC_ARM_REG_R0, text + 12), (UC_ARM_REG_R1, 8), (UC_ARM_REG_R2, place)):
         board.uc.reg_write(reg, value)
     board.pc = PANIC
 
@@ -32,16 +33,22 @@ def panic(board):
 def broken(code):
     """Replaces the tick's first instruction."""
 
-    def mishap(board):
+    def inject(board):
+        board.traps.clear()
         board.uc.mem_write(TICK, code)
         board.uc.ctl_remove_cache(TICK, TICK + 4)
 
-    return mishap
+    return inject
 
 
 def rotten(board):
     """A word of code or constants has two wrong bits."""
     board.two_wrong_bits()
+
+
+def overflowing(board):
+    """The stack is used up but for a few words above the guard."""
+    board.uc.reg_write(UC_ARM_REG_SP, RAM + GUARD + 16)
 
 
 def dip(board):
@@ -99,26 +106,66 @@ def taken(board):
     board.uc.mem_write(TAKEN, b"\x01")
 
 
+def stuck(board):
+    """A bit in a word of the stack that nobody has used yet is stuck."""
+    board.stick(RAM + 0x400, 17)
+
+
+def coupled(board):
+    """A bit in such a word is set by a word elsewhere."""
+    board.couple(RAM + 0x800, RAM + 0x400, 3)
+
+
+def slow(board):
+    """The processor runs at half its speed, so that it sees a faster LSI."""
+    board.lsi = 2 * LSI
+
+
+def silent(board):
+    """The LSI does not start."""
+    board.lsi = 0
+
+
+def delivered(board):
+    """The brown-out level is that of a new chip."""
+    board.brown_out = 0
+
+
+def charged(board):
+    """The voltage monitor reads 100 V from the start."""
+    board.monitors[1] = 410
+
+
 def flipped(board):
     """The last byte of the image has a wrong bit."""
     board.traps.clear()
     board.uc.mem_write(FLASH + len(IMAGE) - 1, bytes([IMAGE[-1] ^ 0x10]))
 
 
-def play(host, mishap, until_us, torn=(), first=None, random_number=None):
-    """Injects `first` where the program begins. After the reset the flash is correct again; the memory keeps its content."""
+def play(host, fault, until_us, torn=(), before=None, first=None, random_number=None):
+    """Injects `before` before power-on and `first` where the program begins. After the reset the flash is correct again; the
+    memory keeps its content. Notes the instructions of every tick that no interrupt interrupts, and the stack's depth."""
     board = Board(IMAGE, RTT, host, FULL_SCALE, RANDOM if random_number is None else random_number)
     for at in torn:
         board.tear(at)
+    if before:
+        before(board)
     ticks = 0
 
     def tick(board):
         nonlocal ticks
         ticks += 1
-        if mishap and ticks == MISHAP_TICK:
-            board.traps.clear()
-            board.note("mishap", ticks)
-            mishap(board)
+        if fault and ticks == FAULT_TICK:
+            board.note("injected", ticks)
+            return fault(board)
+        begin, entries, back = board.now, board.entries, board.uc.reg_read(UC_ARM_REG_LR) & ~1
+
+        def ticked(board):
+            del board.traps[back]
+            if board.entries == entries:
+                board.note("ticked", board.now - begin)
+
+        board.traps[back] = ticked
 
     board.traps[TICK] = tick
     if first:
@@ -128,22 +175,24 @@ def play(host, mishap, until_us, torn=(), first=None, random_number=None):
         board.uc.mem_write(FLASH, IMAGE)
         board.uc.ctl_remove_cache(FLASH, FLASH + len(IMAGE))
         board.reset(cause)
+    board.note("stack", board.depth(RAM + GUARD, STACK))
     return board.log
 
 
 if __name__ == "__main__":
     with open(sys.argv[1], "rb") as file:
         IMAGE = file.read()
-    TICK, PANIC, RTT, MAIN, TAKEN = (int(word, 0) for word in sys.argv[2:7])
-    FULL_SCALE = float(sys.argv[7])
-    HOST, RECORDED = ([(us, bytes.fromhex(frame)) for us, frame in json.loads(arg)] for arg in sys.argv[8:10])
-    RANDOM = int(sys.argv[10], 0)
+    TICK, PANIC, RTT, MAIN, TAKEN, STACK = (int(word, 0) for word in sys.argv[2:8])
+    FULL_SCALE = float(sys.argv[8])
+    HOST, RECORDED = ([(us, bytes.fromhex(frame)) for us, frame in json.loads(arg)] for arg in sys.argv[9:11])
+    RANDOM = int(sys.argv[11], 0)
     print(json.dumps({
         "quiet": play([], None, 1_200_000),
         "host": play(HOST, stalled, 1_700_000),
         "panic": play(HOST, panic, 400_000),
         "hard fault": play(HOST, broken(UNDEFINED), 400_000),
         "two wrong bits": play(HOST, rotten, 400_000),
+        "stack overflow": play(HOST, overflowing, 400_000),
         "torn": play([], None, 200_000, STORE),
         "dip": play(HOST, dip, 400_000),
         "button": play(HOST, pressed, 400_000),
@@ -158,4 +207,10 @@ if __name__ == "__main__":
         "deaf": play(HOST, deaf, 500_000),
         "unguarded": play(HOST, None, 400_000, first=taken),
         "wrong image": play(HOST, None, 400_000, first=flipped),
+        "stuck bit": play(HOST, None, 400_000, before=stuck),
+        "coupled bits": play(HOST, None, 400_000, before=coupled),
+        "slow processor": play(HOST, None, 400_000, before=slow),
+        "no low-speed clock": play(HOST, None, 400_000, before=silent),
+        "brown-out level": play([], None, 100_000, before=delivered),
+        "voltage at the start": play(HOST, None, 1_200_000, before=charged),
     }))

@@ -43,6 +43,42 @@ class Timer:
                 self.fraction = 0
 
 
+class Capture:
+    """TIM16 as the test of the clock uses it: captures of the LSI, whose period is `period` cycles, every PSC-th edge.
+    `running()` is whether the LSI is on."""
+
+    LSI = 6  # TIM16_TISEL.
+
+    def __init__(self, period, running):
+        self.period, self.running = period, running
+        self.regs, self.started, self.taken = {}, None, 0
+
+    def _captures(self, now):
+        """Number of captures since the start."""
+        regs = self.regs
+        captures = regs.get(0x00, 0) & 1 and regs.get(0x20, 0) & 1 and regs.get(0x18, 0) & 3 == 1
+        if not captures or regs.get(0x5C, 0) != self.LSI or not self.period or not self.running():
+            return 0
+        return int((now - self.started) / self._spacing())
+
+    def _spacing(self):
+        return self.period * (1 << (self.regs.get(0x18, 0) >> 2 & 3))
+
+    def get(self, offset, now):
+        captures = self._captures(now)
+        if offset == 0x10:
+            return 2 * (captures > self.taken)
+        if offset == 0x34:
+            self.taken = captures
+            return round(captures * self._spacing()) % 0x10000
+        return self.regs.get(offset, 0)
+
+    def write(self, offset, value, now):
+        self.regs[offset] = value
+        if offset == 0x00:
+            self.started, self.taken = now, 0
+
+
 class SysTick:
     """Counts down at the core's clock and interrupts at zero."""
 

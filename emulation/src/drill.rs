@@ -12,9 +12,10 @@ use anyhow::{Context, Result, bail, ensure};
 use firmware::LONGEST_HANG_MS;
 use firmware::settings::WATCHDOG_MS;
 use host_sim::log::{Event, Line};
-use test_bench::script::{ARM_TICK, FAULT_TICK as MISHAP_TICK, FaultInjection as Mishap};
+use test_bench::script::{ARM_TICK, FAULT_TICK, FaultInjection};
 
 use xtask::build::{self, Board, Opt};
+use xtask::tally::Tally;
 use xtask::{setup, shell};
 
 use crate::qemu::emulator::{self, Run, SAFE, Written};
@@ -35,28 +36,29 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Runs every drill. An error names the first that fails.
 pub(crate) fn all(elf: &Path, bless: bool) -> Result<()> {
-    for mishap in Mishap::ALL {
-        let name = mishap.name();
-        one(elf, mishap, bless).with_context(|| format!("drill {name}"))?;
+    for fault in FaultInjection::ALL {
+        let name = fault.name();
+        one(elf, fault, bless).with_context(|| format!("drill {name}"))?;
         eprintln!("drill {name}: voltage gone, log as approved");
     }
-    Ok(())
+    let faults = ("faults injected under QEMU, the voltage gone each time".to_owned(), Mishap::ALL.len() as u64);
+    Tally::now([faults])?.write("drill")
 }
 
-fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
-    let run = emulator::play(elf, mishap.name(), emulator::SHIFT, |_| {})?;
+fn one(elf: &Path, fault: FaultInjection, bless: bool) -> Result<()> {
+    let run = emulator::play(elf, fault.name(), emulator::SHIFT, |_| {})?;
     ensure!(
         run.exit == 0,
         "the emulator's exit code is {}, the last line {:?}",
         run.exit,
         run.log.last().map(emulator::text)
     );
-    voltage_goes(mishap, &run.dac)?;
-    if let Some(limit_us) = patience_us(mishap) {
+    voltage_goes(fault, &run.dac)?;
+    if let Some(limit_us) = patience_us(fault) {
         found_within(&run.log, limit_us)?;
     }
-    let text = golden_text(mishap, &run);
-    let path = approved(mishap);
+    let text = golden_text(fault, &run);
+    let path = approved(fault);
     if bless {
         return fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()));
     }
@@ -68,29 +70,32 @@ fn one(elf: &Path, mishap: Mishap, bless: bool) -> Result<()> {
 }
 
 /// Most ticks from the injected fault until the output is zero and disabled for good.
-fn grace(mishap: Mishap) -> usize {
-    match mishap {
+fn grace(fault: FaultInjection) -> usize {
+    match fault {
         // No further code.
-        Mishap::Panic | Mishap::HardFault | Mishap::StackOverflow | Mishap::FloatOverflow => 0,
-        Mishap::Interlock | Mishap::TwoFaults | Mishap::Unguarded => 0,
+        FaultInjection::Panic
+        | FaultInjection::HardFault
+        | FaultInjection::StackOverflow
+        | FaultInjection::FloatOverflow => 0,
+        FaultInjection::Interlock | FaultInjection::TwoFaults | FaultInjection::Unguarded => 0,
         // The tick that overruns still ends; the next one detects it.
-        Mishap::Overrun => 1,
+        FaultInjection::Overrun => 1,
         // Nothing is written while the control task hangs; the next write is the zero after its detection.
-        Mishap::Hang | Mishap::Deaf => 0,
+        FaultInjection::Hang | FaultInjection::Deaf => 0,
         // The task watchdog detects the stalled task after 50 ms and its own period.
-        Mishap::Stall => 65,
+        FaultInjection::Stall => 65,
         // A time-out of 500 ms, then a ramp of 300 V at 700 V/s.
-        Mishap::Silence => 500 + 430,
+        FaultInjection::Silence => 500 + 430,
     }
 }
 
 /// Longest time that a task may hang before the fault, in us. The wire cannot show it, because nothing is written
 /// meanwhile.
-fn patience_us(mishap: Mishap) -> Option<u64> {
-    match mishap {
-        Mishap::Hang => Some(u64::from(LONGEST_HANG_MS) * 1000),
+fn patience_us(fault: FaultInjection) -> Option<u64> {
+    match fault {
+        FaultInjection::Hang => Some(u64::from(LONGEST_HANG_MS) * 1000),
         // The hardware watchdog.
-        Mishap::Deaf => Some(u64::from(WATCHDOG_MS) * 1000),
+        FaultInjection::Deaf => Some(u64::from(WATCHDOG_MS) * 1000),
         _ => None,
     }
 }
@@ -101,8 +106,8 @@ fn found_within(log: &[Line], limit_us: u64) -> Result<()> {
     let time = |is: fn(&Event) -> bool| log.iter().find(|line| is(&line.event)).and_then(|line| line.time_us);
     let armed = time(|event| matches!(event, Event::State { to, .. } if to == "armed")).context("never armed")?;
     let fault = time(|event| matches!(event, Event::Fault { .. })).context("no fault")?;
-    let mishap = armed + u64::from(MISHAP_TICK - ARM_TICK) * 1000;
-    let hung = fault.saturating_sub(mishap);
+    let injected = armed + u64::from(FAULT_TICK - ARM_TICK) * 1000;
+    let hung = fault.saturating_sub(injected);
     // A log line is written up to 1 ms after the event.
     ensure!(hung <= limit_us + 1000, "the control task hangs for {hung} us");
     Ok(())
@@ -110,38 +115,38 @@ fn found_within(log: &[Line], limit_us: u64) -> Result<()> {
 
 /// An error unless the output is zero before arming, carries voltage until the fault, is zero after it, and carries
 /// voltage again only in the drills that arm a second time. Without guards it is zero throughout.
-fn voltage_goes(mishap: Mishap, dac: &[Written]) -> Result<()> {
+fn voltage_goes(fault: FaultInjection, dac: &[Written]) -> Result<()> {
     let zero = |from: usize, to: usize| match dac[from..to].iter().position(|written| *written != SAFE) {
         None => Ok(()),
         Some(index) => bail!("write {} is {:?} instead of zero", from + index, dac[from + index]),
     };
-    if mishap == Mishap::Unguarded {
+    if fault == FaultInjection::Unguarded {
         // The 200 ticks are those after the reset, in which nothing can be armed.
         ensure!(dac.len() > 200, "the wire ends after {} writes", dac.len());
         return zero(0, dac.len());
     }
     // One zero is written before the first tick.
-    let (armed, mishap_at) = (1 + ARM_TICK as usize, 1 + MISHAP_TICK as usize);
-    let gone = mishap_at + grace(mishap);
+    let (armed, fault_at) = (1 + ARM_TICK as usize, 1 + FAULT_TICK as usize);
+    let gone = fault_at + grace(fault);
     // An overrun of 8 ms skips ticks but no command.
-    let again = match mishap {
-        Mishap::Interlock | Mishap::Overrun => 1 + 1300,
-        Mishap::TwoFaults => 1 + 1450,
+    let again = match fault {
+        FaultInjection::Interlock | FaultInjection::Overrun => 1 + 1300,
+        FaultInjection::TwoFaults => 1 + 1450,
         _ => dac.len(),
     };
     ensure!(dac.len() > gone + 100, "the wire ends after {} writes", dac.len());
     zero(0, armed)?;
     let driven = |from: usize, to: usize| dac[from..to].iter().all(|written| written.enabled && written.code > 0);
-    ensure!(driven(armed, mishap_at), "no voltage before the fault, so that the drill shows nothing");
+    ensure!(driven(armed, fault_at), "no voltage before the fault, so that the drill shows nothing");
     zero(gone, again)?;
     ensure!(again == dac.len() || driven(again, dac.len()), "no voltage after arming again");
     Ok(())
 }
 
 /// Log and wire as text, values that depend on the build replaced by `_`.
-fn golden_text(mishap: Mishap, run: &Run) -> String {
+fn golden_text(fault: FaultInjection, run: &Run) -> String {
     // The tick of the detection depends on the phase of the stalled task's period of 10 ms.
-    let any_tick = mishap == Mishap::Stall;
+    let any_tick = fault == FaultInjection::Stall;
     let mut text = String::new();
     for line in run.log.iter().map(emulator::text) {
         let words = line.split(' ').map(|word| match word.split_once('=') {
@@ -166,8 +171,8 @@ fn golden_text(mishap: Mishap, run: &Run) -> String {
     text
 }
 
-fn approved(mishap: Mishap) -> PathBuf {
-    shell::root().join("test-bench/drills").join(mishap.name()).with_extension("log")
+fn approved(fault: FaultInjection) -> PathBuf {
+    shell::root().join("test-bench/drills").join(fault.name()).with_extension("log")
 }
 
 #[cfg(test)]
@@ -178,13 +183,13 @@ mod tests {
     fn a_voltage_after_the_fault_is_an_error() {
         let on = Written { code: 1755, enabled: true };
         let wire = |driven: usize| [vec![SAFE; 11], vec![on; driven], vec![SAFE; 1200]].concat();
-        voltage_goes(Mishap::Panic, &wire(290)).unwrap();
-        assert!(voltage_goes(Mishap::Panic, &wire(291)).is_err());
+        voltage_goes(FaultInjection::Panic, &wire(290)).unwrap();
+        assert!(voltage_goes(FaultInjection::Panic, &wire(291)).is_err());
         let mut dip = wire(290);
         dip[700].code = 1;
-        assert!(voltage_goes(Mishap::Panic, &dip).is_err());
-        assert!(voltage_goes(Mishap::Panic, &vec![SAFE; 1200]).is_err(), "never armed shows nothing");
-        voltage_goes(Mishap::Unguarded, &vec![SAFE; 1200]).unwrap();
-        assert!(voltage_goes(Mishap::Unguarded, &wire(290)).is_err());
+        assert!(voltage_goes(FaultInjection::Panic, &dip).is_err());
+        assert!(voltage_goes(FaultInjection::Panic, &vec![SAFE; 1200]).is_err(), "never armed shows nothing");
+        voltage_goes(FaultInjection::Unguarded, &vec![SAFE; 1200]).unwrap();
+        assert!(voltage_goes(FaultInjection::Unguarded, &wire(290)).is_err());
     }
 }

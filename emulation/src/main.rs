@@ -88,7 +88,7 @@ Examples:
     Story(story::Args),
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 64 KB (96 KB with the time-optimal controller), RAM below 16 KB and the
+    /// Exits with 1 unless flash stays below 128 KB, RAM below 16 KB and the
     /// stack within its region.
     #[command(after_help = "\
 Examples:

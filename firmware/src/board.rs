@@ -5,7 +5,7 @@
 use core::future::Future;
 
 use model::Volts;
-use model::supervisor::{Drive, Monitors};
+use model::supervisor::{Drive, Fault, Monitors};
 
 /// Output to the amplifier, and the sensors at it. A simulated plant can implement it as well as a converter.
 pub trait Amplifier {
@@ -37,6 +37,11 @@ pub trait Board {
 
     /// Restarts the period of the hardware watchdog.
     fn feed_watchdog(&mut self);
+
+    /// Fault that a test of the hardware has found at the start; it stands until the chip is restarted.
+    fn fault(&self) -> Option<Fault> {
+        None
+    }
 
     /// Switches the indicator that the output is enabled.
     fn show_armed(&mut self, _armed: bool) {}

@@ -13,13 +13,18 @@ use model::supervisor::{Fault, Faults};
 
 use crate::reset_cause::{self, Cause, Record, Reset};
 
-struct Memory(UnsafeCell<MaybeUninit<Record>>);
+/// The record's place, of four words.
+pub(crate) struct Memory(UnsafeCell<MaybeUninit<Record>>);
 
 // SAFETY: read and written with interrupts off only, by volatile accesses.
 unsafe impl Sync for Memory {}
 
+/// Kept in registers by the [test of the RAM](crate::ram_test).
 #[unsafe(link_section = ".uninit.crash_record")]
-static MEMORY: Memory = Memory(UnsafeCell::new(MaybeUninit::uninit()));
+pub(crate) static MEMORY: Memory = Memory(UnsafeCell::new(MaybeUninit::uninit()));
+
+// The test of the RAM keeps four words.
+const _: () = assert!(size_of::<Record>() == 16);
 
 /// The cause of the last reset. Call it once at boot; `flags` is the source that the chip reports, if it does. The standing
 /// faults stay recorded until [`set`].

@@ -12,6 +12,7 @@
 //! | [`board`] | Traits that a board implements. |
 //! | [`control`] | One control tick: supervisor, model, supervisor. |
 //! | [`mailbox`] | Hand-over of commands to the control tick; drops commands that a fault has made obsolete. |
+//! | [`clock_test`] | Test of the processor's clock at the start: the plausible range. |
 //! | [`pace`] | Time of the next tick, and the number of missed ticks. |
 //! | [`reset_cause`] | Cause of the last reset, from the chip's flags and the crash record. |
 //! | [`settings`] | Settings of spring, controller and amplifier in an image. |
@@ -19,12 +20,13 @@
 //! | [`store`] | Storage of a model in flash, safe against power cuts. |
 //! | [`task_watchdog`] | Check that every task is alive, before the hardware watchdog is fed. |
 //! | `crash_record` | Memory of the crash record. |
-//! | `guards` | Check of the image, and start of both guards. |
+//! | `guards` | Check of RAM and image, and start of both guards. |
 //! | `hang_guard` | Stop of a control task that hangs. |
 //! | `host` | Communication with the host. |
 //! | `image_check` | Check of the image against its checksum. |
 //! | `log` | All log lines. |
 //! | `nucleo` | The board NUCLEO-G474RE. |
+//! | `ram_test` | Test of the RAM at the start. |
 //! | `stack_guard` | Detection of a stack overflow. |
 //! | `stop` | Emergency stop after a panic, hard fault or unexpected interrupt. |
 //! | `tasks` | Control task and housekeeping task. |
@@ -40,6 +42,7 @@
 extern crate std;
 
 pub mod board;
+pub mod clock_test;
 pub mod control;
 pub mod mailbox;
 pub mod pace;
@@ -63,6 +66,8 @@ pub mod image_check;
 pub mod log;
 #[cfg(feature = "nucleo-g474re")]
 pub mod nucleo;
+#[cfg(feature = "mcu")]
+pub mod ram_test;
 #[cfg(feature = "mcu")]
 pub mod stack_guard;
 #[cfg(feature = "mcu")]

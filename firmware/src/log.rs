@@ -103,6 +103,16 @@ pub fn refused(field: &'static str) {
     error!("config refused field={=str}", field);
 }
 
+/// Logs which part failed its test at the start, and the value by which it failed.
+pub fn self_test(part: &'static str, value: u32) {
+    error!("self-test failed part={=str} value={=u32}", part, value);
+}
+
+/// Logs that the chip's brown-out level is not the expected one.
+pub fn brown_out(level: u8, expected: u8) {
+    warn!("brown-out level={=u8} expected={=u8}", level, expected);
+}
+
 /// Logs an event.
 pub fn event(event: Event) {
     let dropped = DROPPED.swap(0, Ordering::Relaxed);

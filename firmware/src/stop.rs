@@ -50,7 +50,7 @@ pub fn restart() -> ! {
 
 /// Handles a panic. Inlined, so that the optimiser removes all panic messages, which nobody reads.
 #[panic_handler]
-#[expect(unused_attributes, reason = "it is not ignored when all crates are optimised at once")]
+#[expect(unused_attributes, reason = "it is not ignored when all crates are optimised together")]
 #[inline(always)]
 fn panic(info: &PanicInfo<'_>) -> ! {
     stop(Fault::Panic, info.location())

@@ -37,7 +37,7 @@ pub async fn control<B: Board>(
             interlock_closed: board.interlock_closed(),
             missed_ticks: arrival.missed_ticks,
             monitors: board.amplifier().monitors(),
-            fault: (incomplete > INCOMPLETE_TICKS).then_some(Fault::Watchdog),
+            fault: (incomplete > INCOMPLETE_TICKS).then_some(Fault::Watchdog).or(board.fault()),
             measured: board.amplifier().measured(),
         };
         let tick = control.tick(&command, &sensors, stopwatch);

@@ -28,6 +28,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Beam(commands::beam::Arguments),
+    Bound(commands::bound::Arguments),
     Compare(commands::compare::Arguments),
     Completions(commands::completions::Completions),
     Diagnose(commands::diagnose::Arguments),
@@ -54,6 +55,7 @@ fn main() -> ExitCode {
     }
     let done = match cli.command {
         Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
+        Some(Command::Bound(arguments)) => commands::bound::run(&arguments),
         Some(Command::Compare(arguments)) => commands::compare::run(&arguments),
         Some(Command::Completions(arguments)) => commands::completions::completions(&arguments, Cli::command()),
         Some(Command::Diagnose(arguments)) => commands::diagnose::run(&arguments),

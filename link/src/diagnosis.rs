@@ -32,8 +32,7 @@ pub struct Sensor(pub u8);
 impl Sensor {
     /// Name for tables and JSON; `unknown` for a code that this version does not know.
     pub fn name(self) -> &'static str {
-        let names = ["none", "trusted", "absent", "stale", "stuck", "jumping", "out-of-range"];
-        names.get(usize::from(self.0)).unwrap_or(&"unknown")
+        model::SENSOR_NAMES.get(usize::from(self.0)).unwrap_or(&"unknown")
     }
 }
 

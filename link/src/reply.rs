@@ -39,7 +39,7 @@ pub enum Reply {
 /// Report of the faults that have come since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FaultReport {
-    /// Number of faults since the start, this one included; it saturates. The host names it when it has heard of them.
+    /// Number of faults since the start, this one included; it wraps around. The host names it when it has heard of them.
     pub number: u32,
     /// Tick in which the newest one was seen.
     pub tick: u64,

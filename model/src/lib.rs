@@ -79,7 +79,7 @@ pub use controller::{Compensation, Config, Input, Output, Settings, State};
 pub use error::OutOfRange;
 pub use estimator::Plant;
 pub use extended::ExtendedPlant;
-pub use feedback::{Feedback, Reading, Sensor};
+pub use feedback::{Feedback, Reading, SENSOR_NAMES, Sensor};
 pub use pre_compensator::Gains;
 pub use stiffness::Spring;
 pub use time_optimal::Approach;

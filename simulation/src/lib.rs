@@ -14,6 +14,7 @@
 //! | [`open_loop`] | the fixed-point spring alone over a record |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the shortest possible t97 |
 //! | [`spring_error`] | the tick on a spring that differs from its model, with a sensor or without |
+//! | [`robust_bound`] | the shortest possible t97 for a spring that is known only to within errors |
 //! | [`comparison`], [`tune`] | controllers compared on the same steps; gains for a spring and the cost of a model error |
 
 pub mod bad_input;
@@ -28,6 +29,7 @@ pub mod plant_file;
 pub mod record;
 pub mod reference;
 pub mod response;
+pub mod robust_bound;
 pub mod run;
 pub mod sampled;
 pub mod schedule;

@@ -63,6 +63,13 @@ impl SpringError {
             Parameter::Gain => &mut self.gain,
         }
     }
+
+    /// The errors with another error of a parameter.
+    #[must_use]
+    pub fn with(mut self, parameter: Parameter, error: f64) -> Self {
+        *self.of(parameter) = error;
+        self
+    }
 }
 
 /// The spring that a controller drives.
@@ -144,9 +151,7 @@ mod tests {
     use model::Plant;
 
     fn differing(file: &PlantFile, parameter: Parameter, by: f64) -> DifferingSpring {
-        let mut error = SpringError::default();
-        *error.of(parameter) = by;
-        DifferingSpring::new(file, &error)
+        DifferingSpring::new(file, &SpringError::default().with(parameter, by))
     }
 
     /// The settled value is independent of share and time constants.

@@ -127,6 +127,27 @@ fn the_documentation_shows_what_an_error_of_the_model_costs_and_a_sensor_saves()
     }
 }
 
+/// docs/fast-controller.md shows what the command prints today; the intervals of an identification are errors as well.
+#[test]
+fn the_documentation_shows_how_well_the_spring_has_to_be_known() {
+    let folder = tempdir().unwrap();
+    let page = fs::read_to_string(docs().join("fast-controller.md")).unwrap();
+    let output = run(folder.path(), &["bound", "--spring-error", "tau=5"]);
+    let stdout = text(&output.stdout);
+    assert!(output.status.success() && page.contains(stdout.trim_end()), "docs/fast-controller.md lacks: {stdout}");
+    let quantity =
+        |value: f64, half: f64| serde_json::json!({"value": value, "low": value - half, "high": value + half});
+    let nominal = serde_json::json!({
+        "gain": quantity(2.0, 0.0), "share": quantity(0.1, 0.0), "tau_s": [quantity(5.5, 0.275)]
+    });
+    fs::write(folder.path().join("identified.json"), serde_json::json!({ "nominal": nominal }).to_string()).unwrap();
+    let report = json(folder.path(), &["bound", "--identified", "identified.json", "--json"]);
+    let error = number(&report["spring_error"], "time_constant");
+    assert!((error - 0.05).abs() < 1e-9, "{report}");
+    let times = report["steps"].as_array().unwrap().iter().map(|step| number(step, "t97_s"));
+    assert!(stdout.contains(&format!("{:.3}", times.fold(0.0, f64::max))), "{report} {stdout}");
+}
+
 #[test]
 fn what_cannot_be_run_is_one_line_and_exit_code_2() {
     let folder = tempdir().unwrap();
@@ -145,6 +166,11 @@ fn what_cannot_be_run_is_one_line_and_exit_code_2() {
         (&["compare", "--spring-error", "mass=3"], "`mass=3`: expected tau, gain or share, then `=` and -90 to 900"),
         (&["compare", "--spring-error", "tau=inf"], "`tau=inf`: expected tau, gain or share"),
         (&["compare", "--spring-error", "tau=1", "--spring-error", "tau=2"], "time constant twice"),
+        (&["bound", "--plant", "falling.toml"], "the plant has [law]; expected a linear spring"),
+        (&["bound", "--spring-error", "gain=-3"], "--spring-error: gain known to -3 %; expected 0 to 90"),
+        (&["bound", "--identified", "falling.toml"], "expected the JSON of `vsj identify`"),
+        (&["bound", "--limit-v", "5"], "--limit-v: full_scale_v = 5 is not allowed"),
+        (&["bound", "--within-s", "nan"], "--within-s NaN: expected a number above 0"),
         (&["compare", "--sensor-noise", "0"], "--sensor-noise 0: expected 0.001 to 10"),
         (&["compare", "--limit-v", "nan"], "--limit-v: full_scale_v = NaN is not allowed"),
         (&["compare", "--slew-v-per-s", "0"], "--slew-v-per-s: slew_v_per_s = 0 is not allowed"),

@@ -164,7 +164,8 @@ fn within(fault: Fault) -> String {
         ),
         Fault::Monitor => format!("{driven} ms, {off} ms while the output is off"),
         Fault::Config => "nothing was enabled".into(),
-        Fault::Supply => "at once, by the reset".into(),
+        Fault::Supply => "immediately, by the reset".into(),
+        Fault::SelfTest => "nothing was enabled".into(),
     }
 }
 
@@ -179,6 +180,7 @@ fn drill(fault: Fault) -> &'static str {
         Fault::Monitor => "boot `no voltage`, boot `current`, boot `supply of 3.6 V`",
         Fault::Config => "drill `unguarded`, boot `unguarded`",
         Fault::Supply => "boot `dip`",
+        Fault::SelfTest => "boot `stuck bit`, boot `coupled bits`, boot `slow processor`",
     }
 }
 

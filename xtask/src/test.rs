@@ -21,14 +21,18 @@ const STEPS: &[Step] = &[
     Step::new("build vsj", &["build", "--release", "-p", "host-sim", "--bin", "vsj"]),
 ];
 
-/// Command lines of the emulation, each with its name and its line in `--help`. The two variants of `boot` cover every
-/// controller and every amplifier.
+/// Command lines of the emulation, each with its name and its line in `--help`. `boot` runs every variant of the image.
 const EMULATION: &[(&str, &str, &[&[&str]])] = &[
     ("firmware", "cargo xtask proof", &[&["proof"]]),
     (
         "boot",
-        "cargo xtask boot; --controller fast --limit-v 1000",
-        &[&["boot"], &["boot", "--controller", "fast", "--limit-v", "1000"]],
+        "cargo xtask boot; --limit-v 1000; --controller fast; --controller fast --limit-v 1000",
+        &[
+            &["boot"],
+            &["boot", "--limit-v", "1000"],
+            &["boot", "--controller", "fast"],
+            &["boot", "--controller", "fast", "--limit-v", "1000"],
+        ],
     ),
     ("story", "cargo xtask story --check", &[&["story", "--check"]]),
 ];

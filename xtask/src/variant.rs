@@ -57,9 +57,13 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Two variants that together cover every controller and every amplifier.
-    pub const BOOTED: [Self; 2] =
-        [Self::of(Controller::Paper), Self { controller: Controller::Fast, limit_v: Limit::Kilovolt }];
+    /// Every variant.
+    pub const ALL: [Self; 4] = [
+        Self::of(Controller::Paper),
+        Self { controller: Controller::Paper, limit_v: Limit::Kilovolt },
+        Self::of(Controller::Fast),
+        Self { controller: Controller::Fast, limit_v: Limit::Kilovolt },
+    ];
 
     /// The variant with this controller and the report's amplifier of 700 V.
     pub const fn of(controller: Controller) -> Self {
@@ -68,8 +72,7 @@ impl Variant {
 
     /// Every variant but this one.
     pub fn others(self) -> impl Iterator<Item = Self> {
-        let each = |controller| Limit::ALL.map(|limit_v| Self { controller, limit_v });
-        Controller::ALL.into_iter().flat_map(each).filter(move |other| *other != self)
+        Self::ALL.into_iter().filter(move |other| *other != self)
     }
 
     /// Features of the package `firmware` that the variant needs.
@@ -103,9 +106,9 @@ mod tests {
     }
 
     #[test]
-    fn booted_variants_cover_every_controller_and_amplifier() {
-        let booted = |choice: &dyn Fn(Variant) -> bool| Variant::BOOTED.into_iter().any(choice);
-        assert!(Controller::ALL.into_iter().all(|controller| booted(&|it| it.controller == controller)));
-        assert!(Limit::ALL.into_iter().all(|limit_v| booted(&|it| it.limit_v == limit_v)));
+    fn every_controller_has_a_variant_for_every_amplifier() {
+        let each = |controller| Limit::ALL.map(|limit_v| Variant { controller, limit_v });
+        assert!(Controller::ALL.into_iter().flat_map(each).eq(Variant::ALL));
+        assert_eq!(Variant::ALL[1].others().count(), 3);
     }
 }

@@ -15,6 +15,7 @@ use model::Settings;
 use model::supervisor::Mismatch;
 use serde::Deserialize;
 use xtask::build::{self, Board, Opt};
+use xtask::tally::Tally;
 use xtask::variant::Variant;
 use xtask::{python, segments, shell};
 
@@ -26,7 +27,7 @@ use runs::{JITTER_US, KILL_US, MONITOR_US, PERIOD_US};
 /// Limits of this verification, printed after every run.
 const CANNOT_SHOW: &str = "\
 not shown: real time (an instruction is one cycle here; no wait states, no conversion times), analogue behaviour (DAC, monitors,
-  the amplifier's pull-down), the memory protection unit, silicon errata, a chip that differs from its manual";
+  the amplifier's pull-down), silicon errata, a chip that differs from its manual";
 
 /// Builds the image, runs it once for each case, and prints what each run showed.
 pub(crate) fn run(variant: Variant) -> Result<()> {
@@ -57,12 +58,16 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     let main = functions.iter().find(|f| f.name == "main").context("no `main` in the image")?;
     let rtt = elf::symbol(&bytes, "_SEGGER_RTT")?;
     let taken = elf::symbol(&bytes, "cortex_m::peripheral::TAKEN")?;
+    let stack = elf::symbol(&bytes, "_stack_start")?;
     let python = python::environment(&shell::target_directory()?, "boot", "emulation/models/requirements.txt")?;
     let output = shell::json(
         shell::command(python)
             .args(["-B", "emulation/models/boot.py"])
             .arg(&bin)
-            .args([ticks[0].address, panic.address, rtt, main.address, taken].map(|address| format!("{address:#x}")))
+            .args(
+                [ticks[0].address, panic.address, rtt, main.address, taken, stack]
+                    .map(|address| format!("{address:#x}")),
+            )
             .arg(amplifier.full_scale_v.to_string())
             .arg(host::frames(host::RANDOM).to_string())
             .arg(host::frames(!host::RANDOM).to_string())
@@ -70,13 +75,16 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
-    println!("{}", runs::quiet(&events("quiet")?, &bytes, variant).context("without a mishap")?);
+    println!("{}", runs::quiet(&events("quiet")?, &bytes, variant).context("without a fault")?);
     println!("host: {}", host::check(&events("host")?, variant).context("with a host")?);
+    println!("tick: {}", runs::instructions(&events("host")?, variant).context("instructions of a tick")?);
+    println!("stack: {}", runs::stack(&output, size.worst_stack())?);
     let hang_us = f64::from(firmware::LONGEST_HANG_MS) * 1e3;
     for (name, within_us, log) in [
         ("panic", KILL_US, "panic at injected.rs:7"),
         ("hard fault", KILL_US, "name=hard-fault"),
         ("two wrong bits", KILL_US, "name=hard-fault"),
+        ("stack overflow", KILL_US, "name=hard-fault"),
         ("hang", hang_us + KILL_US, "name=watchdog"),
     ] {
         println!("{name}: {}", runs::stopped(&events(name)?, &bytes, within_us, log).context(name)?);
@@ -104,6 +112,20 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     for (name, field) in [("unguarded", "guards"), ("wrong image", "image")] {
         println!("{name}: {}", runs::refused(&events(name)?, &bytes, field).context(name)?);
     }
+    for name in ["stuck bit", "coupled bits"] {
+        println!("{name}: {}", runs::unfit(&events(name)?, &bytes).context(name)?);
+    }
+    for (name, seen_hz) in [("slow processor", 64_000), ("no low-speed clock", 0)] {
+        println!("{name}: {}", runs::wrong_clock(&events(name)?, &bytes, seen_hz).context(name)?);
+    }
+    println!("brown-out level: {}", runs::delivered(&events("brown-out level")?, &bytes).context("brown-out level")?);
+    println!(
+        "voltage at the start: {}",
+        runs::held(&events("voltage at the start")?, &bytes).context("voltage at the start")?
+    );
     println!("{CANNOT_SHOW}");
-    Ok(())
+    // All runs but the one without a mishap and the one with a host.
+    let runs = output.as_object().context("no runs")?.values().filter(|run| !run.is_null()).count() as u64;
+    let faults = ("faults injected in the image that is flashed, on register models".to_owned(), runs - 2);
+    Tally::now([faults])?.write(&["boot"].into_iter().chain(variant.features()).collect::<Vec<_>>().join("-"))
 }

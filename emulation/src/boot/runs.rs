@@ -3,9 +3,10 @@
 use anyhow::{Context, Result, ensure};
 use firmware::settings::{SUPERVISION, WATCHDOG_MS};
 use link::frame::MAX_FRAME;
-use link::{FaultReport, Reply};
+use link::{FaultReport, Reason, Reply};
 use model::Amplifier;
 use model::supervisor::{Fault, Mismatch};
+use serde::Deserialize;
 use xtask::variant::Variant;
 
 use super::events::{Event, Events};
@@ -44,11 +45,12 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
         "an amplifier of {limit_v} V, says the log, {log:?}"
     );
     ensure!(log.iter().any(|line| line.contains("summary tick=1000 overruns=0")), "no summary in {log:?}");
+    ensure!(!log.iter().any(|line| line.contains("brown-out level")), "an expected level is logged, {log:?}");
     ensure!(events.times("reset").len() == 1, "it was reset");
     // Start-up writes zero once, before the first tick.
     let (setup, ticking) = events.split("watchdog started")?;
     let ticks = ticking.times("dac");
-    ensure!(ticks.len() > 1190, "{} ticks in 1.2 s", ticks.len());
+    ensure!(ticks.len() > 1180, "{} ticks in 1.2 s", ticks.len());
     // The lateness of each tick on a grid from the first one on, so that drift and missing ticks show.
     let late: Vec<f64> =
         ticks.iter().zip(0u32..).map(|(us, tick)| us - ticks[0] - f64::from(tick) * PERIOD_US).collect();
@@ -73,14 +75,14 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
 /// A run with a panic, fault or hang: the output is zero and disabled within `within_us` and before the first byte of
 /// the log, then a reset follows that logs its cause and keeps the output safe.
 pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<String> {
-    let (_, after) = mishap(events)?;
-    let (dying, reborn) = after.split("reset")?;
+    let (_, after) = injected(events)?;
+    let (dying, restarted) = after.split("reset")?;
     let (silent, _) = dying.split("log")?;
     let gone = gone(&silent)?;
     ensure!(gone <= within_us, "the voltage goes after {gone:.2} us");
     let log = dying.log(image)?;
     ensure!(log.iter().any(|said| said.contains(line)), "no `{line}` in {log:?}");
-    let boot = reborn_safe(&reborn, image, "reset=software")?;
+    let boot = restarted_safe(&restarted, image, "reset=software")?;
     let gone = if gone < 1e3 { format!("{gone:.2} us") } else { format!("{:.1} ms", gone / 1e3) };
     Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
 }
@@ -89,7 +91,7 @@ pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str)
 /// zero and disabled within `within_us`, the ticks go on without voltage whatever the host sends, and the fault is
 /// reported on the line, again and again, because this host does not say that it has heard of it.
 pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, mismatch: Option<Mismatch>) -> Result<String> {
-    let (_, after) = mishap(events)?;
+    let (_, after) = injected(events)?;
     let last = after.0.iter().rposition(Event::drives).context("the voltage had gone before")?;
     let without = Events(after.0[last + 1..].to_vec());
     let us = gone(&without)? + without.0[0].0 - after.0[0].0;
@@ -126,25 +128,25 @@ pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, mismatch: O
 
 /// A run with words of the store that a power cut left half written: uncorrectable errors there are accepted.
 pub(super) fn torn(events: &Events, image: &[u8]) -> Result<String> {
-    let boot = reborn_safe(events, image, "reset=power-on last_fault=0")?;
+    let boot = restarted_safe(events, image, "reset=power-on last_fault=0")?;
     Ok(format!("words with two wrong bits are forgiven there alone; `{boot}`"))
 }
 
 /// A run with a reset from outside: a dip of the supply is a fault of its own, and an earlier fault still has to be
 /// acknowledged after the reset.
 pub(super) fn cut(events: &Events, image: &[u8], cause: &str) -> Result<String> {
-    let (_, after) = mishap(events)?;
-    let (_, reborn) = after.split("reset")?;
-    Ok(format!("no voltage until it is acknowledged; `{}`", reborn_safe(&reborn, image, cause)?))
+    let (_, after) = injected(events)?;
+    let (_, restarted) = after.split("reset")?;
+    Ok(format!("no voltage until it is acknowledged; `{}`", restarted_safe(&restarted, image, cause)?))
 }
 
 /// A run that hangs with interrupts disabled: the watchdog resets the chip in time.
 pub(super) fn deaf(events: &Events, image: &[u8]) -> Result<String> {
-    let (_, after) = mishap(events)?;
-    let (_, reborn) = after.split("reset")?;
-    let us = reborn.0[0].0 - after.0[0].0;
+    let (_, after) = injected(events)?;
+    let (_, restarted) = after.split("reset")?;
+    let us = restarted.0[0].0 - after.0[0].0;
     ensure!(us <= WATCHDOG_US, "the watchdog waits for {us:.0} us");
-    let boot = reborn_safe(&reborn, image, "reset=watchdog")?;
+    let boot = restarted_safe(&restarted, image, "reset=watchdog")?;
     Ok(format!("the voltage stays until the watchdog resets the chip {:.0} ms later; `{boot}`", us / 1e3))
 }
 
@@ -156,11 +158,11 @@ pub(super) fn refused(events: &Events, image: &[u8], field: &str) -> Result<Stri
     let line = format!("config refused field={field}");
     ensure!(log.contains(&line), "it does not say so: {log:?}");
     let (_, start) = events.split("watchdog started")?;
-    let (refused, reborn) = start.split("reset")?;
+    let (refused, restarted) = start.split("reset")?;
     ensure!(refused.times("dac").is_empty(), "it ticks");
-    let us = reborn.0[0].0 - start.0[0].0;
+    let us = restarted.0[0].0 - start.0[0].0;
     ensure!(us <= WATCHDOG_US, "the watchdog waits for {us:.0} us");
-    let boot = reborn_safe(&reborn, image, "reset=watchdog last_fault=7")?;
+    let boot = restarted_safe(&restarted, image, "reset=watchdog last_fault=7")?;
     Ok(format!("nothing starts, the log says so, and the watchdog resets the chip after {:.0} ms; `{boot}`", us / 1e3))
 }
 
@@ -186,10 +188,112 @@ pub(super) fn unrandom(events: &Events, image: &[u8]) -> Result<String> {
     Ok("the log says so, nothing is armed, DAC zero and enable off throughout".into())
 }
 
+/// The instructions of the ticks with voltage, from a run with a host, within the bounds of the variant.
+pub(super) fn instructions(events: &Events, variant: Variant) -> Result<String> {
+    let mut counts = Vec::new();
+    let mut ticked = None;
+    for Event(_, what, value) in &events.0 {
+        match what.as_str() {
+            "ticked" => ticked = value.as_u64(),
+            "dac" => counts.extend(ticked.take().filter(|_| *value != 0)),
+            _ => {}
+        }
+    }
+    ensure!(counts.len() > 1000, "{} ticks with voltage show little", counts.len());
+    let (lowest, highest) = (counts.iter().min().copied().unwrap_or(0), counts.iter().max().copied().unwrap_or(0));
+    let mean = counts.iter().sum::<u64>() / counts.len() as u64;
+    let bounds = variant::instructions(variant);
+    let within = bounds.contains(&lowest) && bounds.contains(&highest);
+    ensure!(within, "{lowest} to {highest} instructions, expected {} to {}", bounds.start(), bounds.end());
+    Ok(format!(
+        "{lowest} to {highest} instructions, mean {mean}, supervisor included, in {} ticks with voltage; {} to {} are allowed",
+        counts.len(),
+        bounds.start(),
+        bounds.end()
+    ))
+}
+
+/// The greatest depth of the stack in any of the runs, which must not exceed the `worst` one that is computed, and the
+/// name of that run.
+pub(super) fn stack(output: &serde_json::Value, worst: u32) -> Result<String> {
+    let depth = |(name, value): (&String, &serde_json::Value)| {
+        let events = Events::deserialize(value).ok()?;
+        events.0.iter().rfind(|event| event.1 == "stack").and_then(|event| Some((event.2.as_u64()?, name.clone())))
+    };
+    // A RAM that fails its test is left full of patterns.
+    let sound = |(name, _): &(&String, &serde_json::Value)| !["stuck bit", "coupled bits"].contains(&name.as_str());
+    let runs = output.as_object().context("no runs")?.iter().filter(sound);
+    let (deepest, name) = runs.filter_map(depth).max().context("no depth of the stack")?;
+    ensure!(
+        deepest <= u64::from(worst),
+        "{deepest} bytes of stack in the run `{name}`, and {worst} were computed as the most"
+    );
+    Ok(format!("at most {deepest} bytes in any run (`{name}`); {worst} are computed as the most"))
+}
+
+/// A start with a RAM that fails its test: nothing starts, the log says so, and the watchdog resets the chip into the
+/// same again.
+pub(super) fn unfit(events: &Events, image: &[u8]) -> Result<String> {
+    events.safe()?;
+    let log = events.log(image)?;
+    let line = "self-test failed part=ram value=536871936";
+    ensure!(log.iter().any(|said| said == line), "it does not say so: {log:?}");
+    ensure!(log.iter().any(|said| said.contains("reset=watchdog last_fault=9")), "no fault is kept: {log:?}");
+    ensure!(events.times("ticked").is_empty() && events.times("sent").is_empty(), "it ticks or talks");
+    let resets = events.times("reset").len();
+    ensure!(resets >= 3, "it is reset {resets} times");
+    Ok(format!("`{line}`; nothing starts, and the watchdog resets the chip into the same again"))
+}
+
+/// A start with a processor whose clock is not what it should be compared with the watchdog's, which it sees as
+/// `seen_hz`: nothing is armed, and the host hears why.
+pub(super) fn wrong_clock(events: &Events, image: &[u8], seen_hz: u32) -> Result<String> {
+    events.safe()?;
+    let log = events.log(image)?;
+    let line = format!("self-test failed part=clock value={seen_hz}");
+    for part in [line.as_str(), "fault code=9 name=self-test"] {
+        ensure!(log.iter().any(|said| said.contains(part)), "no `{part}` in {log:?}");
+    }
+    let answers = answers(events)?;
+    let refused = Reply::Refused(Reason::Faulted(Fault::SelfTest.into()));
+    ensure!(answers.contains(&refused), "arming is not refused: {answers:?}");
+    let reported =
+        |reply: &Reply| matches!(reply, Reply::Fault(report) if report.fault == link::Fault::from(Fault::SelfTest));
+    ensure!(answers.iter().any(reported), "the host does not hear of it: {answers:?}");
+    Ok(format!("`{line}`; reported on the line, arming is refused, DAC zero and enable off throughout"))
+}
+
+/// A start with the brown-out level of a new chip, which the log says.
+pub(super) fn delivered(events: &Events, image: &[u8]) -> Result<String> {
+    let boot = restarted_safe(events, image, "reset=power-on last_fault=0")?;
+    let log = events.log(image)?;
+    let line = "brown-out level=0 expected=4";
+    ensure!(log.iter().any(|said| said == line), "it does not say so: {log:?}");
+    Ok(format!("`{line}`; `{boot}`"))
+}
+
+/// A start with a voltage at the monitor although the amplifier is off: arming is refused, and after the discharge time
+/// it is a fault.
+pub(super) fn held(events: &Events, image: &[u8]) -> Result<String> {
+    events.safe()?;
+    let log = events.log(image)?;
+    let line = format!("monitor {}", Mismatch::Held.name());
+    ensure!(log.iter().any(|said| said.contains(&line)), "no `{line}` in {log:?}");
+    let answers = answers(events)?;
+    ensure!(answers.contains(&Reply::Refused(Reason::Live)), "arming is not refused: {answers:?}");
+    Ok(format!("arming is refused, and after a second `{line}`; DAC zero and enable off throughout"))
+}
+
+/// Everything that the chip sends from its start on.
+fn answers(events: &Events) -> Result<Vec<Reply>> {
+    let (_, ticking) = events.split("watchdog started")?;
+    Ok(host::answers(&ticking)?.into_iter().map(|(_, _, reply)| reply).collect())
+}
+
 /// The events before the injected fault and those from it on. An error if there was no voltage before it.
-fn mishap(events: &Events) -> Result<(Events, Events)> {
-    let (before, after) = events.split("mishap")?;
-    ensure!(before.safe().is_err(), "no voltage before the mishap, so that it shows nothing");
+fn injected(events: &Events) -> Result<(Events, Events)> {
+    let (before, after) = events.split("injected")?;
+    ensure!(before.safe().is_err(), "no voltage before the injected fault, so that it shows nothing");
     Ok((before, after))
 }
 
@@ -204,7 +308,7 @@ fn gone(events: &Events) -> Result<f64> {
 }
 
 /// An error unless the output stays safe for at least 50 ticks after the reset. Returns the boot line from `cause` on.
-fn reborn_safe(events: &Events, image: &[u8], cause: &str) -> Result<String> {
+fn restarted_safe(events: &Events, image: &[u8], cause: &str) -> Result<String> {
     events.safe()?;
     ensure!(events.times("reset").len() == 1, "it is reset again");
     ensure!(events.times("dac").len() > 50, "it does not tick again");
@@ -229,11 +333,11 @@ mod tests {
     #[test]
     fn a_log_line_before_the_output_is_safe_is_an_error() {
         let dying = |list: &[(&str, serde_json::Value)]| gone(&events(list).split("log").unwrap().0);
-        let (mishap, log) = (("mishap", 300.into()), ("log", "00".into()));
+        let (injection, log) = (("injected", 300.into()), ("log", "00".into()));
         let (zero, off) = (("dac", 0.into()), ("enable", "off".into()));
-        assert_eq!(dying(&[mishap.clone(), off.clone(), zero.clone(), log.clone()]).unwrap(), 2.0);
-        assert!(dying(&[mishap.clone(), off.clone(), log.clone(), zero.clone()]).is_err());
-        assert!(dying(&[mishap.clone(), zero.clone(), log.clone(), off.clone()]).is_err());
-        assert!(dying(&[mishap, ("dac", 1755.into()), off, zero, log]).is_err());
+        assert_eq!(dying(&[injection.clone(), off.clone(), zero.clone(), log.clone()]).unwrap(), 2.0);
+        assert!(dying(&[injection.clone(), off.clone(), log.clone(), zero.clone()]).is_err());
+        assert!(dying(&[injection.clone(), zero.clone(), log.clone(), off.clone()]).is_err());
+        assert!(dying(&[injection, ("dac", 1755.into()), off, zero, log]).is_err());
     }
 }

@@ -16,9 +16,6 @@ use super::setup::SetLimits;
 /// Rounding of a voltage and of the ends of the range, in V: 0.13 mV of a code, and one step of a signal.
 const ROUNDING_V: f64 = 1.5e-4;
 
-/// End of the format of a target, in V.
-const HIGHEST_TARGET_V: f64 = 2048.0;
-
 /// Number of ticks in which something was the case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Counts {
@@ -50,6 +47,13 @@ impl Counts {
             silences: self.silences + other.silences,
             trusted: self.trusted + other.trusted,
         }
+    }
+
+    /// The counts with their names, for `cargo xtask counts`.
+    pub(super) fn tallied(&self) -> impl Iterator<Item = (String, u64)> {
+        let runs = [("runs, each with settings of its own".to_owned(), self.runs)];
+        let ticks = self.named().map(|(name, count)| (format!("ticks: {name}"), count));
+        runs.into_iter().chain(ticks)
     }
 
     fn named(&self) -> [(&'static str, u64); 10] {
@@ -101,9 +105,8 @@ fn ensure(holds: bool, what: impl FnOnce() -> String) -> Result<(), String> {
 impl Watch {
     pub(super) fn new(limits: SetLimits) -> Self {
         let sample_time = SampleTime::from_rate(limits.rate_hz).expect("the settings were accepted");
-        // The target of a silent host ramps down from where it is, which may be any voltage of the format here; the link
-        // accepts none outside of the range.
-        let ramp = HIGHEST_TARGET_V / SUPERVISION.ramp_v_per_s / sample_time.seconds();
+        // The target of a silent host ramps down from where it is within the range.
+        let ramp = limits.amplifier.max_v / SUPERVISION.ramp_v_per_s / sample_time.seconds();
         Self {
             limits,
             counts: Counts { runs: 1, ..Counts::default() },

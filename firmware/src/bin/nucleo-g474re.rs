@@ -44,7 +44,7 @@ unsafe fn FMAC() {
 fn main() -> ! {
     switch_amplifier_off();
     let cause = crash_record::reset_cause(Some(reset()));
-    let (board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
+    let (mut board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
     log::boot(cause.name, cause.fault.map_or(0, Fault::code), CONTROLLER);
     if guards::start(clocks::CORE_HZ).is_none() {
         // As after rejected settings: the output stays at zero and off until the watchdog resets the chip.
@@ -52,6 +52,7 @@ fn main() -> ! {
             cortex_m::asm::wfi();
         }
     }
+    board.test();
     interrupt::CORDIC.set_priority(Priority::P4);
     interrupt::LPUART1.set_priority(Priority::P8);
     interrupt::FMAC.set_priority(Priority::P12);

@@ -12,8 +12,12 @@
 //! | [`flash`] | Two pages for the model store. |
 //! | [`reset`] | Source of the last reset. |
 //! | [`random`] | Random number generator. |
+//! | [`clock_test`] | Measurement of the processor's clock. |
+//! | [`brown_out`] | Level of the brown-out reset. |
 
 pub mod amplifier;
+pub mod brown_out;
+pub mod clock_test;
 pub mod clocks;
 pub mod flash;
 pub mod random;
@@ -24,8 +28,10 @@ use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
+use model::supervisor::Fault;
 
 use crate::board::Board;
+use crate::log;
 use crate::settings::WATCHDOG_MS;
 
 pub use amplifier::switch_amplifier_off;
@@ -37,6 +43,7 @@ pub struct Nucleo {
     interlock: Input<'static>,
     watchdog: IndependentWatchdog<'static, IWDG>,
     led: Output<'static>,
+    fault: Option<Fault>,
 }
 
 impl Nucleo {
@@ -51,8 +58,23 @@ impl Nucleo {
             interlock: Input::new(p.PB10, Pull::Down),
             watchdog,
             led: Output::new(p.PA5, Level::Low, Speed::Low),
+            fault: None,
         };
         (board, uart::Uart::new(p.LPUART1, p.PA3, p.PA2), flash::Flash::new(p.FLASH))
+    }
+}
+
+impl Nucleo {
+    /// Compares the processor's clock with the watchdog's, and reads the level of the brown-out reset. A wrong clock is a
+    /// `self-test` fault until the restart, another level is logged only.
+    pub fn test(&mut self) {
+        if let Some(seen_hz) = clock_test::failed() {
+            log::self_test("clock", seen_hz);
+            self.fault = Some(Fault::SelfTest);
+        }
+        if let Some(level) = brown_out::unexpected() {
+            log::brown_out(level, brown_out::EXPECTED);
+        }
     }
 }
 
@@ -69,6 +91,10 @@ impl Board for Nucleo {
 
     fn feed_watchdog(&mut self) {
         self.watchdog.pet();
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        self.fault
     }
 
     fn show_armed(&mut self, armed: bool) {

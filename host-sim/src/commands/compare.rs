@@ -1,19 +1,16 @@
 //! `vsj compare`: every controller on the same steps.
 
-use std::str::FromStr;
-
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::compare::text;
 use host_sim::output::terminal::{json, print};
 use model::Amplifier;
 use simulation::bad_input;
-use simulation::bad_input::{BadInput, excerpt};
 use simulation::comparison::{Actual, compare};
 use simulation::plant_file;
-use simulation::spring_error::{Parameter, SpringError};
 
 use super::option_names::{SETTINGS, named};
+use super::spring_error::{ErrorOf, together};
 
 /// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller
 #[derive(Args, Debug)]
@@ -55,45 +52,10 @@ const MOST_AMPLIFIERS: usize = 16;
 const FULL_SCALE_V: f64 = 500.0;
 /// Smallest and largest noise of a sensor, in percent.
 const NOISE_PERCENT: (f64, f64) = (0.001, 10.0);
-/// Smallest and largest error of a parameter, in percent.
-const ERROR_PERCENT: (f64, f64) = (-90.0, 900.0);
-
-/// An error of one parameter of the spring.
-#[derive(Clone, Copy, Debug)]
-struct ErrorOf {
-    parameter: Parameter,
-    error: f64,
-}
-
-impl FromStr for ErrorOf {
-    type Err = BadInput;
-
-    fn from_str(text: &str) -> Result<Self, BadInput> {
-        let refused = || BadInput(format!("`{}`: expected tau, gain or share, then `=` and -90 to 900", excerpt(text)));
-        let (key, percent) = text.split_once('=').ok_or_else(refused)?;
-        let parameter = match key {
-            "tau" => Parameter::TimeConstant,
-            "gain" => Parameter::Gain,
-            "share" => Parameter::Share,
-            _ => return Err(refused()),
-        };
-        let percent: f64 = percent.parse().map_err(|_| refused())?;
-        let allowed = (ERROR_PERCENT.0..=ERROR_PERCENT.1).contains(&percent);
-        if allowed { Ok(Self { parameter, error: percent / 100.0 }) } else { Err(refused()) }
-    }
-}
-
 impl Arguments {
     /// The spring and its sensor, where they differ from the model.
     fn actual(&self) -> Result<Option<Actual>> {
-        let mut spring_error = SpringError::default();
-        for ErrorOf { parameter, error } in &self.spring_error {
-            let known = spring_error.of(*parameter);
-            if *known != 0.0 {
-                bad_input!("--spring-error: {} twice; expected each parameter once", parameter.name());
-            }
-            *known = *error;
-        }
+        let spring_error = together(&self.spring_error)?;
         let sensor_noise_v = self.sensor_noise.map(|percent| percent / 100.0 * FULL_SCALE_V);
         if let Some(percent) = self.sensor_noise.filter(|of| !(NOISE_PERCENT.0..=NOISE_PERCENT.1).contains(of)) {
             bad_input!("--sensor-noise {percent}: expected {} to {}", NOISE_PERCENT.0, NOISE_PERCENT.1);

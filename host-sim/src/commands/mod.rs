@@ -1,6 +1,7 @@
 //! One module per subcommand: it reads arguments, calls a library, and hands the result to [`host_sim::output`].
 
 pub(crate) mod beam;
+pub(crate) mod bound;
 mod choice;
 pub(crate) mod compare;
 pub(crate) mod completions;
@@ -14,6 +15,7 @@ mod option_names;
 pub(crate) mod plan;
 mod record_arguments;
 pub(crate) mod reproduce;
+mod spring_error;
 pub(crate) mod stair;
 pub(crate) mod tune;
 pub(crate) mod watch;

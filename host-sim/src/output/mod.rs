@@ -4,11 +4,12 @@
 //! | --- | --- |
 //! | [`terminal`], [`screen`] | stdout and stderr; a status that is refreshed in place |
 //! | [`files`] | the files of one run: all of them or none |
-//! | [`beam`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
+//! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`recording`] | telemetry as CSV while it arrives |
 //! | [`figure`], [`plots`] | plots as SVG |
 
 pub mod beam;
+pub mod bound;
 mod cells;
 pub mod compare;
 pub mod diagnosis;

@@ -180,7 +180,7 @@ impl Server {
         self.session.answer(&reply)
     }
 
-    /// The report of faults to send ahead of everything else, if one is due: at once after a new fault, then ten times per
+    /// The report of faults to send ahead of everything else, if one is due: immediately after a new fault, then ten times per
     /// second until the host has heard of it. Nothing is due before the first session.
     pub fn fault(&mut self, view: &View) -> Option<&[u8]> {
         self.reports.see(view);

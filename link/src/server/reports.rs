@@ -56,3 +56,39 @@ impl Reports {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reply::Telemetry;
+    use model::supervisor::{self, State};
+
+    fn view(tick: u64, fault: Option<supervisor::Fault>) -> View {
+        View {
+            sample: Telemetry { tick, ..Telemetry::default() },
+            state: fault.map_or(State::Disarmed, State::Faulted),
+            standing: fault.map_or(Faults::NONE, |fault| Faults::NONE.with(fault)),
+            refusal: None,
+            overruns: 0,
+        }
+    }
+
+    #[test]
+    fn every_fault_is_reported_and_heard_across_the_wrap_of_its_number() {
+        let before = u32::MAX - 3;
+        let mut reports = Reports::NEW;
+        (reports.latest.number, reports.heard) = (before, before);
+        for step in 1..=8 {
+            let now = 10 * u64::from(step);
+            let number = before.wrapping_add(step);
+            reports.see(&view(now, Some(supervisor::Fault::Interlock)));
+            assert_eq!(reports.due(now, 5).map(|report| report.number), Some(number), "reported");
+            reports.hear(number.wrapping_sub(1));
+            assert_eq!(reports.due(now + 4, 5), None, "not yet again");
+            assert!(reports.due(now + 5, 5).is_some(), "an earlier number does not end the repetition");
+            reports.hear(number);
+            assert_eq!(reports.due(now + 10, 5), None, "heard");
+            reports.see(&view(now + 1, None));
+        }
+    }
+}

@@ -211,7 +211,7 @@ fn a_report_of_a_fault_is_repeated_until_the_host_has_heard_of_it() {
     for tick in 1008..3000 {
         assert_eq!(sent(&mut server, tick), None, "{tick}");
     }
-    // A second fault is reported at once, with both.
+    // A second fault is reported immediately, with both.
     let both = View { standing: Faults::NONE.with(Cause::Monitor).with(Cause::Watchdog), ..FAULTED };
     let Some(Reply::Fault(second)) = server.fault(&at(3000, both)).map(reply) else { panic!() };
     assert_eq!((second.number, second.fault, second.standing), (3, Cause::Watchdog.into(), 0x30));
@@ -250,4 +250,17 @@ fn telemetry_that_is_not_sent_is_counted() {
     send(&mut server, &at(5003, DISARMED), nonce, 3, Request::Heartbeat);
     assert!(server.telemetry(&at(5013, DISARMED)).is_some());
     assert_eq!(server.counters().telemetry_dropped, 4);
+}
+
+/// The monitors agree again once the output is off; the report still says what they found.
+#[test]
+fn a_report_of_a_fault_names_what_disagreed() {
+    let mut server = server();
+    let nonce = greet(&mut server, &DISARMED);
+    send(&mut server, &DISARMED, nonce, 1, Request::Status);
+    let mut found = at(6, FAULTED);
+    found.sample.mismatch = Mismatch(4);
+    let Some(Reply::Fault(first)) = server.fault(&found).map(reply) else { panic!() };
+    let Some(Reply::Fault(later)) = server.fault(&at(106, FAULTED)).map(reply) else { panic!() };
+    assert_eq!((first.tick, first.mismatch, later), (6, Mismatch(4), first));
 }

@@ -45,6 +45,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn the_mean_slew_is_exact_even_below_one_code_per_tick(slew in 1.0..5000.0f64, rate in 100.0..10_000.0f64) {
         let config = config(&Amplifier { slew_v_per_s: Some(slew), ..Amplifier::PAPER }, rate);
         let mut state = State::default();
@@ -153,7 +154,7 @@ fn a_limit_is_reported_only_when_it_holds_the_voltage_back() {
     assert_eq!(config.clamp_target(Volts(lowest.0 - step)), (lowest, true));
 }
 
-/// A slew that crosses the whole range in one tick is none; the range alone is reported, in the same tick.
+/// A slew that crosses the whole range in one tick is not a limit; the range alone is reported, in the same tick.
 #[test]
 fn a_jump_over_the_whole_range_is_held_by_its_end_and_not_by_the_slew() {
     // 0.125 V per code, 511.875 V in one tick.

@@ -38,7 +38,7 @@ fn the_step_gain_is_the_response_of_the_spring_that_runs() {
         let gain = plant.smallest_step_gain(sample_time());
         assert!((gain.feedthrough + gain.in_one_tick - end).abs() < 2e-6, "{gain:?}: {now} {end}");
     }
-    // Without leakage the feedthrough is what comes at once; with it the largest gain is that of the first moment.
+    // Without leakage the feedthrough is the instantaneous part; with it the largest gain is that of the first moment.
     let (now, end) = response(&PLAIN);
     let (small, large) = (PLAIN.smallest_step_gain(sample_time()), PLAIN.largest_step_gain(sample_time()));
     for gain in [small, large] {

@@ -63,6 +63,9 @@ mod disabled;
 #[cfg(feature = "feedback")]
 mod enabled;
 
+/// Names of what can be said of a stiffness sensor, in the order of their numbers in frames: 0 stands for no sensor.
+pub const SENSOR_NAMES: [&str; 7] = ["none", "trusted", "absent", "stale", "stuck", "jumping", "out-of-range"];
+
 #[cfg(not(feature = "feedback"))]
 pub use disabled::{Config, Feedback, Reading, Sensor, State};
 #[cfg(feature = "feedback")]

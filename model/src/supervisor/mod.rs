@@ -150,7 +150,7 @@ pub struct Supervisor {
     standing: Faults,
     /// Target on the ramp down while the host is silent; 64 bits, so that the slowest ramp moves.
     ramp: Option<Accumulator>,
-    /// Target of the last tick with voltage.
+    /// Target of the last tick with voltage, as the controller has limited it.
     pursued: Volts,
     /// Missed ticks that are not forgotten yet, in ticks until they are; at most one of them while disabled.
     misses: u32,
@@ -231,7 +231,6 @@ impl Supervisor {
             self.ramp = None;
             return Decision::Rest;
         };
-        self.pursued = target;
         if was_armed { Decision::Pursue(target) } else { Decision::Start(target) }
     }
 
@@ -242,6 +241,7 @@ impl Supervisor {
             self.monitors.expect(None);
             return Drive::SAFE;
         }
+        self.pursued = output.target;
         self.monitors.expect(Some(output.applied));
         Drive { code: output.code, enabled: true }
     }

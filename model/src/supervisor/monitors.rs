@@ -10,7 +10,12 @@
 //!   monitors agree with it: only a reference of its own shows it.
 //!
 //! While the output is enabled a disagreement may last as long as the amplifier takes to settle; while it is disabled,
-//! as long as the spring takes to discharge.
+//! as long as the spring takes to discharge. A tick that agrees takes off one that disagreed, so that a noisy monitor is
+//! a fault as well: if a fraction `p > 1/2` of its readings disagrees, within `1 / (2 p - 1)` of these times on average.
+//!
+//! Not detectable: a monitor that disagrees in less than half of the ticks, which an amplifier that settles after each
+//! change does too; a reading that is late by less than the amplifier may take to settle; a load that is disconnected,
+//! because the current of a change has passed between two readings.
 
 use super::settings::Config;
 use crate::units::Volts;
@@ -66,7 +71,7 @@ impl Mismatch {
     }
 }
 
-/// Counter of the ticks for which the monitors have disagreed with the output.
+/// Counter of the ticks in which the monitors have disagreed with the output, less those in which they have agreed since.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct MonitorCheck {
     /// The voltage that was put out; `None` while the output is disabled.
@@ -89,11 +94,16 @@ impl MonitorCheck {
         self.driven = driven;
     }
 
-    /// Compares the readings of one tick; returns true if they have disagreed for too long.
+    /// Compares the readings of one tick; returns true if they have disagreed in too many.
     pub(super) fn update(&mut self, config: &Config, monitors: Option<Monitors>) -> bool {
         self.mismatch = monitors.and_then(|monitors| self.compare(config, &monitors));
-        self.ticks = if self.mismatch.is_some() { self.ticks.saturating_add(1) } else { 0 };
-        self.ticks > if self.driven.is_some() { config.monitor_ticks } else { config.discharge_ticks }
+        let allowed = if self.driven.is_some() { config.monitor_ticks } else { config.discharge_ticks };
+        // Counted no further than to the fault, so that it is forgotten within the same time.
+        self.ticks = match self.mismatch {
+            Some(_) => self.ticks.min(allowed).saturating_add(1),
+            None => self.ticks.saturating_sub(1),
+        };
+        self.ticks > allowed
     }
 
     /// Returns what disagreed in the last tick.

@@ -50,7 +50,11 @@ fn output(applied_v: f64) -> Output {
 /// Both halves of a tick; the controller's output is always 300 V.
 fn tick(supervisor: &mut Supervisor, inputs: Inputs) -> (Decision, Drive) {
     let decision = supervisor.decide(&inputs);
-    (decision, supervisor.release(&output(300.0)))
+    let target = match decision {
+        Decision::Start(target) | Decision::Pursue(target) => target,
+        Decision::Rest => Volts::ZERO,
+    };
+    (decision, supervisor.release(&Output { target, ..output(300.0) }))
 }
 
 fn armed() -> Supervisor {

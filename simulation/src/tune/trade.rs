@@ -42,9 +42,7 @@ pub(super) fn over_model_errors(file: &PlantFile, with_gains: Option<&Run>, fast
 
 /// Worst response when the voltages of `run` drive a spring that differs from the file's.
 fn with_model_error(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> Worst {
-    let mut errors = SpringError::default();
-    *errors.of(parameter) = error;
-    let differing = DifferingSpring::new(file, &errors);
+    let differing = DifferingSpring::new(file, &SpringError::default().with(parameter, error));
     let times: Vec<f64> = (0..run.with.len()).map(|tick| run.time_s(tick)).collect();
     let volts: Vec<f64> = run.with.iter().map(|sample| sample.applied.to_f64()).collect();
     let stiffness = sampled::simulate(&differing.spring(), &times, &volts);

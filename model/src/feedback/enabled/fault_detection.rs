@@ -38,6 +38,7 @@
 //! Not detectable: a sensor that shifts its readings slowly, or by less than the gate, which is wide while the model
 //! moves. A wrong model, or a spring that is late, gives the same readings.
 
+use super::super::SENSOR_NAMES;
 use super::envelope::{self, Envelope};
 use super::settings::{Feedback, Reading};
 use crate::coefficient::{Rate, Weight, saturated, upper, widened};
@@ -76,17 +77,10 @@ pub enum Sensor {
 impl Sensor {
     /// Returns a stable lower-case name for logs: `trusted`, or the fault.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Trusted => "trusted",
-            Self::Failed(Fault::Absent) => "absent",
-            Self::Failed(Fault::Stale) => "stale",
-            Self::Failed(Fault::Stuck) => "stuck",
-            Self::Failed(Fault::Jumping) => "jumping",
-            Self::Failed(Fault::OutOfRange) => "out-of-range",
-        }
+        SENSOR_NAMES[self.code() as usize]
     }
 
-    /// Returns the stable number for frames, 1 to 255.
+    /// Returns the stable number for frames: the index of the name in [`SENSOR_NAMES`], never 0.
     pub const fn code(self) -> u8 {
         match self {
             Self::Trusted => 1,

@@ -9,7 +9,7 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
     ];
     let supply = prop_oneof![3 => Just(None), 2 => Just(Some(3300)), 1 => any::<u16>().prop_map(Some)];
     let monitors = prop_oneof![3 => Just(None), 1 => (any::<i32>(), any::<i32>(), supply).prop_map(Some)];
-    let fault = prop_oneof![30 => Just(None), 1 => (0..8usize).prop_map(|i| Some(Fault::ALL[i]))];
+    let fault = prop_oneof![30 => Just(None), 1 => (0..Fault::ALL.len()).prop_map(|i| Some(Fault::ALL[i]))];
     (command, any::<i32>(), prop_oneof![0..1000u32, any::<u32>()], 0..20u8, 0..40u32, monitors, fault).prop_map(
         |(command, target, ticks_since_host, interlock, missed, monitors, fault)| Inputs {
             command,

@@ -82,3 +82,21 @@ fn a_ramp_that_reaches_exactly_zero_disarms_in_that_tick() {
     assert!(targets.iter().all(|(is, expected)| is == expected), "{targets:?}");
     assert_eq!((supervisor.decide(&silent), supervisor.state()), (Decision::Rest, State::Disarmed));
 }
+
+/// A target of 1000 V that the controller limits to 700 V.
+#[test]
+fn the_ramp_begins_at_the_target_that_the_controller_has_limited() {
+    let mut supervisor = armed();
+    let beyond = Inputs { target: volts(1000.0), ..good() };
+    supervisor.decide(&beyond);
+    supervisor.release(&output(700.0));
+    let silent = |ticks: u32| Inputs { ticks_since_host: 500 + ticks, ..beyond };
+    for ticks in 1..1000 {
+        let Decision::Pursue(target) = supervisor.decide(&silent(ticks)) else { panic!("{ticks}: {supervisor:?}") };
+        assert!((target.to_f64() - (700.0 - 0.7 * f64::from(ticks))).abs() < 1e-3, "{ticks}: {target:?}");
+        supervisor.release(&Output { target, ..output(300.0) });
+    }
+    supervisor.decide(&silent(1000));
+    supervisor.decide(&silent(1001));
+    assert_eq!(supervisor.state(), State::Disarmed, "after one second, give or take a rounding");
+}

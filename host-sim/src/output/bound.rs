@@ -1,0 +1,53 @@
+//! The answer of `vsj bound` as text.
+
+use crate::output::cells::{line, optional, tidy};
+use simulation::robust_bound::Answer;
+use simulation::spring_error::Parameter;
+
+/// The shortest times of all steps, and how well the spring has to be known.
+pub fn text(answer: &Answer) -> String {
+    let mut text = String::new();
+    let mut error = answer.spring_error;
+    let known: Vec<String> = Parameter::ALL
+        .into_iter()
+        .map(|parameter| (parameter.name(), 100.0 * *error.of(parameter)))
+        .filter(|(_, percent)| *percent != 0.0)
+        .map(|(name, percent)| format!("{name} to +-{percent:.3} %"))
+        .collect();
+    let slew = answer.slew_v_per_s.map_or(String::new(), |slew| format!(", {} V/s", tidy(slew)));
+    line(
+        &mut text,
+        &format!(
+            "Shortest time to reach and keep 97 % without a sensor, up to {} V{slew}, overshoot at most {} %:",
+            tidy(answer.limit_v),
+            tidy(answer.overshoot_percent)
+        ),
+    );
+    line(&mut text, "    step [V] | spring known [s] | known to the errors [s]");
+    for step in &answer.steps {
+        line(
+            &mut text,
+            &format!(
+                "{:>4} -> {:<4} | {:>16} | {:>23}",
+                tidy(step.from_v),
+                tidy(step.to_v),
+                optional(step.known_s, 3),
+                optional(step.t97_s, 3)
+            ),
+        );
+    }
+    line(&mut text, &format!("Errors: {}", if known.is_empty() { "none".to_owned() } else { known.join(", ") }));
+    text.push('\n');
+    line(
+        &mut text,
+        &format!("For all steps in {} s the spring has to be known, each parameter alone, to", tidy(answer.within_s)),
+    );
+    for (parameter, needed) in
+        Parameter::ALL.into_iter().zip([answer.needed.share, answer.needed.time_constant, answer.needed.gain])
+    {
+        let needed = needed
+            .map_or("impossible even if it is known exactly".to_owned(), |needed| format!("+-{:.1} %", 100.0 * needed));
+        line(&mut text, &format!("  {:<14} {needed}", parameter.name()));
+    }
+    text
+}

@@ -1,0 +1,102 @@
+//! The bounds of the steps of a stair, and how well the spring has to be known for a time.
+
+use anyhow::Result;
+use model::{SampleTime, Validate};
+use serde::Serialize;
+
+use super::{Allowed, RobustBound};
+use crate::bad_input::BadInput;
+use crate::plant_file::PlantFile;
+use crate::schedule::Schedule;
+use crate::spring_error::{Parameter, SpringError};
+
+/// What is asked of [`answer`].
+#[derive(Clone, Copy, Debug)]
+pub struct Question {
+    /// Amplifier and overshoot.
+    pub allowed: Allowed,
+    /// Largest relative errors of the parameters, both ways, 0 or more.
+    pub spring_error: SpringError,
+    /// Time in which all steps have to be done, in s.
+    pub within_s: f64,
+}
+
+/// The answer of `vsj bound --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Answer {
+    /// Highest voltage of the amplifier, in V.
+    pub limit_v: f64,
+    /// Slew limit of the amplifier, in V/s; `None` without one.
+    pub slew_v_per_s: Option<f64>,
+    /// Largest overshoot, in percent of the step.
+    pub overshoot_percent: f64,
+    /// Relative errors to within which the spring is known.
+    pub spring_error: SpringError,
+    /// The steps of the stair.
+    pub steps: Vec<Step>,
+    /// Time in which all steps have to be done, in s.
+    pub within_s: f64,
+    /// How well each parameter alone has to be known for it.
+    pub needed: Needed,
+}
+
+/// Shortest times of one step, from rest.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Step {
+    /// Voltage before the step, in V.
+    pub from_v: f64,
+    /// Voltage that holds the stiffness after the step, in V.
+    pub to_v: f64,
+    /// Shortest t97 if the spring is known exactly, in s; `None` if out of reach.
+    pub known_s: Option<f64>,
+    /// Shortest t97 for all springs within the errors, in s; `None` if out of reach.
+    pub t97_s: Option<f64>,
+}
+
+/// Largest relative errors, both ways; `None` if the time is too short even without errors.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Needed {
+    /// Of the instantaneous share.
+    pub share: Option<f64>,
+    /// Of all time constants.
+    pub time_constant: Option<f64>,
+    /// Of the gain of the whole response.
+    pub gain: Option<f64>,
+}
+
+/// Computes the bounds of the stair's steps and the errors that a time allows.
+///
+/// # Errors
+/// The errors of [`RobustBound::new`], and [`crate::BadInput`] for an amplifier that the model rejects.
+pub fn answer(file: &PlantFile, question: &Question) -> Result<Answer> {
+    let Question { allowed, spring_error, within_s } = *question;
+    // The rate has no part in it.
+    let rejected = |error: model::OutOfRange| BadInput(error.to_string());
+    allowed.amplifier.validate(SampleTime::from_rate(1000.0).map_err(rejected)?).map_err(rejected)?;
+    let bound = RobustBound::new(file, allowed)?;
+    let steps: Vec<(f64, f64)> =
+        Schedule::ideal_stair().changes().iter().map(|change| (change.from_v, change.to_v)).collect();
+    let of = |&(from_v, to_v): &(f64, f64)| {
+        let known_s = bound.shortest_s(from_v, to_v, &SpringError::default());
+        let t97_s = if spring_error == SpringError::default() {
+            known_s
+        } else {
+            bound.shortest_s(from_v, to_v, &spring_error)
+        };
+        Step { from_v, to_v, known_s, t97_s }
+    };
+    let needed = |parameter| bound.needed(parameter, within_s, &steps);
+    Ok(Answer {
+        limit_v: allowed.amplifier.max_v,
+        slew_v_per_s: allowed.amplifier.slew_v_per_s,
+        overshoot_percent: 100.0 * allowed.overshoot,
+        spring_error,
+        steps: steps.iter().map(of).collect(),
+        within_s,
+        needed: Needed {
+            share: needed(Parameter::Share),
+            time_constant: needed(Parameter::TimeConstant),
+            gain: needed(Parameter::Gain),
+        },
+    })
+}
