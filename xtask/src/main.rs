@@ -83,7 +83,8 @@ enum Command {
     /// Write the image to the real board and show its log (probe-rs)
     ///
     /// The log's first line names the controller, a second one an amplifier of 1000 V. A stored model stays; a model
-    /// that the controller cannot run is a fault until it is acknowledged.
+    /// that the controller cannot run is a fault until it is acknowledged. Needs `cargo install probe-rs-tools --locked`, and
+    /// on Linux the udev rules of https://probe.rs/docs/getting-started/probe-setup/
     #[command(
         verbatim_doc_comment,
         after_help = "\
@@ -101,9 +102,10 @@ Examples:
     #[command(after_help = "\
 Examples:
   cargo xtask image                                    nucleo-g474re, mps2-an386
+  cargo xtask image --board mps2-an386                 the emulated board's alone
   cargo xtask image --controller fast                  nucleo-g474re-fast, mps2-an386-fast
   cargo xtask image --controller fast --limit-v 1000   nucleo-g474re-fast-kilovolt, mps2-an386-fast-kilovolt")]
-    Image(Variant),
+    Image(image::Args),
     /// Run the image that is flashed on models of the STM32G474's registers
     Boot(Forwarded),
     /// Run random ticks on the host and check every invariant in each
@@ -218,7 +220,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Check => check::run(),
         Test => test::run(),
         Flash(variant) => flash::run(variant),
-        Image(variant) => image::run(variant),
+        Image(args) => image::run(args),
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
         Counts(args) => counts::run(&args),
