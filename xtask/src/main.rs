@@ -12,6 +12,7 @@ mod fuzz;
 mod image;
 mod mutants;
 mod nightly;
+mod package;
 mod reproducible;
 mod sanitize;
 mod sbom;
@@ -119,6 +120,8 @@ Examples:
         after_help = "Example:\n  cargo xtask bench --json | jq '.rows[] | {name, to_numba, met}'"
     )]
     Bench(bench::Args),
+    /// Install the Python package in a virtual environment and run its tests
+    Python,
     /// Change the code in one place at a time; count what no test notices
     ///
     /// Over model, link and the parts of the firmware that a host can run. Fails below 95 % caught, or if a change lives
@@ -213,8 +216,8 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Reproducible};
-    use Command::{Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
+    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
+    use Command::{Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -223,6 +226,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Image(args) => image::run(args),
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
+        Python => package::run(),
         Counts(args) => counts::run(&args),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),

@@ -1,0 +1,209 @@
+//! Identification, diagnosis and plan: records in, the command's JSON out, with the courses over time that it does not contain.
+
+use std::time::Duration;
+
+use ::identify::plan::{Basis, Request};
+use ::identify::plant::base::Base;
+use ::identify::{Diagnosis, Effort, Input, Options, Stop, examine_several};
+use anyhow::Result;
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use simulation::bad_input;
+use simulation::plant_file::{self, PlantFile};
+use simulation::record::MeasuredRecord;
+
+use crate::interrupt;
+use crate::records::{self, Given, Records, copied};
+
+/// Named columns of numbers, each with one value per reading.
+type Course = Vec<(&'static str, Vec<f64>)>;
+
+/// An answer: its JSON, a plant file, remarks, and the courses of each record by name.
+struct Answer {
+    json: String,
+    plant: String,
+    remarks: Vec<String>,
+    courses: Vec<(String, Course)>,
+}
+
+impl Answer {
+    fn into_python(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let answer = PyDict::new(py);
+        answer.set_item("json", self.json)?;
+        answer.set_item("plant", self.plant)?;
+        answer.set_item("remarks", self.remarks)?;
+        let courses = self.courses.into_iter().map(|(name, course)| Ok((name, arrays(py, course)?)));
+        answer.set_item("courses", courses.collect::<PyResult<Vec<_>>>()?)?;
+        Ok(answer)
+    }
+}
+
+fn arrays(py: Python<'_>, course: Course) -> PyResult<Bound<'_, PyDict>> {
+    let arrays = PyDict::new(py);
+    for (name, values) in course {
+        let array: Bound<'_, PyArray1<f64>> = values.into_pyarray(py);
+        arrays.set_item(name, array)?;
+    }
+    Ok(arrays)
+}
+
+/// The text of a plant file, with the records that it was identified from.
+fn plant_text(plant: &PlantFile, records: &Records) -> Result<String> {
+    let names: Vec<&str> = records.measured.iter().map(|measured| measured.record.name.as_str()).collect();
+    Ok(format!("# Identified from {}\n{}", names.join(", ").replace(['\n', '\r'], " "), plant.to_toml()?))
+}
+
+/// Identifies the linear spring of records.
+#[pyfunction]
+pub(crate) fn identify<'py>(
+    py: Python<'py>,
+    records: Vec<Given<'py>>,
+    options: records::Options,
+) -> PyResult<Bound<'py, PyDict>> {
+    let records = copied(records);
+    let answer = interrupt::run(py, &Stop::default(), move || {
+        let records = options.open(&records)?;
+        if records.input == Input::Stair {
+            bad_input!("--input stair: expected hold or linear; the report's stair is for `vsj diagnose`");
+        }
+        let units = records.measured[0].units.clone();
+        let found = ::identify::identify(&records.rows(), records.input, &units)?;
+        let json = serde_json::to_string(&found.report)?;
+        let plant = plant_text(&found.plant, &records)?;
+        let course = |it: ::identify::nominal::Course| {
+            let model = it.reading.iter().zip(&it.residual).map(|(reading, residual)| reading - residual).collect();
+            let columns = vec![
+                ("time_s", it.time_s),
+                ("voltage_v", it.voltage_v),
+                ("reading", it.reading),
+                ("model", model),
+                ("residual", it.residual),
+                ("held_out", it.held_out),
+            ];
+            (it.name, columns)
+        };
+        Ok(Answer { json, plant, remarks: records.remarks, courses: found.records.into_iter().map(course).collect() })
+    })?;
+    answer.into_python(py)
+}
+
+/// The nominal spring of a diagnosis: `paper`, `identify`, a plant file's path, or its name and text.
+#[derive(FromPyObject)]
+pub(crate) enum Plant {
+    Text((String, String)),
+    Named(String),
+}
+
+/// Diagnoses records.
+#[pyfunction]
+pub(crate) fn diagnose<'py>(
+    py: Python<'py>,
+    records: Vec<Given<'py>>,
+    options: records::Options,
+    plant: Plant,
+    effort: String,
+    within: Option<f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let records = copied(records);
+    let stop = deadline(within).map_err(crate::error::exception)?;
+    let answer = interrupt::run(py, &stop.clone(), move || {
+        let effort = match effort.as_str() {
+            "quick" => Effort::Quick,
+            "normal" => Effort::Normal,
+            "thorough" => Effort::Thorough,
+            other => bad_input!("--effort {other}: expected quick, normal or thorough"),
+        };
+        let records = options.open(&records)?;
+        records.check_stair()?;
+        let rows = records.rows();
+        let units = records.measured[0].units.clone();
+        let (plant, file, linear) = match plant {
+            Plant::Named(name) if name == "identify" => {
+                let identified = ::identify::identify(&rows, records.input, &units)?;
+                (name, identified.plant, identified.linear)
+            }
+            Plant::Named(name) => (name.clone(), plant_file::load_for_host(&name)?, None),
+            Plant::Text((name, text)) => (name.clone(), plant_file::parse_for_host(&name, &text)?, None),
+        };
+        let options = Options { plant, units, input: records.input, base: Base::new(file)?, effort, linear, stop };
+        let found = examine_several(&rows, &options, |_| {})?;
+        let json = serde_json::to_string(&found.report)?;
+        let plant = plant_text(&found.plant, &records)?;
+        let courses = courses(&found, &records);
+        Ok(Answer { json, plant, remarks: records.remarks, courses })
+    })?;
+    answer.into_python(py)
+}
+
+/// The courses of a diagnosis, one for each record with its own times.
+fn courses(found: &Diagnosis, records: &Records) -> Vec<(String, Course)> {
+    let data = &found.data;
+    let places: Vec<(usize, f64)> = (0..data.rows()).map(|row| data.place(row)).collect();
+    let less = |residual: &[f64]| -> Vec<f64> {
+        data.reading.iter().zip(residual).map(|(reading, left)| reading - left).collect()
+    };
+    let time_s: Vec<f64> = places.iter().map(|(_, time_s)| *time_s).collect();
+    let columns: [(&str, &[f64]); 9] = [
+        ("time_s", &time_s),
+        ("voltage_v", &data.voltage_v),
+        ("reading", &data.reading),
+        ("baseline", &less(&found.baseline.residual)),
+        ("extended", &less(&found.extended.residual)),
+        ("baseline_residual", &found.baseline.residual),
+        ("residual", &found.extended.residual),
+        ("baseline_held_out", &found.held_out[0]),
+        ("held_out", &found.held_out[1]),
+    ];
+    let of_record = |(index, measured): (usize, &MeasuredRecord)| {
+        let of = |values: &[f64]| -> Vec<f64> {
+            values.iter().zip(&places).filter(|(_, (record, _))| *record == index).map(|(value, _)| *value).collect()
+        };
+        (measured.record.name.clone(), columns.iter().map(|(name, values)| (*name, of(values))).collect())
+    };
+    records.measured.iter().enumerate().map(of_record).collect()
+}
+
+/// A stop after `within` seconds.
+fn deadline(within: Option<f64>) -> Result<Stop> {
+    let Some(seconds) = within else { return Ok(Stop::default()) };
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(time) if seconds > 0.0 => Ok(Stop::after(time)),
+        _ => bad_input!("--within {seconds}: expected a positive time in s"),
+    }
+}
+
+/// Plans the next experiment from the JSON of a diagnosis; `name` is what messages call it.
+#[pyfunction]
+pub(crate) fn plan<'py>(
+    py: Python<'py>,
+    diagnosis: String,
+    name: String,
+    minutes: Option<f64>,
+    limit_v: Option<f64>,
+    slew_v_per_s: Option<f64>,
+) -> PyResult<(String, Bound<'py, PyDict>)> {
+    let (json, course) = interrupt::run(py, &Stop::default(), move || {
+        for (option, value) in [("--minutes", minutes), ("--limit-v", limit_v), ("--slew-v-per-s", slew_v_per_s)] {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                bad_input!("{option} {value}: expected a number above 0");
+            }
+        }
+        let basis: Basis = match serde_json::from_str(&diagnosis) {
+            Ok(basis) => basis,
+            Err(error) => {
+                let what = error.to_string();
+                let what = what.rsplit_once(" at line ").map_or(what.as_str(), |(what, _)| what);
+                let (line, column) = (error.line(), error.column());
+                bad_input!("{name}, line {line}, column {column}: {what}; expected the JSON of `vsj diagnose`")
+            }
+        };
+        let plan = ::identify::plan::plan(&basis, &Request { minutes, limit_v, slew_v_per_s }, &name)?;
+        let course: Course = vec![
+            ("time_s", plan.commands.iter().map(|command| command.time_s).collect()),
+            ("voltage_v", plan.commands.iter().map(|command| command.voltage_v).collect()),
+        ];
+        Ok((serde_json::to_string(&plan)?, course))
+    })?;
+    Ok((json, arrays(py, course)?))
+}

@@ -1,0 +1,30 @@
+//! The compiled part of the Python package `vsj`: records and arrays come in, reports as JSON and arrays go out.
+//!
+//! `vsj/__init__.py` makes data classes of them. Every long computation runs without the interpreter's lock.
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`error`] | the library's errors as exceptions |
+//! | [`table`] | columns in memory as the text of a data file, so that they are read as the command reads a file |
+//! | [`records`] | the options of a record, and its rows |
+//! | [`interrupt`] | computations that Ctrl-C ends |
+//! | [`analysis`] | identification, diagnosis, plan |
+//! | [`controller`] | the controller's tick, and the spring alone |
+
+mod analysis;
+mod controller;
+mod error;
+mod interrupt;
+mod records;
+mod table;
+
+/// The compiled part of the package `vsj`.
+#[pyo3::pymodule]
+mod _vsj {
+    #[pymodule_export]
+    use crate::analysis::{diagnose, identify, plan};
+    #[pymodule_export]
+    use crate::controller::{Controller, predict, simulate};
+    #[pymodule_export]
+    use crate::error::BadInput;
+}

@@ -1,0 +1,201 @@
+"""Identification, diagnosis and plan compared with the command's JSON."""
+
+import json
+import threading
+import time
+from dataclasses import is_dataclass
+
+import numpy as np
+import pandas
+import polars
+import pytest
+
+import vsj
+from conftest import SAMPLE
+
+
+def without_names(answer):
+    """The JSON of an answer without the names of its records."""
+    answer = json.loads(answer)
+    for start in answer.get("start", []):
+        start.pop("record")
+    return answer
+
+
+def every_field_is_there(value, parsed, path="answer"):
+    """Fails for a field of the JSON that the data classes do not have or have with another value."""
+    if is_dataclass(value):
+        names = {"with": "with_"}
+        for name, inner in parsed.items():
+            every_field_is_there(getattr(value, names.get(name, name)), inner, f"{path}.{name}")
+    elif isinstance(value, dict):
+        assert value.keys() == parsed.keys(), path
+        for name, inner in parsed.items():
+            every_field_is_there(value[name], inner, f"{path}.{name}")
+    elif isinstance(value, list):
+        assert len(value) == len(parsed), path
+        for index, inner in enumerate(parsed):
+            every_field_is_there(value[index], inner, f"{path}[{index}]")
+    else:
+        assert value == parsed, path
+
+
+def test_identify_equals_the_command(command):
+    found = vsj.identify(SAMPLE)
+    assert json.loads(found.to_json()) == json.loads(command("identify", SAMPLE, "--json"))
+    every_field_is_there(found, json.loads(found.to_json()))
+
+
+def test_diagnose_equals_the_command(command, diagnosis):
+    expected = json.loads(command("diagnose", SAMPLE, "--effort", "quick", "--json"))
+    assert json.loads(diagnosis.to_json()) == expected
+    every_field_is_there(diagnosis, expected)
+    assert diagnosis.findings[0].cause == "hysteresis"
+
+
+def test_plan_equals_the_command(command, diagnosis, tmp_path):
+    file = tmp_path / "diagnosis.json"
+    file.write_text(diagnosis.to_json())
+    expected = json.loads(command("plan", file, "--minutes", 2, "--json"))
+    plan = vsj.plan(diagnosis, minutes=2)
+    assert json.loads(plan.to_json()) == expected
+    every_field_is_there(plan, expected)
+    assert plan.plot().axes[0].lines
+    command("plan", file, "--minutes", 2, "--out", tmp_path / "plan")
+    schedule = pandas.read_csv(tmp_path / "plan/schedule.csv", comment="#")
+    np.testing.assert_allclose(plan.to_frame()[["time_s", "voltage_v"]], schedule[["time_s", "voltage_v"]], atol=1e-6)
+
+
+def test_frames_and_arrays_have_the_answer_of_the_file(sample):
+    expected = without_names(vsj.identify(SAMPLE).to_json())
+    arrays = tuple(sample[name] for name in ("time_s", "voltage_v", "stiffness"))
+    structured = np.rec.fromarrays(list(sample.values()), names=list(sample))
+    for record in (
+        pandas.DataFrame(sample),
+        polars.DataFrame(sample),
+        sample,
+        arrays,
+        np.column_stack(arrays),
+        structured,
+    ):
+        assert without_names(vsj.identify(record).to_json()) == expected, type(record)
+
+
+def test_units_and_names_mean_what_the_options_mean(command, sample, tmp_path):
+    frame = pandas.DataFrame(
+        {"t": 1e3 * sample["time_s"], "u": 1e-3 * sample["voltage_v"], "x": sample["stiffness"], "note": "a, b"}
+    )
+    frame.loc[[5, 9], "x"] = np.nan
+    file = tmp_path / "record.csv"
+    frame.to_csv(file, index=False)
+    options = dict(time="t:ms", voltage="u:kV", reading="x:mm")
+    words = [word for name, value in options.items() for word in (f"--{name}", value)]
+    expected = without_names(command("identify", file, *words, "--json"))
+    assert expected["unit"] == "mm" and expected["rows"] == len(frame) - 2
+    with pytest.warns(vsj.RecordWarning, match="2 of .* rows without a reading"):
+        assert without_names(vsj.identify(frame, **options).to_json()) == expected
+    with pytest.warns(vsj.RecordWarning):
+        assert without_names(vsj.identify(polars.DataFrame(frame.to_dict("list")).fill_nan(None), **options).to_json()) == expected
+    arrays = tuple(frame[name].to_numpy() for name in ("t", "u", "x"))
+    with pytest.warns(vsj.RecordWarning):
+        assert without_names(vsj.identify(arrays, **options).to_json()) == expected
+
+
+@pytest.mark.filterwarnings("ignore::vsj.RecordWarning")
+def test_time_stamps_and_nanoseconds_are_times(sample):
+    # Nanoseconds are rounded.
+    expected = vsj.identify(SAMPLE).nominal.tau_s[0].value
+    nanoseconds = np.round(1e9 * sample["time_s"]).astype(np.int64) + 1_769_900_000_000_000_000
+    for time_column in (pandas.to_datetime(nanoseconds), nanoseconds, pandas.to_timedelta(sample["time_s"], unit="s")):
+        frame = pandas.DataFrame(
+            {"time": time_column, "voltage_v": sample["voltage_v"], "stiffness": sample["stiffness"]}
+        )
+        unit = "time:ns" if time_column is nanoseconds else "time"
+        assert vsj.identify(frame, time=unit).nominal.tau_s[0].value == pytest.approx(expected, rel=1e-7)
+
+
+def test_several_records_are_of_one_spring(command, sample):
+    expected = json.loads(command("identify", SAMPLE, SAMPLE, "--json"))
+    assert json.loads(vsj.identify([SAMPLE, SAMPLE]).to_json()) == expected
+    found = vsj.diagnose([sample, sample], effort="quick")
+    assert [name for name, _ in found.courses] == ["columns 1", "columns 2"]
+    assert len(found.courses_frame()) == 2 * len(sample["time_s"]) and len(found.records) == 2
+
+
+def test_errors_have_the_text_of_the_command(command, sample, tmp_path):
+    frame = pandas.DataFrame(sample)
+    frame.loc[7, "voltage_v"] = np.inf
+    file = tmp_path / "bad.csv"
+    frame.to_csv(file, index=False)
+    text = command.error("identify", file)
+    with pytest.raises(vsj.BadInput) as error:
+        vsj.identify(file)
+    assert str(error.value) == text and isinstance(error.value, ValueError)
+    with pytest.raises(vsj.BadInput) as error:
+        vsj.identify(frame)
+    assert str(error.value) == text.replace(str(file), "DataFrame")
+    for options in ({"reading": "force"}, {"time": "time_s:parsec"}, {"columns": tmp_path / "no.toml"}):
+        words = [str(word) for name, value in options.items() for word in (f"--{name}", value)]
+        with pytest.raises(vsj.BadInput) as error:
+            vsj.diagnose(SAMPLE, **options)
+        assert str(error.value) == command.error("diagnose", SAMPLE, *words)
+    with pytest.raises(vsj.BadInput) as error:
+        vsj.diagnose(SAMPLE, plant=tmp_path / "no.toml")
+    assert str(error.value) == command.error("diagnose", SAMPLE, "--plant", tmp_path / "no.toml")
+    for call in (
+        lambda: vsj.identify(tmp_path / "no.csv"),
+        lambda: vsj.identify(np.zeros((4, 2))),
+        lambda: vsj.identify((np.zeros(3), np.zeros(4), np.zeros(3))),
+        lambda: vsj.identify([]),
+        lambda: vsj.identify(SAMPLE, input="stair"),
+        lambda: vsj.diagnose(SAMPLE, effort="much"),
+        lambda: vsj.diagnose(SAMPLE, within=-1),
+        lambda: vsj.plan(tmp_path / "no.json"),
+        lambda: vsj.plan(SAMPLE),
+    ):
+        with pytest.raises(vsj.BadInput):
+            call()
+
+
+def test_a_diagnosis_of_the_identified_spring_is_that_of_the_command(command, tmp_path):
+    expected = json.loads(command("diagnose", SAMPLE, "--plant", "identify", "--effort", "quick", "--json"))
+    assert json.loads(vsj.diagnose(SAMPLE, plant="identify", effort="quick").to_json()) == expected
+    command("identify", SAMPLE, "--out", tmp_path)
+    expected = command("diagnose", SAMPLE, "--plant", tmp_path / "plant.toml", "--effort", "quick", "--json")
+    found = vsj.diagnose(SAMPLE, plant=vsj.identify(SAMPLE), effort="quick")
+    found, expected = json.loads(found.to_json()), json.loads(expected)
+    for answer in (found, expected):
+        answer["nominal"].pop("plant")
+    assert found == expected
+
+
+def test_courses_have_the_errors_of_the_report(diagnosis):
+    [(_, course)] = diagnosis.courses
+    for quality, residual in ((diagnosis.baseline, "baseline_residual"), (diagnosis.extended, "residual")):
+        assert np.sqrt(np.mean(course[residual] ** 2)) == pytest.approx(quality.rmse, rel=1e-6)
+    frame = diagnosis.to_frame()
+    assert list(frame["cause"])[:1] == ["hysteresis"] and frame.loc[0, "low"] < frame.loc[0, "value"]
+
+
+def test_other_threads_run_during_a_diagnosis():
+    ticks, done = 0, threading.Event()
+
+    def work():
+        vsj.diagnose(SAMPLE, effort="quick")
+        done.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    while not done.is_set():
+        ticks += 1
+        time.sleep(0.001)
+    thread.join()
+    assert ticks > 10
+
+
+def test_figures_are_drawn(diagnosis):
+    found = vsj.identify(SAMPLE)
+    for answer in (found, diagnosis, vsj.Controller().run(np.full(100, 200.0))):
+        figure = answer.plot()
+        assert figure.axes and figure.axes[0].lines
+    assert set(found.to_frame()["quantity"]) >= {"gain", "zero", "share", "delay_s", "tau_s[0]", "weight[0]"}

@@ -1,0 +1,103 @@
+"""The tick compared with the command's, bit for bit."""
+
+import numpy as np
+import pandas
+import pytest
+
+import vsj
+
+
+@pytest.fixture(scope="module")
+def hysteretic(tmp_path_factory, diagnosis):
+    file = tmp_path_factory.mktemp("plant") / "plant.toml"
+    file.write_text(diagnosis.plant)
+    return file
+
+
+CASES = [
+    (dict(controller="paper"), []),
+    (dict(controller="none"), []),
+    (dict(controller="fast", limit_v=1000), ["--limit-v", 1000]),
+    (dict(controller="paper", rate_hz=500, slew_v_per_s=2000.0, dac_bits=16), ["--rate-hz", 500, "--slew-v-per-s", 2000, "--dac-bits", 16]),
+]
+
+
+@pytest.mark.parametrize("options, words", CASES)
+@pytest.mark.parametrize("extended", [False, True])
+def test_codes_are_those_of_the_command(command, tmp_path, hysteretic, options, words, extended):
+    plant = hysteretic if extended else "paper"
+    words = ["--controller", options["controller"], *words, "--plant", plant]
+    command("stair", "--input", "step", "--out", tmp_path, *words)
+    expected = pandas.read_csv(tmp_path / "stair.csv", comment="#")
+    controller = vsj.Controller(plant, **options)
+    run = controller.run(expected["target_v"].to_numpy())
+    assert run.code.dtype == np.uint16 and len(np.unique(run.code)) > 4
+    np.testing.assert_array_equal(run.code, expected["dac_code"])
+    np.testing.assert_array_equal(np.round(run.applied_v, 6), expected["applied_v"])
+    np.testing.assert_array_equal(np.round(run.stiffness_v, 6), expected["stiffness"])
+    controller.reset()
+    parts = [controller.run(part).code for part in np.array_split(run.target_v, 7)]
+    np.testing.assert_array_equal(np.concatenate(parts), run.code)
+
+
+def test_limits_name_what_acted():
+    run = vsj.Controller(limit_v=400).run(np.r_[np.full(10, 300.0), np.full(10, 500.0), np.full(10, 0.0)])
+    assert run.limits[0] & vsj.Limit.UPPER and not run.limits[0] & vsj.Limit.TARGET
+    assert run.limits[15] & vsj.Limit.TARGET and run.limits[25] & vsj.Limit.LOWER
+    frame = run.to_frame()
+    assert list(frame) == ["time_s", "target_v", "code", "applied_v", "stiffness_v", "limits"]
+
+
+def test_readings_correct_the_estimate():
+    sensor = vsj.Feedback(noise_v=1.0, fastest_s=0.1)
+    targets = np.full(20_000, 300.0)
+    without = vsj.Controller(feedback=sensor).run(targets, np.full(20_000, np.nan))
+    plain = vsj.Controller().run(targets)
+    np.testing.assert_array_equal(without.code, plain.code)
+    # Each reading is 20 V above the model's stiffness after the tick before.
+    readings = np.r_[np.nan, plain.stiffness_v[:-1]] + 20.0
+    with_sensor = vsj.Controller(feedback=sensor).run(targets, readings)
+    assert with_sensor.applied_v[-1] < plain.applied_v[-1] - 5.0
+
+
+def test_simulate_is_the_spring_of_the_controller():
+    volts = np.repeat([0.0, 300.0, 600.0, 100.0], 500)
+    run = vsj.Controller(controller="none", dac_bits=16).run(volts)
+    stiffness = vsj.simulate("paper", run.time_s, run.applied_v)
+    np.testing.assert_allclose(stiffness, run.stiffness_v, atol=1e-6)
+
+
+def test_settings_and_inputs_out_of_range_are_bad_input(command):
+    for options, words in (
+        (dict(limit_v=20000), ["--limit-v", 20000]),
+        (dict(rate_hz=1), ["--rate-hz", 1]),
+        (dict(kp=-1), ["--kp", -1]),
+        (dict(dac_bits=40), ["--dac-bits", 40]),
+        (dict(approach_s=0.1), ["--approach-s", 0.1]),
+        (dict(plant="no.toml"), ["--plant", "no.toml"]),
+    ):
+        with pytest.raises(vsj.BadInput) as error:
+            vsj.Controller(**options)
+        assert str(error.value) == command.error("stair", *words)
+    for call in (
+        lambda: vsj.Controller("paper", "slow"),
+        lambda: vsj.Controller().run([1.0, np.nan]),
+        lambda: vsj.Controller().run([1.0], [1.0]),
+        lambda: vsj.Controller(feedback=vsj.Feedback()).run([1.0, 2.0], [1.0]),
+        lambda: vsj.Controller().run(np.zeros((2, 2))),
+        lambda: vsj.simulate("paper", [0.0, 1.0], [0.0]),
+        lambda: vsj.simulate("paper", [1.0, 0.0], [0.0, 0.0]),
+    ):
+        with pytest.raises(vsj.BadInput):
+            call()
+    controller = vsj.Controller()
+    with pytest.raises(vsj.BadInput, match=r"targets\[1\]"):
+        controller.run([500.0, np.nan])
+    np.testing.assert_array_equal(controller.run([300.0]).code, vsj.Controller().run([300.0]).code)
+
+
+def test_a_plant_is_taken_from_an_answer(hysteretic, diagnosis):
+    targets = np.repeat([200.0, 400.0, 100.0], 300)
+    codes = [vsj.Controller(plant).run(targets).code for plant in (hysteretic, diagnosis)]
+    np.testing.assert_array_equal(*codes)
+    assert np.any(codes[0] != vsj.Controller().run(targets).code)

@@ -1,0 +1,208 @@
+"""The controller's tick on arrays, and the spring alone."""
+
+import warnings
+from dataclasses import asdict, dataclass
+from enum import IntFlag
+from typing import Optional, Tuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _vsj
+from .analysis import Plant, named_plant
+from .records import RecordWarning
+
+
+class Limit(IntFlag):
+    """A limit that acted in a tick: upper or lower end of the range, slew, or a target outside of the range."""
+
+    UPPER = 1
+    LOWER = 2
+    SLEW = 4
+    TARGET = 8
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """A stiffness sensor that corrects the estimate.
+
+    ``noise_v`` is the standard deviation of one reading in V, ``model_uncertainty`` that with which the model's error wanders in V
+    per root second, ``fastest_s`` the shortest time constant of the correction in s, ``interval_s`` the time between two readings
+    in s, ``oldest_s`` the age in s above which a reading is stale, ``lowest_v`` and ``highest_v`` the sensor's range in V, and
+    ``fade_s`` the time constant in s with which the correction decays while the sensor is not trusted.
+    """
+
+    noise_v: float = 1.0
+    model_uncertainty: float = 1.0
+    fastest_s: float = 0.1
+    interval_s: float = 1e-3
+    oldest_s: float = 0.01
+    lowest_v: float = -50.0
+    highest_v: float = 1000.0
+    fade_s: float = 2.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """Ticks of a controller, as arrays of shape ``(n,)``.
+
+    ``time_s`` since the first tick in s, ``target_v`` in V, the DAC's ``code`` (uint16), the ``applied_v`` of that code in V, the
+    estimated ``stiffness_v`` just after it in V of equivalent static voltage, and ``limits`` that acted (uint8, bits of
+    :class:`Limit`).
+    """
+
+    time_s: np.ndarray
+    target_v: np.ndarray
+    code: np.ndarray
+    applied_v: np.ndarray
+    stiffness_v: np.ndarray
+    limits: np.ndarray
+
+    def to_frame(self):
+        """A pandas DataFrame with one row per tick."""
+        import pandas
+
+        return pandas.DataFrame({name: getattr(self, name) for name in self.__dataclass_fields__})
+
+    def plot(self, axes=None):
+        """Draw target, stiffness and voltage over time; returns the matplotlib Figure."""
+        from .plots import run
+
+        return run(self, axes)
+
+
+class Controller:
+    """The controller of the microcontroller, bit for bit: fixed-point pre-compensator, amplifier limits and estimator.
+
+    Parameters
+    ----------
+    plant : str, path, Identified, Diagnosis or Spring
+        The spring that the estimator runs: ``"paper"``, a plant file, or an answer of this package.
+    controller : {"paper", "fast", "none"}
+        The report's proportional-integral pre-compensator, the time-optimal one, or none.
+    limit_v, min_v : float
+        Highest and lowest voltage of the amplifier, in V.
+    slew_v_per_s : float, optional
+        Slew limit of the amplifier, in V/s; default: none.
+    dac_bits : int
+        Width of the DAC, in bits.
+    kp, ki : float
+        Proportional gain, and integral gain in 1/s, of the controller ``"paper"``.
+    approach_s : float, optional
+        Time constant of the approach to the target of the controller ``"fast"``, in s.
+    rate_hz : float
+        Ticks per second, 100 to 10 000.
+    feedback : Feedback, optional
+        A stiffness sensor, whose readings :meth:`run` takes.
+
+    Raises
+    ------
+    BadInput
+        For the first setting out of its range.
+    """
+
+    def __init__(
+        self,
+        plant: Plant = "paper",
+        controller: str = "paper",
+        *,
+        limit_v: float = 700.0,
+        min_v: float = 0.0,
+        slew_v_per_s: Optional[float] = None,
+        dac_bits: int = 12,
+        kp: float = 4.0,
+        ki: float = 1.35,
+        approach_s: Optional[float] = None,
+        rate_hz: float = 1000.0,
+        feedback: Optional[Feedback] = None,
+    ) -> None:
+        options = dict(
+            controller=controller,
+            limit_v=float(limit_v),
+            min_v=float(min_v),
+            slew_v_per_s=slew_v_per_s,
+            dac_bits=dac_bits,
+            kp=float(kp),
+            ki=float(ki),
+            approach_s=approach_s,
+            rate_hz=float(rate_hz),
+            feedback=None if feedback is None else asdict(feedback),
+        )
+        self.rate_hz = float(rate_hz)
+        self._inner = _vsj.Controller(named_plant(plant), options)
+        warn_of(self._inner.not_simulated)
+
+    @property
+    def range_v(self) -> Tuple[float, float]:
+        """Lowest and highest voltage that is put out, in V."""
+        return self._inner.range_v
+
+    def reset(self) -> None:
+        """Forget everything: the spring is at rest at 0 V."""
+        self._inner.reset()
+
+    def run(self, targets: ArrayLike, readings: Optional[ArrayLike] = None) -> Run:
+        """Run one tick per target, from where the last run ended.
+
+        Parameters
+        ----------
+        targets : array_like of shape (n,)
+            Desired stiffness, as the equivalent static voltage, in V.
+        readings : array_like of shape (n,), optional
+            Readings of the stiffness sensor just after the tick before, in V; NaN where there is none.
+
+        Returns
+        -------
+        Run
+            Arrays of shape (n,).
+        """
+        targets = vector(targets)
+        readings = None if readings is None else vector(readings)
+        code, applied, stiffness, limits = self._inner.run(targets, readings)
+        time = np.arange(len(targets)) / self.rate_hz
+        return Run(time, targets, code, applied, stiffness, limits)
+
+
+def simulate(
+    plant: Plant, time: ArrayLike, voltage: ArrayLike, *, rate_hz: float = 1000.0
+) -> np.ndarray:
+    """Compute the stiffness of a spring without a controller, as the microcontroller's model does.
+
+    Parameters
+    ----------
+    plant : str, path, Identified, Diagnosis or Spring
+        The spring: ``"paper"``, a plant file, or an answer of this package.
+    time : array_like of shape (n,)
+        Increasing times, in s; they are rounded to the nearest tick.
+    voltage : array_like of shape (n,)
+        Applied voltage from each time on, held until the next, in V.
+    rate_hz : float
+        Ticks per second, 100 to 10 000.
+
+    Returns
+    -------
+    numpy.ndarray of shape (n,)
+        Stiffness just after the voltage was applied, as the equivalent static voltage, in V.
+
+    Raises
+    ------
+    BadInput
+        For a spring that the tick rejects, and times that do not increase.
+    """
+    stiffness, left_out = _vsj.simulate(named_plant(plant), vector(time), vector(voltage), float(rate_hz))
+    warn_of(left_out)
+    return stiffness
+
+
+def vector(values):
+    """``values`` as a contiguous array of doubles of shape (n,)."""
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.ndim != 1:
+        raise _vsj.BadInput(f"shape {array.shape}; expected one dimension")
+    return array
+
+
+def warn_of(left_out):
+    """Warns of parts of a plant file that the tick does not simulate."""
+    if left_out:
+        warnings.warn(f"not simulated: {', '.join(left_out)}", RecordWarning, stacklevel=3)

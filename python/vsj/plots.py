@@ -1,0 +1,53 @@
+"""Figures. matplotlib is imported when the first one is drawn."""
+
+
+def courses(records, models, unit, axes=None):
+    """Readings with models, and residuals below them. ``axes`` are two matplotlib Axes, or ``None`` for a new figure."""
+    figure, (above, below) = _figure(axes, 2)
+    multiple = len(records) > 1
+    for name, course in records:
+        label = f", {name}" if multiple else ""
+        time = course["time_s"]
+        above.plot(time, course["reading"], ".", markersize=2, color="0.6", label=f"reading{label}")
+        for model in models:
+            above.plot(time, course[model], linewidth=1, label=f"{model}{label}")
+            below.plot(time, course["reading"] - course[model], linewidth=0.8, label=f"reading - {model}{label}")
+    bracket = f" ({unit})" if unit else ""
+    above.set_ylabel(f"reading{bracket}")
+    below.set_ylabel(f"residual{bracket}")
+    below.set_xlabel("time (s)")
+    above.legend(fontsize="small")
+    below.legend(fontsize="small")
+    return figure
+
+
+def schedule(course, axes=None):
+    """A voltage that is held between its times."""
+    figure, (axis,) = _figure(axes, 1)
+    axis.step(course["time_s"], course["voltage_v"], where="post", linewidth=1)
+    axis.set_xlabel("time (s)")
+    axis.set_ylabel("voltage (V)")
+    return figure
+
+
+def run(ticks, axes=None):
+    """Target and stiffness, and the applied voltage below them."""
+    figure, (above, below) = _figure(axes, 2)
+    above.step(ticks.time_s, ticks.target_v, where="post", linewidth=1, color="0.6", label="target")
+    above.plot(ticks.time_s, ticks.stiffness_v, linewidth=1, label="stiffness")
+    below.step(ticks.time_s, ticks.applied_v, where="post", linewidth=1, label="applied")
+    above.set_ylabel("stiffness (V)")
+    below.set_ylabel("voltage (V)")
+    below.set_xlabel("time (s)")
+    above.legend(fontsize="small")
+    return figure
+
+
+def _figure(axes, rows):
+    if axes is not None:
+        axes = [axes] if rows == 1 and not hasattr(axes, "__len__") else list(axes)
+        return axes[0].figure, axes
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(rows, 1, sharex=True, squeeze=False, layout="constrained")
+    return figure, axes[:, 0]

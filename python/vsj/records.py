@@ -1,0 +1,93 @@
+"""Records as users have them, as columns for the library."""
+
+import os
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+
+CONTRACT = ("time_s", "voltage_v", "stiffness")
+"""Names of the columns of an array without names."""
+
+
+class RecordWarning(UserWarning):
+    """How a record was read, where it left a choice: the remarks that the command prints."""
+
+
+def given(data, options):
+    """The records of ``data`` as a list of ``(name, columns)``; ``columns`` is ``None`` for the path of a file."""
+    several = data if isinstance(data, list) else [data]
+    name = "DataFrame" if not isinstance(data, list) else "DataFrame {}"
+    return [_record(one, name.format(index + 1), options) for index, one in enumerate(several)]
+
+
+def warn(remarks):
+    """Warns of each remark, at the line that called the library's function."""
+    for remark in remarks:
+        warnings.warn(remark, RecordWarning, stacklevel=3)
+
+
+def _record(data, name, options):
+    if isinstance(data, (str, os.PathLike)):
+        return os.fspath(data), None
+    if isinstance(data, Mapping):
+        return name.replace("DataFrame", "columns"), [(str(key), _cells(column)) for key, column in data.items()]
+    columns = getattr(data, "columns", None)
+    if columns is not None:
+        return name, [(str(column), _cells(data[column])) for column in columns]
+    if isinstance(data, np.ndarray) and data.dtype.names:
+        return name.replace("DataFrame", "array"), [(column, _cells(data[column])) for column in data.dtype.names]
+    if isinstance(data, tuple):
+        columns = data
+    else:
+        array = np.asarray(data)
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise _bad_input(
+                f"data: shape {array.shape}; expected a path, a frame, columns by name, three arrays, or an array of shape (n, 3)"
+            )
+        columns = tuple(array.T)
+    if len(columns) != 3:
+        raise _bad_input(f"data: {len(columns)} arrays; expected three: time, voltage, reading")
+    asked = (options["time"], options["voltage"], options["reading"] or options["column"])
+    names = [_name(option, default) for option, default in zip(asked, CONTRACT)]
+    return name.replace("DataFrame", "arrays"), list(zip(names, map(_cells, columns)))
+
+
+def _bad_input(text):
+    from ._vsj import BadInput
+
+    return BadInput(text)
+
+
+def _name(option, default):
+    """The name of a column without name: that of the option ``NAME:UNIT``."""
+    return default if option is None else option.rpartition(":")[0] or option
+
+
+def _cells(column):
+    """A column as an array of doubles, or as a list of texts where doubles would lose something."""
+    if hasattr(column, "to_numpy"):
+        column = column.to_numpy()
+    array = np.asarray(column)
+    if array.ndim != 1:
+        raise _bad_input(f"column: shape {array.shape}; expected one dimension")
+    kind = array.dtype.kind
+    if kind == "M":
+        return np.datetime_as_string(array, unit="ns").tolist()
+    if kind == "m":
+        return array / np.timedelta64(1, "s")
+    # Times in ns since 1970 have more digits than a double.
+    if kind in "iu" and array.size and max(abs(int(array.min())), abs(int(array.max()))) > 2**53:
+        return array.astype(str).tolist()
+    if kind in "biuf":
+        return np.ascontiguousarray(array, dtype=np.float64)
+    return ["" if _is_missing(cell) else _text(cell) for cell in array]
+
+
+def _is_missing(cell):
+    # pandas' NaT and NaN differ from themselves; its NA compares as itself.
+    return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
+
+
+def _text(cell):
+    return cell.isoformat() if hasattr(cell, "isoformat") else str(cell)

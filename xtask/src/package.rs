@@ -1,0 +1,32 @@
+//! `cargo xtask python`: the Python package, installed as a user installs it, and its tests.
+
+use std::env;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use xtask::{python, shell};
+
+/// Folder of the package, a workspace of its own, and the packages that its tests need.
+const FOLDER: &str = "./python";
+const REQUIREMENTS: &str = "python/requirements.txt";
+
+/// Builds the package and the command, installs the package in a virtual environment under the target directory, and runs the
+/// tests there, which compare it with the command.
+pub(crate) fn run() -> Result<()> {
+    shell::run(shell::cargo().args(["fmt", "--manifest-path", "python/Cargo.toml", "--check"]))?;
+    let target = shell::target_directory()?;
+    let python = python::environment(&target, "python", REQUIREMENTS)?;
+    shell::run(shell::cargo().args(["build", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
+    // In the same folder, so that what both depend on is built once.
+    let install = ["-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps", "--force-reinstall", FOLDER];
+    let path = with_first(python.parent().context("an interpreter is in a folder")?)?;
+    shell::run(shell::command(&python).args(install).env("CARGO_TARGET_DIR", &target).env("PATH", path))?;
+    let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
+    shell::run(shell::command(&python).args(tests).env("VSJ", target.join("release/vsj")))
+}
+
+/// The search path with a folder in front.
+fn with_first(folder: &Path) -> Result<std::ffi::OsString> {
+    let path = env::var_os("PATH").unwrap_or_default();
+    Ok(env::join_paths([folder.to_owned()].into_iter().chain(env::split_paths(&path)))?)
+}
