@@ -9,9 +9,12 @@ use xtask::variant::Variant;
 /// The MCU's name in probe-rs.
 const CHIP: &str = "STM32G474RETx";
 
+/// What an attempt that failed may lack: the tool, or on Linux the right to use the probe.
+const HELP: &str = "probe-rs flashes the board (cargo install probe-rs-tools --locked; if it finds no probe on Linux, the udev rules \
+                    of https://probe.rs/docs/getting-started/probe-setup/ are missing)";
+
 /// Builds the board's image and hands it to `probe-rs run`.
 pub(crate) fn run(variant: Variant) -> Result<()> {
     let elf = build::image_with(&variant.features(), Board::Nucleo, Opt::S)?;
-    shell::run(shell::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
-        .context("probe-rs flashes the board (cargo install probe-rs-tools --locked)")
+    shell::run(shell::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf)).context(HELP)
 }

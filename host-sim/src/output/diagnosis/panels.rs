@@ -13,8 +13,8 @@ pub fn panels(data: &Data, simulation: &[f64]) -> String {
         Series::new("reading", READING, Shape::Wide, each(&|row| data.reading[row])),
         Series::line("simulation", BEFORE, each(&|row| simulation[row])),
     ];
-    let below = Series::line("reading less simulation", AFTER, each(&|row| data.reading[row] - simulation[row]));
+    let below = Series::line("residual", AFTER, each(&|row| data.reading[row] - simulation[row]));
     let above = Chart { height: 200.0, ..Chart::new("", "", "stiffness [V]", above) };
-    let below = Chart { height: 120.0, ..Chart::new("", "time [s]", "reading less simulation [V]", vec![below]) };
+    let below = Chart { height: 120.0, ..Chart::new("", "time [s]", "residual [V]", vec![below]) };
     chart::stacked(&[&above, &below])
 }

@@ -44,7 +44,7 @@ fn readings_label(data: &Data) -> String {
 }
 
 fn difference_label(data: &Data) -> String {
-    format!("reading less simulation [{}]", data.scales().unit(Dimension::Reading))
+    format!("residual [{}]", data.scales().unit(Dimension::Reading))
 }
 
 /// Size of the unit of time that is shown, in s.

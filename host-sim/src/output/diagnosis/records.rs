@@ -106,7 +106,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().skip(1).collect();
         assert_eq!(lines[0], "record        rows  zero offset      noise       RMSE   in this record only");
         assert_eq!(lines[1], "a.csv          500       -8.000     0.5000     0.5000   none");
-        assert!(lines[2].ends_with("   sensor-saturation (limit = 380.0 [379.9, 380.1] V)"), "{text}");
+        assert!(lines[2].ends_with("   sensor-saturation (limit = 380.00 [379.90, 380.10] V)"), "{text}");
         assert!(section(&[], &scales).into_string().is_empty());
     }
 }

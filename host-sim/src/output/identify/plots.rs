@@ -36,8 +36,8 @@ fn of_record(record: &Course, units: &Units) -> [Figure; 2] {
         },
         Figure {
             name: "residual.svg",
-            caption: "Reading minus model: of the fit to all rows, and of predictions by fits that did not use the segment.",
-            chart: chart(residuals, &record.name, "reading less model"),
+            caption: "Residual (reading minus model): of the fit to all rows, and of predictions by fits that did not use the segment.",
+            chart: chart(residuals, &record.name, "residual"),
         },
     ]
 }

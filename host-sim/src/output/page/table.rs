@@ -56,7 +56,7 @@ impl Table {
                     @for Row { class, cells, note } in &self.rows {
                         tr role="row" class=[some(class)] {
                             @for ((name, class), cell) in self.columns.iter().zip(cells) {
-                                td role="cell" class=[some(class)] data-name=[some(name)] { (cell) }
+                                td role="cell" class=[some(class)] data-name=[some(name)] { @if !cell.0.is_empty() { div { (cell) } } }
                             }
                         }
                         @if let Some(note) = note {
@@ -83,9 +83,9 @@ mod tests {
         table.row(Row::new([html! { "hum" }, html! { i {} }, html! { "2" }]).class("best").note(html! { "why" }));
         let html = table.markup().into_string();
         for part in [
-            r#"<td role="cell" class="cause" data-name="cause &amp; place">hum</td>"#,
-            r#"<td role="cell"><i></i></td>"#,
-            r#"<td role="cell" class="number" data-name="RMSE [V]">2</td>"#,
+            r#"<td role="cell" class="cause" data-name="cause &amp; place"><div>hum</div></td>"#,
+            r#"<td role="cell"><div><i></i></div></td>"#,
+            r#"<td role="cell" class="number" data-name="RMSE [V]"><div>2</div></td>"#,
             r#"<tr class="best" role="row">"#,
             r#"colspan="3">why</td>"#,
         ] {
