@@ -49,7 +49,7 @@ const MOST_ROWS: usize = 40;
 fn rows(text: &mut String, rows: &[Row]) {
     let printed = rows.iter().any(|row| row.printed_with.is_some());
     let measured = rows.iter().any(|row| row.measured.is_some());
-    let of_loop = |name: &str| if printed { format!("  {name:^27} |") } else { format!(" {name:^19} |") };
+    let of_loop = |name: &str| if printed { format!("{name:^30}|") } else { format!("{name:^21}|") };
     let column = |text: &str| if printed { format!(" {text:>8}") } else { String::new() };
     let both = |texts: [&str; 3]| format!("{} {:>9} {:>9} |", column(texts[0]), texts[1], texts[2]);
     let last = |text: &str| if measured { format!(" {text:>8}") } else { String::new() };

@@ -17,9 +17,9 @@ const LINE: f64 = 30.0;
 /// Distance from the axes to the first line of text below them.
 const BELOW: f64 = 26.0;
 /// Width of a letter in a narrow plot.
-const LETTER: f64 = 12.0;
+const LETTER: f64 = 13.0;
 /// Width of the sample of a line in the legend, with its distances.
-const SAMPLE: f64 = 60.0;
+const SAMPLE: f64 = 64.0;
 /// Largest number of labels on the horizontal and the vertical axis.
 const MOST: [usize; 2] = [7, 6];
 /// Colours of grid lines, axes and paper.
@@ -240,4 +240,53 @@ fn text(out: &mut String, (x, y): (f64, f64), anchor: &str, more: &str, text: &s
 fn escaped(text: &str) -> String {
     let text: String = text.chars().filter(|letter| *letter == '\n' || !letter.is_control()).collect();
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(names: &[&str], size: f64) -> Chart {
+        let series = names.iter().map(|name| Series::line(name, "#0072b2", vec![(0.0, -size), (10.0, size)]));
+        Chart::new("<title> & more", "time [s]", "voltage [V]", series.collect())
+    }
+
+    fn axes(svg: &str) -> Vec<&str> {
+        svg.lines().filter(|line| line.contains("\" stroke=\"#000000\" fill=\"none\"")).collect()
+    }
+
+    #[test]
+    fn time_axes_align_whatever_legend_and_labels_are() {
+        let [narrow, wide] = [chart(&["a"], 1.0), chart(&["a", "a very long name of a series", "another name"], 1e5)];
+        let ends = |chart: &Chart| {
+            let svg = file(&[chart]);
+            let axis = axes(&svg)[0].to_owned();
+            [
+                axis[axis.find('M').unwrap()..].split(' ').next().unwrap().to_owned(),
+                axis[axis.find('H').unwrap()..].to_owned(),
+            ]
+        };
+        assert_eq!(ends(&narrow), ends(&wide));
+        assert_eq!(axes(&file(&[&narrow, &wide])).len(), 2);
+    }
+
+    #[test]
+    fn legend_is_below_the_axes_and_within_the_plot() {
+        let names = ["reading", "simulation with a long name", "another long name", "extended"];
+        let chart = chart(&names, 1.0);
+        let panel = Panel::new(&chart, 0.0);
+        for (name, (x, y)) in names.iter().zip(&panel.legend) {
+            assert!(*y > panel.span[1] + BELOW && *y < panel.bottom, "{name}: {y}");
+            assert!(x + SAMPLE + LETTER * name.len() as f64 <= WIDTH, "{name}: {x}");
+        }
+    }
+
+    #[test]
+    fn values_are_shown_on_hover_and_texts_are_escaped() {
+        let svg = file(&[&chart(&["a & b"], 1.0)]);
+        assert!(svg.contains("<title>time [s]: 10.00\na &amp; b: 1.000</title>"), "{svg}");
+        assert!(svg.contains("aria-label=\"&lt;title&gt; &amp; more\"") && !svg.contains("a & b"));
+        // The page contains the style once, for all of its plots.
+        assert!(svg.contains("<style>") && !inline(&[&chart(&["a"], 1.0)]).contains("<style>"));
+    }
 }
