@@ -426,7 +426,7 @@ mod tests {
         assert_eq!(said, [law, tau]);
         assert!(
             text("r.csv", &report, &Scales::default())
-                .contains("tau_high_s = 8.0000 [7.0000, 9.0000] s (extrapolated)\n")
+                .contains("tau_high_s = 8.0 [7.0, 9.0] s (extrapolated)\n")
         );
         report.extended.law_range_v = Some([200.0, 500.0]);
         let law = limits_of_curves(&report, &Scales::default()).remove(0);

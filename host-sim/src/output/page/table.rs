@@ -86,7 +86,7 @@ mod tests {
             r#"<td role="cell" class="cause" data-name="cause &amp; place"><div>hum</div></td>"#,
             r#"<td role="cell"><div><i></i></div></td>"#,
             r#"<td role="cell" class="number" data-name="RMSE [V]"><div>2</div></td>"#,
-            r#"<tr class="best" role="row">"#,
+            r#"<tr role="row" class="best">"#,
             r#"colspan="3">why</td>"#,
         ] {
             assert!(html.contains(part), "{part}: {html}");
