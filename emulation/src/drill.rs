@@ -15,6 +15,7 @@ use host_sim::log::{Event, Line};
 use test_bench::script::{ARM_TICK, FAULT_TICK, FaultInjection};
 
 use xtask::build::{self, Board, Opt};
+use xtask::tally::Tally;
 use xtask::{setup, shell};
 
 use crate::qemu::emulator::{self, Run, SAFE, Written};
@@ -40,7 +41,9 @@ pub(crate) fn all(elf: &Path, bless: bool) -> Result<()> {
         one(elf, fault, bless).with_context(|| format!("drill {name}"))?;
         eprintln!("drill {name}: voltage gone, log as approved");
     }
-    Ok(())
+    let faults =
+        ("faults injected under QEMU, the voltage gone each time".to_owned(), FaultInjection::ALL.len() as u64);
+    Tally::now([faults])?.write("drill")
 }
 
 fn one(elf: &Path, fault: FaultInjection, bless: bool) -> Result<()> {

@@ -33,6 +33,8 @@
 //!
 //! The modules with links build on a host as well, where their results can be compared with the MCU's bit for bit. The others
 //! require the feature `mcu`.
+//!
+#![doc = include_str!("pins.md")]
 #![no_std]
 #![deny(unsafe_code)]
 

@@ -5,9 +5,13 @@
 //! | [`output`] | terminal, CSV, plots, report page |
 //! | [`log`] | the log that the firmware writes, decoded |
 //! | [`mod@link`] | the host's side of the serial link to the MCU |
+//! | [`watch`] | the running loop on a full screen |
+//! | [`qemu`] | the emulated board |
 //! | [`signals`] | what Ctrl-C and other signals do |
 
 pub mod link;
 pub mod log;
 pub mod output;
+pub mod qemu;
 pub mod signals;
+pub mod watch;

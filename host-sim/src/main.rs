@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use host_sim::output::terminal::{has_reader, remark};
 use host_sim::signals;
 use simulation::bad_input::BadInput;
@@ -17,7 +17,7 @@ use simulation::bad_input::BadInput;
 #[derive(Parser)]
 #[command(
     name = "vsj",
-    version,
+    version = concat!(env!("CARGO_PKG_VERSION"), " (", env!("GIT_REVISION"), ")"),
     after_help = "Exit codes: 0 success, 1 the command failed or stdout cannot be written, 2 bad arguments or bad input."
 )]
 struct Cli {
@@ -30,16 +30,19 @@ enum Command {
     Beam(commands::beam::Arguments),
     Bound(commands::bound::Arguments),
     Compare(commands::compare::Arguments),
+    Completions(commands::completions::Completions),
     Diagnose(commands::diagnose::Arguments),
     Dynamics(commands::dynamics::Arguments),
     Identify(commands::identify::Arguments),
     Joint(commands::joint::Arguments),
     Link(commands::link::Arguments),
     Log(commands::log::Arguments),
+    Man(commands::completions::Manual),
     Plan(commands::plan::Arguments),
     Reproduce(commands::reproduce::Arguments),
     Stair(commands::stair::Arguments),
     Tune(commands::tune::Arguments),
+    Watch(commands::watch::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -54,16 +57,19 @@ fn main() -> ExitCode {
         Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
         Some(Command::Bound(arguments)) => commands::bound::run(&arguments),
         Some(Command::Compare(arguments)) => commands::compare::run(&arguments),
+        Some(Command::Completions(arguments)) => commands::completions::completions(&arguments, Cli::command()),
         Some(Command::Diagnose(arguments)) => commands::diagnose::run(&arguments),
         Some(Command::Dynamics(arguments)) => commands::dynamics::run(&arguments),
         Some(Command::Identify(arguments)) => commands::identify::run(&arguments),
         Some(Command::Joint(arguments)) => commands::joint::run(&arguments),
         Some(Command::Link(arguments)) => commands::link::run(&arguments),
         Some(Command::Log(arguments)) => commands::log::run(&arguments),
+        Some(Command::Man(arguments)) => commands::completions::manual(&arguments, Cli::command()),
         Some(Command::Plan(arguments)) => commands::plan::run(&arguments),
         Some(Command::Reproduce(arguments)) => commands::reproduce::run(&arguments),
         Some(Command::Stair(arguments)) => commands::stair::run(&arguments),
         Some(Command::Tune(arguments)) => commands::tune::run(&arguments),
+        Some(Command::Watch(arguments)) => commands::watch::run(&arguments),
         None => commands::stair::run(&commands::stair::Arguments::main_job()),
     };
     exit_code(done)
@@ -105,7 +111,6 @@ fn one_line(error: &clap::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     /// Width of a terminal, in columns; a longer example would be wrapped and could not be copied.
     const COLUMNS: usize = 80;
@@ -131,7 +136,7 @@ mod tests {
                 assert!(line.len() <= COLUMNS, "{} columns: {line}", line.len());
                 // Without the other parts of the shell command and without the comment.
                 let words = &line[line.find("vsj").expect("an example of vsj")..];
-                let words = words.split("  ").next().into_iter().flat_map(|words| words.split(" |")).next();
+                let words = words.split("  ").next().into_iter().flat_map(|words| words.split(['|', '>'])).next();
                 let words = words.unwrap_or_default();
                 let parsed = Cli::try_parse_from(words.split_whitespace());
                 assert!(parsed.is_ok(), "{line}: {}", parsed.err().map(|error| error.to_string()).unwrap_or_default());

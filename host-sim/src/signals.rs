@@ -1,7 +1,8 @@
 //! Signals that end the program: Ctrl-C, SIGTERM and SIGHUP.
 //!
-//! In: what the first Ctrl-C does, and the temporary folders that exist. Out: a program that ends with the code 128 plus the
-//! signal's number, leaves no temporary folder, and is not ended while results are moved to their places.
+//! In: what the first signal does, the temporary folders that exist, and what else is to be undone. Out: a program that ends
+//! with the code 128 plus the signal's number, leaves no temporary folder, and is not ended while results are moved to their
+//! places.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,10 +10,19 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// What is done once; its argument is the number of the signal.
+type OnSignal = Box<dyn FnOnce(i32) + Send>;
+/// What is done once.
+type Action = Box<dyn FnOnce() + Send>;
+
 /// Temporary folders that exist. Whoever holds the lock is not interrupted.
 static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// What the next Ctrl-C does instead of ending the program.
-static ON_CTRL_C: Mutex<Option<Box<dyn FnOnce() + Send>>> = Mutex::new(None);
+static ON_CTRL_C: Mutex<Option<Action>> = Mutex::new(None);
+/// What the next signal does instead of ending the program.
+static ON_SIGNAL: Mutex<Option<OnSignal>> = Mutex::new(None);
+/// What is done before a signal ends the program.
+static AT_END: Mutex<Vec<Action>> = Mutex::new(Vec::new());
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -21,6 +31,17 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Makes the next Ctrl-C call `action`; the one after it ends the program.
 pub fn on_ctrl_c(action: impl FnOnce() + Send + 'static) {
     *lock(&ON_CTRL_C) = Some(Box::new(action));
+}
+
+/// Makes the next signal, whichever of those that end the program, call `action` with its number; the one after it ends the
+/// program.
+pub fn on_signal(action: impl FnOnce(i32) + Send + 'static) {
+    *lock(&ON_SIGNAL) = Some(Box::new(action));
+}
+
+/// Does `action` before a signal ends the program. It is not done when the program ends otherwise.
+pub fn at_end(action: impl FnOnce() + Send + 'static) {
+    lock(&AT_END).push(Box::new(action));
 }
 
 /// Runs `work` without being ended by a signal.
@@ -62,9 +83,11 @@ impl Drop for TemporaryFolder {
     }
 }
 
-/// Ends the program without leaving a temporary folder.
-#[cfg(unix)]
-fn end(signal: i32) -> ! {
+/// Ends the program as `signal` would, without leaving a temporary folder.
+pub fn end(signal: i32) -> ! {
+    for action in lock(&AT_END).drain(..) {
+        action();
+    }
     let folders = lock(&FOLDERS);
     for path in folders.iter() {
         let _ = fs::remove_dir_all(path);
@@ -85,8 +108,13 @@ pub fn handle() -> io::Result<()> {
     let handle = move || {
         for signal in signals.forever() {
             let action = if signal == SIGINT { lock(&ON_CTRL_C).take() } else { None };
+            if let Some(action) = action {
+                action();
+                continue;
+            }
+            let action = lock(&ON_SIGNAL).take();
             match action {
-                Some(action) => action(),
+                Some(action) => action(signal),
                 None => end(signal),
             }
         }
@@ -109,9 +137,14 @@ fn ignored() -> u64 {
 /// If the handler cannot be installed.
 #[cfg(not(unix))]
 pub fn handle() -> io::Result<()> {
-    let handler = || match lock(&ON_CTRL_C).take() {
-        Some(action) => action(),
-        None => std::process::exit(130),
+    const SIGINT: i32 = 2;
+    let handler = || {
+        let (ctrl_c, any) = (lock(&ON_CTRL_C).take(), lock(&ON_SIGNAL).take());
+        match (ctrl_c, any) {
+            (Some(action), _) => action(),
+            (None, Some(action)) => action(SIGINT),
+            (None, None) => end(SIGINT),
+        }
     };
     ctrlc::set_handler(handler).map_err(io::Error::other)
 }

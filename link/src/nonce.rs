@@ -77,6 +77,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn no_nonce_repeats_and_none_is_zero() {
         for seed in [0, 7, u32::MAX, u32::MAX - 1000] {
             let mut nonces = Nonces::new(seed);
@@ -85,6 +86,23 @@ mod tests {
         }
         assert_eq!(mixed(0), 0);
         assert_ne!(Nonces::new(u32::MAX).draw(), Nonce::NONE, "the one that would be 0 is left out");
+    }
+
+    /// Over many seeds every bit of the nonce changes in half of them, whichever bit of the seed does.
+    #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
+    fn each_bit_of_a_seed_changes_each_bit_of_the_nonce_in_half_of_all_seeds() {
+        const SEEDS: u32 = 1000;
+        for bit in 0..32 {
+            let mut changed = [0; 32];
+            for seed in (0..SEEDS).map(|index| index.wrapping_mul(0x9e37_79b9)) {
+                let differ = mixed(seed) ^ mixed(seed ^ 1 << bit);
+                changed.iter_mut().enumerate().for_each(|(at, count)| *count += differ >> at & 1);
+            }
+            // 6 standard deviations of a fair coin, and as much for the function's own bias.
+            let fair = SEEDS * 3 / 10..=SEEDS * 7 / 10;
+            assert!(changed.iter().all(|count| fair.contains(count)), "bit {bit}: {changed:?}");
+        }
     }
 
     #[test]

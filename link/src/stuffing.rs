@@ -51,6 +51,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(5000))]
 
         #[test]
+        #[cfg_attr(miri, ignore = "slow under Miri")]
         fn encoding_matches_the_crate_cobs_and_is_reversible(
             packet in prop::collection::vec(prop_oneof![Just(0), any::<u8>()], 0..=MAX_PACKET),
         ) {
@@ -63,6 +64,7 @@ mod tests {
         }
 
         #[test]
+        #[cfg_attr(miri, ignore = "slow under Miri")]
         fn decoding_matches_the_crate_cobs(
             bytes in prop::collection::vec(prop_oneof![1..=9u8, 1..=255u8], 1..=MAX_ENCODED),
         ) {

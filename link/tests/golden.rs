@@ -151,6 +151,6 @@ fn a_complete_frame() {
 
 #[test]
 fn fault_codes() {
-    let names = (0..=9).map(|code| Fault(code).name()).collect::<Vec<_>>().join(" ");
-    assert_eq!(names, "none panic hard-fault overrun interlock watchdog monitor config supply unknown");
+    let names = (0..=10).map(|code| Fault(code).name()).collect::<Vec<_>>().join(" ");
+    assert_eq!(names, "none panic hard-fault overrun interlock watchdog monitor config supply self-test unknown");
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use link::frame::MAX_FRAME;
+use link::frame::{MAX_FRAME, MAX_MESSAGE};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
@@ -10,6 +10,8 @@ use link::{
     State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
+use serde::ser::SerializeTuple;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 fn decode<M: Message>(frame: &Frame) -> Vec<(Stamp, M)> {
     let mut receiver = Receiver::new();
@@ -26,6 +28,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_request_survives_a_round_trip(sequence: u16, session: u32, request in common::request()) {
         let stamp = Nonce(session).stamp(Sequence(sequence));
         let frame = Frame::new(stamp, &request);
@@ -35,6 +38,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_reply_survives_a_round_trip(sequence: u16, session: u32, reply in common::reply()) {
         let stamp = Nonce(session).stamp(Sequence(sequence));
         let frame = Frame::new(stamp, &reply);
@@ -53,6 +57,37 @@ fn is_not_a_reply(frame: &Frame) -> bool {
 fn nan_survives_a_round_trip() {
     let decoded = decode::<Request>(&Frame::new(Sequence(0), &Request::Set(Desired::Pascal(f64::NAN))));
     assert!(matches!(decoded[..], [(_, Request::Set(Desired::Pascal(number)))] if number.is_nan()));
+}
+
+/// A message of any number of bytes.
+#[derive(Clone, Debug, PartialEq)]
+struct Long(usize);
+
+impl Serialize for Long {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut tuple = serializer.serialize_tuple(self.0)?;
+        (0..self.0).try_for_each(|_| tuple.serialize_element(&7u8))?;
+        tuple.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Long {
+    fn deserialize<D: Deserializer<'de>>(_: D) -> Result<Self, D::Error> {
+        Err(serde::de::Error::custom("only sent"))
+    }
+}
+
+impl Message for Long {
+    const KIND: u8 = b'L';
+}
+
+/// Two delimiters, the byte of COBS, version, kind, sequence, session and CRC-32C are the rest of the frame.
+#[test]
+fn a_message_of_the_largest_length_fills_a_frame_and_a_longer_one_is_not_sent() {
+    let length = |bytes| Frame::new(Sequence(1), &Long(bytes)).as_bytes().len();
+    assert_eq!(length(MAX_MESSAGE), MAX_FRAME);
+    assert_eq!(length(MAX_MESSAGE - 1), MAX_FRAME - 1);
+    assert_eq!(length(MAX_MESSAGE + 1), 0);
 }
 
 /// The longest message, with the longest encoding of every number.

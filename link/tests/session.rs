@@ -301,6 +301,7 @@ fn telemetry_keeps_its_period_skips_missed_samples_and_stops_while_the_host_is_s
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn the_numbers_of_telemetry_wrap_around() {
     let mut mcu = Mcu::after_hello(0);
     mcu.hear(1, &Request::Stream { every_ticks: 1 });

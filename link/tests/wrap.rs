@@ -46,6 +46,7 @@ impl Host {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn every_request_is_executed_across_the_wrap_of_its_number_until_the_session_is_used_up() {
     const NUMBERS: u32 = 1 << 16;
     let mut host = Host::begin(65_000, 0);
@@ -62,6 +63,7 @@ fn every_request_is_executed_across_the_wrap_of_its_number_until_the_session_is_
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn telemetry_and_silence_go_on_when_the_ticks_pass_two_to_the_32() {
     const EVERY: u16 = 7;
     let start = (1u64 << 32) - 300_000;

@@ -278,6 +278,7 @@ mod tests {
 
     /// Exact for a held voltage at any rate: forward Euler would be off by 0.03 V at 100 Hz.
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_step_response_is_the_exact_exponential_at_every_rate() {
         for rate in [100.0, 333.0, 1000.0, 10_000.0] {
             let (config, mut state) = (paper(rate), State::default());
@@ -293,6 +294,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_lag_of_one_millivolt_is_integrated_at_10_khz() {
         let (config, mut state) = (paper(10_000.0), State::default());
         let applied = Volts::new(0.001).unwrap();

@@ -198,6 +198,14 @@ mod tests {
     }
 
     #[test]
+    fn a_spring_states_its_range_and_the_modulus_of_an_estimate() {
+        let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 20.0, 650.0).unwrap();
+        assert_eq!(spring.range_v(), (20.0, 650.0));
+        let estimate = ScaledStiffness(Volts::new(400.0).unwrap().0);
+        assert_eq!(spring.estimate_pa(estimate), 1.301e9 + 400.0 * 1.069e6);
+    }
+
+    #[test]
     fn a_setting_out_of_range_is_rejected_by_name() {
         let beam = Cantilever { thickness_m: 0.0, ..Cantilever::PAPER };
         assert_eq!(Spring::new(YoungsModulus::PAPER, beam, 0.0, 700.0).unwrap_err().field, "thickness_m");

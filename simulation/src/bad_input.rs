@@ -56,6 +56,12 @@ pub fn excerpt(text: &str) -> String {
     }
 }
 
+/// Escapes the control characters of a text that comes from a file: a message is one line, and does not command a terminal.
+pub fn one_line(text: &str) -> String {
+    let escaped = |letter: char| if letter.is_control() { letter.escape_default().to_string() } else { letter.into() };
+    text.chars().map(escaped).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,6 +80,7 @@ mod tests {
             let error = check("x", value, 0.0..=1.0, "V").unwrap_err().to_string();
             assert_eq!(error, format!("x = {shown} is not allowed: expected 0 to 1 V"));
         }
+        assert_eq!(one_line("a\r\nb\u{1b}[2J \u{b5}"), "a\\r\\nb\\u{1b}[2J \u{b5}");
         let whole = "\u{b5}".repeat(40);
         assert_eq!((excerpt(&whole), excerpt(&(whole.clone() + "V"))), (whole.clone(), whole + "..."));
     }

@@ -102,6 +102,17 @@ fn every_page_and_folder_in_docs_is_linked_from_its_index_directly_or_over_other
 }
 
 #[test]
+fn the_pins_in_the_manual_are_those_of_the_firmware() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).expect("a page");
+    let (pins, manual) = (read("firmware/src/pins.md"), read("docs/firmware.md"));
+    let rows: Vec<&str> = pins.lines().filter(|line| line.starts_with("| P")).collect();
+    assert!(
+        rows.len() > 5 && rows.iter().all(|row| manual.contains(row)),
+        "docs/firmware.md differs from firmware/src/pins.md"
+    );
+}
+
+#[test]
 fn the_readme_quotes_what_diagnose_prints_on_the_sample_record() {
     let readme = fs::read_to_string(root().join("README.md")).expect("the README");
     let (_, rest) = readme.split_once("diagnose data/sample_hysteresis.csv\n").expect("the example");

@@ -75,6 +75,6 @@ fn every_format_keeps_its_properties_for_any_bytes() {
                 Ok(())
             })
             .unwrap_or_else(|error| panic!("{target}: {error}"));
-        println!("fuzz {target}: {} inputs, {} of them a corpus", inputs + files.len() + RANDOM as usize, files.len());
+        println!("count: {} inputs of the format {target}", inputs + files.len() + RANDOM as usize);
     }
 }

@@ -57,6 +57,8 @@ const COMMANDS: &[(i32, &[&str])] = &[
     (0, &["log", "fw.elf", "log.bin", "--json"]),
     (0, &["reproduce"]),
     (0, &["tune"]),
+    (0, &["completions", "bash"]),
+    (2, &["watch", "unix:/nonexistent", "--lines"]),
     (1, &["log", "fw.elf", "cut.bin", "--json"]),
     (2, &["link", "unix:/nonexistent", "status"]),
     (2, &["link", "unix:/nonexistent", "record", "out.csv", "--input", "long.csv"]),

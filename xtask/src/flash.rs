@@ -9,9 +9,9 @@ use xtask::variant::Variant;
 /// The MCU's name in probe-rs.
 const CHIP: &str = "STM32G474RETx";
 
-/// What an attempt that failed may lack: the tool, or on Linux the right to use the probe.
-const HELP: &str = "probe-rs flashes the board (cargo install probe-rs-tools --locked; if it finds no probe on Linux, the udev rules \
-                    of https://probe.rs/docs/getting-started/probe-setup/ are missing)";
+/// What helps if it fails.
+const HELP: &str = "probe-rs flashes the board; it is installed by `cargo install probe-rs-tools --locked`, and on Linux it needs \
+                    the udev rules of https://probe.rs/docs/getting-started/probe-setup/";
 
 /// Builds the board's image and hands it to `probe-rs run`.
 pub(crate) fn run(variant: Variant) -> Result<()> {

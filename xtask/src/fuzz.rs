@@ -6,7 +6,12 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use xtask::shell;
+use xtask::tally::Tally;
+use xtask::tool::Tool;
 
+use crate::nightly;
+
+const TOOL: Tool = Tool { name: "cargo-fuzz", version: "0.13.2" };
 /// Folder of the targets, a workspace of its own, and of their corpora.
 const FOLDER: &str = "fuzz";
 /// Largest memory of a target, in MiB, its sanitizer included.
@@ -41,18 +46,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if let Some(unknown) = args.targets.iter().find(|target| !all.contains(target)) {
         bail!("no target {unknown}; expected {}", all.join(", "));
     }
-    install()?;
+    nightly::install("rust-src")?;
+    let program = TOOL.program()?;
     // Before the first run, so that the time of a target is not that of its build.
-    shell::run(fuzz().args(["build"]))?;
+    shell::run(fuzz(&program).arg("build"))?;
     let targets = if args.targets.is_empty() { &all } else { &args.targets };
-    let rows = targets.iter().map(|target| row(target, args.seconds)).collect::<Result<Vec<_>>>()?;
+    let rows = targets.iter().map(|target| row(&program, target, args.seconds)).collect::<Result<Vec<_>>>()?;
     println!("{:<10} {:>12} {:>8} {:>8}", "format", "inputs", "edges", "corpus");
     for Row { target, inputs, edges, corpus } in &rows {
         println!("{target:<10} {inputs:>12} {edges:>8} {corpus:>8}");
     }
     let inputs: u64 = rows.iter().map(|row| row.inputs).sum();
     println!("{inputs} inputs, no finding");
-    Ok(())
+    Tally::now(rows.into_iter().map(|row| (format!("inputs of the format {}", row.target), row.inputs)))?.write("fuzz")
 }
 
 /// Names of the targets: those that have a corpus.
@@ -65,42 +71,15 @@ fn all_targets() -> Result<Vec<String>> {
     Ok(targets)
 }
 
-/// Installs the nightly compiler and cargo-fuzz where they are missing.
-fn install() -> Result<()> {
-    let toolchains = shell::output(nightly("rustup").args(["toolchain", "list"]))?;
-    if !toolchains.lines().any(|line| line.starts_with("nightly")) {
-        shell::run(nightly("rustup").args([
-            "toolchain",
-            "install",
-            "nightly",
-            "--profile",
-            "minimal",
-            "--no-self-update",
-        ]))?;
-    }
-    if shell::command("cargo-fuzz").arg("--version").output().is_ok_and(|version| version.status.success()) {
-        return Ok(());
-    }
-    eprintln!("fuzz: cargo-fuzz is missing, installing it");
-    shell::run(shell::cargo().args(["install", "cargo-fuzz", "--locked"]))
-}
-
-/// A command that does not inherit the toolchain of `cargo xtask`.
-fn nightly(program: &str) -> Command {
-    let mut command = shell::command(program);
-    command.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO").env_remove("RUSTFLAGS");
-    command
-}
-
 /// cargo-fuzz on the nightly compiler.
-fn fuzz() -> Command {
-    let mut command = nightly("rustup");
-    command.args(["run", "nightly", "cargo", "fuzz"]).current_dir(shell::root().join(FOLDER));
+fn fuzz(program: &Path) -> Command {
+    let mut command = nightly::command(program);
+    command.arg("fuzz").current_dir(shell::root().join(FOLDER));
     command
 }
 
 /// Runs a target on its corpus, which stays as it is; what is found anew goes to the folder of built files.
-fn row(target: &str, seconds: u32) -> Result<Row> {
+fn row(program: &Path, target: &str, seconds: u32) -> Result<Row> {
     let found = shell::root().join(FOLDER).join("target/corpus").join(target);
     fs::create_dir_all(&found).with_context(|| format!("cannot create {}", found.display()))?;
     let limits = [
@@ -110,7 +89,7 @@ fn row(target: &str, seconds: u32) -> Result<Row> {
         format!("-max_len={INPUT_BYTES}"),
         "-print_final_stats=1".to_owned(),
     ];
-    let mut command = fuzz();
+    let mut command = fuzz(program);
     command.args(["run", target]).arg(&found).arg(Path::new("corpus").join(target)).arg("--").args(limits);
     eprintln!("fuzz: {target} for {seconds} s");
     let output = command.output().context("rustup does not start")?;

@@ -10,9 +10,24 @@ use xtask::variant::Variant;
 
 use crate::sbom;
 
-/// Builds the image of each board and prints the paths of its four files.
-pub(crate) fn run(variant: Variant) -> Result<()> {
-    for board in Board::ALL {
+/// Options of `cargo xtask image`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    variant: Variant,
+    /// This board's image alone
+    #[arg(long, value_parser = board)]
+    board: Option<Board>,
+}
+
+fn board(name: &str) -> Result<Board, String> {
+    let names = || Board::ALL.map(Board::name).join(", ");
+    Board::ALL.into_iter().find(|board| board.name() == name).ok_or_else(|| format!("expected {}", names()))
+}
+
+/// Builds the image of each board and prints the paths of its four files, the ELF file first.
+pub(crate) fn run(Args { variant, board }: Args) -> Result<()> {
+    for board in Board::ALL.into_iter().filter(|each| board.is_none_or(|only| *each == only)) {
         let path = build::image_with(&variant.features(), board, Opt::S)?;
         let flash = segments::flash(&build::read(&path)?).with_context(|| format!("in {}", path.display()))?;
         let (bin, hex) = (path.with_extension("bin"), path.with_extension("hex"));

@@ -9,5 +9,6 @@ mod seal;
 pub mod segments;
 pub mod setup;
 pub mod shell;
+pub mod tally;
 pub mod tool;
 pub mod variant;

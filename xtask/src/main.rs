@@ -4,12 +4,14 @@
 mod bench;
 mod bench_records;
 mod check;
+mod counts;
 mod deny;
 mod emulation;
 mod flash;
 mod fuzz;
 mod image;
 mod mutants;
+mod nightly;
 mod reproducible;
 mod sanitize;
 mod sbom;
@@ -81,7 +83,8 @@ enum Command {
     /// Write the image to the real board and show its log (probe-rs)
     ///
     /// The log's first line names the controller, a second one an amplifier of 1000 V. A stored model stays; a model
-    /// that the controller cannot run is a fault until it is acknowledged.
+    /// that the controller cannot run is a fault until it is acknowledged. Needs `cargo install probe-rs-tools --locked`, and
+    /// on Linux the udev rules of https://probe.rs/docs/getting-started/probe-setup/
     #[command(
         verbatim_doc_comment,
         after_help = "\
@@ -99,9 +102,10 @@ Examples:
     #[command(after_help = "\
 Examples:
   cargo xtask image                                    nucleo-g474re, mps2-an386
+  cargo xtask image --board mps2-an386                 the emulated board's alone
   cargo xtask image --controller fast                  nucleo-g474re-fast, mps2-an386-fast
   cargo xtask image --controller fast --limit-v 1000   nucleo-g474re-fast-kilovolt, mps2-an386-fast-kilovolt")]
-    Image(Variant),
+    Image(image::Args),
     /// Run the image that is flashed on models of the STM32G474's registers
     Boot(Forwarded),
     /// Run random ticks on the host and check every invariant in each
@@ -137,12 +141,26 @@ Examples:
     /// Check licences, duplicates, sources and advisories of all dependencies
     ///
     /// As deny.toml says. Installs cargo-deny under the target directory unless it is there.
+    /// The advisories need RustSec's database from GitHub; without it the rest is checked, and what is missing is said.
     #[command(verbatim_doc_comment)]
     Deny {
         /// Fail if the database of advisories cannot be had
         #[arg(long)]
         require_advisories: bool,
     },
+    /// Print how much the tests and commands have tried
+    ///
+    /// Inputs, pairs of state and event, injected faults, changes of the code, ticks; each with date and commit of its last
+    /// run in this folder, or "not run".
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Examples:
+  cargo xtask counts
+  cargo xtask counts --run                             the tests that count as well, in minutes
+  cargo xtask counts --run pairs power-cuts"
+    )]
+    Counts(counts::Args),
     /// Build the images in two folders and compare every byte
     #[command(after_help = "\
 Examples:
@@ -195,16 +213,17 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Reproducible};
+    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Reproducible};
     use Command::{Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
         Test => test::run(),
         Flash(variant) => flash::run(variant),
-        Image(variant) => image::run(variant),
+        Image(args) => image::run(args),
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
+        Counts(args) => counts::run(&args),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),
         Sanitize(args) => sanitize::run(&args),

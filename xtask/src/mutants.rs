@@ -2,7 +2,8 @@
 //!
 //! In: packages, and `.cargo/mutants-survivors.toml`, the list of changes that live with the reason of each. Out: caught
 //! and missed changes by package on stdout. It fails if fewer than [`LEAST_CAUGHT`] are caught, or if a change lives that
-//! is not listed. The unit tests see each change first; what they miss is tried again with all tests of its package.
+//! is not listed. Each change is tried with the quick unit tests first; what they miss is tried again with all tests of its
+//! package. A run that was interrupted goes on with `--iterate`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -10,6 +11,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use xtask::shell;
+use xtask::tally::Tally;
 use xtask::tool::Tool;
 
 const TOOL: Tool = Tool { name: "cargo-mutants", version: "26.0.0" };
@@ -19,6 +21,12 @@ const LEAST_CAUGHT: f64 = 0.95;
 const SURVIVORS: &str = ".cargo/mutants-survivors.toml";
 /// The packages whose tests run on a host and that the MCU runs.
 const PACKAGES: [&str; 3] = ["model", "link", "firmware"];
+
+/// Arguments of `cargo test` in each pass. The first pass leaves out the unit tests that need most of the time.
+const PASSES: [&[&str]; 2] = [
+    &["--cargo-arg=--lib", "--cargo-test-arg=--", "--cargo-test-arg=--skip=every_state_and_event"],
+    &["--cargo-arg=--tests"],
+];
 
 /// Arguments of `cargo xtask mutants`.
 #[derive(clap::Args)]
@@ -51,12 +59,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     for package in &packages {
         let out = folder.join(package);
         fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
-        for (tests, iterate) in [("--lib", args.iterate), ("--tests", true)] {
+        if args.iterate {
+            // The last run may have been interrupted before it kept them.
+            keep(&out, true)?;
+        }
+        for (tests, iterate) in PASSES.into_iter().zip([args.iterate, true]) {
             try_changes(&program, args, package, tests, iterate, &out)?;
             keep(&out, iterate)?;
         }
         let outcomes = Outcomes::read(&out)?;
         println!("{package:<10} {}", outcomes.counts);
+        if args.file.is_empty() {
+            Tally::now(outcomes.counts.named())?.write(&format!("mutants-{package}"))?;
+        }
         all = all.and(&outcomes.counts);
         for missed in outcomes.missed {
             if !listed.contains_key(&missed.key) {
@@ -84,7 +99,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Runs the tool once. It exits with 2 or 3 when changes live, which is no failure here.
-fn try_changes(program: &Path, args: &Args, package: &str, tests: &str, iterate: bool, out: &Path) -> Result<()> {
+fn try_changes(program: &Path, args: &Args, package: &str, tests: &[&str], iterate: bool, out: &Path) -> Result<()> {
     let mut command = shell::command(program);
     command.args([
         "mutants",
@@ -96,7 +111,7 @@ fn try_changes(program: &Path, args: &Args, package: &str, tests: &str, iterate:
         "--package",
         package,
     ]);
-    command.arg(format!("--jobs={}", args.jobs)).arg(format!("--cargo-arg={tests}")).arg("--output").arg(out);
+    command.arg(format!("--jobs={}", args.jobs)).args(tests).arg("--output").arg(out);
     args.file.iter().for_each(|file| _ = command.args(["--file", file]));
     // The time limit follows from the tests' own time, which is measured before the first change: on a busy machine a
     // fixed one would count changes as caught that no test has noticed.
@@ -129,6 +144,17 @@ impl Counts {
             timeout: self.timeout + other.timeout,
             unviable: self.unviable + other.unviable,
         }
+    }
+
+    /// The counts with their names, for `cargo xtask counts`.
+    fn named(&self) -> [(String, u64); 4] {
+        [
+            ("caught", self.caught),
+            ("caught by the time limit", self.timeout),
+            ("not caught", self.missed),
+            ("do not compile", self.unviable),
+        ]
+        .map(|(what, count)| (format!("changes: {what}"), count))
     }
 
     /// Share of the changes that the tests notice; 1 if there are none.
@@ -244,6 +270,14 @@ mod tests {
         assert!(listed.iter().all(|(change, reason)| change.contains(".rs: ") && reason.len() > 20), "{listed:#?}");
         assert!(parse("[[survivor]]\nchanges = ['a']").is_err());
         assert!(parse("[[survivor]]\nreason = 'a'").is_err());
+    }
+
+    #[test]
+    fn the_page_shows_every_survivor() {
+        let page = fs::read_to_string(shell::root().join("docs/counts.md")).unwrap();
+        for change in listed().unwrap().keys() {
+            assert!(page.contains(&format!("`{change}`")), "{change}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use crate::shell;
 
@@ -29,7 +29,8 @@ impl Tool {
         }
         eprintln!("{name}: {version} is missing, installing it into {}", folder.display());
         let install = ["install", "--locked", "--quiet", name, "--version", version, "--root"];
-        shell::run(shell::cargo().args(install).arg(&folder))?;
+        shell::run(shell::cargo().args(install).arg(&folder))
+            .with_context(|| format!("{name} {version} is needed, and cargo cannot install it from the registry"))?;
         Ok(own)
     }
 

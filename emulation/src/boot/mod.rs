@@ -15,6 +15,7 @@ use model::Settings;
 use model::supervisor::Mismatch;
 use serde::Deserialize;
 use xtask::build::{self, Board, Opt};
+use xtask::tally::Tally;
 use xtask::variant::Variant;
 use xtask::{python, segments, shell};
 
@@ -123,5 +124,8 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         runs::held(&events("voltage at the start")?, &bytes).context("voltage at the start")?
     );
     println!("{CANNOT_SHOW}");
-    Ok(())
+    // All runs but the one without a mishap and the one with a host.
+    let runs = output.as_object().context("no runs")?.values().filter(|run| !run.is_null()).count() as u64;
+    let faults = ("faults injected in the image that is flashed, on register models".to_owned(), runs - 2);
+    Tally::now([faults])?.write(&["boot"].into_iter().chain(variant.features()).collect::<Vec<_>>().join("-"))
 }

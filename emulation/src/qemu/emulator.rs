@@ -16,16 +16,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use host_sim::log::{Decoder, Done, Event, Formats, Item, Line, table_row};
+pub(crate) use host_sim::qemu::SHIFT;
+use host_sim::qemu::{self, LINK, PROGRAM};
 use tempfile::NamedTempFile;
 
 use xtask::build::{self, Opt};
-use xtask::setup::QEMU;
 use xtask::shell;
 
-/// QEMU's `-icount shift`: an instruction takes 2^6 ns of the board's time.
-pub(crate) const SHIFT: u32 = 6;
-/// Name of the script in which a host commands the board.
-const LINK: &str = "link";
 /// Longest time of a run on the host's clock; after it the emulator is stopped.
 const TIMEOUT: Duration = Duration::from_secs(120);
 
@@ -94,20 +91,15 @@ pub(crate) fn text(line: &Line) -> String {
 /// Starts QEMU with an image and a script, in `folder`. `host` is the QEMU character device of the serial line to a
 /// host, `wire` the file for the DAC's bytes, `clock` the value of `-icount`.
 fn start(folder: &Path, elf: &Path, script: &str, host: &str, wire: &Path, clock: &str) -> Result<Child> {
-    shell::command(QEMU)
+    qemu::Run { script, host, wire, clock }
+        .command(elf)
         .current_dir(folder)
-        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", host])
-        .args(["-serial", &format!("file:{}", wire.display())])
-        .args(["-icount", clock])
-        .args(["-semihosting-config", &format!("enable=on,target=native,arg={script}")])
-        .arg("-kernel")
-        .arg(elf)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .spawn()
         .map_err(|error| match error.kind() {
-            ErrorKind::NotFound => anyhow::anyhow!("`{QEMU}` is not installed: run cargo xtask setup"),
-            _ => anyhow::anyhow!("cannot start `{QEMU}`: {error}"),
+            ErrorKind::NotFound => anyhow::anyhow!("`{PROGRAM}` is not installed: run cargo xtask setup"),
+            _ => anyhow::anyhow!("cannot start `{PROGRAM}`: {error}"),
         })
 }
 
@@ -135,8 +127,8 @@ pub(crate) fn obey_in<T>(
     let formats = Formats::parse(&build::read(elf)?)?;
     let wire = NamedTempFile::new()?;
     let begin = Instant::now();
-    let host = format!("unix:{},server=on,wait=off", socket.display());
-    let mut child = start(folder, elf, LINK, &host, wire.path(), &format!("shift={SHIFT},align=on"))?;
+    let host = qemu::Run::socket(socket);
+    let mut child = start(folder, elf, LINK, &host, wire.path(), &qemu::Run::real_time())?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let (result, log) = thread::scope(|scope| {
         let reader = scope.spawn(|| decode(formats, &mut output, show));
@@ -156,8 +148,8 @@ pub(crate) fn obey_in<T>(
 /// Runs the board on the unix socket `socket` until the emulator ends. `show` is called with every line of the log.
 pub(crate) fn serve(elf: &Path, socket: &Path, show: impl FnMut(&str)) -> Result<()> {
     let formats = Formats::parse(&build::read(elf)?)?;
-    let host = format!("unix:{},server=on,wait=off", socket.display());
-    let mut child = start(shell::root(), elf, LINK, &host, Path::new("/dev/null"), &format!("shift={SHIFT},align=on"))?;
+    let host = qemu::Run::socket(socket);
+    let mut child = start(shell::root(), elf, LINK, &host, Path::new("/dev/null"), &qemu::Run::real_time())?;
     let mut output = child.stdout.take().context("the emulator has no output")?;
     let ended = decode(formats, &mut output, show);
     child.wait()?;

@@ -49,6 +49,13 @@ impl Counts {
         }
     }
 
+    /// The counts with their names, for `cargo xtask counts`.
+    pub(super) fn tallied(&self) -> impl Iterator<Item = (String, u64)> {
+        let runs = [("runs, each with settings of its own".to_owned(), self.runs)];
+        let ticks = self.named().map(|(name, count)| (format!("ticks: {name}"), count));
+        runs.into_iter().chain(ticks)
+    }
+
     fn named(&self) -> [(&'static str, u64); 10] {
         [
             ("ran", self.ticks),

@@ -18,6 +18,7 @@ use firmware::pace::Pace;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use xtask::tally::Tally;
 
 use events::Events;
 use invariants::{Counts, Watch};
@@ -48,7 +49,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if let Some(missing) = counts.missing() {
         bail!("no tick {missing}: too few ticks to show anything about it");
     }
-    Ok(())
+    Tally::now(counts.tallied())?.write("soak")
 }
 
 /// Runs `ticks` ticks with the settings and events that the number of the run stands for.

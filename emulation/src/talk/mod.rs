@@ -16,6 +16,7 @@ use link::{
 use simulation::plant_file;
 
 use xtask::build::{self, Board, Opt};
+use xtask::tally::Tally;
 use xtask::{setup, shell};
 
 use crate::qemu::emulator::{self, SAFE, Written};
@@ -67,6 +68,13 @@ pub(crate) fn run(elf: &Path) -> Result<String> {
     let missed = summary.overruns.context("the log has no summary")?;
     ensure!(missed == 0, "{missed} ticks missed, says the log");
     let driven = wire(&run.dac, armed)?;
+    let count = |what: &str, count| (what.to_owned(), count);
+    Tally::now([
+        count("hostile frames to the emulated board", u64::from(HOSTILE)),
+        count("ticks on the wire meanwhile", run.dac.len() as u64),
+        count("ticks missed meanwhile", missed),
+    ])?
+    .write("talk")?;
     Ok(format!("{said}; {} ticks on the wire, {driven} with voltage, {missed} missed", run.dac.len()))
 }
 

@@ -1,13 +1,4 @@
-//! The board NUCLEO-G474RE: an STM32G474RE at 170 MHz.
-//!
-//! | pin | function |
-//! | --- | --- |
-//! | PA4 | DAC1 channel 1, the amplifier's input: 0 to 3.3 V for 0 V to its full scale, from up to 15 kOhm (unbuffered) |
-//! | PB5 | enable of the amplifier, active high; a pull-down at the amplifier keeps it off while the chip is in reset |
-//! | PB10 | interlock, high when closed; pulled down, so that a broken wire reads as open |
-//! | PA0, PA1 | ADC1, the amplifier's voltage and current monitors |
-//! | PA5 | LED, on while the output is enabled |
-//! | PA2, PA3 | LPUART1, line to the host, 115 200 bit/s: the debugger's USB port |
+//! The board NUCLEO-G474RE: an STM32G474RE at 170 MHz. Its pins are in the table of the crate's page.
 //!
 //! The DAC's output buffer ends 0.2 V before either supply and is therefore off: PA4 is driven through the DAC's own resistance.
 //! An amplifier with an input current needs a voltage follower at PA4: an input resistance of 1.5 MOhm reduces the voltage by

@@ -25,10 +25,9 @@ use super::spring_error::{ErrorOf, together};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj bound                                  how well the spring has to be known for 0.6 s
-  vsj bound --spring-error tau=5             with a time constant known to 5 %
+  vsj bound                        how well the spring has to be known for 0.6 s
+  vsj bound --spring-error tau=5   with a time constant known to 5 %
   vsj bound --spring-error tau=2 --spring-error gain=1 --limit-v 700
-  vsj identify record.csv --out spring --json > identified.json
   vsj bound --plant spring/plant.toml --identified identified.json")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file of at most 1 MiB with shares and time constants only

@@ -19,7 +19,7 @@ Examples:
   vsj compare                             none, paper, fast at 700 V and 1000 V
   vsj compare --limit-v 850 --slew-v-per-s 500
   vsj compare --plant spring.toml --json  on another spring
-  vsj compare --spring-error tau=10       on a spring whose time constant is 10 % larger than the model's
+  vsj compare --spring-error tau=10       time constant 10 % above the model's
   vsj compare --spring-error gain=-5 --sensor-noise 0.2  with a stiffness sensor")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter

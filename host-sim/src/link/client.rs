@@ -34,6 +34,12 @@ impl Patience {
     }
 }
 
+/// Interval of heartbeats: five within the longest silence that the MCU allows, 0.01 s to 1 s.
+pub fn heartbeat(status: &Status) -> Duration {
+    let limit_s = f64::from(status.silence_limit_ticks) / f64::from(status.rate_hz.max(1));
+    Duration::from_secs_f64((limit_s / 5.0).clamp(0.01, 1.0))
+}
+
 /// Why a request failed.
 #[derive(Debug)]
 pub enum Failure {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::log::line::Line;
 use crate::log::shape::{Formatted, Shape, Stop, Walk};
 use simulation::bad_input;
-use simulation::bad_input::{BadInput, excerpt};
+use simulation::bad_input::{BadInput, excerpt, one_line};
 
 /// Encoding of the frames, as recorded in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -65,7 +65,7 @@ impl Formats {
             Ok(None) => bad_input!("has no .defmt section; expected the ELF file of the firmware that wrote the log"),
             Err(error) => {
                 let why = error.to_string().lines().collect::<Vec<_>>().join(", ");
-                bad_input!("{why}; expected the ELF file of the firmware that wrote the log")
+                bad_input!("{}; expected the ELF file of the firmware that wrote the log", one_line(&why))
             }
         };
         let encoding = match table.encoding() {
@@ -90,7 +90,7 @@ impl Formats {
         let sections: Vec<_> =
             elf.sections().filter(|s| s.name().is_ok_and(is_defmt)).map(|section| section.index()).collect();
         let bounded = |name: &str, error: BadInput| {
-            BadInput(format!("symbol `{}`: {error}, as in the ELF file of a firmware", excerpt(name)))
+            BadInput(format!("symbol `{}`: {error}, as in the ELF file of a firmware", one_line(&excerpt(name))))
         };
         for symbol in elf.symbols() {
             let (Ok(name), Some(section)) = (symbol.name(), symbol.section_index()) else { continue };

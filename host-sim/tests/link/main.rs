@@ -8,3 +8,5 @@ mod model;
 #[cfg(target_os = "linux")]
 mod output;
 mod vsj;
+#[cfg(target_os = "linux")]
+mod watch;

@@ -251,3 +251,16 @@ fn telemetry_that_is_not_sent_is_counted() {
     assert!(server.telemetry(&at(5013, DISARMED)).is_some());
     assert_eq!(server.counters().telemetry_dropped, 4);
 }
+
+/// The monitors agree again once the output is off; the report still says what they found.
+#[test]
+fn a_report_of_a_fault_names_what_disagreed() {
+    let mut server = server();
+    let nonce = greet(&mut server, &DISARMED);
+    send(&mut server, &DISARMED, nonce, 1, Request::Status);
+    let mut found = at(6, FAULTED);
+    found.sample.mismatch = Mismatch(4);
+    let Some(Reply::Fault(first)) = server.fault(&found).map(reply) else { panic!() };
+    let Some(Reply::Fault(later)) = server.fault(&at(106, FAULTED)).map(reply) else { panic!() };
+    assert_eq!((first.tick, first.mismatch, later), (6, Mismatch(4), first));
+}

@@ -45,6 +45,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn the_mean_slew_is_exact_even_below_one_code_per_tick(slew in 1.0..5000.0f64, rate in 100.0..10_000.0f64) {
         let config = config(&Amplifier { slew_v_per_s: Some(slew), ..Amplifier::PAPER }, rate);
         let mut state = State::default();

@@ -92,6 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn the_charge_and_its_mean_over_a_tick_are_the_exact_exponentials() {
         for rate_hz in [100.0, 1000.0, 10_000.0] {
             let sample_time = SampleTime::from_rate(rate_hz).unwrap();

@@ -83,7 +83,7 @@ impl Class {
         });
         let mut failures = failures.into_inner().expect("no panic");
         failures.extend(temporaries(self.folder.path()).map(|path| format!("left over: {}", path.display())));
-        println!("hostile input, {}: {} runs", self.name, self.cases.len());
+        println!("count: {} runs of vsj with hostile input: {}", self.cases.len(), self.name);
         assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), self.cases.len(), failures.join("\n"));
     }
 }

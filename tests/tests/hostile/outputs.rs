@@ -174,7 +174,7 @@ fn a_signal_at_any_moment_leaves_old_results_or_new_ones_and_no_temporary_file()
             }
         }
     }
-    println!("hostile input, signals: 28 runs, {interrupted} of them interrupted");
+    println!("count: 28 runs of vsj with hostile input: signals");
     assert!(interrupted > 4, "{interrupted} of 28 runs were interrupted");
 }
 

@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use crate::shell;
 
 /// The emulator's program.
-pub const QEMU: &str = "qemu-system-arm";
+const QEMU: &str = "qemu-system-arm";
 /// Package of the emulator in Debian and Ubuntu.
 const QEMU_PACKAGE: &str = "qemu-system-arm";
 

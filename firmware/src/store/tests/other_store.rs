@@ -84,6 +84,7 @@ fn other_newest(flash: &Flash) -> Option<Vec<u8>> {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn both_stores_keep_the_old_or_the_new_payload_and_agree_after_each_store() {
     let mut random = 1u32;
     let (mut ours, mut theirs) = (Flash::BLANK, Flash::BLANK);

@@ -1,8 +1,8 @@
 //! `vsj link`: the MCU over its serial link.
 
 mod model;
-mod record;
-mod session;
+pub(super) mod record;
+pub(super) mod session;
 mod watch;
 
 use anyhow::{Context, Result};

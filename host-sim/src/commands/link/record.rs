@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use host_sim::link::heartbeat;
 use host_sim::output::recording::{Every, Recording};
 use host_sim::output::terminal::{print, remark};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -18,8 +19,6 @@ use simulation::schedule::{Between, Schedule};
 use super::session::{Session, seconds, stop_on_interrupt, stopped};
 use crate::commands::choice::{BETWEEN, one_of};
 
-/// Bits of the line that a sample takes, start and stop bits included: the longest frame and a share for the answers.
-const SAMPLE_BITS: f64 = 460.0;
 /// Longest accepted input, in s; much more cannot be expressed as a [`Duration`].
 const LONGEST_S: f64 = 1e9;
 
@@ -57,27 +56,37 @@ impl Arguments {
     }
 
     fn time(&self) -> Result<Option<Duration>> {
-        if !(self.rate_hz >= 0.02 && self.rate_hz <= 10_000.0) {
-            bad_input!("--rate-hz {}: expected 0.02 to 10000", self.rate_hz);
-        }
+        rows_hz(self.rate_hz)?;
         self.seconds.map(|time| seconds("--seconds", time, f64::INFINITY)).transpose()
     }
 
     fn schedule(&self) -> Result<Option<Schedule>> {
-        Ok(match self.input.as_deref() {
-            None => None,
-            Some("stair") => Some(Schedule::stair()),
-            Some("step") => Some(Schedule::ideal_stair()),
-            Some(file) => {
-                let schedule = Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, self.between);
-                let length_s = schedule.end_s() - schedule.start_s();
-                if length_s > LONGEST_S {
-                    bad_input!("{file} lasts {} s; expected at most {LONGEST_S} s", number(length_s));
-                }
-                Some(schedule)
-            }
-        })
+        self.input.as_deref().map(|input| schedule(input, self.between)).transpose()
     }
+}
+
+/// Reads `--input`: the report's stair, its ideal steps, or a file.
+pub(crate) fn schedule(input: &str, between: Between) -> Result<Schedule> {
+    Ok(match input {
+        "stair" => Schedule::stair(),
+        "step" => Schedule::ideal_stair(),
+        file => {
+            let schedule = Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, between);
+            let length_s = schedule.end_s() - schedule.start_s();
+            if length_s > LONGEST_S {
+                bad_input!("{file} lasts {} s; expected at most {LONGEST_S} s", number(length_s));
+            }
+            schedule
+        }
+    })
+}
+
+/// Checks `--rate-hz`, rows per second.
+pub(crate) fn rows_hz(rate_hz: f64) -> Result<f64> {
+    if !(0.02..=10_000.0).contains(&rate_hz) {
+        bad_input!("--rate-hz {rate_hz}: expected 0.02 to 10000");
+    }
+    Ok(rate_hz)
 }
 
 pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Result<()> {
@@ -91,11 +100,8 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     }
     let length = schedule.as_ref().map(|schedule| Duration::from_secs_f64(schedule.end_s() - schedule.start_s()));
     let whole = arguments.time()?.or(length);
-    let ticks = f64::from(session.status.rate_hz) / arguments.rate_hz;
-    let every_ticks = ticks.round().clamp(1.0, f64::from(u16::MAX)) as u16;
     stop_on_interrupt();
-    let line_ticks = (f64::from(session.status.rate_hz) * SAMPLE_BITS / f64::from(baud)).ceil();
-    let every = Every::new(every_ticks, line_ticks.clamp(1.0, f64::from(u16::MAX)) as u16);
+    let every = Every::at(arguments.rate_hz, session.status.rate_hz, baud);
     let mut recording = Recording::new(&arguments.file, arguments.force, &session.status, every)?;
     if arguments.arm {
         session.order(Request::Arm)?;
@@ -139,7 +145,7 @@ fn follow(
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos} of {len} s, {msg}")?);
     let whole = whole.unwrap_or(Duration::MAX);
     let mut reader = schedule.map(|schedule| (schedule.start_s(), schedule.reader()));
-    let (start, heartbeat) = (Instant::now(), session.heartbeat());
+    let (start, heartbeat) = (Instant::now(), heartbeat(&session.status));
     let (mut commanded, mut heard) = (None, start);
     while start.elapsed() < whole && !stopped() {
         let elapsed = start.elapsed();

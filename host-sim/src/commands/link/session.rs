@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use host_sim::link::{Client, Failure, StatusReport};
+use host_sim::link::{Client, Failure, StatusReport, heartbeat};
 use host_sim::output::terminal::{json, print, remark};
 use host_sim::signals::on_ctrl_c;
 use link::{Desired, Reason, Request, Status, WireVolts};
@@ -81,12 +81,6 @@ impl Session {
         print(&if self.json { json(&done)? } else { text })
     }
 
-    /// Interval of heartbeats: five within the longest silence that the MCU allows, 0.01 s to 1 s.
-    pub(super) fn heartbeat(&self) -> Duration {
-        let limit_s = f64::from(self.status.silence_limit_ticks) / f64::from(self.status.rate_hz.max(1));
-        Duration::from_secs_f64((limit_s / 5.0).clamp(0.01, 1.0))
-    }
-
     /// Returns an error unless the MCU is armed. Ramping is accepted: the frame that reported it has ended it.
     pub(super) fn still_armed(&mut self, state: link::State) -> Result<()> {
         if !matches!(state, link::State::Armed | link::State::Ramping) {
@@ -101,7 +95,7 @@ impl Session {
     fn keep(&mut self, time: Option<Duration>) -> Result<()> {
         let Some(time) = time else { return Ok(()) };
         stop_on_interrupt();
-        let (start, pause) = (Instant::now(), self.heartbeat());
+        let (start, pause) = (Instant::now(), heartbeat(&self.status));
         while start.elapsed() < time && !stopped() {
             let (state, _) = self.order(Request::Heartbeat)?;
             self.still_armed(state)?;
@@ -123,7 +117,7 @@ pub(super) fn stopped() -> bool {
 }
 
 /// Checks a time in s that must be positive and at most `most`; an infinite one becomes the longest `Duration`.
-pub(super) fn seconds(option: &str, value: f64, most: f64) -> Result<Duration> {
+pub(crate) fn seconds(option: &str, value: f64, most: f64) -> Result<Duration> {
     if !(value > 0.0 && value <= most) {
         bad_input!("{option} {}: expected a positive number of seconds", number(value));
     }

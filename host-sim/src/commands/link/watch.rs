@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::link::StatusReport;
+use host_sim::link::{StatusReport, heartbeat};
 use host_sim::output::screen::Screen;
 use host_sim::output::terminal::{json, print};
 use serde::Serialize;
@@ -46,7 +46,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let (every, whole) = arguments.times()?;
     stop_on_interrupt();
     let mut screen = Screen::new(session.json);
-    let (start, heartbeat) = (Instant::now(), session.heartbeat());
+    let (start, heartbeat) = (Instant::now(), heartbeat(&session.status));
     let (mut samples, mut next) = (0, start);
     let mut report = StatusReport::new(&session.status);
     while start.elapsed() < whole && !stopped() {

@@ -4,6 +4,9 @@ use std::cmp::Ordering;
 
 use link::WireVolts;
 
+/// Bits of the line that a sample takes, start and stop bits included: the longest frame and a share for the answers.
+const SAMPLE_BITS: f64 = 460.0;
+
 /// How often the MCU sends a sample, and how often one becomes a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Every {
@@ -14,6 +17,14 @@ pub struct Every {
 }
 
 impl Every {
+    /// For `rows_hz` rows per second of an MCU with `rate_hz` ticks per second, and samples more often as far as a line of `baud`
+    /// bit/s carries them.
+    pub fn at(rows_hz: f64, rate_hz: u32, baud: u32) -> Self {
+        let bounded = |ticks: f64| ticks.clamp(1.0, f64::from(u16::MAX)) as u16;
+        let rate_hz = f64::from(rate_hz);
+        Self::new(bounded((rate_hz / rows_hz).round()), bounded((rate_hz * SAMPLE_BITS / f64::from(baud)).ceil()))
+    }
+
     /// The shortest time between samples that divides the time between rows and is at least `line_ticks`, which a line needs
     /// for a sample.
     pub fn new(row_ticks: u16, line_ticks: u16) -> Self {

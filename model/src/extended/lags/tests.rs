@@ -2,6 +2,7 @@ use super::*;
 
 /// The slowest lag of 3000 s is integrated even at 10 kHz.
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_step_response_is_the_exact_sum_of_exponentials_at_any_rate() {
     let relaxation = Relaxation {
         share: 0.1,
@@ -71,6 +72,7 @@ fn each_bound_of_a_relaxation_is_where_it_is_documented() {
 /// A time constant that depends on the voltage gives, at a constant voltage, the exponential of its value there; the
 /// other lags are not affected.
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_step_response_at_any_voltage_has_the_time_constant_of_that_voltage() {
     let sample_time = SampleTime::from_rate(1000.0).unwrap();
     for (high_s, volts) in [(8.0, 0.0), (8.0, 500.0), (8.0, 900.0), (2.5, 400.0), (2.5, 1000.0)] {

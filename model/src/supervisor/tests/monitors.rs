@@ -52,7 +52,7 @@ fn a_noisy_monitor_that_disagrees_in_more_than_half_of_the_ticks_is_a_fault() {
 fn a_monitor_that_is_late_by_more_than_the_amplifier_may_take_to_settle_is_a_fault() {
     for (late, fault) in [(0, false), (40, false), (50, false), (51, true), (60, true)] {
         let mut supervisor = armed();
-        let voltage = |tick: usize| if tick / 200 % 2 == 0 { 300.0 } else { 0.0 };
+        let voltage = |tick: usize| if (tick / 200).is_multiple_of(2) { 300.0 } else { 0.0 };
         for now in 1..1000_usize {
             // The reading is that of the output of the tick before.
             let measured = voltage((now - 1).saturating_sub(late));

@@ -194,6 +194,7 @@ fn every_state_of_the_sensor_has_a_name_of_its_own() {
 
 /// After 65 535 good readings, after 49.7 days without one.
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn counters_stay_at_their_ends() {
     let mut bench = Bench::trusted(Signal::ZERO);
     for reading in 0..70_000 {

@@ -20,6 +20,7 @@ fn reductions(half_s: f64, ratio: f64, sides: u32) -> u8 {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn only_an_oscillation_that_is_fast_and_does_not_decay_reduces_the_gain() {
     let six = u32::from(SWINGS);
     assert_eq!(reductions(0.05, 1.0, six - 1), 0);
@@ -32,6 +33,7 @@ fn only_an_oscillation_that_is_fast_and_does_not_decay_reduces_the_gain() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_crossing_counts_up_to_the_longest_pause_after_the_last_one() {
     assert!(reductions(PAUSE_S, 1.0, 60) > 0);
     assert_eq!(reductions(PAUSE_S + 0.001, 1.0, 60), 0);
@@ -50,6 +52,7 @@ fn an_amplitude_that_shrinks_by_more_than_a_sixteenth_decays() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn only_crossings_of_more_than_the_gate_on_both_sides_count() {
     // The gate at rest is the noise passed in, 6 V; the mean stays within 0.2 V of zero.
     let config = Config::new(1e-3, SampleTime::from_rate(1000.0).unwrap());

@@ -1,6 +1,7 @@
 use super::*;
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn the_gain_is_that_of_the_steady_kalman_filter() {
     // The steady filter, by iterating the prediction and update of its variance.
     for (noise_v, model_uncertainty, interval_s) in [(1.0, 1.0, 1e-3), (0.2, 3.0, 1e-2), (20.0, 0.1, 1e-4)] {

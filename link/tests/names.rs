@@ -1,0 +1,78 @@
+//! Names, remedies and codes: what a host shows is what the MCU's code stands for.
+
+use link::{Controller, Fault, Field, Sensor, State};
+use model::amplifier::Limits;
+use model::supervisor::{self, Command, Inputs, Settings, Supervisor};
+use model::{Approach, Compensation, DacCode, Gains, Output, SampleTime, Volts};
+
+#[test]
+fn a_fault_has_the_name_and_the_remedy_of_the_supervisor() {
+    for fault in supervisor::Fault::ALL {
+        let code = Fault::from(fault);
+        assert_eq!((code.name(), code.remedy()), (fault.name(), Some(fault.remedy())));
+    }
+    for (code, name) in [(0, "none"), (200, "unknown")] {
+        assert_eq!((Fault(code).name(), Fault(code).remedy()), (name, None));
+    }
+}
+
+#[test]
+fn a_field_keeps_its_name_across_the_link() {
+    for name in ["memory.direct", "leakage.share", "integral_gain_per_s"] {
+        assert_eq!(Field::named(name).name(), name);
+    }
+    for unknown in [Field::named("no such field"), Field(18)] {
+        assert_eq!(unknown.name(), "another setting");
+    }
+    assert_eq!(Field::named("no such field"), Field::OTHER);
+}
+
+#[test]
+fn every_diagnosis_of_the_sensor_has_its_own_code() {
+    use model::feedback::Fault::{Absent, Jumping, OutOfRange, Stale, Stuck};
+    let faults = [Absent, Stale, Stuck, Jumping, OutOfRange].map(model::Sensor::Failed);
+    let all = [model::Sensor::Trusted].into_iter().chain(faults);
+    let names: Vec<&str> = all.map(|sensor| Sensor::from(Some(sensor)).name()).collect();
+    assert_eq!(names, ["trusted", "absent", "stale", "stuck", "jumping", "out-of-range"]);
+}
+
+#[test]
+fn controllers_are_called_as_on_the_command_line() {
+    let gains = Gains { proportional: 1.0, integral_per_s: 1.0 };
+    for (compensation, name) in [
+        (Compensation::None, "none"),
+        (Compensation::ProportionalIntegral(gains), "paper"),
+        (Compensation::TimeOptimal(Approach { time_constant_s: 0.1 }), "fast"),
+    ] {
+        assert_eq!(Controller::of(&compensation).name(), name);
+    }
+}
+
+/// A supervisor that disarms, arms, is left alone by its host and meets a fault, as the link shows it.
+#[test]
+fn the_state_on_the_link_is_that_of_the_supervisor() {
+    let config = Settings::DEFAULT.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize();
+    let mut supervisor = Supervisor::new(config, None);
+    let mut shown = |inputs: Inputs| {
+        supervisor.decide(&inputs);
+        let voltage = Volts::new(300.0).unwrap();
+        supervisor.release(&Output {
+            target: voltage,
+            voltage,
+            code: DacCode(1755),
+            applied: voltage,
+            stiffness: model::ScaledStiffness::default(),
+            limits: Limits::NONE,
+            sensor: None,
+        });
+        State::from(&supervisor).name()
+    };
+    let target = Volts::new(300.0).unwrap();
+    let calm = Inputs { ticks_since_host: 0, interlock_closed: true, target, ..Inputs::default() };
+    assert_eq!(shown(calm), "disarmed");
+    assert_eq!(shown(Inputs { command: Some(Command::Arm), ..calm }), "armed");
+    assert_eq!(shown(calm), "armed");
+    assert_eq!(shown(Inputs { ticks_since_host: 501, ..calm }), "ramping");
+    assert_eq!(shown(calm), "armed");
+    assert_eq!(shown(Inputs { interlock_closed: false, ..calm }), "faulted");
+}
