@@ -19,6 +19,9 @@ pub(crate) struct Args {
     /// Print the result as JSON; the log goes to stderr
     #[arg(long)]
     json: bool,
+    /// Show every line of the log, also the summaries, one for each second of the run
+    #[arg(long, conflicts_with_all = ["link", "rivals", "blocks"])]
+    log: bool,
     /// Run no script: wait for `vsj link unix:PATH` on this socket until Ctrl-C
     #[arg(long, value_name = "PATH", conflicts_with = "json")]
     link: Option<PathBuf>,
@@ -50,7 +53,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         eprintln!("talk to it with: vsj link unix:{} status", socket.display());
         return emulator::serve(&elf, &socket, |line| println!("{line}"));
     }
-    let show = |line: &str| if args.json { eprintln!("{line}") } else { println!("{line}") };
+    let show = |line: &str| match is_shown(line, args.log) {
+        true if args.json => eprintln!("{line}"),
+        true => println!("{line}"),
+        false => (),
+    };
     let run = emulator::play(&elf, "stair", emulator::SHIFT, show)?;
     let comparison = Comparison::new("stair", &run)?;
     if args.json {
@@ -59,4 +66,21 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         println!("{}", comparison.summary(&run));
     }
     comparison.check()
+}
+
+/// True if a line of the log is shown: all but the summaries, which are nearly equal, or all lines with `all`.
+fn is_shown(line: &str, all: bool) -> bool {
+    all || !line.split_whitespace().any(|word| word == "summary")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn summaries_are_shown_only_on_request_and_every_other_line_always() {
+        let summary = "    1.000 info  summary tick=1000 overruns=0";
+        assert_eq!([is_shown(summary, false), is_shown(summary, true)], [false, true]);
+        assert!(is_shown("    1.000 warn  limit bits=1 tick=70", false) && is_shown("info  state off -> armed", false));
+    }
 }

@@ -71,7 +71,9 @@ impl fmt::Display for OutOfRange {
         if lowest != highest {
             write!(f, " to {highest}")?;
         }
-        write!(f, " {unit}")
+        write!(f, " {unit}")?;
+        // The bound is another setting, which a user who raises this one must raise too.
+        if *field == "max_v" { write!(f, "; `full_scale_v` bounds it, `Amplifier::up_to` sets both") } else { Ok(()) }
     }
 }
 

@@ -80,6 +80,8 @@ pub enum Rows<'a> {
     Table3 {
         /// True if the run is the report's own, so that its printed values should be reproduced.
         same: bool,
+        /// True if the spring is the report's own, whose printed and measured values belong to the rows.
+        spring: bool,
     },
     /// A record of the user's.
     Record(&'a Record),
@@ -96,7 +98,7 @@ impl Report {
         source: &Rows<'_>,
         controlled: bool,
     ) -> Result<Self> {
-        let compared = matches!(source, Rows::Table3 { same: true });
+        let compared = matches!(source, Rows::Table3 { same: true, .. });
         let mut rows = rows(experiment, run, source)?;
         let (printed_compared, printed_agree) = if compared { explain(&mut rows) } else { (0, 0) };
         let samples = if controlled { &run.with } else { &run.without };
@@ -131,6 +133,9 @@ fn rows<P: HasReference>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_
         }
     };
     let mut rows: Vec<Row> = match source {
+        Rows::Table3 { spring: false, .. } => {
+            table3::rows()?.iter().map(|printed| blank(printed.time_s, printed.voltage_v, None)).collect()
+        }
         Rows::Table3 { .. } => table3::rows()?
             .iter()
             .map(|printed| Row {

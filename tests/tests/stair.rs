@@ -262,3 +262,19 @@ fn the_documentation_equals_the_output_of_the_command() {
         assert!(page.contains(line), "docs/stair.md lacks: {line}");
     }
 }
+
+/// Printed and measured values belong to the report's spring alone.
+#[test]
+fn another_spring_is_not_compared_with_the_reports_values() {
+    let folder = tempdir().unwrap();
+    let shown = |arguments: &[&str]| text(&run(folder.path(), arguments).stdout);
+    let plant = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/plant.toml");
+    let other = shown(&["stair", "--plant", plant.to_str().unwrap()]);
+    assert!(other.contains("reference") && !other.contains("printed") && !other.contains("measured"), "{other}");
+    let own = shown(&["stair"]);
+    assert!(own.contains("printed") && own.contains("measured"), "{own}");
+    let answer = json(folder.path(), &["stair", "--plant", plant.to_str().unwrap(), "--json"]);
+    assert!(
+        answer["rows"].as_array().unwrap().iter().all(|row| row["printed_with"].is_null() && row["measured"].is_null())
+    );
+}

@@ -200,7 +200,10 @@ fn run_plant<P: HasReference>(
 
     let rows = match &record {
         Some(record) => Rows::Record(record),
-        None => Rows::Table3 { same: arguments.input == "stair" && is_the_reports(&experiment.settings) },
+        None => Rows::Table3 {
+            same: arguments.input == "stair" && is_the_reports(&experiment.settings),
+            spring: arguments.plant == "paper",
+        },
     };
     let controlled = arguments.controller != Controller::None;
     let report = paper::stair::Report::new(&experiment, &run, &rows, controlled)?;

@@ -7,20 +7,22 @@
 //! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`recording`] | telemetry as CSV while it arrives |
 //! | [`figure`], [`plots`] | plots as SVG |
+//! | [`chart`], [`page`] | the parts of all plots and of all report pages |
 
 pub mod beam;
 pub mod bound;
 mod cells;
+mod chart;
+mod colours;
 pub mod compare;
 pub mod diagnosis;
-mod document;
-mod draw;
 pub mod dynamics;
 pub mod figure;
 pub mod files;
 pub mod identify;
 pub mod joint;
 pub mod log;
+mod page;
 pub mod plan;
 pub mod plots;
 pub mod recording;
@@ -28,6 +30,5 @@ pub mod reproduce;
 pub mod screen;
 pub mod stair;
 mod step_response;
-mod style;
 pub mod terminal;
 pub mod tune;

@@ -45,25 +45,33 @@ pub fn text(report: &stair::Report) -> String {
 /// Largest number of rows on the terminal.
 const MOST_ROWS: usize = 40;
 
+/// The table of rows; columns of printed and measured values only where there are any.
 fn rows(text: &mut String, rows: &[Row]) {
-    line(text, "               |       with controller        |      without controller      |");
-    line(text, " time   target |  printed reference fixed-pt. |  printed reference fixed-pt. | measured");
-    line(text, "  [s]      [V] |      [V]       [V]       [V] |      [V]       [V]       [V] |      [V]");
+    let printed = rows.iter().any(|row| row.printed_with.is_some());
+    let measured = rows.iter().any(|row| row.measured.is_some());
+    let of_loop = |name: &str| if printed { format!("{name:^30}|") } else { format!("{name:^21}|") };
+    let column = |text: &str| if printed { format!(" {text:>8}") } else { String::new() };
+    let both = |texts: [&str; 3]| format!("{} {:>9} {:>9} |", column(texts[0]), texts[1], texts[2]);
+    let last = |text: &str| if measured { format!(" {text:>8}") } else { String::new() };
+    let names = both(["printed", "reference", "fixed-pt."]);
+    let units = both(["[V]", "[V]", "[V]"]);
+    line(text, &format!("               |{}{}", of_loop("with controller"), of_loop("without controller")));
+    line(text, &format!(" time   target |{names}{names}{}", last("measured")));
+    line(text, &format!("  [s]      [V] |{units}{units}{}", last("[V]")));
     for row in rows.iter().take(MOST_ROWS) {
         let mark = if row.note.is_some() { " *" } else { "" };
+        let of = |printed: Option<f64>, reference: f64, fixed: f64| {
+            both([&optional(printed, 2), &format!("{reference:.3}"), &format!("{fixed:.3}")])
+        };
         line(
             text,
             &format!(
-                "{:5} {:8} | {:>8} {:9.3} {:9.3} | {:>8} {:9.3} {:9.3} | {:>8}{mark}",
+                "{:5} {:8} |{}{}{}{mark}",
                 tidy(row.time_s),
                 tidy(row.voltage_v),
-                optional(row.printed_with, 2),
-                row.with,
-                row.with_fixed,
-                optional(row.printed_without, 2),
-                row.without,
-                row.without_fixed,
-                optional(row.measured, 0),
+                of(row.printed_with, row.with, row.with_fixed),
+                of(row.printed_without, row.without, row.without_fixed),
+                last(&optional(row.measured, 0)),
             ),
         );
     }

@@ -95,31 +95,76 @@ pub fn write(files: &mut Files, tuning: &Tuning) -> Result<()> {
         Ok(())
     })?;
     type Value = fn(&Worst) -> Option<f64>;
-    let figures: [(&str, &str, &str, Value); 2] = [
-        ("t97.svg", "Time to 97 % on a spring that differs from its model", "t97 of the slowest step [s]", |worst| {
-            worst.t97_s
-        }),
-        ("overshoot.svg", "Overshoot on a spring that differs from its model", "largest overshoot [%]", |worst| {
-            Some(worst.overshoot_percent)
-        }),
+    let figures: [(&str, &str, &str, Value, &str); 2] = [
+        (
+            "t97.svg",
+            "Time to 97 % on a spring that differs from its model",
+            "t97 of the slowest step [s]",
+            |worst| worst.t97_s,
+            "97 % not reached",
+        ),
+        (
+            "overshoot.svg",
+            "Overshoot on a spring that differs from its model",
+            "largest overshoot [%]",
+            |worst| Some(worst.overshoot_percent),
+            "unstable",
+        ),
     ];
-    for (name, title, y, value) in figures {
-        let mut figure = Figure::new(title, "model error: parameter of the spring relative to the model [%]", y);
+    for (name, title, y, value, why) in figures {
+        let mut figure = Figure::new(title, "model error: spring relative to its model [%]", y);
         for parameter in Parameter::ALL {
-            let rows = || tuning.trade.iter().filter(move |row| row.parameter == parameter);
-            let fast = rows().filter_map(|row| Some((100.0 * row.error, value(&row.fast?)?)));
-            figure = figure.curve(&format!("fast, {}", parameter.name()), fast, false);
+            let rows = tuning.trade.iter().filter(|row| row.parameter == parameter);
+            let fast = rows.map(|row| (100.0 * row.error, row.fast.and_then(|fast| value(&fast))));
+            let (points, end) = until(fast, why);
+            figure = figure.curve(&format!("fast, {}{end}", parameter.name()), points, false);
         }
         for parameter in Parameter::ALL {
-            let rows = || tuning.trade.iter().filter(move |row| row.parameter == parameter);
-            let gains: Vec<(f64, f64)> =
-                rows().filter_map(|row| Some((100.0 * row.error, value(&row.proportional_integral?)?))).collect();
-            if !gains.is_empty() {
-                figure = figure.curve(&format!("PI, {}", parameter.name()), gains, true);
+            let rows = tuning.trade.iter().filter(|row| row.parameter == parameter);
+            let gains = rows.map(|row| (100.0 * row.error, row.proportional_integral.and_then(|gains| value(&gains))));
+            let (points, end) = until(gains, why);
+            if !points.is_empty() {
+                figure = figure.curve(&format!("PI, {}{end}", parameter.name()), points, true);
             }
         }
         let svg = figure::svg(&figure);
         files.add(name, |out| out.write_all(svg.as_bytes()))?;
     }
     Ok(())
+}
+
+/// The points of a curve that have a value, and words on where it ends early; `why` says what is lacking there.
+fn until(rows: impl Iterator<Item = (f64, Option<f64>)>, why: &str) -> (Vec<(f64, f64)>, String) {
+    let rows: Vec<(f64, Option<f64>)> = rows.collect();
+    let points: Vec<(f64, f64)> = rows.iter().filter_map(|&(error, value)| Some((error, value?))).collect();
+    let mut words = String::new();
+    if let [(first, _), .., (last, _)] = points.as_slice() {
+        let mut ends = Vec::new();
+        if rows.iter().any(|(error, _)| error < first) {
+            ends.push(format!("below {first:.0} %"));
+        }
+        if rows.iter().any(|(error, _)| error > last) {
+            ends.push(format!("above {last:.0} %"));
+        }
+        if !ends.is_empty() {
+            words = format!(" ({}: {why})", ends.join(" and "));
+        }
+    }
+    (points, words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_that_ends_early_says_where_and_why() {
+        let all = |from: i32, to: i32| {
+            let has = move |error: i32| (from..=to).contains(&error).then_some(1.0);
+            until((-5..=5).map(move |error| (f64::from(10 * error), has(error))), "97 % not reached")
+        };
+        assert_eq!(all(-5, 5), ((-5..=5).map(|error| (f64::from(10 * error), 1.0)).collect(), String::new()));
+        assert_eq!(all(-5, 4).1, " (above 40 %: 97 % not reached)");
+        assert_eq!(all(-3, 3).1, " (below -30 % and above 30 %: 97 % not reached)");
+    }
 }

@@ -40,7 +40,7 @@ fn a_session(mcu: &Mcu) {
     assert_eq!(json(port, &["set", "300"])["target_v"], 300.0);
     let target = json(port, &["set", "1.5e9", "--unit", "pa"])["target_v"].as_f64().unwrap();
     assert!((target - 0.199e9 / 1.069e6).abs() < 1e-3, "{target}");
-    assert!(good(port, &["set", "0.25", "--unit", "n-per-m"]).starts_with("armed, target "));
+    assert!(good(port, &["set", "0.25", "--unit", "N/m"]).starts_with("armed, target "));
     assert!(bad(2, port, &["set", "700.1"]).contains("out of range: expected 0 to 700 V"));
     assert!(bad(2, port, &["set", "-1"]).contains("out of range"));
     assert!(bad(2, port, &["set", "1", "--unit", "pa"]).contains("expected 1301000000 to 2049300000 Pa"));

@@ -42,6 +42,9 @@ fn every_file_is_written_and_named() {
         "tau_s = ",
         "held-out RMSE",
         ">extended</th>",
+        "data-name=\"extended [V]\"",
+        "<summary>Values: residual [V]</summary>",
+        "prefers-color-scheme: dark",
         "<code>vsj diagnose record.csv --out made/here</code>",
         "record.csv, column stiffness",
         "held between rows",
@@ -113,8 +116,6 @@ fn the_page_needs_nothing_else_and_no_name_gets_through() {
     let output = run(folder.path(), &["diagnose", NASTY, "--out", "out"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let page = fs::read_to_string(folder.path().join("out/report.html")).expect("a page");
-    // Within the page, a plot refers to its own clip path.
-    let page = page.replace("url(#", "");
     for outside in ["http:", "https:", "src=", "url(", "@import", "<link", "<script", "<iframe", "<img"] {
         assert!(!page.contains(outside), "{outside} is on the page");
     }
@@ -124,6 +125,10 @@ fn the_page_needs_nothing_else_and_no_name_gets_through() {
         let svg = fs::read_to_string(folder.path().join("out").join(name)).expect("a plot");
         assert!(svg.starts_with("<svg xmlns=") && svg.trim_end().ends_with("</svg>"), "{name}");
         assert!(!svg.contains("alert") && !svg.contains("NaN"), "{name}");
+        // Values on hover, colours for a dark screen, a size that follows the place.
+        for part in ["<title>", "prefers-color-scheme: dark", "viewBox=", "max-width: 100%"] {
+            assert!(svg.contains(part), "{part} is not in {name}");
+        }
     }
 }
 
@@ -155,8 +160,8 @@ fn a_short_record_is_drawn_as_the_points_that_it_is() {
     let drawn = |name: &str, what: &str| {
         fs::read_to_string(folder.path().join("out").join(name)).expect("a plot").matches(what).count()
     };
-    // Readings, the simulation, and two dots in the legend; the command alone is a line.
-    assert_eq!((drawn("readings.svg", "<circle"), drawn("readings.svg", "<path")), (2 * 17 + 2, 1));
+    // Readings, the simulation, and two dots in the legend; the grid, the axes and the command are lines.
+    assert_eq!((drawn("readings.svg", "<circle"), drawn("readings.svg", "<path")), (2 * 17 + 2, 3));
     // The last row is 16 rows after the first.
     assert_eq!((drawn("autocorrelation.svg", "<circle"), drawn("input_correlation.svg", "<circle")), (16, 17));
 }

@@ -83,7 +83,7 @@ struct Set {
     #[arg(allow_negative_numbers = true)]
     value: f64,
     /// Unit of the value: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, ignore_case = true)]
     unit: Unit,
     /// Arm the MCU first
     #[arg(long)]
@@ -98,6 +98,7 @@ enum Unit {
     #[default]
     V,
     Pa,
+    #[value(alias = "N/m")]
     NPerM,
 }
 

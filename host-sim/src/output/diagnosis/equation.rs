@@ -121,7 +121,7 @@ pub(super) mod tests {
         for part in [
             "a hypothesis, no finding",
             "y = c0 + c1 v; v = play(u, r1, a1)",
-            "c1 = 2.000 [1.000, 3.000] mm/V, r1 = 34.00 [33.00, 35.00] V",
+            "c1 = 2.0 [1.0, 3.0] mm/V, r1 = 34.0 [33.0, 35.0] V",
             "held-out RMSE 1.000 V; extended simulation 4.000, best linear model 2.000, simulation 8.000",
             "no plant file: a product",
         ] {

@@ -4,20 +4,11 @@ use identify::Diagnosis;
 
 use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::plots;
-
-/// A plot of a diagnosis.
-pub(in crate::output) struct Figure {
-    /// File name.
-    pub(in crate::output) name: &'static str,
-    /// Caption on the page.
-    pub(in crate::output) caption: &'static str,
-    /// The drawing.
-    pub(in crate::output) svg: String,
-}
+use crate::output::page::Figure;
 
 /// All plots, in the order of the page.
 pub(super) fn figures(diagnosis: &Diagnosis) -> Vec<Figure> {
-    let figure = |name, caption, svg| Figure { name, caption, svg };
+    let figure = |name, caption, chart| Figure { name, caption, chart };
     let (readings, last) = if is_extended(diagnosis) {
         (
             "Readings compared with the original and the extended simulation, both free-run: their only input is the voltage.",

@@ -5,15 +5,16 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 
 use crate::output::files::Files;
-use figures::{Figure, figures};
+use crate::output::page::Figure;
+use figures::figures;
 use identify::Diagnosis;
 
 mod equation;
 mod extension;
-pub(super) mod figures;
+mod figures;
 pub(super) mod number;
 mod origin;
-pub(super) mod page;
+mod page;
 pub mod panels;
 mod plant_file;
 pub mod plots;
@@ -36,8 +37,8 @@ pub fn write(mut files: Files, diagnosis: &Diagnosis, origin: &Origin) -> Result
     let figures = figures(diagnosis);
     let page = page::page(diagnosis, origin, &figures);
     files.add("report.html", |out| out.write_all(page.as_bytes()))?;
-    for Figure { name, svg, .. } in &figures {
-        files.add(name, |out| out.write_all(svg.as_bytes()))?;
+    for Figure { name, chart, .. } in &figures {
+        files.add(name, |out| out.write_all(chart.file().as_bytes()))?;
     }
     files.add("residuals.csv", |out| residuals::write(out, diagnosis))?;
     let plant = plant_file::text(diagnosis, &origin.record)?;

@@ -7,9 +7,25 @@ use identify::record::scales::Scales;
 /// Formats a parameter with its interval and unit, and says so if it is extrapolated.
 pub(super) fn interval(parameter: &Parameter, scales: &Scales) -> String {
     let &Parameter { value, low, high, dimension, .. } = parameter;
-    let shown = |value: f64| number(value / dimension.size_of_shown_unit(&scales.units));
-    let text = format!("{} [{}, {}] {}", shown(value), shown(low), shown(high), scales.unit(dimension));
+    let size = dimension.size_of_shown_unit(&scales.units);
+    let [value, low, high] = with_interval([value / size, low / size, high / size]);
+    let text = format!("{value} [{low}, {high}] {}", scales.unit(dimension));
     text.trim_end().to_owned() + extrapolated(parameter)
+}
+
+/// Formats a value and the ends of its interval with two significant digits of the interval's half-width; an interval without
+/// a width, and numbers of very different size, are formatted with four significant digits.
+pub(in crate::output) fn with_interval([value, low, high]: [f64; 3]) -> [String; 3] {
+    let half = 0.5 * (high - low);
+    let decimals = 1 - half.log10().floor().clamp(-99.0, 99.0) as i32;
+    let large = value.abs().max(low.abs()).max(high.abs());
+    if !(half > 0.0 && half.is_finite()) || !(-6..=9).contains(&decimals) || large >= 1e7 {
+        return [value, low, high].map(number);
+    }
+    let decimals = decimals.max(0) as usize;
+    // What rounds to zero has no sign.
+    let zero = 0.5 * 10f64.powi(-(decimals as i32));
+    [value, low, high].map(|it| format!("{:.decimals$}", if it.abs() < zero { 0.0 } else { it }))
 }
 
 /// The words after a parameter that is the value of a curve where the record has not been.
@@ -28,4 +44,23 @@ pub(super) fn shown_name<'n>(name: &'n str, dimension: Dimension, scales: &Scale
         return name;
     }
     ["_v_per_s", "_s", "_v", "_hz"].into_iter().find_map(|suffix| name.strip_suffix(suffix)).unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_follow_the_width_of_the_interval() {
+        for (numbers, texts) in [
+            ([1.200_031, 1.199_874, 1.200_188], ["1.20003", "1.19987", "1.20019"]),
+            ([-70.6, -90.0, -51.2], ["-71", "-90", "-51"]),
+            ([645.653, 645.4621, 645.844], ["645.65", "645.46", "645.84"]),
+            ([0.001, -0.01, 0.012], ["0.001", "-0.010", "0.012"]),
+            ([5.0, 5.0, 5.0], ["5.000", "5.000", "5.000"]),
+            ([1e-12, 9e-13, 1.1e-12], ["1.000e-12", "9.000e-13", "1.100e-12"]),
+        ] {
+            assert_eq!(with_interval(numbers), texts);
+        }
+    }
 }

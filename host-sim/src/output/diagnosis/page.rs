@@ -1,16 +1,15 @@
 //! The report page: one self-contained HTML file.
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use crate::output::diagnosis::equation;
 use crate::output::diagnosis::extension::is_extended;
-use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::origin::Origin;
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
 use crate::output::diagnosis::tables;
 use crate::output::diagnosis::text;
-use crate::output::document::document;
+use crate::output::page::{Figure, document};
 use identify::answer::Verdict;
 use identify::{Diagnosis, Input};
 
@@ -30,9 +29,9 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         (equation::section(report.equation_details.as_ref(), scales))
         (records::section(&report.records, scales))
         h2 { "Readings and simulations" }
-        @for figure in [readings, residual, residual_voltage] { (drawn(figure)) }
+        @for figure in [readings, residual, residual_voltage] { (figure.markup()) }
         h2 { "Residual tests" }
-        div.pair { @for figure in correlations { (drawn(figure)) } }
+        div.pair { @for figure in correlations { (figure.markup()) } }
         @if let Some(leftover) = &report.leftover { p { (leftover) "." } }
         h2 { "Ranking of the causes and their rivals" }
         (tables::standings(diagnosis))
@@ -68,26 +67,6 @@ fn verdict(verdict: Verdict) -> &'static str {
         Verdict::Ambiguous => "ambiguous: other causes explain the difference as well",
         Verdict::Unexplained => "unexplained: a part of the difference has no known cause",
         Verdict::Insufficient => "insufficient: the record has too little excitation to decide",
-    }
-}
-
-/// An SVG inside the page: scaled to the column, without its namespace.
-pub(in crate::output) fn drawn(Figure { caption, svg, .. }: &Figure) -> Markup {
-    let inline = svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
-    let side = |name: &str| {
-        inline.split_once(&format!(" {name}=\"")).and_then(|(_, rest)| rest.split_once('"')).map(|it| it.0)
-    };
-    let inline = match (side("width"), side("height")) {
-        (Some(width), Some(height)) => {
-            inline.replacen("<svg", &format!(r#"<svg role="img" viewBox="0 0 {width} {height}""#), 1)
-        }
-        _ => inline,
-    };
-    html! {
-        figure {
-            (PreEscaped(inline))
-            figcaption { (caption) }
-        }
     }
 }
 

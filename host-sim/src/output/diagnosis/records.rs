@@ -7,6 +7,8 @@ use identify::record::scales::Scales;
 use maud::{Markup, html};
 
 use crate::output::diagnosis::number::{interval, number};
+use crate::output::diagnosis::tables;
+use crate::output::page::{Row, Table};
 
 /// The table for the terminal; empty for a single record.
 pub(super) fn text(records: &[RecordReport], scales: &Scales) -> String {
@@ -31,6 +33,14 @@ pub(super) fn text(records: &[RecordReport], scales: &Scales) -> String {
 
 /// The section of the page; empty for a single record.
 pub(super) fn section(records: &[RecordReport], scales: &Scales) -> Markup {
+    let columns = ["rows", "zero offset", "noise", "RMSE"];
+    let table = columns.iter().fold(Table::default().column("record", ""), |table, name| table.column(name, "number"));
+    let mut table = table.column("in this record only", "");
+    for of in records {
+        let numbers = [of.rows.to_string()].into_iter().chain([of.offset, of.sigma, of.rmse].map(number));
+        let cells = std::iter::once(of.name.clone()).chain(numbers).map(|text| html! { (text) });
+        table.row(Row::new(cells.chain([tables::list(only(of, scales))])));
+    }
     html! {
         @if !records.is_empty() {
             h2 { "Each record" }
@@ -38,21 +48,7 @@ pub(super) fn section(records: &[RecordReport], scales: &Scales) -> Markup {
                 "Every record has its own initial state, zero offset and noise. What is in one record only is a fault of that record, \
                 not a property of the spring."
             }
-            div.scroll { table {
-                thead { tr {
-                    th { "record" } th.number { "rows" } th.number { "zero offset" } th.number { "noise" } th.number { "RMSE" }
-                    th { "in this record only" }
-                } }
-                tbody {
-                    @for of in records {
-                        tr {
-                            td { (of.name) } td.number { (of.rows) }
-                            @for value in [of.offset, of.sigma, of.rmse] { td.number { (number(value)) } }
-                            td { ul.parameters { @for fault in only(of, scales) { li { (fault) } } } }
-                        }
-                    }
-                }
-            } }
+            (table.markup())
         }
     }
 }
@@ -110,7 +106,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().skip(1).collect();
         assert_eq!(lines[0], "record        rows  zero offset      noise       RMSE   in this record only");
         assert_eq!(lines[1], "a.csv          500       -8.000     0.5000     0.5000   none");
-        assert!(lines[2].ends_with("   sensor-saturation (limit = 380.0 [379.9, 380.1] V)"), "{text}");
+        assert!(lines[2].ends_with("   sensor-saturation (limit = 380.00 [379.90, 380.10] V)"), "{text}");
         assert!(section(&[], &scales).into_string().is_empty());
     }
 }

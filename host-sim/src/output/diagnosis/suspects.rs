@@ -8,6 +8,8 @@ use identify::record::scales::Scales;
 use maud::{Markup, html};
 
 use crate::output::diagnosis::number::{interval, number, shown_name};
+use crate::output::diagnosis::tables;
+use crate::output::page::Row;
 
 /// Explanation of the table.
 const CAPTION: &str = "Causes that come closest to a finding and are none. Each would be one with so many nats more; an error that \
@@ -47,29 +49,22 @@ pub(super) fn text(suspects: &[Suspect], scales: &Scales) -> String {
 
 /// The section of the page; empty without suspects.
 pub(super) fn section(suspects: &[Suspect], scales: &Scales) -> Markup {
-    let unit = scales.unit(Dimension::ReadingSize);
+    let mut table = tables::candidates("nats short", scales);
+    for suspect in suspects {
+        let cells = [
+            html! { (suspect.cause) },
+            html! { (format!("{:.1}", suspect.nats_short)) },
+            tables::list(parameters(suspect, scales)),
+            html! { (number(suspect.rmse_before)) },
+            html! { (number(suspect.rmse_after)) },
+        ];
+        table.row(Row::new(cells).class("noted").note(html! { (judge(suspect.judge)) (company(suspect)) "." }));
+    }
     html! {
         @if !suspects.is_empty() {
             h2 { "Suspects" }
             p.small { (CAPTION) }
-            div.scroll { table.suspects {
-                thead { tr {
-                    th { "cause" } th.number { "nats short" } th { "parameters with 95 % intervals" }
-                    th.number { "RMSE without [" (unit) "]" } th.number { "with [" (unit) "]" }
-                } }
-                tbody {
-                    @for suspect in suspects {
-                        tr.cause {
-                            td.cause { (suspect.cause) }
-                            td.number { (format!("{:.1}", suspect.nats_short)) }
-                            td { ul.parameters { @for parameter in parameters(suspect, scales) { li { (parameter) } } } }
-                            td.number { (number(suspect.rmse_before)) }
-                            td.number { (number(suspect.rmse_after)) }
-                        }
-                        tr { td.small colspan="5" { div.evidence { (judge(suspect.judge)) (company(suspect)) "." } } }
-                    }
-                }
-            } }
+            (table.markup())
         }
     }
 }
@@ -137,16 +132,11 @@ mod tests {
         let suspects = [suspect(Judge::LeaveOneOut, Vec::new()), suspect(Judge::HeldOut, vec!["hum", "drift"])];
         let text = text(&suspects, &Scales::default());
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
-        assert_eq!(
-            lines[2][..8],
-            ["reading-offset", "2.3", "42.67", "21.50", "offset", "=", "-70.60", "[-90.00,"],
-            "{text}"
-        );
+        assert_eq!(lines[2][..8], ["reading-offset", "2.3", "42.67", "21.50", "offset", "=", "-71", "[-90,"], "{text}");
         assert_eq!(lines[3][..7], ["errors", "with", "one", "reading", "left", "out", "at"]);
         assert!(text.ends_with("errors on held-out segments, together with hum and drift\n"), "{text}");
         let page = section(&suspects, &Scales::default()).into_string();
-        for shown in ["<td class=\"number\">2.3</td>", "offset = -70.60 [-90.00, -51.20] V", "42.67", "21.50", CAPTION]
-        {
+        for shown in ["<div>2.3</div>", "offset = -71 [-90, -51] V", "42.67", "21.50", CAPTION] {
             assert!(page.contains(shown), "{shown}: {page}");
         }
     }

@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use crate::output::diagnosis::extension::is_extended;
 use crate::output::diagnosis::number::{interval, number, shown_name};
 use crate::output::diagnosis::text::linear_name;
+use crate::output::page::{Row, Table};
 use identify::answer::{Finding, LinearError};
 use identify::dimension::Dimension;
 use identify::record::scales::Scales;
@@ -14,34 +15,40 @@ use identify::verdict::ranking::RankedCauses as Standing;
 
 /// Each cause with its parameters.
 pub(super) fn findings(findings: &[Finding], scales: &Scales) -> Markup {
-    let unit = scales.unit(Dimension::ReadingSize);
     if findings.is_empty() {
         return html! { p { "No cause was found." } };
     }
-    html! {
-        div.scroll { table {
-            thead { tr {
-                th { "cause" } th.number { "probability" } th { "parameters with 95 % intervals" }
-                th.number { "RMSE without [" (unit) "]" } th.number { "with [" (unit) "]" }
-            } }
-            tbody {
-                @for finding in findings {
-                    tr.cause {
-                        td.cause { (finding.cause) }
-                        td.number { (format!("{:.3}", finding.probability)) }
-                        td { ul.parameters {
-                            @for (name, parameter) in &finding.parameters { li {
-                                (shown_name(name, parameter.dimension, scales)) " = " (interval(parameter, scales))
-                            } }
-                        } }
-                        td.number { (number(finding.rmse_before)) }
-                        td.number { (number(finding.rmse_after)) }
-                    }
-                    tr { td.small colspan="5" { div.evidence { (finding.evidence) "." } } }
-                }
-            }
-        } }
+    let mut table = candidates("probability", scales);
+    for finding in findings {
+        let parameters = finding.parameters.iter().map(|(name, parameter)| {
+            format!("{} = {}", shown_name(name, parameter.dimension, scales), interval(parameter, scales))
+        });
+        let cells = [
+            html! { (finding.cause) },
+            html! { (format!("{:.3}", finding.probability)) },
+            list(parameters),
+            html! { (number(finding.rmse_before)) },
+            html! { (number(finding.rmse_after)) },
+        ];
+        table.row(Row::new(cells).class("noted").note(html! { (finding.evidence) "." }));
     }
+    table.markup()
+}
+
+/// An empty table of causes, each with a number that tells how sure it is, its parameters and the errors without and with it.
+pub(super) fn candidates(how_sure: &str, scales: &Scales) -> Table {
+    let unit = scales.unit(Dimension::ReadingSize);
+    Table::default()
+        .column("cause", "cause")
+        .column(how_sure, "number")
+        .column("parameters with 95 % intervals", "")
+        .column(&format!("RMSE without [{unit}]"), "number")
+        .column(&format!("with [{unit}]"), "number")
+}
+
+/// Texts below each other.
+pub(super) fn list(lines: impl IntoIterator<Item = String>) -> Markup {
+    html! { ul.parameters { @for line in lines { li { (line) } } } }
 }
 
 /// The best sets of causes, each with its distance from the best and the cause that it lacks.
@@ -55,36 +62,35 @@ pub(super) fn standings(diagnosis: &Diagnosis) -> Markup {
     let furthest = standings.iter().map(behind).fold(1.0, f64::max);
     // Rivals are a few nats behind, wrong causes thousands, so the bars are logarithmic.
     let width = |nats: f64| format!("width:{:.1}%", 100.0 * nats.ln_1p() / furthest.ln_1p());
+    let mut table = Table::default()
+        .column("causes", "set")
+        .column("behind [nats]", "number")
+        .column("", "bar")
+        .column(&format!("RMSE [{unit}]"), "number")
+        .column(&format!("held-out RMSE [{unit}]"), "number")
+        .column("", "small remark");
+    for (place, standing) in standings.iter().enumerate() {
+        let cells = [
+            html! { (set(&standing.causes)) div.small { (values(&standing.values)) } },
+            html! { (format!("{:.1}", behind(standing))) },
+            html! { i style=(width(behind(standing))) {} },
+            html! { (number(standing.rmse)) },
+            html! { (number(standing.held_out_rmse)) },
+            html! { (note(standing, place)) },
+        ];
+        table.row(Row::new(cells).class(if place == 0 { "best" } else { "" }));
+    }
+    if let Some(linear) = &diagnosis.report.linear {
+        let errors = [linear.rmse, linear.held_out_rmse].map(|error| html! { (number(error)) });
+        let name = html! { "best linear model, order " (linear.order) };
+        table.row(Row::new([name, html! {}, html! {}].into_iter().chain(errors).chain([html! { "no causes" }])));
+    }
     html! {
         p.small {
             "Distance from the best set in held-out log-likelihood, in nats, after a penalty for each cause; bars are logarithmic. "
             "3 nats are odds of 20 to 1."
         }
-        div.scroll { table {
-            thead { tr {
-                th { "causes" } th.number { "behind [nats]" } th { "" } th.number { "RMSE [" (unit) "]" }
-                th.number { "held-out RMSE [" (unit) "]" } th { "" }
-            } }
-            tbody {
-                @for (place, standing) in standings.iter().enumerate() {
-                    tr.best[place == 0] {
-                        td.set { (set(&standing.causes)) div.small.note { (values(&standing.values)) } }
-                        td.number { (format!("{:.1}", behind(standing))) }
-                        td.bar { i style=(width(behind(standing))) {} }
-                        td.number { (number(standing.rmse)) }
-                        td.number { (number(standing.held_out_rmse)) }
-                        td.small.note { (note(standing, place)) }
-                    }
-                }
-                @if let Some(linear) = &diagnosis.report.linear {
-                    tr.linear {
-                        td.set { "best linear model, order " (linear.order) } td.number {} td.bar {}
-                        td.number { (number(linear.rmse)) } td.number { (number(linear.held_out_rmse)) }
-                        td.small.note { "no causes" }
-                    }
-                }
-            }
-        } }
+        (table.markup())
     }
 }
 
@@ -132,28 +138,23 @@ pub(super) fn quality(diagnosis: &Diagnosis) -> Markup {
         (error("one-step"), number(before.one_step_rmse), number(after.one_step_rmse), None),
         ("fit [%]".to_owned(), of_spread(before.fit_percent), of_spread(after.fit_percent), None),
     ];
-    html! {
-        div.scroll { table {
-            thead { tr {
-                th { "" } th.number.before { "simulation" } @if extended { th.number.after { "extended" } }
-                @if let Some(linear) = linear { th.number { (linear_name(linear)) } }
-            } }
-            tbody {
-                @for (what, before, after, of_linear) in rows {
-                    tr {
-                        td { (what) } td.number { (before) } @if extended { td.number { (after) } }
-                        @if linear.is_some() { td.number { (of_linear.unwrap_or_default()) } }
-                    }
-                }
-                @if extended {
-                    tr {
-                        td { "held-out improvement [%]" } td {} td.number { (format!("{:.1}", 100.0 * report.extended.gain)) }
-                        @if let Some(linear) = linear { td.number { (gain(before.held_out_rmse, linear.held_out_rmse)) } }
-                    }
-                }
-            }
-        } }
+    let mut table = Table::default().column("", "").column("simulation", "number before");
+    if extended {
+        table = table.column("extended", "number after");
     }
+    if let Some(linear) = linear {
+        table = table.column(&linear_name(linear), "number");
+    }
+    let improvement = extended.then(|| {
+        let linear = linear.map(|linear| improvement(before.held_out_rmse, linear.held_out_rmse));
+        let extended = format!("{:.1}", 100.0 * report.extended.gain);
+        ("held-out improvement [%]".to_owned(), String::new(), extended, linear)
+    });
+    for (what, before, after, of_linear) in rows.into_iter().chain(improvement) {
+        let errors = [Some(before), extended.then_some(after), linear.map(|_| of_linear.unwrap_or_default())];
+        table.row(Row::new(std::iter::once(what).chain(errors.into_iter().flatten()).map(|text| html! { (text) })));
+    }
+    table.markup()
 }
 
 /// Error of both simulations on each fold.
@@ -171,35 +172,38 @@ pub(super) fn folds(diagnosis: &Diagnosis) -> Markup {
     let largest = rows.iter().map(|row| row.2.max(row.3)).fold(1e-12, f64::max);
     let width = |rmse: f64| format!("width:{:.1}%", 100.0 * rmse / largest);
     let unit = data.scales().unit(Dimension::ReadingSize);
-    html! {
-        div.scroll { table {
-            thead { tr {
-                th.number { "fold" } th.number { "rows" } th.number.before { "simulation [" (unit) "]" } th.number.after { "extended [" (unit) "]" } th { "" }
-                th.number { "improvement [%]" }
-            } }
-            tbody {
-                @for (fold, rows, before, after) in rows {
-                    tr {
-                        td.number { (fold) } td.number { (rows) }
-                        td.number { (number(before)) } td.number { (number(after)) }
-                        td.bar { i.before style=(width(before)) {} i style=(width(after)) {} }
-                        td.number { (gain(before, after)) }
-                    }
-                }
-                @if let Some(linear) = &diagnosis.report.linear {
-                    tr.linear {
-                        td colspan="2" { "all, " (linear_name(linear)) } td.number {} td.number { (number(linear.held_out_rmse)) }
-                        td.bar { i style=(width(linear.held_out_rmse.min(largest))) {} }
-                        td.number { (gain(diagnosis.report.baseline.held_out_rmse, linear.held_out_rmse)) }
-                    }
-                }
-            }
-        } }
+    let mut table = Table::default()
+        .column("fold", "number")
+        .column("rows", "number")
+        .column(&format!("simulation [{unit}]"), "number before")
+        .column(&format!("extended [{unit}]"), "number after")
+        .column("", "bar")
+        .column("improvement [%]", "number");
+    for (fold, rows, before, after) in rows {
+        table.row(Row::new([
+            html! { (fold) },
+            html! { (rows) },
+            html! { (number(before)) },
+            html! { (number(after)) },
+            html! { i.before style=(width(before)) {} i style=(width(after)) {} },
+            html! { (improvement(before, after)) },
+        ]));
     }
+    if let Some(linear) = &diagnosis.report.linear {
+        table.row(Row::new([
+            html! { "all, " (linear_name(linear)) },
+            html! {},
+            html! {},
+            html! { (number(linear.held_out_rmse)) },
+            html! { i style=(width(linear.held_out_rmse.min(largest))) {} },
+            html! { (improvement(diagnosis.report.baseline.held_out_rmse, linear.held_out_rmse)) },
+        ]));
+    }
+    table.markup()
 }
 
 /// Improvement in percent; `-` for a fold without error.
-fn gain(before: f64, after: f64) -> String {
+fn improvement(before: f64, after: f64) -> String {
     if before > 0.0 { format!("{:.1}", 100.0 * (1.0 - after / before)) } else { "-".to_owned() }
 }
 
@@ -229,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_fold_without_error_has_no_improvement() {
-        assert_eq!([gain(0.0, 0.0), gain(4.0, 1.0), gain(1.0, 2.0)], ["-", "75.0", "-100.0"]);
+        assert_eq!([improvement(0.0, 0.0), improvement(4.0, 1.0), improvement(1.0, 2.0)], ["-", "75.0", "-100.0"]);
     }
 
     #[test]

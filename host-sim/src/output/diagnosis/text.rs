@@ -10,7 +10,7 @@ use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
 use crate::output::diagnosis::equation;
-use crate::output::diagnosis::number::{self, shown_name};
+use crate::output::diagnosis::number::{interval, shown_name};
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
 
@@ -177,7 +177,7 @@ pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
         }
     };
     format!(
-        "Nominal spring: {}, time constant {}, instantaneous part {}{reading}.",
+        "Nominal spring: {}, time constant {}, instantaneous share {}{reading}.",
         nominal.plant,
         taus.join(" and "),
         significant(nominal.share, 3)
@@ -303,14 +303,7 @@ fn row(text: &mut String, finding: &Finding, scales: &Scales) {
     let parameters: Vec<String> = finding
         .parameters
         .iter()
-        .map(|(name, it)| {
-            // Ratios and rates may be small in any unit.
-            let small = it.value.abs() < 0.01 && matches!(it.dimension, Dimension::Ratio | Dimension::Rate);
-            let number = |value| if small { significant(value, 4) } else { scales.number(it.dimension, value, 4) };
-            let (name, unit) = (shown_name(name, it.dimension, scales), scales.unit(it.dimension));
-            let text = format!("{name} = {} [{}, {}] {unit}", number(it.value), number(it.low), number(it.high));
-            text.trim().to_owned() + number::extrapolated(it)
-        })
+        .map(|(name, it)| format!("{} = {}", shown_name(name, it.dimension, scales), interval(it, scales)))
         .collect();
     let _ = writeln!(text, "{:34} {:>11.3}   {}", finding.cause, finding.probability, parameters.join(", "));
     let _ = writeln!(text, "  {}", finding.evidence);
@@ -433,7 +426,7 @@ mod tests {
         assert_eq!(said, [law, tau]);
         assert!(
             text("r.csv", &report, &Scales::default())
-                .contains("tau_high_s = 8.0000 [7.0000, 9.0000] s (extrapolated)\n")
+                .contains("tau_high_s = 8.0 [7.0, 9.0] s (extrapolated)\n")
         );
         report.extended.law_range_v = Some([200.0, 500.0]);
         let law = limits_of_curves(&report, &Scales::default()).remove(0);

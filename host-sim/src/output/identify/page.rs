@@ -4,12 +4,10 @@ use identify::Identified;
 use maud::{Markup, html};
 use simulation::units::Units;
 
-use crate::output::diagnosis::figures::Figure;
 use crate::output::diagnosis::number::number;
-use crate::output::diagnosis::page::drawn;
-use crate::output::document::document;
 use crate::output::identify::table::{self, Line};
 use crate::output::identify::{Origin, PLANT_FILE};
+use crate::output::page::{Figure, Row, Table, document};
 
 /// The whole page; texts from files are escaped.
 pub(super) fn page(identified: &Identified, units: &Units, origin: &Origin, figures: &[Figure]) -> String {
@@ -24,7 +22,7 @@ pub(super) fn page(identified: &Identified, units: &Units, origin: &Origin, figu
         h2 { "The spring" }
         (lines(["", "value", "95 % interval"], &table::quantities(report, units)))
         h2 { "Readings and model" }
-        @for figure in figures { (drawn(figure)) }
+        @for figure in figures { (figure.markup()) }
         h2 { "Linear models" }
         p.small {
             "The best model of each order, in free run on segments that its fit did not use. On the last 40 %, by a fit to the "
@@ -46,10 +44,9 @@ pub(super) fn page(identified: &Identified, units: &Units, origin: &Origin, figu
 }
 
 fn lines(head: [&str; 3], lines: &[Line]) -> Markup {
-    html! {
-        div.scroll { table {
-            thead { tr { @for cell in head { th { (cell) } } } }
-            tbody { @for line in lines { tr { @for cell in line { td { (cell) } } } } }
-        } }
+    let mut table = head.iter().fold(Table::default(), |table, name| table.column(name, ""));
+    for line in lines {
+        table.row(Row::new(line.iter().map(|cell| html! { (cell) })));
     }
+    table.markup()
 }

@@ -1,13 +1,12 @@
-//! Plots of an identification as SVG.
+//! Plots of an identification.
 
 use identify::Identified;
 use identify::nominal::Course;
-use kuva::prelude::*;
 use simulation::units::Units;
 
-use crate::output::diagnosis::figures::Figure;
-use crate::output::draw::{self, Axes, line, thinned};
-use crate::output::style::{AFTER, BEFORE, READING};
+use crate::output::chart::{Chart, Series, Shape};
+use crate::output::colours::{AFTER, BEFORE, READING};
+use crate::output::page::Figure;
 
 /// Two figures for each record: readings with the model, and the held-out residual.
 pub(super) fn figures(identified: &Identified, units: &Units) -> Vec<Figure> {
@@ -15,33 +14,30 @@ pub(super) fn figures(identified: &Identified, units: &Units) -> Vec<Figure> {
 }
 
 fn of_record(record: &Course, units: &Units) -> [Figure; 2] {
-    let over_time = |value: &dyn Fn(usize) -> f64| {
-        thinned((0..record.reading.len()).map(|row| (record.time_s[row] / units.time.si, value(row))).collect())
+    let over_time = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+        (0..record.reading.len()).map(|row| (record.time_s[row] / units.time.si, value(row))).collect()
     };
-    let x = format!("time [{}]", units.time.name);
-    let drawn = |plots: Vec<Plot>, title: &str, y: &str| {
-        let layout = draw::layout(&plots, Axes { title, x: &x, y: &format!("{y} [{}]", units.reading) });
-        let ends = [record.time_s.first(), record.time_s.last()].map(|time| time.unwrap_or(&0.0) / units.time.si);
-        render_to_svg(plots, layout.with_x_axis_min(ends[0]).with_x_axis_max(ends[1]))
+    let chart = |series: Vec<Series>, title: &str, y: &str| {
+        Chart::new(title, &format!("time [{}]", units.time.name), &format!("{y} [{}]", units.reading), series)
     };
-    let readings: Vec<Plot> = vec![
-        line(over_time(&|row| record.reading[row]), READING, "reading").into(),
-        line(over_time(&|row| record.reading[row] - record.residual[row]), AFTER, "model").into(),
+    let readings = vec![
+        Series::new("reading", READING, Shape::Wide, over_time(&|row| record.reading[row])),
+        Series::line("model", AFTER, over_time(&|row| record.reading[row] - record.residual[row])),
     ];
-    let residuals: Vec<Plot> = vec![
-        line(over_time(&|row| record.held_out[row]), BEFORE, "held out").into(),
-        line(over_time(&|row| record.residual[row]), AFTER, "fit").into(),
+    let residuals = vec![
+        Series::line("held out", BEFORE, over_time(&|row| record.held_out[row])),
+        Series::line("fit", AFTER, over_time(&|row| record.residual[row])),
     ];
     [
         Figure {
             name: "readings.svg",
             caption: "Readings compared with the model in free run: its only input is the voltage.",
-            svg: drawn(readings, &record.name, "reading"),
+            chart: chart(readings, &record.name, "reading"),
         },
         Figure {
             name: "residual.svg",
-            caption: "Reading minus model: of the fit to all rows, and of predictions by fits that did not use the segment.",
-            svg: drawn(residuals, &record.name, "reading less model"),
+            caption: "Residual (reading minus model): of the fit to all rows, and of predictions by fits that did not use the segment.",
+            chart: chart(residuals, &record.name, "residual"),
         },
     ]
 }

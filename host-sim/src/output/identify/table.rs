@@ -3,7 +3,7 @@
 use identify::nominal::report::{InputLaw, Quantity, Report};
 use simulation::units::Units;
 
-use crate::output::diagnosis::number::number;
+use crate::output::diagnosis::number::{number, with_interval};
 
 /// A quantity as it is shown: name, value with unit, interval.
 pub(super) type Line = [String; 3];
@@ -11,7 +11,7 @@ pub(super) type Line = [String; 3];
 /// All quantities in the user's units.
 pub(super) fn quantities(report: &Report, units: &Units) -> Vec<Line> {
     let line = |name: String, quantity: &Quantity, size: f64, unit: &str| {
-        let [value, low, high] = [quantity.value, quantity.low, quantity.high].map(|value| number(value / size));
+        let [value, low, high] = with_interval([quantity.value / size, quantity.low / size, quantity.high / size]);
         [name, format!("{value} {unit}").trim_end().to_owned(), format!("[{low}, {high}]")]
     };
     let (nominal, reading, time) = (&report.nominal, report.unit.as_str(), &units.time);

@@ -1,13 +1,9 @@
 //! Plots of a plan as SVG.
 
 use identify::plan::Plan;
-use kuva::prelude::*;
 
-use crate::output::draw::{Axes, line, svg};
-use crate::output::style::COMMAND;
-
-/// Colours of the sets of causes, which colour-blind readers can distinguish.
-const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+use crate::output::chart::{COLOURS, Chart, Series};
+use crate::output::colours::COMMAND;
 
 /// The schedule, the readings that each set of causes predicts, and their differences from those of the likeliest set.
 pub(super) fn figures(plan: &Plan) -> Vec<(&'static str, String)> {
@@ -30,8 +26,8 @@ fn schedule(plan: &Plan) -> String {
         .windows(2)
         .flat_map(|pair| [(pair[0].time_s, pair[0].voltage_v), (pair[1].time_s, pair[0].voltage_v)]);
     let end = plan.commands.last().map(|last| (last.time_s, last.voltage_v));
-    let plots: Vec<Plot> = vec![line(points.chain(end).collect(), COMMAND, "commanded").into()];
-    svg(plots, Axes { title: "Schedule", x: "time [s]", y: "voltage [V]" })
+    let series = Series::line("commanded", COMMAND, points.chain(end).collect());
+    Chart::new("Schedule", "time [s]", "voltage [V]", vec![series]).file()
 }
 
 fn responses(plan: &Plan, title: &str, y: &str, less: impl Fn(usize) -> f64) -> String {
@@ -39,7 +35,7 @@ fn responses(plan: &Plan, title: &str, y: &str, less: impl Fn(usize) -> f64) -> 
         let readings = response.reading.iter().enumerate().map(|(row, reading)| reading - less(row));
         let points = response.time_s.iter().copied().zip(readings).collect();
         let name = if response.causes.is_empty() { "no cause".to_owned() } else { response.causes.join(" + ") };
-        line(points, colour, &name).into()
+        Series::line(&name, colour, points)
     });
-    svg(of_set.collect(), Axes { title, x: "time [s]", y })
+    Chart::new(title, "time [s]", y, of_set.collect()).file()
 }

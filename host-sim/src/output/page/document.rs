@@ -2,10 +2,10 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::output::style;
+use crate::output::chart;
 
 /// A whole page with its title as the first heading; texts in the title are escaped.
-pub(super) fn document(title: &str, body: Markup) -> String {
+pub(in crate::output) fn document(title: &str, body: Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -13,7 +13,7 @@ pub(super) fn document(title: &str, body: Markup) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) }
-                style { (PreEscaped(style::sheet())) }
+                style { (PreEscaped(include_str!("page.css"))) (PreEscaped(chart::STYLE)) }
             }
             body {
                 h1 { (title) }

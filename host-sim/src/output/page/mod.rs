@@ -1,0 +1,9 @@
+//! Parts of a report page: its frame, tables that fold on narrow screens, plots with a table of their values.
+
+mod document;
+mod figure;
+mod table;
+
+pub(super) use document::document;
+pub(super) use figure::Figure;
+pub(super) use table::{Row, Table};
