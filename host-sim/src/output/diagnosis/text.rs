@@ -424,10 +424,7 @@ mod tests {
             "The record shows the static law from 0 to 330 V; the plant file continues it above with its end slope.";
         let tau = "voltage-dependent-time-constant: tau_high_s is extrapolated from a record of 0 to 300 V.";
         assert_eq!(said, [law, tau]);
-        assert!(
-            text("r.csv", &report, &Scales::default())
-                .contains("tau_high_s = 8.0 [7.0, 9.0] s (extrapolated)\n")
-        );
+        assert!(text("r.csv", &report, &Scales::default()).contains("tau_high_s = 8.0 [7.0, 9.0] s (extrapolated)\n"));
         report.extended.law_range_v = Some([200.0, 500.0]);
         let law = limits_of_curves(&report, &Scales::default()).remove(0);
         assert!(law.ends_with("above with its end slope, and below it as a straight line to 0 V."), "{law}");
