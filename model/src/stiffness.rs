@@ -104,7 +104,7 @@ impl Spring {
         OutOfRange::check("width_m", beam.width_m, 1e-5..=10.0, "m")?;
         OutOfRange::check("thickness_m", beam.thickness_m, 1e-7..=1.0, "m")?;
         OutOfRange::check("min_v", min_v, 0.0..=1000.0, "V")?;
-        OutOfRange::check("max_v", max_v, min_v..=1000.0, "V")?;
+        OutOfRange::check("spring.max_v", max_v, min_v..=1000.0, "V")?;
         Ok(Self { youngs_modulus, beam, min_v, max_v })
     }
 
@@ -209,6 +209,6 @@ mod tests {
     fn a_setting_out_of_range_is_rejected_by_name() {
         let beam = Cantilever { thickness_m: 0.0, ..Cantilever::PAPER };
         assert_eq!(Spring::new(YoungsModulus::PAPER, beam, 0.0, 700.0).unwrap_err().field, "thickness_m");
-        assert_eq!(Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 9.0, 7.0).unwrap_err().field, "max_v");
+        assert_eq!(Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 9.0, 7.0).unwrap_err().field, "spring.max_v");
     }
 }

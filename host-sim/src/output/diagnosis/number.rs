@@ -19,7 +19,7 @@ pub(in crate::output) fn with_interval([value, low, high]: [f64; 3]) -> [String;
     let half = 0.5 * (high - low);
     let decimals = 1 - half.log10().floor().clamp(-99.0, 99.0) as i32;
     let large = value.abs().max(low.abs()).max(high.abs());
-    if !(half > 0.0 && half.is_finite()) || !(-6..=9).contains(&decimals) || large >= 1e7 {
+    if !(half > 0.0 && half.is_finite() && (-6..=9).contains(&decimals) && large < 1e7) {
         return [value, low, high].map(number);
     }
     let decimals = decimals.max(0) as usize;
