@@ -16,12 +16,15 @@ type Candidate = (String, [String; 3]);
 
 /// Candidates as the HTML page lists them.
 fn of_page(page: &str) -> Vec<Candidate> {
-    let cell = |text: &str| text.split('<').next().unwrap_or_default().to_owned();
+    let cell = |text: &str| {
+        let inside = text.split_once("<div>").map_or(text, |(_, inside)| inside);
+        inside.split('<').next().unwrap_or_default().to_owned()
+    };
     let row = |row: &str| {
-        let mut numbers = row.split("<td class=\"number\">").skip(1).map(cell);
+        let mut numbers = row.split("<td role=\"cell\" class=\"number\"").skip(1).map(cell);
         (cell(row), [(); 3].map(|()| numbers.next().expect("a number")))
     };
-    page.split("<td class=\"set\">").skip(1).map(row).collect()
+    page.split("<td role=\"cell\" class=\"set\"").skip(1).map(row).collect()
 }
 
 /// Candidates as the README lists them, which adds remarks to some causes.
