@@ -7,7 +7,7 @@
 //! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`recording`] | telemetry as CSV while it arrives |
 //! | [`figure`], [`plots`] | plots as SVG |
-//! | [`chart`], [`page`] | the parts of all plots and of all report pages |
+//! | `chart`, `page` | the parts of all plots and of all report pages |
 
 pub mod beam;
 pub mod bound;
