@@ -1,4 +1,4 @@
-//! What shells, `man` and a bug report are told: completions, manual pages, version.
+//! What shells, `man` and a bug report need: completions, manual pages, version.
 
 use std::process::{Command, Output};
 
@@ -16,7 +16,7 @@ fn every_shell_is_told_of_every_command() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let script = stdout(vsj(&["completions", shell]));
         for command in ["stair", "diagnose", "watch", "acknowledge"] {
-            assert!(script.contains(command), "{shell} is not told of {command}");
+            assert!(script.contains(command), "{shell} lacks {command}");
         }
     }
     assert_eq!(vsj(&["completions", "tcsh"]).status.code(), Some(2));

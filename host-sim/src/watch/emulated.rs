@@ -30,7 +30,7 @@ pub struct Emulated {
 }
 
 impl Emulated {
-    /// Starts the board with the image `elf`, or with one that is found or built. `say` is told what takes time.
+    /// Starts the board with the image `elf`, or with one that is found or built. `say` receives what takes time.
     ///
     /// # Errors
     /// If QEMU, the compiler's target or the image is missing, with the command that helps; if QEMU does not start.

@@ -11,7 +11,7 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`message`] | what the worker reports, and what it is told |
+//! | [`message`] | what the worker reports, and what it is asked |
 //! | [`worker`] | the thread that owns the connection: requests, telemetry, schedule, reconnection |
 //! | `recorder` | the files that are written meanwhile |
 //! | `history` | the samples of the last minutes, and those of them that a plot shows |

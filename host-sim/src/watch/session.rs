@@ -37,7 +37,7 @@ pub struct Options {
     pub lines: bool,
 }
 
-/// Watches the MCU behind `client` until it is told to end, and disarms it then. Returns what is left to be said, and the
+/// Watches the MCU behind `client` until it is asked to end, and disarms it then. Returns what is left to be said, and the
 /// number of the signal that ended it, if one did.
 ///
 /// # Errors

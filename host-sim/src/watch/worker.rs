@@ -84,7 +84,7 @@ pub struct Worker<'a> {
 }
 
 impl<'a> Worker<'a> {
-    /// A worker that reports to `events` and is told what to do by `orders`; `status` is that of the first connection.
+    /// A worker that reports to `events` and takes `orders`; `status` is that of the first connection.
     pub fn new(settings: &'a Settings, status: Status, events: Sender<Event>, orders: Receiver<Order>) -> Self {
         Self {
             settings,
@@ -101,7 +101,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Works until it is told to quit, or nobody gives orders any more.
+    /// Works until it is asked to quit, or nobody gives orders any more.
     pub fn run(mut self, client: Client) -> Outcome {
         let mut connected = Some(client);
         while let Some(mut client) = connected {
@@ -133,7 +133,7 @@ impl<'a> Worker<'a> {
         self.say(Event::Failed(reason.to_string()));
     }
 
-    /// Uses a connection until it is told to quit. An error is a lost connection.
+    /// Uses a connection until it is asked to quit. An error is a lost connection.
     fn stay(&mut self, client: &mut Client) -> Result<(), Failure> {
         if std::mem::take(&mut self.must_disarm) {
             self.order(client, Order::Disarm)?;
@@ -142,7 +142,7 @@ impl<'a> Worker<'a> {
         self.every = Every::at(self.settings.rows_hz, self.status.rate_hz, self.settings.baud);
         client.order(Request::Stream { every_ticks: self.every.sample_ticks })?;
         self.say(Event::Connected(self.status));
-        let (mut heard, mut read, mut told) = (Instant::now(), Instant::now(), Instant::now());
+        let (mut heard, mut read, mut shown) = (Instant::now(), Instant::now(), Instant::now());
         loop {
             for order in Order::by_urgency(self.waiting()) {
                 if order == Order::Quit {
@@ -165,9 +165,9 @@ impl<'a> Worker<'a> {
                 self.say(Event::Faults(report));
             }
             self.collect(client)?;
-            if told.elapsed() >= PROGRESS {
+            if shown.elapsed() >= PROGRESS {
                 self.tell_progress();
-                told = Instant::now();
+                shown = Instant::now();
             }
         }
     }
@@ -326,7 +326,7 @@ impl<'a> Worker<'a> {
         Ok(is_new)
     }
 
-    /// Tries to connect until it succeeds; `None` if it is told to quit before.
+    /// Tries to connect until it succeeds; `None` if it is asked to quit before.
     fn reconnect(&mut self) -> Option<Client> {
         loop {
             let reason = match self.settings.connect() {
