@@ -27,7 +27,7 @@ pub(crate) struct Completions {
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj man --out ~/.local/share/man/man1                then: man vsj, man vsj-diagnose
+  vsj man --out ~/.local/share/man/man1   then: man vsj, man vsj-diagnose
 
 Exit codes: 0 success, 1 a page cannot be written, 2 a folder that cannot be created.")]
 pub(crate) struct Manual {
