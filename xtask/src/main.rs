@@ -6,6 +6,7 @@ mod bench_records;
 mod check;
 mod counts;
 mod deny;
+mod dist;
 mod emulation;
 mod flash;
 mod fuzz;
@@ -164,6 +165,19 @@ Examples:
   cargo xtask counts --run pairs power-cuts"
     )]
     Counts(counts::Args),
+    /// Pack a release: vsj, images, documents, licences, checksums
+    ///
+    /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the images of
+    /// both boards for each controller and amplifier with their bills of materials, the documents, the changes of this version,
+    /// the licences of all dependencies, SHA256SUMS.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Example:
+  cargo xtask dist
+  cd target/releases/vsj-*/ && sha256sum --check SHA256SUMS"
+    )]
+    Dist,
     /// Build the images in two folders and compare every byte
     #[command(after_help = "\
 Examples:
@@ -216,7 +230,7 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
+    use Command::{Bench, Boot, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
     use Command::{Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
@@ -228,6 +242,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Fuzz(args) => fuzz::run(&args),
         Python => package::run(),
         Counts(args) => counts::run(&args),
+        Dist => dist::run(),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),
         Sanitize(args) => sanitize::run(&args),
