@@ -11,6 +11,7 @@ mod emulation;
 mod flash;
 mod fuzz;
 mod image;
+mod manual;
 mod mutants;
 mod nightly;
 mod package;
@@ -123,6 +124,12 @@ Examples:
     Bench(bench::Args),
     /// Install the Python package in a virtual environment and run its tests
     Python,
+    /// Build the documents as a book, with a page for each command
+    ///
+    /// Into target/manual/book; prints the path of its first page. Installs mdbook under the target directory unless it is
+    /// there.
+    #[command(verbatim_doc_comment)]
+    Manual,
     /// Change the code in one place at a time; count what no test notices
     ///
     /// Over model, link and the parts of the firmware that a host can run. Fails below 95 % caught, or if a change lives
@@ -231,7 +238,7 @@ fn arguments() -> Vec<OsString> {
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
     use Command::{Bench, Boot, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
-    use Command::{Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
+    use Command::{Manual, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -241,6 +248,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
         Python => package::run(),
+        Manual => manual::run(),
         Counts(args) => counts::run(&args),
         Dist => dist::run(),
         Times(args) => times::run(&args),

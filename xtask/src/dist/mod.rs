@@ -1,7 +1,7 @@
 //! `cargo xtask dist`: the files of a release.
 //!
 //! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the
-//! images of both boards for each controller and amplifier, the documents, this version's changes, the licences of all
+//! images of both boards for each controller and amplifier, the manual, this version's changes, the licences of all
 //! dependencies, and the SHA-256 of every file.
 
 mod licences;
@@ -15,7 +15,7 @@ use xtask::build::{self, Board};
 use xtask::shell;
 use xtask::variant::Variant;
 
-use crate::image;
+use crate::{image, manual};
 
 /// The project's own texts.
 const TEXTS: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"];
@@ -40,7 +40,7 @@ pub(crate) fn run() -> Result<()> {
     for text in TEXTS {
         copy(&shell::root().join(text), &new.join(text))?;
     }
-    documents(&new)?;
+    copy_folder(&manual::build()?, &new.join("manual"))?;
     let changes = fs::read_to_string(shell::root().join("CHANGELOG.md")).context("cannot read CHANGELOG.md")?;
     write(&new.join("CHANGES.md"), section(&changes, version)?.as_bytes())?;
     write(&new.join("THIRD-PARTY.txt"), licences::all(&["host-sim", "firmware", "test-bench"])?.as_bytes())?;
@@ -97,13 +97,14 @@ fn images(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies the documents that git tracks.
-fn documents(folder: &Path) -> Result<()> {
-    let files = shell::output(shell::command("git").args(["ls-files", "-z", "docs"]))?;
-    for file in files.split('\0').filter(|file| !file.is_empty()) {
-        let to = folder.join(file);
+/// Copies a folder with all that it contains.
+fn copy_folder(from: &Path, to: &Path) -> Result<()> {
+    let mut files = Vec::new();
+    list(from, &mut files)?;
+    for file in files {
+        let to = to.join(file.strip_prefix(from)?);
         make(to.parent().context("a file in a folder")?)?;
-        copy(&shell::root().join(file), &to)?;
+        copy(&file, &to)?;
     }
     Ok(())
 }
