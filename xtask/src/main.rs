@@ -13,6 +13,7 @@ mod image;
 mod mutants;
 mod nightly;
 mod package;
+mod page;
 mod reproducible;
 mod sanitize;
 mod sbom;
@@ -122,6 +123,15 @@ Examples:
     Bench(bench::Args),
     /// Install the Python package in a virtual environment and run its tests
     Python,
+    /// Build the page to try the product in a browser, in target/page
+    ///
+    /// WebAssembly of the controller and the diagnosis, inlined, so that target/page/index.html also opens from a disk. Fails if the
+    /// page is larger than 2 MB, compressed.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "Examples:\n  cargo xtask page\n  cargo xtask page --test            and compare it with vsj, in headless Chromium"
+    )]
+    Page(page::Args),
     /// Change the code in one place at a time; count what no test notices
     ///
     /// Over model, link and the parts of the firmware that a host can run. Fails below 95 % caught, or if a change lives
@@ -216,7 +226,7 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
+    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof, Python};
     use Command::{Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
@@ -227,6 +237,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
         Python => package::run(),
+        Page(args) => page::run(&args),
         Counts(args) => counts::run(&args),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),
