@@ -1,5 +1,5 @@
 //! The functions that the worker calls. Requests, files and answers are bytes in this module's memory; the worker has a function
-//! for reports on the way.
+//! for reports on the way. Names like `free` would be taken for those of the C library.
 
 use std::panic;
 use std::sync::Once;
@@ -14,22 +14,22 @@ unsafe extern "C" {
     safe fn panicked(text: *const u8, length: usize);
 }
 
-/// Returns memory for `length` bytes, which the worker fills and hands to [`call`].
+/// Returns memory for `length` bytes, which the worker fills and hands to [`page_call`].
 #[unsafe(no_mangle)]
-extern "C" fn alloc(length: usize) -> *mut u8 {
-    Box::into_raw(vec![0; length].into_boxed_slice()).cast()
+extern "C" fn page_alloc(length: usize) -> *mut u8 {
+    Box::into_raw(vec![0u8; length].into_boxed_slice()).cast()
 }
 
 /// Frees an answer.
 #[unsafe(no_mangle)]
-extern "C" fn free(bytes: *mut u8, length: usize) {
+extern "C" fn page_free(bytes: *mut u8, length: usize) {
     drop(owned(bytes, length));
 }
 
 /// Answers a request, a JSON object, about a file, which may be empty. Frees both; returns the address of the answer in the upper
 /// half, its length in the lower.
 #[unsafe(no_mangle)]
-extern "C" fn call(request: *mut u8, request_length: usize, file: *mut u8, file_length: usize) -> u64 {
+extern "C" fn page_call(request: *mut u8, request_length: usize, file: *mut u8, file_length: usize) -> u64 {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         panic::set_hook(Box::new(|panic| {
@@ -44,9 +44,9 @@ extern "C" fn call(request: *mut u8, request_length: usize, file: *mut u8, file_
     ((bytes as u64) << 32) | length
 }
 
-/// Takes back memory that [`alloc`] or [`call`] has given to the worker.
+/// Takes back memory that [`page_alloc`] or [`page_call`] has given to the worker.
 fn owned(bytes: *mut u8, length: usize) -> Box<[u8]> {
-    // SAFETY: the worker passes an address and a length that it got from `alloc` or `call`, each once; both made them from a boxed
+    // SAFETY: the worker passes an address and a length that it got from `page_alloc` or `page_call`, each once; both made them from a boxed
     // slice of this length.
     unsafe { Box::from_raw(std::ptr::slice_from_raw_parts_mut(bytes, length)) }
 }

@@ -14,7 +14,7 @@ function textAt(address, length) {
 
 /** Copies bytes into the engine's memory, which then owns them; returns their address. */
 function give(bytes) {
-  const address = engine.alloc(bytes.length);
+  const address = engine.page_alloc(bytes.length);
   new Uint8Array(engine.memory.buffer, address, bytes.length).set(bytes);
   return address;
 }
@@ -36,10 +36,10 @@ async function start(base64) {
 /** Answers one request; returns the parsed answer. */
 function call(request, file) {
   const bytes = encoder.encode(JSON.stringify(request));
-  const packed = engine.call(give(bytes), bytes.length, give(file), file.length);
+  const packed = engine.page_call(give(bytes), bytes.length, give(file), file.length);
   const [address, length] = [Number(packed >> 32n), Number(packed & 0xffffffffn)];
   const text = textAt(address, length);
-  engine.free(address, length);
+  engine.page_free(address, length);
   return JSON.parse(text);
 }
 

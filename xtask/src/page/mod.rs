@@ -1,6 +1,8 @@
 //! `cargo xtask page`: the page in `page/`, as one static folder without a server.
 
+mod browser;
 mod bundle;
+mod test;
 
 use std::fs;
 use std::io::Write;
@@ -57,7 +59,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     println!("compressed {all} of at most {MOST} bytes");
     if args.test {
         setup::browser()?;
-        shell::run(shell::cargo().args(["test", "--package", "end-to-end", "--test", "page", "--", "--ignored", "--nocapture"]))?;
+        test::run(&folder)?;
     }
     Ok(())
 }
