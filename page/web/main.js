@@ -8,6 +8,8 @@ import { resetSpring } from "./spring.js";
 const control = new ControlPanel();
 const records = new RecordPanel((plant) => {
   byId("plant").value = plant;
+  // An effect is hidden in a plain spring only.
+  byId("effect").value = "";
   byId("more-spring").open = true;
   byId("control-title").scrollIntoView();
   byId("controller").focus();

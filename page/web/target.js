@@ -162,7 +162,9 @@ export class Target {
     this.#changed();
   }
 
+  /** Draws all anew; the point that has the keyboard keeps it. */
   #draw() {
+    const focused = this.#place.contains(document.activeElement) ? document.activeElement.dataset.index : undefined;
     const line = byId("linear").checked
       ? this.points.map(([time, volts]) => `${this.#x(time)} ${this.#y(volts)}`).join("L")
       : this.points.map(([time, volts], index) => (index ? `H${this.#x(time)}V${this.#y(volts)}` : `${this.#x(time)} ${this.#y(volts)}`)).join("");
@@ -190,6 +192,7 @@ export class Target {
       ...points,
     );
     this.#text.value = this.points.map((point) => point.join(" ")).join("\n");
+    if (focused !== undefined) this.#focus(focused);
   }
 
   /** Draws again, after a setting of the line has changed. */
