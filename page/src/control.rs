@@ -5,6 +5,7 @@ use model::{Amplifier, Approach, Compensation, Gains};
 use paper::stair::request::{Answer, Request, Target};
 use serde::{Deserialize, Serialize};
 use simulation::bad_input;
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
 use simulation::run::{Run, Sample};
@@ -125,5 +126,6 @@ pub(crate) fn answer(control: &Control, plant: &PlantFile, progress: impl FnMut(
         amplifier: Amplifier { slew_v_per_s: control.slew_v_per_s, ..Amplifier::up_to(control.limit_v) },
         rate_hz: control.rate_hz,
     };
+    request.check().map_err(|error| named(error, SETTINGS))?;
     request.run(progress)
 }

@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 use simulation::bad_input;
 use simulation::csv_table::text::Source;
 use simulation::plant_file::{self, PlantFile};
-use simulation::record::gaps::missed_turns;
-use simulation::record::{Format, MeasuredRecord};
-use simulation::schedule::Schedule;
+use simulation::record::{ColumnNames, Format, MeasuredRecord, remarks_on};
 
 use crate::curve::Curve;
 
@@ -58,9 +56,6 @@ pub struct Shown {
     curves: Vec<(&'static str, Curve)>,
 }
 
-/// Tolerance in s within which a row of the stair may have the voltage before or after a step, as in `vsj diagnose`.
-const RAMP_S: f64 = 0.1;
-
 /// A record that was read.
 struct Read {
     measured: MeasuredRecord,
@@ -74,27 +69,16 @@ impl Records {
         if !self.reading.is_empty() && !self.column.is_empty() {
             bad_input!("--column and --reading: both name the reading; expected one of them");
         }
-        let mut format = Format { sort: self.sort, ..Format::default() };
-        format.columns.time = given(&self.time);
-        format.columns.voltage = given(&self.voltage);
-        format.columns.reading = given(&self.reading);
-        format.columns.stiffness = given(&self.column);
-        let input = match self.input.as_str() {
-            "hold" => Input::Hold,
-            "linear" => Input::Linear,
-            "stair" => Input::Stair,
-            other => bad_input!("--input {other}: expected hold, linear or stair"),
+        let columns = ColumnNames {
+            time: given(&self.time),
+            voltage: given(&self.voltage),
+            reading: given(&self.reading),
+            stiffness: given(&self.column),
         };
+        let format = Format { columns, sort: self.sort, ..Format::default() };
+        let input = self.input.parse()?;
         let measured = format.read(Source::read(&self.name, file)?)?;
-        let mut remarks = measured.remarks.clone();
-        let turns = missed_turns(&measured.record.rows);
-        if turns > 0 {
-            remarks.push(format!(
-                "{}: the voltage turns in {turns} gap(s) between the rows; what it did there is not in the record and may be taken \
-                 for a property of the spring",
-                self.name
-            ));
-        }
+        let remarks = remarks_on(std::slice::from_ref(&measured))?;
         Ok(Read { measured, input, remarks })
     }
 }
@@ -105,7 +89,14 @@ impl Read {
     }
 
     /// The answer without curves; those are over the time, and `voltage_v` and the times are in SI units.
-    fn shown(self, json: String, plant: &PlantFile, time_s: &[f64], voltage_v: &[f64], more: &[(&'static str, Vec<f64>)]) -> Result<Shown> {
+    fn shown(
+        self,
+        json: String,
+        plant: &PlantFile,
+        time_s: &[f64],
+        voltage_v: &[f64],
+        more: &[(&'static str, Vec<f64>)],
+    ) -> Result<Shown> {
         let units = &self.measured.units;
         let curve = |values: &[f64], unit: f64| {
             Curve::new(values.len(), |row| time_s[row] / units.time.si, |row| values[row] / unit)
@@ -114,7 +105,11 @@ impl Read {
         curves.extend(more.iter().map(|(name, values)| (*name, curve(values, 1.0))));
         Ok(Shown {
             json,
-            plant: format!("# Identified from {}\n{}", self.measured.record.name.replace(['\n', '\r'], " "), plant.to_toml()?),
+            plant: format!(
+                "# Identified from {}\n{}",
+                self.measured.record.name.replace(['\n', '\r'], " "),
+                plant.to_toml()?
+            ),
             units: [units.time.name.clone(), units.voltage.name.clone(), units.reading.clone()],
             curves,
             remarks: self.remarks,
@@ -144,16 +139,9 @@ pub fn identify(records: &Records, file: &[u8]) -> Result<Shown> {
 /// # Errors
 /// [`simulation::BadInput`] with the file, line, column and what was expected.
 pub fn diagnose(records: &Records, file: &[u8], progress: &mut dyn FnMut(&str)) -> Result<Shown> {
-    let effort = match records.effort.as_str() {
-        "quick" => Effort::Quick,
-        "normal" => Effort::Normal,
-        "thorough" => Effort::Thorough,
-        other => bad_input!("--effort {other}: expected quick, normal or thorough"),
-    };
+    let effort: Effort = records.effort.parse()?;
     let read = records.read(file)?;
-    if read.input == Input::Stair {
-        Schedule::stair().check_commanded("the report's stair (--input stair)", &read.measured.record, RAMP_S)?;
-    }
+    read.input.check(&read.measured.record)?;
     let (name, plant, linear) = match records.plant.as_str() {
         "identify" => {
             let found = read.identify()?;

@@ -68,7 +68,9 @@ pub fn record(hidden: &Hidden) -> Result<Made> {
     }
     let file = control::spring(&control.plant)?;
     let Some(plant) = file.extended().plain() else {
-        bad_input!("the spring has more than a share and a time constant; expected these alone, the effect is added to them");
+        bad_input!(
+            "the spring has more than a share and a time constant; expected these alone, the effect is added to them"
+        );
     };
     let schedule = sampled(control, *rows)?;
     let noise = Noise::white(*noise_percent);
@@ -108,4 +110,77 @@ fn sampled(control: &Control, rows: usize) -> Result<Schedule> {
         bad_input!("the target ends after one row; expected a longer one");
     }
     Ok(Schedule { time_s, voltage_v })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hidden(target: &str, effect: &str) -> Hidden {
+        let control = Control {
+            plant: "paper".to_owned(),
+            target: target.to_owned(),
+            linear: false,
+            controller: "none".to_owned(),
+            limit_v: 700.0,
+            slew_v_per_s: None,
+            kp: 4.0,
+            ki: 1.35,
+            approach_s: 0.0,
+            rate_hz: 100.0,
+        };
+        Hidden { control, effect: effect.to_owned(), size: 1.0, noise_percent: 0.2, seed: 1, rows: 1000 }
+    }
+
+    #[test]
+    fn every_effect_makes_a_record_of_any_target() {
+        let flat = "time_s,voltage_v\n0,0\n9,0\n";
+        let short = "time_s,voltage_v\n0,0\n0.01,700\n0.05,700\n";
+        let long = "time_s,voltage_v\n5,0\n600,700\n1200,0\n";
+        for target in ["stair", "step", flat, short, long] {
+            for effect in effects().into_iter().chain(["none"]) {
+                let made = record(&hidden(target, effect)).unwrap();
+                let rows = made.csv.lines().count() - 1;
+                assert!((2..=1000).contains(&rows) && !made.csv.contains("NaN"), "{effect}: {rows} rows");
+                assert_eq!(
+                    made.truth.first().map(|truth| truth.cause.name()),
+                    Some(effect).filter(|&name| name != "none")
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn values_that_make_no_record_are_refused() {
+        let usual = hidden("stair", "drift");
+        let spring = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 5\n[leakage]\nshare = 0.1\ntau_s = 20\n";
+        let leaking = Control { plant: spring.to_owned(), ..usual.control.clone() };
+        for (wrong, what) in [
+            (Hidden { size: f64::NAN, ..usual.clone() }, "size = NaN"),
+            (Hidden { noise_percent: -1.0, ..usual.clone() }, "noise_percent = -1"),
+            (Hidden { rows: 3, ..usual.clone() }, "rows = 3"),
+            (Hidden { effect: "rust".to_owned(), ..usual.clone() }, "effect rust: expected none, gain-error"),
+            (Hidden { control: leaking, ..usual.clone() }, "the spring has more than"),
+        ] {
+            let error = record(&wrong).unwrap_err().to_string();
+            assert!(error.starts_with(what), "{error}");
+        }
+    }
+
+    /// The spring's own time constant has effect.
+    #[test]
+    fn an_effect_is_added_to_the_spring_that_was_asked_for() {
+        let usual = hidden("step", "none");
+        let spring = "schema = 1\n[relaxation]\nshare = 0.3\ntau_s = 1\n";
+        let faster = Hidden { control: Control { plant: spring.to_owned(), ..usual.control.clone() }, ..usual.clone() };
+        let after_step = |hidden: &Hidden| {
+            let curve = record(hidden).unwrap().stiffness;
+            curve.y[curve.x.iter().position(|&time| time >= 21.0).unwrap()]
+        };
+        let (slow, fast) = (after_step(&usual), after_step(&faster));
+        // A second after a step of 100 V.
+        let expected = |share: f64, tau: f64| 100.0 * (1.0 - (1.0 - share) * f64::exp(-1.0 / tau));
+        assert!((slow - expected(1.0 / 11.0, 5.5)).abs() < 2.0, "{slow}");
+        assert!((fast - expected(0.3, 1.0)).abs() < 2.0, "{fast}");
+    }
 }

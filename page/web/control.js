@@ -1,6 +1,6 @@
 // The control panel: a target through the controller, with stiffness, voltage and the bound.
 
-import { byId, digits, html, save, table } from "./dom.js";
+import { byId, decimals, digits, html, save, table } from "./dom.js";
 import { Cancelled, Engine } from "./engine.js";
 import { COLOUR, show } from "./plot.js";
 import { spring } from "./spring.js";
@@ -158,7 +158,9 @@ function steps({ steps, bound_from }) {
   const names = ["step [V]", "50 % [s]", "90 % [s]", "97 % [s]", "bound of 97 % [s]", "overshoot [%]", "peak [V]"];
   const rows = steps.map((step) => [
     { text: `${digits(step.from_v)} to ${digits(step.to_v)}`, class: "cause" },
-    ...[step.t50_s, step.t90_s, step.t97_s, step.bound_t97_s, step.overshoot_percent, step.peak_v].map((value) => digits(value, 3)),
+    ...[step.t50_s, step.t90_s, step.t97_s, step.bound_t97_s].map((value) => decimals(value, 3)),
+    decimals(step.overshoot_percent, 2),
+    decimals(step.peak_v, 1),
   ]);
   const caption = `Time to complete each change. The bound is for any controller, from a spring that ${bound_from === "settled" ? "has settled" : "is as this loop has left it"}.`;
   return table(names, rows, caption);

@@ -30,20 +30,22 @@ export function save(name, text, type = "text/plain") {
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
-/** A table with its head; it folds on a narrow screen. A cell is a text, or { text, class }. */
+/** A table with its head; it folds on a narrow screen. A cell is a number as a text, or { text, class }. */
 export function table(names, rows, caption) {
-  const cell = (value, index) => {
-    const { text, class: kind } = typeof value === "object" ? value : { text: value, class: "number" };
-    return html("td", { class: kind, "data-name": names[index] }, text);
-  };
+  const parts = (value) => (typeof value === "object" ? value : { text: value, class: "number" });
+  const cell = (value, index) => html("td", { class: parts(value).class, "data-name": names[index] }, parts(value).text);
+  const head = (name, index) => html("th", { scope: "col", class: rows[0] && parts(rows[0][index]).class === "number" ? "number" : null }, name);
   return html(
     "table",
     {},
     html("caption", { class: "small" }, caption),
-    html("thead", {}, html("tr", {}, ...names.map((name) => html("th", { scope: "col" }, name)))),
+    html("thead", {}, html("tr", {}, ...names.map(head))),
     html("tbody", {}, ...rows.map((row) => html("tr", {}, ...row.map(cell)))),
   );
 }
+
+/** A number with some decimals; a dash for none. */
+export const decimals = (value, count) => (value == null ? "-" : value.toFixed(count));
 
 /** A number with some significant digits. */
 export function digits(value, count = 4) {

@@ -115,7 +115,7 @@ export class RecordPanel {
     byId("found").hidden = false;
     draw(Object.fromEntries(curves), units, Boolean(report.findings?.length));
     byId("record-status").textContent =
-      command === "diagnose" ? `Finished: ${report.verdict}. ${sentence(report)}` : `Finished: ${report.rows} rows identified.`;
+      command === "diagnose" ? sentence(report) : `Identified from ${report.rows} rows: held-out error ${digits(report.held_out_rmse)} ${report.unit}.`;
   }
 }
 
@@ -145,19 +145,16 @@ function sizes(parameters) {
   return Object.entries(parameters).map(([name, parameter]) => `${name} = ${size(parameter)}`).join("; ");
 }
 
-/** What the causes improve, as a sentence. */
-function sentence({ findings, baseline, extended }) {
-  if (!findings.length) return `No cause was found; held-out error ${digits(baseline.held_out_rmse)}.`;
+/** The verdict, and what the causes improve. */
+function sentence({ verdict, findings, baseline, extended }) {
+  if (!findings.length) return `Verdict: ${verdict}. No cause was found; held-out error ${digits(baseline.held_out_rmse)}.`;
   const [before, after] = [baseline, extended].map(({ held_out_rmse }) => digits(held_out_rmse));
-  return `${findings.map(({ cause }) => cause).join(", ")}: the held-out error goes from ${before} to ${after}, by ${digits(100 * extended.gain, 3)} %.`;
+  return `Verdict: ${verdict}, ${findings.map(({ cause }) => cause).join(", ")}. The held-out error goes from ${before} to ${after}, by ${digits(100 * extended.gain, 3)} %.`;
 }
 
 function diagnosis(report) {
-  const { verdict, findings, suspects, alternatives, next_experiment, leftover } = report;
-  const parts = [
-    html("p", {}, html("span", { class: "verdict" }, verdict)),
-    html("p", { class: "sentences" }, sentence(report)),
-  ];
+  const { findings, suspects, alternatives, next_experiment, leftover } = report;
+  const parts = [];
   if (findings.length) {
     parts.push(table(["cause", "probability", "size [95 % interval]", "error before", "after"], findings.map(causeRow), "Causes, by the error that they explain"));
     parts.push(...findings.map(({ cause, evidence }) => html("p", { class: "small" }, `${cause}: ${evidence}.`)));
@@ -180,12 +177,9 @@ function causeRow({ cause, probability, parameters, rmse_before, rmse_after }) {
   ];
 }
 
-function identification({ nominal, held_out_rmse, unit }) {
+function identification({ nominal }) {
   const listed = Object.entries(nominal).flatMap(([name, value]) =>
     Array.isArray(value) ? value.map((of, index) => [`${name} ${index + 1}`, of]) : [[name, value]]);
   const rows = listed.filter(([, value]) => value?.value != null).map(([name, value]) => [{ text: name, class: "cause" }, { text: size(value), class: "" }]);
-  return [
-    html("p", { class: "sentences" }, `Held-out error ${digits(held_out_rmse)} ${unit ?? ""}.`),
-    table(["quantity", "value [95 % interval]"], rows, "The spring that the record shows"),
-  ];
+  return [table(["quantity", "value [95 % interval]"], rows, "The spring that the record shows")];
 }

@@ -6,10 +6,12 @@ mod bench_records;
 mod check;
 mod counts;
 mod deny;
+mod dist;
 mod emulation;
 mod flash;
 mod fuzz;
 mod image;
+mod manual;
 mod mutants;
 mod nightly;
 mod package;
@@ -123,6 +125,12 @@ Examples:
     Bench(bench::Args),
     /// Install the Python package in a virtual environment and run its tests
     Python,
+    /// Build the documents as a book, with a page for each command
+    ///
+    /// Into target/manual/book; prints the path of its first page. Installs mdbook under the target directory unless it is
+    /// there.
+    #[command(verbatim_doc_comment)]
+    Manual,
     /// Build the page to try the product in a browser, in target/page
     ///
     /// WebAssembly of the controller and the diagnosis, inlined, so that target/page/index.html also opens from a disk. Fails if the
@@ -174,6 +182,19 @@ Examples:
   cargo xtask counts --run pairs power-cuts"
     )]
     Counts(counts::Args),
+    /// Pack a release: vsj, images, documents, licences, checksums
+    ///
+    /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the images of
+    /// both boards for each controller and amplifier with their bills of materials, the documents, the changes of this version,
+    /// the licences of all dependencies, SHA256SUMS.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Example:
+  cargo xtask dist
+  cd target/releases/vsj-*/ && sha256sum --check SHA256SUMS"
+    )]
+    Dist,
     /// Build the images in two folders and compare every byte
     #[command(after_help = "\
 Examples:
@@ -226,8 +247,8 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof, Python};
-    use Command::{Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
+    use Command::{Bench, Boot, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof};
+    use Command::{Manual, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -237,8 +258,10 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
         Python => package::run(),
+        Manual => manual::run(),
         Page(args) => page::run(&args),
         Counts(args) => counts::run(&args),
+        Dist => dist::run(),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),
         Sanitize(args) => sanitize::run(&args),

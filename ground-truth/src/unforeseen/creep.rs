@@ -218,10 +218,8 @@ mod tests {
     fn a_tank_settles_where_inflow_equals_outflow() {
         let mut draw = super::super::tests::draw(1.0);
         let mut chain = tank(&mut draw);
-        let hold = crate::Schedule {
-            time_s: (0..2000).map(|k| 0.1 * f64::from(k)).collect(),
-            voltage_v: vec![500.0; 2000],
-        };
+        let hold =
+            crate::Schedule { time_s: (0..2000).map(|k| 0.1 * f64::from(k)).collect(), voltage_v: vec![500.0; 2000] };
         let end = chain.stiffness(&hold, 10)[1999];
         assert!((end - 500.0).abs() < 0.1, "level and inflow are equal at 500 V: {end}");
     }

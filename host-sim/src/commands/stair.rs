@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use super::choice::{BETWEEN, one_of};
-use super::option_names::{SETTINGS, named};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::output::files::{Files, write_csv};
@@ -15,6 +14,7 @@ use paper::stair::request::{Answer, Request, Target};
 use simulation::bad_input;
 use simulation::bad_input::number;
 use simulation::experiment::paper_spring;
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::Between;
@@ -173,7 +173,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     };
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
     let request = arguments.request(&file, target);
-    request.check().map_err(|error| named(error, &[SETTINGS, OWN].concat()))?;
+    request.check().map_err(|error| named(error, SETTINGS))?;
     let answer = request.run(|done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
@@ -185,15 +185,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     };
     print(&if arguments.json { json(&answer.report)? } else { stair::text(&answer.report) + &wrote(&paths) })
 }
-
-/// The options, other than [`SETTINGS`], that set fields of the settings.
-const OWN: &[(&str, &str)] = &[
-    ("min_v", "--min-v"),
-    ("dac_bits", "--dac-bits"),
-    ("proportional_gain", "--kp"),
-    ("integral_gain_per_s", "--ki"),
-    ("approach_s", "--approach-s"),
-];
 
 fn write(folder: &Path, answer: &Answer, controlled: bool, stride: usize) -> Result<Vec<PathBuf>> {
     let Answer { experiment, run, report } = answer;

@@ -18,8 +18,15 @@ const LOOK: Duration = Duration::from_millis(50);
 /// The browser reads commands from file descriptor 3 and answers on 4.
 const PIPES: &str = r#"exec "$0" "$@" 3<&0 4>&1 </dev/null >/dev/null 2>&1"#;
 const FLAGS: &[&str] = &[
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--remote-debugging-pipe",
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--remote-debugging-pipe",
 ];
 
 /// A browser with one page.
@@ -60,7 +67,8 @@ impl Browser {
                 }
             }
         });
-        let mut browser = Self { process, commands, messages, folder, session: Value::Null, last: 0, errors: Vec::new() };
+        let mut browser =
+            Self { process, commands, messages, folder, session: Value::Null, last: 0, errors: Vec::new() };
         let downloads = browser.folder.display().to_string();
         browser.ask("Browser.setDownloadBehavior", json!({"behavior": "allow", "downloadPath": downloads}))?;
         let page = browser.ask("Target.createTarget", json!({"url": "about:blank"}))?["targetId"].take();
@@ -141,7 +149,8 @@ impl Browser {
         let events = "for (const kind of ['input', 'change']) field.dispatchEvent(new Event(kind, { bubbles: true }));";
         let set = if value == "true" || value == "false" { "checked" } else { "value" };
         let value = if set == "value" { json!(value).to_string() } else { value.to_owned() };
-        self.value(&format!("{{ const field = document.getElementById('{id}'); field.{set} = {value}; {events} }}")).map(drop)
+        self.value(&format!("{{ const field = document.getElementById('{id}'); field.{set} = {value}; {events} }}"))
+            .map(drop)
     }
 
     /// The middle of an element on the screen, which is scrolled to it.
@@ -163,7 +172,8 @@ impl Browser {
         let [x, y] = self.middle(selector)?;
         let mut mouse = |kind: &str, part: f64| {
             let at = [x + part * by[0], y + part * by[1]];
-            let parameters = json!({"type": kind, "x": at[0], "y": at[1], "button": "left", "buttons": 1, "clickCount": 1});
+            let parameters =
+                json!({"type": kind, "x": at[0], "y": at[1], "button": "left", "buttons": 1, "clickCount": 1});
             self.ask("Input.dispatchMouseEvent", parameters).map(drop)
         };
         mouse("mousePressed", 0.0)?;
@@ -189,7 +199,8 @@ impl Browser {
     /// Chooses a file in a field.
     pub(super) fn choose(&mut self, id: &str, file: &Path) -> Result<()> {
         let root = self.ask("DOM.getDocument", json!({}))?["root"]["nodeId"].take();
-        let field = self.ask("DOM.querySelector", json!({"nodeId": root, "selector": format!("#{id}")}))?["nodeId"].take();
+        let field =
+            self.ask("DOM.querySelector", json!({"nodeId": root, "selector": format!("#{id}")}))?["nodeId"].take();
         self.ask("DOM.setFileInputFiles", json!({"nodeId": field, "files": [file]})).map(drop)
     }
 
