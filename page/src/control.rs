@@ -40,6 +40,9 @@ pub struct Control {
     pub rate_hz: f64,
 }
 
+/// Largest number of ticks: a browser has less memory than the command.
+const MOST_TICKS: f64 = 2e6;
+
 /// A finished run with what is drawn of it. Curves are over the time in s.
 #[derive(Debug, Serialize)]
 pub struct Shown {
@@ -61,13 +64,13 @@ pub struct Shown {
     range_v: [f64; 2],
 }
 
-/// Runs a target; `progress` receives the finished part of the ticks.
+/// Runs a target.
 ///
 /// # Errors
 /// [`simulation::BadInput`] for settings, springs and targets that `vsj stair` refuses.
-pub fn run(control: &Control, progress: &mut dyn FnMut(&str)) -> Result<Shown> {
+pub fn run(control: &Control) -> Result<Shown> {
     let plant = spring(&control.plant)?;
-    let answer = answer(control, &plant, |done, all| progress(&format!(r#"{{"done":{done},"all":{all}}}"#)))?;
+    let answer = answer(control, &plant)?;
     let Answer { experiment, run, report } = &answer;
     let curve = |samples: &[Sample], value: fn(&Sample) -> f64| {
         Curve::new(samples.len(), |tick| run.time_s(tick), |tick| value(&samples[tick]))
@@ -101,13 +104,19 @@ pub(crate) fn spring(plant: &str) -> Result<PlantFile> {
 }
 
 /// Runs a target on a spring.
-pub(crate) fn answer(control: &Control, plant: &PlantFile, progress: impl FnMut(usize, usize)) -> Result<Answer> {
+pub(crate) fn answer(control: &Control, plant: &PlantFile) -> Result<Answer> {
     let record;
     let target = match control.target.as_str() {
         "stair" => Target::Stair,
         "step" => Target::Step,
         text => {
-            record = Record::parse("target", text, MEASURED)?;
+            record = Record::parse("target.csv", text, MEASURED)?;
+            let ticks = (record.rows[record.rows.len() - 1].time_s - record.rows[0].time_s) * control.rate_hz;
+            if ticks > MOST_TICKS {
+                bad_input!(
+                    "the target takes {ticks:.0} ticks; expected at most {MOST_TICKS} on the page (`vsj stair` runs more)"
+                );
+            }
             Target::Record(&record, if control.linear { Between::Linear } else { Between::Hold })
         }
     };
@@ -127,5 +136,5 @@ pub(crate) fn answer(control: &Control, plant: &PlantFile, progress: impl FnMut(
         rate_hz: control.rate_hz,
     };
     request.check().map_err(|error| named(error, SETTINGS))?;
-    request.run(progress)
+    request.run(|_, _| ())
 }

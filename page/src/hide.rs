@@ -99,7 +99,7 @@ pub fn record(hidden: &Hidden) -> Result<Made> {
 
 /// The voltages that a loop applies, at even times.
 fn sampled(control: &Control, rows: usize) -> Result<Schedule> {
-    let run = control::answer(control, &control::spring(&control.plant)?, |_, _| ())?.run;
+    let run = control::answer(control, &control::spring(&control.plant)?)?.run;
     let samples = control::chosen(control, &run);
     let stride = samples.len().div_ceil(rows).max(1);
     let ticks = (0..samples.len()).step_by(stride);

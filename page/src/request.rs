@@ -41,7 +41,7 @@ fn of(request: &[u8], file: &[u8], progress: &mut dyn FnMut(&str)) -> Result<Val
         Err(error) => bad_input!("request: {error}"),
     };
     Ok(match request {
-        Request::Control(control) => value(&control::run(&control, progress)?)?,
+        Request::Control(control) => value(&control::run(&control)?)?,
         Request::Effects => value(&hide::effects())?,
         Request::Hide(hidden) => value(&hide::record(&hidden)?)?,
         Request::Identify(records) => value(&diagnose::identify(&records, file)?)?,

@@ -9,7 +9,7 @@ import { Target } from "./target.js";
 /** Time after the last change of a setting before it is computed, in ms. */
 const PAUSE_MS = 120;
 
-/** The panel. `asks` has the last request and answer; listeners of the event `hidden` get a record with a hidden effect. */
+/** The panel, which computes its settings after each change. */
 export class ControlPanel {
   #engine = new Engine();
   #target = new Target(() => this.#later());
@@ -30,8 +30,9 @@ export class ControlPanel {
     this.update();
   }
 
+  /** Lists the effects. An engine that does not start is reported by the first run. */
   async #list() {
-    const effects = await this.#engine.ask({ command: "effects" });
+    const effects = await this.#engine.ask({ command: "effects" }).catch(() => []);
     byId("effect").append(...effects.map((name) => html("option", {}, name)));
   }
 
@@ -42,7 +43,6 @@ export class ControlPanel {
 
   /** The request that the settings make. */
   request() {
-    const number = (id) => (byId(id).value === "" ? null : Number(byId(id).value));
     const target = byId("target").value;
     return {
       plant: spring(),
@@ -50,7 +50,7 @@ export class ControlPanel {
       linear: byId("linear").checked,
       controller: byId("controller").value,
       limit_v: number("limit"),
-      slew_v_per_s: number("slew"),
+      slew_v_per_s: byId("slew").value === "" ? null : number("slew"),
       kp: number("kp"),
       ki: number("ki"),
       approach_s: number("approach"),
@@ -102,8 +102,8 @@ export class ControlPanel {
   async #hide(control) {
     const effect = byId("effect").value;
     if (!effect) return undefined;
-    const value = (id) => Number(byId(id).value);
-    const made = { effect, size: value("size"), noise_percent: value("noise"), seed: value("seed"), rows: value("rows") };
+    const whole = (id) => Math.trunc(number(id));
+    const made = { effect, size: number("size"), noise_percent: number("noise"), seed: whole("seed"), rows: whole("rows") };
     return this.#engine.ask({ command: "hide", control, ...made });
   }
 
@@ -148,6 +148,13 @@ export class ControlPanel {
   }
 }
 
+/** The number in a field. */
+function number(id) {
+  const field = byId(id);
+  if (field.value === "") throw new Error(`${field.labels[0].textContent}: expected a number`);
+  return Number(field.value);
+}
+
 /** The areas before the bounds: until then no controller completes 97 % of a change. */
 function bounds(steps, changes) {
   return steps.flatMap(({ from_v, to_v, bound_t97_s }, index) =>
@@ -155,14 +162,14 @@ function bounds(steps, changes) {
 }
 
 function steps({ steps, bound_from }) {
-  const names = ["step [V]", "50 % [s]", "90 % [s]", "97 % [s]", "bound of 97 % [s]", "overshoot [%]", "peak [V]"];
+  const names = ["step [V]", "50 % [s]", "90 % [s]", "97 % [s]", "bound [s]", "overshoot [%]", "peak [V]"];
   const rows = steps.map((step) => [
     { text: `${digits(step.from_v)} to ${digits(step.to_v)}`, class: "cause" },
     ...[step.t50_s, step.t90_s, step.t97_s, step.bound_t97_s].map((value) => decimals(value, 3)),
     decimals(step.overshoot_percent, 2),
     decimals(step.peak_v, 1),
   ]);
-  const caption = `Time to complete each change. The bound is for any controller, from a spring that ${bound_from === "settled" ? "has settled" : "is as this loop has left it"}.`;
+  const caption = `Time to complete each change. The bound is that of 97 % for any controller, from a spring that ${bound_from === "settled" ? "has settled" : "is as this loop has left it"}.`;
   return table(names, rows, caption);
 }
 

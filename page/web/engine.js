@@ -26,7 +26,7 @@ export class Engine {
     const request = this.#waiting.get(id);
     if (progress) return request?.onProgress?.(progress);
     if (panicked) return this.#end(new Error(`This is a bug of the page: ${panicked}`));
-    if (failed) return this.#end(new Error(`The engine does not run in this browser: ${failed}`));
+    if (failed) return this.#end(new Error(`The engine stopped: ${failed}`));
     this.#waiting.delete(id);
     if (answer.error) request?.reject(new Error(answer.error));
     else request?.resolve(answer.ok);

@@ -18,6 +18,7 @@ const records = new RecordPanel((plant) => {
 
 byId("report-spring").addEventListener("click", () => {
   resetSpring();
+  byId("more-spring").open = false;
   control.update();
 });
 

@@ -10,6 +10,7 @@ export function spring() {
   const text = byId("plant").value.trim();
   if (text) return text;
   const [share, tau] = [byId("share").value, byId("tau").value];
+  if (!share || !tau) throw new Error("The spring: expected a share and a time constant");
   if (share === PAPER.share && tau === PAPER.tau) return "paper";
   return `schema = 1\n\n[relaxation]\nshare = ${Number(share)}\ntau_s = ${Number(tau)}\n`;
 }

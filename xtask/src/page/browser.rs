@@ -221,7 +221,7 @@ impl Browser {
 
     /// Sets the width of the screen, in pixels, and its colours.
     pub(super) fn screen(&mut self, width: u32, scheme: &str) -> Result<()> {
-        let size = json!({"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false});
+        let size = json!({"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500});
         self.ask("Emulation.setDeviceMetricsOverride", size)?;
         let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
         self.ask("Emulation.setEmulatedMedia", media).map(drop)

@@ -18,9 +18,9 @@ const CONTROL: Duration = Duration::from_secs(30);
 const DIAGNOSIS: Duration = Duration::from_secs(300);
 /// Relative difference between numbers of the page and of the command: their functions in double precision (`exp`, `sin`) are of
 /// different libraries. The fixed-point tick has none.
-const ROUNDING: f64 = 1e-9;
+const ROUNDING: f64 = 1e-12;
 /// The same after a search, whose steps end when they gain little.
-const CONVERGENCE: f64 = 1e-4;
+const CONVERGENCE: f64 = 1e-6;
 /// The same between the numbers of steps of a search.
 const WORK: f64 = 0.02;
 /// A record in the repository.
@@ -33,12 +33,15 @@ struct Test {
     folder: PathBuf,
 }
 
+/// One test.
+type Check = fn(&mut Test) -> Result<()>;
+
 /// Runs all tests on the page in a folder; pictures of it go to the folder as well.
 pub(super) fn run(page: &Path) -> Result<()> {
     let vsj = build::vsj()?;
     let folder = env::temp_dir().join(format!("vsj-page-{}", std::process::id()));
     let mut test = Test { browser: Browser::start(folder.join("browser"))?, vsj, folder };
-    let tests: [(&str, fn(&mut Test) -> Result<()>); 8] = [
+    let tests: [(&str, Check); 8] = [
         ("the stair has the command's numbers", Test::stair),
         ("every field has a label", Test::labels),
         ("a target drawn by pointer and keys has the command's numbers", Test::drawn),
@@ -122,6 +125,7 @@ impl Test {
 
     fn drawn(&mut self) -> Result<()> {
         self.browser.set("target", "drawn")?;
+        self.control()?;
         let before = self.points()?;
         self.browser.drag("#drawing [data-index='1']", [20.0, 30.0])?;
         let moved = self.points()?;
