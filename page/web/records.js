@@ -17,12 +17,16 @@ export class RecordPanel {
 
   constructor(control) {
     this.#control = control;
-    const zone = byId("drop");
-    byId("file").addEventListener("change", ({ target }) => target.files[0] && this.#open(target.files[0]));
+    byId("file").addEventListener("change", ({ target }) => {
+      if (target.files[0]) this.#open(target.files[0]);
+      // The same file may be chosen again after it has changed.
+      target.value = "";
+    });
+    // Anywhere on the page: beside the field a browser would open the file instead.
     for (const kind of ["dragover", "dragleave", "drop"]) {
-      zone.addEventListener(kind, (event) => {
+      document.addEventListener(kind, (event) => {
         event.preventDefault();
-        zone.classList.toggle("over", kind === "dragover");
+        byId("drop").classList.toggle("over", kind === "dragover");
         if (kind === "drop" && event.dataTransfer.files[0]) this.#open(event.dataTransfer.files[0]);
       });
     }

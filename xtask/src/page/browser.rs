@@ -204,6 +204,17 @@ impl Browser {
         self.ask("DOM.setFileInputFiles", json!({"nodeId": field, "files": [file]})).map(drop)
     }
 
+    /// Drops a file with a text on the page.
+    pub(super) fn drop_file(&mut self, name: &str, text: &str) -> Result<()> {
+        let (name, text) = (json!(name), json!(text));
+        self.value(&format!(
+            "{{ const dataTransfer = new DataTransfer(); dataTransfer.items.add(new File([{text}], {name})); \
+             const drop = new DragEvent('drop', {{ dataTransfer, bubbles: true, cancelable: true }}); \
+             document.querySelector('main').dispatchEvent(drop); }}"
+        ))
+        .map(drop)
+    }
+
     /// Waits for a download and returns its text.
     pub(super) fn downloaded(&mut self, name: &str) -> Result<String> {
         let path = self.folder.join(name);
