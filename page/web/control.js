@@ -139,7 +139,7 @@ export class ControlPanel {
         { name: `limits, ${low} and ${high} V`, colour: COLOUR.before, curve: ends(high), dashed: true },
       ],
     });
-    byId("steps").replaceChildren(steps(answer));
+    byId("steps").replaceChildren(...(answer.steps.length ? [steps(answer)] : []));
     byId("control-status").textContent = summary(answer, run.remarks);
     byId("truth").textContent = hidden ? truth(hidden) : "";
     byId("diagnose-hidden").hidden = byId("save-record").hidden = !hidden;

@@ -33,7 +33,7 @@ export function show(place, chart) {
 /** The names of the series with samples of their lines. */
 function legend({ series, areas }) {
   const entries = series.map(({ name, ...line }) => [name, svg("line", { x1: 0, y1: 6, x2: 28, y2: 6, ...stroke(line) })]);
-  if (areas) entries.push([areas.name, svg("rect", { width: 28, height: 12, fill: COLOUR.other, "fill-opacity": 0.3 })]);
+  if (areas?.of.length) entries.push([areas.name, svg("rect", { width: 28, height: 12, fill: COLOUR.other, "fill-opacity": 0.3 })]);
   const entry = ([name, sample]) =>
     html("li", {}, svg("svg", { class: "plot", width: 30, height: 12, "aria-hidden": "true" }, sample), ` ${name}`);
   return html("ul", { class: "legend" }, ...entries.map(entry));

@@ -3,11 +3,13 @@
 import { byId, svg } from "./dom.js";
 import { ticks } from "./axis.js";
 
-const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [720, 240, 58, 14, 14, 34];
+const [HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [240, 58, 14, 14, 34];
 /** Smallest distance between two points, in s. */
 const APART_S = 0.1;
 /** Steps of the arrow keys, in s and V, and their factor with the shift key. */
 const [STEP_S, STEP_V, COARSE] = [0.5, 10, 5];
+/** Largest number of points that a line along the whole target has. */
+const MOST_DRAWN = 80;
 /** A pointer that moves less than this, in units of the drawing, adds a single point. */
 const CLICK = 5;
 
@@ -16,6 +18,7 @@ export class Target {
   /** [time in s, voltage in V], by increasing time. */
   points = [[0, 0], [5, 300], [20, 100], [35, 450], [60, 450]];
   #highest = 700;
+  #width = 720;
   #changed;
   #place = byId("drawing");
   #text = byId("points");
@@ -25,6 +28,7 @@ export class Target {
     this.#changed = changed;
     this.#text.addEventListener("change", () => this.#read());
     this.#place.addEventListener("pointerdown", (event) => this.#press(event));
+    new ResizeObserver(() => this.#draw()).observe(this.#place);
     this.#draw();
   }
 
@@ -44,15 +48,15 @@ export class Target {
     return Math.max(this.points.at(-1)[0], 1);
   }
 
-  #x = (time) => LEFT + ((WIDTH - LEFT - RIGHT) * time) / this.#length;
+  #x = (time) => LEFT + ((this.#width - LEFT - RIGHT) * time) / this.#length;
   #y = (volts) => HEIGHT - BOTTOM - ((HEIGHT - TOP - BOTTOM) * volts) / this.#highest;
 
   /** The point under a pointer, rounded as far as a hand is exact. */
   #at(event) {
     const box = this.#place.getBoundingClientRect();
-    const x = ((event.clientX - box.left) / box.width) * WIDTH;
+    const x = ((event.clientX - box.left) / box.width) * this.#width;
     const y = ((event.clientY - box.top) / box.height) * HEIGHT;
-    const time = (this.#length * (x - LEFT)) / (WIDTH - LEFT - RIGHT);
+    const time = (this.#length * (x - LEFT)) / (this.#width - LEFT - RIGHT);
     const volts = (this.#highest * (HEIGHT - BOTTOM - y)) / (HEIGHT - TOP - BOTTOM);
     const within = (value, most) => Math.min(most, Math.max(0, value));
     return [Math.round(10 * within(time, this.#length)) / 10, Math.round(within(volts, this.#highest))];
@@ -86,7 +90,7 @@ export class Target {
   #replace(stroke, length) {
     const times = stroke.map(([time]) => time);
     const [first, last] = [Math.min(...times), Math.max(...times)];
-    const every = Math.max(APART_S, length / 240);
+    const every = Math.max(APART_S, length / MOST_DRAWN);
     const drawn = [];
     for (const point of [...stroke].sort((a, b) => a[0] - b[0])) {
       if (!drawn.length || point[0] - drawn.at(-1)[0] >= every) drawn.push(point);
@@ -164,15 +168,18 @@ export class Target {
 
   /** Draws all anew; the point that has the keyboard keeps it. */
   #draw() {
+    // As wide as it is shown, so that text and points keep their size.
+    this.#width = Math.max(280, this.#place.clientWidth);
+    this.#place.setAttribute("viewBox", `0 0 ${this.#width} ${HEIGHT}`);
     const focused = this.#place.contains(document.activeElement) ? document.activeElement.dataset.index : undefined;
     const line = byId("linear").checked
       ? this.points.map(([time, volts]) => `${this.#x(time)} ${this.#y(volts)}`).join("L")
       : this.points.map(([time, volts], index) => (index ? `H${this.#x(time)}V${this.#y(volts)}` : `${this.#x(time)} ${this.#y(volts)}`)).join("");
-    const across = ticks({ low: 0, high: this.#length }, 7);
+    const across = ticks({ low: 0, high: this.#length }, this.#width < 500 ? 4 : 8);
     const upwards = ticks({ low: 0, high: this.#highest }, 5);
     const points = this.points.map(([time, volts], index) => {
       const handle = svg("circle", {
-        cx: this.#x(time), cy: this.#y(volts), r: this.points.length > 40 ? 4 : 9, "data-index": index, tabindex: 0, role: "slider",
+        cx: this.#x(time), cy: this.#y(volts), r: this.points.length > 20 ? 5 : 9, "data-index": index, tabindex: 0, role: "slider",
         "aria-label": `Point ${index + 1} of ${this.points.length}`, "aria-valuemin": 0, "aria-valuemax": this.#highest,
         "aria-valuenow": volts, "aria-valuetext": `${volts} volts at ${time} seconds`, fill: "#0072b2",
         onkeydown: (event) => this.#key(event, index),
@@ -185,7 +192,7 @@ export class Target {
         svg("text", { x: this.#x(value), y: HEIGHT - 10, "text-anchor": "middle" }, `${label} s`),
       ]),
       ...upwards.flatMap(({ value, label }) => [
-        svg("path", { d: `M${LEFT} ${this.#y(value)}H${WIDTH - RIGHT}`, stroke: "#cccccc" }),
+        svg("path", { d: `M${LEFT} ${this.#y(value)}H${this.#width - RIGHT}`, stroke: "#cccccc" }),
         svg("text", { x: LEFT - 6, y: this.#y(value) + 5, "text-anchor": "end" }, `${label} V`),
       ]),
       svg("path", { d: `M${line}`, fill: "none", stroke: "#888888", "stroke-width": 2 }),
