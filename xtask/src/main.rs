@@ -16,6 +16,7 @@ mod mutants;
 mod nightly;
 mod package;
 mod page;
+mod prove;
 mod reproducible;
 mod sanitize;
 mod sbom;
@@ -195,6 +196,19 @@ Example:
   cd target/releases/vsj-*/ && sha256sum --check SHA256SUMS"
     )]
     Dist,
+    /// Prove by an SMT solver what holds for every setting, state and input of the plain tick
+    ///
+    /// No overflow, codes and voltages in range, slew kept, the estimator's state within the range: one inductive step over the
+    /// tick in model/proof/tick.py, which is compared with the one in Rust on random settings and targets. Installs the solver
+    /// (z3) in a virtual environment.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Examples:
+  cargo xtask prove
+  cargo xtask prove --verbose --ticks 1000000"
+    )]
+    Prove(prove::Args),
     /// Build the images in two folders and compare every byte
     #[command(after_help = "\
 Examples:
@@ -248,7 +262,7 @@ fn arguments() -> Vec<OsString> {
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
     use Command::{Bench, Boot, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof};
-    use Command::{Manual, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
+    use Command::{Manual, Prove, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -260,6 +274,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Python => package::run(),
         Manual => manual::run(),
         Page(args) => page::run(&args),
+        Prove(args) => prove::run(&args),
         Counts(args) => counts::run(&args),
         Dist => dist::run(),
         Times(args) => times::run(&args),
