@@ -6,7 +6,7 @@ mod test;
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use base64::Engine;
@@ -35,11 +35,22 @@ pub(crate) struct Args {
     test: bool,
 }
 
-/// Builds the page and prints the size of its files, compressed.
+/// Builds the page, and tests it if that is asked for.
 pub(crate) fn run(args: &Args) -> Result<()> {
+    let folder = build()?;
+    if args.test {
+        setup::browser()?;
+        test::run(&folder)?;
+    }
+    Ok(())
+}
+
+/// Builds the page, prints the size of its files, and returns their folder.
+pub(crate) fn build() -> Result<PathBuf> {
     let target = shell::target_directory()?;
-    let line = ["build", "--package", "page", "--lib", "--profile", "page", "--target", WASM];
-    shell::run(shell::cargo().args(line))?;
+    let mut command = shell::cargo();
+    build::without_paths(&mut command, shell::root());
+    shell::run(command.args(["build", "--package", "page", "--lib", "--profile", "page", "--target", WASM]))?;
     let engine = gzip(&build::read(&target.join(WASM).join("page/page.wasm"))?)?;
     let engine = format!("window.vsjEngine = \"{}\";\n", STANDARD.encode(engine));
 
@@ -57,11 +68,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         bail!("the page has {all} bytes, compressed; expected at most {MOST}");
     }
     println!("compressed {all} of at most {MOST} bytes");
-    if args.test {
-        setup::browser()?;
-        test::run(&folder)?;
-    }
-    Ok(())
+    Ok(folder)
 }
 
 /// The page with its style sheets and scripts in it.

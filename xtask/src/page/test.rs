@@ -36,7 +36,7 @@ struct Test {
 /// One test.
 type Check = fn(&mut Test) -> Result<()>;
 
-/// Runs all tests on the page in a folder; pictures of it go to the folder as well.
+/// Runs all tests on the page in a folder; pictures of it go to the folder `page-test` beside it.
 pub(super) fn run(page: &Path) -> Result<()> {
     let vsj = build::vsj()?;
     let folder = env::temp_dir().join(format!("vsj-page-{}", std::process::id()));
@@ -61,7 +61,7 @@ pub(super) fn run(page: &Path) -> Result<()> {
         of(&mut test).with_context(|| name.to_owned())?;
         println!("ok, {:.1} s: {name}", begin.elapsed().as_secs_f64());
     }
-    test.screens(page)?;
+    test.screens(&page.with_file_name("page-test"))?;
     ensure!(test.browser.errors.is_empty(), "errors in the page: {:?}", test.browser.errors);
     fs::remove_dir_all(&test.folder).with_context(|| format!("cannot remove {}", test.folder.display()))
 }
@@ -259,7 +259,8 @@ impl Test {
     }
 
     /// Pictures on a phone and on a wide screen; nothing may be wider than the screen.
-    fn screens(&mut self, page: &Path) -> Result<()> {
+    fn screens(&mut self, pictures: &Path) -> Result<()> {
+        fs::create_dir_all(pictures)?;
         let record = shell::root().join(RECORD);
         self.browser.choose("file", &record)?;
         self.browser.set("effort", "normal")?;
@@ -274,7 +275,7 @@ impl Test {
             self.browser.screen(width, scheme)?;
             std::thread::sleep(Duration::from_millis(500));
             let wide = self.browser.value("document.documentElement.scrollWidth")?;
-            let picture = page.join(format!("{width}-{scheme}.png"));
+            let picture = pictures.join(format!("{width}-{scheme}.png"));
             fs::write(&picture, STANDARD.decode(self.browser.picture()?)?)?;
             println!("{}", picture.display());
             ensure!(wide.as_u64() <= Some(u64::from(width)), "the page is {wide} pixels wide on a screen of {width}");
