@@ -1,5 +1,5 @@
 //! The functions that the worker calls. Requests, files and answers are bytes in this module's memory; the worker has a function
-//! for reports on the way. Names like `free` would be taken for those of the C library.
+//! for reports on the way. Their prefix keeps the names apart from those of the C library, such as `free`.
 
 use std::panic;
 use std::sync::Once;
@@ -46,7 +46,7 @@ extern "C" fn page_call(request: *mut u8, request_length: usize, file: *mut u8, 
 
 /// Takes back memory that [`page_alloc`] or [`page_call`] has given to the worker.
 fn owned(bytes: *mut u8, length: usize) -> Box<[u8]> {
-    // SAFETY: the worker passes an address and a length that it got from `page_alloc` or `page_call`, each once; both made them from a boxed
-    // slice of this length.
+    // SAFETY: the worker passes an address and a length that it got from `page_alloc` or `page_call`, each once; both made them
+    // from a boxed slice of this length.
     unsafe { Box::from_raw(std::ptr::slice_from_raw_parts_mut(bytes, length)) }
 }

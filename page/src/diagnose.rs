@@ -27,9 +27,6 @@ pub struct Records {
     /// Column of the reading and its unit.
     #[serde(default)]
     pub reading: String,
-    /// Column of a reading that is the stiffness in V.
-    #[serde(default)]
-    pub column: String,
     /// `hold`, `linear` or `stair`.
     pub input: String,
     /// Whether rows are ordered by time.
@@ -66,14 +63,11 @@ struct Read {
 impl Records {
     fn read(&self, file: &[u8]) -> Result<Read> {
         let given = |text: &String| (!text.is_empty()).then(|| text.clone());
-        if !self.reading.is_empty() && !self.column.is_empty() {
-            bad_input!("--column and --reading: both name the reading; expected one of them");
-        }
         let columns = ColumnNames {
             time: given(&self.time),
             voltage: given(&self.voltage),
             reading: given(&self.reading),
-            stiffness: given(&self.column),
+            ..ColumnNames::default()
         };
         let format = Format { columns, sort: self.sort, ..Format::default() };
         let input = self.input.parse()?;
@@ -88,7 +82,8 @@ impl Read {
         ::identify::identify(std::slice::from_ref(&self.measured.record), self.input, &self.measured.units)
     }
 
-    /// The answer without curves; those are over the time, and `voltage_v` and the times are in SI units.
+    /// The answer to be shown: the command's JSON, the spring, and curves over the times; `time_s` and `voltage_v` are in SI units,
+    /// the values of `more` in the reading's unit.
     fn shown(
         self,
         json: String,

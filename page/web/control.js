@@ -22,7 +22,6 @@ export class ControlPanel {
     const form = byId("control");
     form.addEventListener("submit", (event) => event.preventDefault());
     form.addEventListener("input", () => this.#later());
-    form.addEventListener("reset", () => setTimeout(() => this.#later()));
     byId("save-target").addEventListener("click", () => save("target.csv", this.#target.csv(), "text/csv"));
     byId("save-stair").addEventListener("click", () => save("stair.json", byId("stair-json").textContent, "application/json"));
     byId("save-record").addEventListener("click", () => save("record.csv", this.#hidden.csv, "text/csv"));
@@ -72,7 +71,7 @@ export class ControlPanel {
     byId("braking").hidden = controller !== "fast";
     byId("record-settings").hidden = byId("effect").value === "";
     this.#target.highest = Number(byId("limit").value);
-    this.#target.redraw();
+    this.#target.draw();
   }
 
   /** Computes the settings; while that runs, further changes wait for its end. */
@@ -124,15 +123,15 @@ export class ControlPanel {
     ];
     const hidden = this.#hidden;
     if (hidden) series.push({ name: "true, with the effect", colour: COLOUR.reading, curve: hidden.stiffness });
-    const axes = { x: "time [s]" };
+    const x = "time [s]";
     show(byId("stiffness"), {
-      title: "Stiffness", y: "stiffness [V]", ...axes, series,
+      title: "Stiffness", y: "stiffness [V]", x, series,
       areas: { name: "out of reach of any controller", of: bounds(answer.steps, run.changes) },
     });
     const [low, high] = run.range_v;
     const ends = (value) => ({ x: [run.target.x[0], run.target.x.at(-1)], y: [value, value] });
     show(byId("voltage"), {
-      title: "Voltage", y: "voltage [V]", ...axes,
+      title: "Voltage", y: "voltage [V]", x,
       series: [
         { name: "target", colour: COLOUR.target, curve: run.target, dashed: true },
         { name: "across the spring", colour: COLOUR.after, curve: run.applied },
@@ -169,8 +168,8 @@ function steps({ steps, bound_from }) {
     decimals(step.overshoot_percent, 2),
     decimals(step.peak_v, 1),
   ]);
-  const caption = `Time to complete each change. The bound is that of 97 % for any controller, from a spring that ${bound_from === "settled" ? "has settled" : "is as this loop has left it"}.`;
-  return table(names, rows, caption);
+  const start = bound_from === "settled" ? "has settled" : "is as this loop has left it";
+  return table(names, rows, `Time to complete each change. The bound is that of 97 % for any controller, from a spring that ${start}.`);
 }
 
 function summary({ steps, max_fixed_point_error, limited_ticks }, remarks) {

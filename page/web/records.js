@@ -118,8 +118,8 @@ export class RecordPanel {
     byId("answer").replaceChildren(...parts, ...remarks.map((remark) => html("p", { class: "small" }, remark)));
     byId("found").hidden = false;
     draw(Object.fromEntries(curves), units, Boolean(report.findings?.length));
-    byId("record-status").textContent =
-      command === "diagnose" ? sentence(report) : `Identified from ${report.rows} rows: held-out error ${digits(report.held_out_rmse)} ${report.unit}.`;
+    const identified = `Identified from ${report.rows} rows: held-out error ${digits(report.held_out_rmse)} ${report.unit}.`;
+    byId("record-status").textContent = command === "diagnose" ? sentence(report) : identified;
   }
 }
 
@@ -153,14 +153,16 @@ function sizes(parameters) {
 function sentence({ verdict, findings, baseline, extended }) {
   if (!findings.length) return `Verdict: ${verdict}. No cause was found; held-out error ${digits(baseline.held_out_rmse)}.`;
   const [before, after] = [baseline, extended].map(({ held_out_rmse }) => digits(held_out_rmse));
-  return `Verdict: ${verdict}, ${findings.map(({ cause }) => cause).join(", ")}. The held-out error goes from ${before} to ${after}, by ${digits(100 * extended.gain, 3)} %.`;
+  const causes = findings.map(({ cause }) => cause).join(", ");
+  return `Verdict: ${verdict}, ${causes}. The held-out error goes from ${before} to ${after}, by ${digits(100 * extended.gain, 3)} %.`;
 }
 
 function diagnosis(report) {
   const { findings, suspects, alternatives, next_experiment, leftover } = report;
   const parts = [];
   if (findings.length) {
-    parts.push(table(["cause", "probability", "size [95 % interval]", "error before", "after"], findings.map(causeRow), "Causes, by the error that they explain"));
+    const names = ["cause", "probability", "size [95 % interval]", "error before", "after"];
+    parts.push(table(names, findings.map(causeRow), "Causes, by the error that they explain"));
     parts.push(...findings.map(({ cause, evidence }) => html("p", { class: "small" }, `${cause}: ${evidence}.`)));
   }
   if (suspects.length) {
@@ -184,6 +186,7 @@ function causeRow({ cause, probability, parameters, rmse_before, rmse_after }) {
 function identification({ nominal }) {
   const listed = Object.entries(nominal).flatMap(([name, value]) =>
     Array.isArray(value) ? value.map((of, index) => [`${name} ${index + 1}`, of]) : [[name, value]]);
-  const rows = listed.filter(([, value]) => value?.value != null).map(([name, value]) => [{ text: name, class: "cause" }, { text: size(value), class: "" }]);
+  const known = listed.filter(([, value]) => value?.value != null);
+  const rows = known.map(([name, value]) => [{ text: name, class: "cause" }, { text: size(value), class: "" }]);
   return [table(["quantity", "value [95 % interval]"], rows, "The spring that the record shows")];
 }

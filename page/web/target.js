@@ -28,8 +28,8 @@ export class Target {
     this.#changed = changed;
     this.#text.addEventListener("change", () => this.#read());
     this.#place.addEventListener("pointerdown", (event) => this.#press(event));
-    new ResizeObserver(() => this.#draw()).observe(this.#place);
-    this.#draw();
+    new ResizeObserver(() => this.draw()).observe(this.#place);
+    this.#show();
   }
 
   /** The target as the CSV that `vsj stair --input` reads. */
@@ -41,7 +41,7 @@ export class Target {
   set highest(volts) {
     if (volts === this.#highest || !(volts > 0)) return;
     this.#highest = volts;
-    this.#draw();
+    this.draw();
   }
 
   get #length() {
@@ -101,7 +101,7 @@ export class Target {
     });
     this.points = [...outside, ...drawn].sort((a, b) => a[0] - b[0]);
     if (this.points[0][0] > 0) this.points.unshift([0, 0]);
-    this.#draw();
+    this.#show();
   }
 
   /** Moves a point, between its neighbours; the first one stays at 0 s. */
@@ -110,14 +110,14 @@ export class Target {
     const after = this.points[index + 1]?.[0] ?? 600;
     const at = index === 0 ? 0 : Math.min(Math.max(time, before + APART_S), after - APART_S);
     this.points[index] = [Math.round(10 * at) / 10, Math.round(Math.min(this.#highest, Math.max(0, volts)))];
-    this.#draw();
+    this.#show();
   }
 
   #add(time, volts) {
     if (this.points.some(([at]) => Math.abs(at - time) < APART_S)) return;
     this.points.push([time, volts]);
     this.points.sort((a, b) => a[0] - b[0]);
-    this.#draw();
+    this.#show();
     this.#focus(this.points.findIndex(([at]) => at === time));
   }
 
@@ -139,7 +139,7 @@ export class Target {
       this.#add(Math.round(5 * (time + next)) / 10, Math.round((volts + level) / 2));
     } else if (event.key === "Delete" && this.points.length > 2 && index > 0) {
       this.points.splice(index, 1);
-      this.#draw();
+      this.#show();
       this.#focus(Math.min(index, this.points.length - 1));
     } else {
       return;
@@ -162,12 +162,18 @@ export class Target {
     this.#text.setCustomValidity(message);
     if (!this.#text.reportValidity()) return;
     this.points = points.map(([time, volts]) => [time, volts]);
-    this.#draw();
+    this.#show();
     this.#changed();
   }
 
+  /** Shows changed points, as a drawing and as text. */
+  #show() {
+    this.#text.value = this.points.map((point) => point.join(" ")).join("\n");
+    this.draw();
+  }
+
   /** Draws all anew; the point that has the keyboard keeps it. */
-  #draw() {
+  draw() {
     // As wide as it is shown, so that text and points keep their size.
     this.#width = Math.max(280, this.#place.clientWidth);
     this.#place.setAttribute("viewBox", `0 0 ${this.#width} ${HEIGHT}`);
@@ -178,13 +184,12 @@ export class Target {
     const across = ticks({ low: 0, high: this.#length }, this.#width < 500 ? 4 : 8);
     const upwards = ticks({ low: 0, high: this.#highest }, 5);
     const points = this.points.map(([time, volts], index) => {
-      const handle = svg("circle", {
+      return svg("circle", {
         cx: this.#x(time), cy: this.#y(volts), r: this.points.length > 20 ? 5 : 9, "data-index": index, tabindex: 0, role: "slider",
         "aria-label": `Point ${index + 1} of ${this.points.length}`, "aria-valuemin": 0, "aria-valuemax": this.#highest,
         "aria-valuenow": volts, "aria-valuetext": `${volts} volts at ${time} seconds`, fill: "#0072b2",
         onkeydown: (event) => this.#key(event, index),
       });
-      return handle;
     });
     this.#place.replaceChildren(
       ...across.flatMap(({ value, label }) => [
@@ -198,12 +203,6 @@ export class Target {
       svg("path", { d: `M${line}`, fill: "none", stroke: "#888888", "stroke-width": 2 }),
       ...points,
     );
-    this.#text.value = this.points.map((point) => point.join(" ")).join("\n");
     if (focused !== undefined) this.#focus(focused);
-  }
-
-  /** Draws again, after a setting of the line has changed. */
-  redraw() {
-    this.#draw();
   }
 }

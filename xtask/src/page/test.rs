@@ -126,7 +126,10 @@ impl Test {
     fn drawn(&mut self) -> Result<()> {
         self.browser.set("target", "drawn")?;
         self.control()?;
+        self.browser.set("points", "0 0\n5 300\n20,100\n 35 450\n60 450\n")?;
+        self.control()?;
         let before = self.points()?;
+        ensure!(before == [[0.0, 0.0], [5.0, 300.0], [20.0, 100.0], [35.0, 450.0], [60.0, 450.0]], "typed: {before:?}");
         self.browser.drag("#drawing [data-index='1']", [20.0, 30.0])?;
         let moved = self.points()?;
         ensure!(moved[1][0] > before[1][0] && moved[1][1] < before[1][1], "not moved: {moved:?}");
