@@ -132,9 +132,9 @@ Examples:
     /// there.
     #[command(verbatim_doc_comment)]
     Manual,
-    /// Build the page to try the product in a browser, in target/page
+    /// Build the page to try the product in a browser, in target/site
     ///
-    /// WebAssembly of the controller and the diagnosis, inlined, so that target/page/index.html also opens from a disk. Fails if the
+    /// WebAssembly of the controller and the diagnosis, inlined, so that target/site/index.html also opens from a disk. Fails if the
     /// page is larger than 2 MB, compressed.
     #[command(
         verbatim_doc_comment,
@@ -186,8 +186,8 @@ Examples:
     /// Pack a release: vsj, images, documents, licences, checksums
     ///
     /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the images of
-    /// both boards for each controller and amplifier with their bills of materials, the documents, the changes of this version,
-    /// the licences of all dependencies, SHA256SUMS.
+    /// both boards for each controller and amplifier with their bills of materials, the manual, the page for a browser, the changes of
+    /// this version, the licences of all dependencies, SHA256SUMS.
     #[command(
         verbatim_doc_comment,
         after_help = "\

@@ -24,6 +24,8 @@ const WEB: &str = "page/web";
 /// Style sheets in their order: those of the report pages and plots, then the page's own.
 const STYLES: [&str; 3] =
     ["host-sim/src/output/page/page.css", "host-sim/src/output/chart/plot.css", "page/web/page.css"];
+/// Folder of the page below the target directory; `page` is that of the profile.
+const FOLDER: &str = "site";
 /// Largest size of the page, compressed, in bytes.
 const MOST: usize = 2_000_000;
 
@@ -47,6 +49,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Builds the page, prints the size of its files, and returns their folder.
 pub(crate) fn build() -> Result<PathBuf> {
+    setup::target(WASM)?;
     let target = shell::target_directory()?;
     let mut command = shell::cargo();
     build::without_paths(&mut command, shell::root());
@@ -54,7 +57,7 @@ pub(crate) fn build() -> Result<PathBuf> {
     let engine = gzip(&build::read(&target.join(WASM).join("page/page.wasm"))?)?;
     let engine = format!("window.vsjEngine = \"{}\";\n", STANDARD.encode(engine));
 
-    let folder = target.join("page");
+    let folder = target.join(FOLDER);
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut all = 0;
     for (name, text) in [("index.html", index()?), ("engine.js", engine)] {

@@ -21,6 +21,11 @@ pub fn run() -> Result<()> {
     emulator()
 }
 
+/// Has rustup add a target to the pinned toolchain unless it is there.
+pub fn target(name: &str) -> Result<()> {
+    toolchain::add_target(name)
+}
+
 /// Installs QEMU with apt-get unless it starts.
 pub fn emulator() -> Result<()> {
     program(QEMU)
