@@ -1,8 +1,8 @@
 //! `cargo xtask dist`: the files of a release.
 //!
 //! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the
-//! images of both boards for each controller and amplifier, the manual, the page for a browser, this version's changes, the licences of all
-//! dependencies, and the SHA-256 of every file.
+//! images of both boards for each controller and amplifier, the manual, the page for a browser, this version's changes, the
+//! licences of all dependencies, and the SHA-256 of every file.
 
 mod licences;
 
