@@ -67,6 +67,7 @@ pub mod error;
 pub mod estimator;
 pub mod extended;
 pub mod feedback;
+pub mod isolation;
 pub mod pre_compensator;
 pub mod stiffness;
 pub mod supervisor;

@@ -24,6 +24,7 @@ pub mod comparison;
 pub mod csv_table;
 pub mod experiment;
 pub mod has_reference;
+pub mod isolation;
 pub mod open_loop;
 pub mod plant_file;
 pub mod record;
