@@ -17,6 +17,7 @@ pub struct Bank {
     /// Number of blocks since the sums were restarted.
     pub age: u32,
     rate_hz: f64,
+    since_decision: u32,
     last: ([f64; VECTORS], f64),
     upward: [f64; SMALLEST.len()],
     downward: [f64; SMALLEST.len()],
@@ -88,6 +89,7 @@ impl Bank {
             settings,
             ticks,
             rate_hz,
+            since_decision: 0,
             block_s,
             sigma_v,
             correlation,
@@ -273,7 +275,9 @@ impl Bank {
                 self.verdict = Verdict::Alarm;
             }
         }
-        if self.alarmed && self.blocks.is_multiple_of(bank::ROUND) {
+        self.since_decision += 1;
+        if self.alarmed && self.since_decision >= bank::ROUND {
+            self.since_decision = 0;
             self.decide();
         }
         if self.blocks == MOST_BLOCKS {
@@ -300,6 +304,7 @@ impl Bank {
     fn restart(&mut self) {
         self.products.iter_mut().flatten().flatten().for_each(|sum| *sum = 0.0);
         self.blocks = 0;
+        self.since_decision = 0;
         self.age = 0;
         self.filters.nuisances = [256.0; 3];
         self.released = (false, false);
@@ -326,7 +331,7 @@ impl Bank {
             }
         }
         best.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let (cause, least, size) = best[0];
+        let (cause, least, _) = best[0];
         let total = (self.none - n).max(0.0);
         let tolerated = thresholds::NOISE_SIGMAS as f64 * (2.0 * n).sqrt() + total / f64::from(1 << thresholds::MODEL_ERROR_BITS);
         // A rival is excluded if it leaves more than its linear signature can be wrong by, and much more than the best.
@@ -340,7 +345,9 @@ impl Bank {
         } else {
             self.among(cause, &rivals)
         };
-        self.size = size;
+        if let Verdict::Named(cause) | Verdict::Ambiguous(cause, _) = says {
+            self.size = best.iter().find(|known| known.0 == cause).map_or((0.0, 0.0), |known| known.2);
+        }
         if says == self.proposed {
             self.verdict = says;
         }

@@ -39,6 +39,26 @@ pub enum Cause {
 }
 
 impl Cause {
+    /// All causes, in the order of their numbers.
+    pub const ALL: [Self; 16] = [
+        Self::GainError,
+        Self::InstantaneousShare,
+        Self::TimeConstant,
+        Self::VoltageDependentTimeConstant,
+        Self::SecondRelaxation,
+        Self::ChargeLeakage,
+        Self::Hysteresis,
+        Self::StaticNonlinearity,
+        Self::AmplifierLimit,
+        Self::AmplifierSlew,
+        Self::Delay,
+        Self::SeriesLag,
+        Self::ReadingOffset,
+        Self::Drift,
+        Self::SensorSaturation,
+        Self::StuckSensor,
+    ];
+
     /// Returns the cause code, as in the findings of `vsj diagnose`; `stuck-sensor` has none there.
     pub const fn name(self) -> &'static str {
         match self {
