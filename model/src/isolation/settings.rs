@@ -33,7 +33,7 @@ impl Settings {
         interval_s: 1e-3,
         noise_correlation_s: 0.0,
         range_v: 700.0,
-        alarm_nats: 22.0,
+        alarm_nats: 20.0,
         margin_nats: 10.0,
     };
 }
