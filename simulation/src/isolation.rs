@@ -24,11 +24,13 @@ pub struct Bank {
     energy: f64,
     products: Vec<Vec<Vec<f64>>>,
     released: (bool, bool),
+    pinned_at: Option<f64>,
     /// Number of blocks in the sums.
     pub blocks: u32,
     /// True after a sequential test has exceeded its threshold.
     pub alarmed: bool,
     proposed: Verdict,
+    agreed: u8,
     /// The last decision that two rounds in a row agree on.
     pub verdict: Verdict,
     /// Size of the best hypothesis and its standard deviation.
@@ -102,9 +104,11 @@ impl Bank {
             energy: 0.0,
             products: HYPOTHESES.iter().map(|h| vec![vec![0.0; h.vectors.len() + 1]; h.vectors.len() + 1]).collect(),
             released: (false, false),
+            pinned_at: None,
             blocks: 0,
             alarmed: false,
             proposed: Verdict::Quiet,
+            agreed: 0,
             verdict: Verdict::Quiet,
             size: (0.0, 0.0),
             fits: vec![(0.0, 0.0); HYPOTHESES.len()],
@@ -155,7 +159,10 @@ impl Bank {
             return;
         }
         let residual = sums.residual / f64::from(sums.readings);
-        let pinned = sums.readings >= 4 && 4 * sums.identical >= 3 * sums.readings;
+        let mut pinned = sums.readings >= 4 && 4 * sums.identical >= 3 * sums.readings;
+        if pinned {
+            pinned = *self.pinned_at.get_or_insert(sums.last_reading) == sums.last_reading;
+        }
         self.update(vectors, residual, pinned);
     }
 
@@ -308,6 +315,7 @@ impl Bank {
         self.age = 0;
         self.filters.nuisances = [256.0; 3];
         self.released = (false, false);
+        self.pinned_at = None;
     }
 
     fn decide(&mut self) {
@@ -348,7 +356,8 @@ impl Bank {
         if let Verdict::Named(cause) | Verdict::Ambiguous(cause, _) = says {
             self.size = best.iter().find(|known| known.0 == cause).map_or((0.0, 0.0), |known| known.2);
         }
-        if says == self.proposed {
+        self.agreed = if says == self.proposed { self.agreed.saturating_add(1) } else { 1 };
+        if self.agreed >= thresholds::AGREED {
             self.verdict = says;
         }
         self.proposed = says;

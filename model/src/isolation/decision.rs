@@ -68,6 +68,7 @@ pub(super) struct Decision {
     bar: i64,
     rivals: u32,
     proposed: Verdict,
+    agreed: u8,
     pub(super) verdict: Verdict,
     pub(super) size: Size,
     /// Number of decisions made.
@@ -99,6 +100,7 @@ impl Default for Decision {
             bar: 0,
             rivals: 0,
             proposed: Verdict::Quiet,
+            agreed: 0,
             verdict: Verdict::Quiet,
             size: Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 },
             rounds: 0,
@@ -314,7 +316,8 @@ impl Decision {
         } else {
             self.among(released)
         };
-        if says == self.proposed {
+        self.agreed = if says == self.proposed { self.agreed.saturating_add(1) } else { 1 };
+        if self.agreed >= thresholds::AGREED {
             self.verdict = says;
         }
         self.proposed = says;

@@ -171,6 +171,7 @@ pub struct State {
     age: u32,
     since_decision: u32,
     pinned: bool,
+    pinned_at: Option<i32>,
     released: bool,
 }
 
@@ -193,6 +194,7 @@ impl Default for State {
             age: 0,
             since_decision: 0,
             pinned: false,
+            pinned_at: None,
             released: false,
         }
     }
@@ -214,6 +216,10 @@ impl Config {
         state.sums.add(self, applied, model, reading.map(|reading| reading.0));
         if step + 1 == self.ticks {
             state.means = state.sums.finish(self);
+            // A sensor that rounds coarsely repeats readings at many values; one that is stuck or saturated, at one.
+            if state.means.pinned {
+                state.means.pinned = *state.pinned_at.get_or_insert(state.means.last_reading) == state.means.last_reading;
+            }
             state.working = true;
         } else if state.working {
             self.work(state, step);
@@ -304,7 +310,7 @@ impl State {
     fn restart(&mut self) {
         self.filters.restart();
         (self.blocks, self.age, self.since_decision) = (0, 0, 0);
-        (self.pinned, self.released) = (false, false);
+        (self.pinned, self.pinned_at, self.released) = (false, None, false);
     }
 
     /// Ends an alarm: the bank looks for a fault anew, and one that lasts is found again.

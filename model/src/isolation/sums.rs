@@ -39,6 +39,7 @@ pub(super) struct Means {
     pub(super) residual: i32,
     /// True if there were enough readings.
     pub(super) usable: bool,
+    pub(super) last_reading: i32,
     /// True if three quarters of the readings equal the one before.
     pub(super) pinned: bool,
 }
@@ -90,6 +91,7 @@ impl Sums {
             end: self.last_model,
             residual: self.residual.checked_div(i64::from(self.readings)).unwrap_or(0) as i32,
             usable: self.readings >= config.fewest,
+            last_reading: self.last_reading,
             pinned: self.readings >= 4 && 4 * self.identical >= 3 * self.readings,
         };
         let Self { slewed, last_voltage, last_model, last_reading, .. } = *self;
