@@ -71,6 +71,20 @@ pub enum Verdict {
     Unknown,
 }
 
+impl Verdict {
+    /// Returns a number for frames and logs: the state in the upper byte (quiet 0, alarm 1, unknown 2, named 3, ambiguous 4), then the
+    /// numbers of the two causes, four bits each, as their places in [`Cause::ALL`].
+    pub const fn code(self) -> u16 {
+        match self {
+            Self::Quiet => 0,
+            Self::Alarm => 1 << 8,
+            Self::Unknown => 2 << 8,
+            Self::Named(cause) => 3 << 8 | cause as u16,
+            Self::Ambiguous(cause, other) => 4 << 8 | (other as u16) << 4 | cause as u16,
+        }
+    }
+}
+
 /// The bank for one spring, sensor and sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
