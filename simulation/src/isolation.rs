@@ -124,7 +124,9 @@ impl Bank {
         sums.last_voltage = voltage;
         sums.voltage += voltage;
         sums.model += model;
-        sums.jumps += change * change.abs();
+        if change.abs() > SMOOTH_V {
+            sums.jumps += change * change.abs();
+        }
         sums.last_model = model;
         let left = self.ticks - sums.ticks;
         for (tail, part) in sums.tails.iter_mut().zip([4, 2]) {
@@ -132,9 +134,12 @@ impl Bank {
         }
         for (i, slewed) in sums.slewed.iter_mut().enumerate() {
             let rate = SLEW_RATES[i] * self.settings.range_v / self.settings.plant.time_constant_s;
-            let reach = rate * self.block_s / f64::from(self.ticks);
+            if sums.ticks % SLEW_TICKS != i as u32 {
+                continue;
+            }
+            let reach = rate * self.block_s / f64::from(self.ticks) * f64::from(SLEW_TICKS);
             *slewed += (voltage - *slewed).clamp(-reach, reach);
-            sums.lags[i] += *slewed - voltage;
+            sums.lags[i] += (*slewed - voltage) * f64::from(SLEW_TICKS);
         }
         if let Some(reading) = reading {
             sums.residual += reading - model;

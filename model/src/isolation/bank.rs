@@ -105,7 +105,7 @@ pub const LAG_MIDDLE: usize = 42;
 pub const LAG_LONGER: usize = 43;
 /// 1 V.
 pub const OFFSET: usize = 44;
-/// `y k / 4096`, `k` the number of blocks since the sums were restarted, at most 4096.
+/// `y k / 2048`, `k` the number of blocks since the sums were restarted, at most 2048.
 pub const DRIFT: usize = 45;
 /// The residual where the readings are identical and below the model; otherwise 0.
 pub const PINNED_BELOW: usize = 46;
@@ -119,7 +119,7 @@ pub const LIMITS: [f64; 3] = [0.45, 0.65, 0.85];
 /// Slew rates, in ranges per time constant of the spring.
 pub const SLEW_RATES: [f64; 3] = [16.0, 5.0, 1.6];
 /// Time constants of the lags in series, as fractions of the spring's.
-pub const LAG_TAUS: [f64; 3] = [0.03, 0.1, 0.35];
+pub const LAG_TAUS: [f64; 3] = [0.04, 0.12, 0.35];
 /// Time constants of the slow vectors, as multiples of the spring's.
 pub const SLOW_TAUS: [f64; 2] = [3.0, 10.0];
 
@@ -187,24 +187,29 @@ pub const SMALLEST: [(usize, f64); 11] = [
     (PLAY_SECOND, 0.006),
     (LAW, 0.004),
     (LIMIT, 0.015),
-    (SLEW, 2.0),
-    (DELAY, 0.05),
+    (SLEW, 1.0),
+    (DELAY, 0.025),
     (OFFSET, 1.0),
 ];
 
 /// Number of blocks from one decision to the next.
-pub const ROUND: u32 = 32;
+pub const ROUND: u32 = 16;
 /// Smallest number of readings of a block, as a fraction of the expected number in 256ths; a block with fewer is left out.
 pub const FEWEST: u32 = 192;
 /// Largest fraction of a distance that a low-pass covers in one block: shorter time constants count as this one.
 pub const FASTEST: f64 = 0.499;
 /// Largest number of blocks in the sums; they are halved when it is reached.
-pub const MOST_BLOCKS: u32 = 4096;
+pub const MOST_BLOCKS: u32 = 2048;
 
-/// Returns the number of ticks of a block: 64 or a larger power of two, at least 50 ms.
+/// Changes of the voltage in one tick that are no jump, in V.
+pub const SMOOTH_V: f64 = 1.0;
+/// Number of ticks from one step of a slewed voltage to the next.
+pub const SLEW_TICKS: u32 = 4;
+
+/// Returns the number of ticks of a block: 128 or a larger power of two, at least 100 ms.
 pub const fn block_ticks(rate_hz: f64) -> u32 {
-    let mut ticks = 64;
-    while (ticks as f64) < 0.05 * rate_hz {
+    let mut ticks = 128;
+    while (ticks as f64) < 0.1 * rate_hz {
         ticks *= 2;
     }
     ticks

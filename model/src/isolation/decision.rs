@@ -9,7 +9,7 @@ use super::{CAUSES, Cause, Config, Verdict, thresholds};
 use crate::units::saturated_to_32;
 
 /// Elements of the matrix that one tick eliminates.
-const EACH: u32 = 3;
+const EACH: u32 = 2;
 /// Bits of the scaled diagonal.
 const BITS: u32 = 29;
 

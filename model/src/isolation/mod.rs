@@ -51,9 +51,9 @@ const SLOTS: usize = 64;
 /// Number of causes.
 const CAUSES: usize = Cause::ALL.len();
 /// Number of vectors that one tick whitens.
-const WHITENED: u32 = 8;
-/// Largest whitened value, in standard deviations with 10 fraction bits: 4096 products of two of them fit 64 bits.
-const LARGEST: i32 = 1 << 24;
+const WHITENED: u32 = 3;
+/// Largest whitened value, in standard deviations with 10 fraction bits: the products of two of them in all blocks fit 64 bits.
+const LARGEST: i32 = (1 << 24) - 1;
 
 /// What the bank says of the spring and its sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -90,6 +90,9 @@ impl Verdict {
 pub struct Config {
     ticks: u32,
     shift: u32,
+    slew_shift: u32,
+    half: u32,
+    three_quarters: u32,
     fewest: u32,
     reach: [i32; 3],
     share: Gain,
@@ -108,8 +111,9 @@ pub struct Config {
     jump: WideGain,
     per_slew: [WideGain; 3],
     per_lag: [WideGain; 3],
-    whitening: WideGain,
-    correlation: Gain,
+    /// With 31 fraction bits.
+    whitening: i32,
+    correlation: Option<Gain>,
     pinned_below: i32,
     smallest: [i32; bank::SMALLEST.len()],
     bounds: [(i32, i32); bank::HYPOTHESES.len()],
@@ -134,8 +138,11 @@ impl Validated<'_, Settings> {
         Config {
             ticks,
             shift: ticks.trailing_zeros(),
+            slew_shift: ticks.trailing_zeros() - bank::SLEW_TICKS.trailing_zeros(),
+            half: ticks / 2,
+            three_quarters: ticks / 4 * 3,
             fewest: ((block_s / settings.interval_s) as u32 * bank::FEWEST).div_ceil(256).max(1),
-            reach: bank::SLEW_RATES.map(|rate| signal(rate * range / tau * sample_time.seconds()).to_bits()),
+            reach: bank::SLEW_RATES.map(|rate| signal(rate * range / tau * sample_time.seconds() * f64::from(bank::SLEW_TICKS)).to_bits()),
             share: Gain::new(share),
             rest: Gain::new(1.0 - share),
             share_over_rest: Weight::new(share / (1.0 - share)),
@@ -153,8 +160,8 @@ impl Validated<'_, Settings> {
             jump: WideGain::new(1024.0 / (2.0 * range)),
             per_slew: bank::SLEW_RATES.map(|rate| WideGain::new(rate * block_s / tau)),
             per_lag: bank::LAG_TAUS.map(|times| WideGain::new(block_s / (times * tau))),
-            whitening: WideGain::new(1.0 / (1024.0 * whitened_v)),
-            correlation: Gain::new(correlation),
+            whitening: bits(1.0 / (1024.0 * whitened_v), 31),
+            correlation: (correlation > 0.0).then(|| Gain::new(correlation)),
             pinned_below: signal(-3.0 * sigma_v).to_bits(),
             smallest: bank::SMALLEST.map(|(_, size)| bits(size, 28)),
             bounds: bank::HYPOTHESES.map(|hypothesis| (bits(hypothesis.lowest, 16), bits(hypothesis.highest, 16))),
@@ -219,7 +226,7 @@ const WHITEN: u32 = signatures::STEPS;
 const TEST: u32 = WHITEN + (bank::VECTORS as u32 + 1).div_ceil(WHITENED);
 const ADD: u32 = TEST + sequential::STEPS;
 const DECIDE: u32 = ADD + products::STEPS;
-const _: () = assert!(DECIDE < 60 && bank::VECTORS < SLOTS, "a block of 64 ticks leaves time for the decision");
+const _: () = assert!(DECIDE < 116 && bank::VECTORS < SLOTS, "a block of 128 ticks leaves time for the decision");
 
 impl Config {
     /// Advances the bank by one tick: applied voltage, the model's stiffness just after it was applied without the sensor's
@@ -270,9 +277,10 @@ impl Config {
         state.vectors[bank::VECTORS] = state.means.residual;
         let slots = state.vectors.iter().zip(&mut state.last).zip(&mut state.whitened);
         for ((new, last), whitened) in slots.skip(first as usize).take(WHITENED as usize) {
-            let predicted = self.correlation.times(Signal::from_bits(*last)).to_bits();
-            let value = sums::times(self.whitening, new.saturating_sub(predicted));
-            *whitened = value.max(-LARGEST).min(LARGEST);
+            let predicted = self.correlation.map_or(0, |gain| gain.times(Signal::from_bits(*last)).to_bits());
+            let difference = new.saturating_sub(predicted);
+            let value = ((i64::from(difference) * i64::from(self.whitening)) >> 31) as i32;
+            *whitened = value.max(-LARGEST - 1).min(LARGEST);
             *last = *new;
         }
     }

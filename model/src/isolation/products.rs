@@ -4,7 +4,7 @@ use super::SLOTS;
 use super::bank::{HYPOTHESES, VECTORS};
 
 /// Number of products that one tick adds.
-const EACH: usize = 12;
+const EACH: usize = 5;
 /// Number of products of all hypotheses.
 pub(super) const PRODUCTS: usize = count();
 /// Number of ticks that the products of a block take.
@@ -77,18 +77,19 @@ impl Products {
     #[inline(never)]
     pub(super) fn step(&mut self, step: u32, mode: Mode, whitened: &[i32; SLOTS]) {
         let first = step as usize * EACH;
-        let entries = self.sums.iter_mut().zip(&mut self.copy).zip(&PAIRS);
-        for ((sum, copy), (i, j)) in entries.skip(first).take(EACH) {
+        let (Some(sums), Some(pairs)) = (self.sums.get_mut(first..), PAIRS.get(first..)) else { return };
+        for (sum, (i, j)) in sums.iter_mut().zip(pairs).take(EACH) {
             let (i, j) = (usize::from(*i) & (SLOTS - 1), usize::from(*j) & (SLOTS - 1));
-            let product = i64::from(whitened[i]) * i64::from(whitened[j]);
-            let mut new = if mode.fresh { product } else { *sum + product };
-            if mode.copy {
-                *copy = new;
-            }
-            if mode.halve {
-                new >>= 1;
-            }
-            *sum = new;
+            let before = if mode.fresh { 0 } else { *sum };
+            *sum = before + i64::from(whitened[i]) * i64::from(whitened[j]);
+        }
+        if mode.copy
+            && let Some(copy) = self.copy.get_mut(first..)
+        {
+            copy.iter_mut().zip(&*sums).take(EACH).for_each(|(copy, sum)| *copy = *sum);
+        }
+        if mode.halve {
+            sums.iter_mut().take(EACH).for_each(|sum| *sum >>= 1);
         }
     }
 }

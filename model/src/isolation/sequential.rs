@@ -10,7 +10,7 @@ use super::{Config, SLOTS, thresholds};
 use crate::units::saturated_to_32;
 
 /// Number of ticks that the tests of a block take.
-pub(super) const STEPS: u32 = 6;
+pub(super) const STEPS: u32 = SMALLEST.len() as u32;
 
 const ONE: f64 = 1_048_576.0;
 /// Least that one block adds, in nats with 20 fraction bits.
@@ -36,7 +36,7 @@ fn added(statistic: i32, nats: i64) -> i32 {
 }
 
 impl Tests {
-    /// Advances two tests; the whitened values have 10 fraction bits.
+    /// Advances one test; the whitened values have 10 fraction bits.
     #[inline(never)]
     pub(super) fn step(&mut self, config: &Config, step: u32, whitened: &[i32; SLOTS]) {
         let innovation = i64::from(whitened[VECTORS]);
@@ -44,13 +44,11 @@ impl Tests {
             self.energy = added(self.energy, ((3 * innovation * innovation) >> 3) - LN_2);
             self.highest = self.energy;
         }
-        let first = 2 * step as usize;
         let tests = self.upward.iter_mut().zip(&mut self.downward).zip(SMALLEST.iter().zip(&config.smallest));
-        for ((upward, downward), ((vector, _), smallest)) in tests.skip(first).take(2) {
+        for ((upward, downward), ((vector, _), smallest)) in tests.skip(step as usize).take(1) {
             // 16 fraction bits.
-            let shift = i64::from(saturated_to_32(
-                (i64::from(whitened[vector & (SLOTS - 1)]) * i64::from(*smallest)) >> 22,
-            ));
+            let product = i64::from(whitened[vector & (SLOTS - 1)]) * i64::from(*smallest);
+            let shift = i64::from(saturated_to_32(product >> 22));
             let (along, half) = ((shift * innovation) >> 6, (shift * shift) >> 13);
             *upward = added(*upward, along - half);
             *downward = added(*downward, -along - half);

@@ -11,7 +11,7 @@ use crate::validated::Validate;
 pub struct Settings {
     /// The spring that the tick's estimator runs; the signatures are its sensitivities.
     pub plant: Plant,
-    /// Standard deviation of one reading, 0.01 to 100 V.
+    /// Standard deviation of one reading, 0.05 to 100 V.
     pub noise_v: f64,
     /// Time between two readings, one sample time to 20 ms.
     pub interval_s: f64,
@@ -77,7 +77,7 @@ impl Validate for Settings {
         let block_s = f64::from(bank::block_ticks(rate_hz)) * sample_time.seconds();
         // A low-pass covers less than half of its distance in one block.
         OutOfRange::check("plant.time_constant_s", self.plant.time_constant_s, 2.0 * block_s..=1000.0, "s")?;
-        OutOfRange::check("noise_v", self.noise_v, 0.01..=100.0, "V")?;
+        OutOfRange::check("noise_v", self.noise_v, 0.05..=100.0, "V")?;
         OutOfRange::check("interval_s", self.interval_s, sample_time.seconds()..=0.02, "s")?;
         OutOfRange::check("noise_correlation_s", self.noise_correlation_s, 0.0..=1.0, "s")?;
         OutOfRange::check("range_v", self.range_v, 50.0..=1000.0, "V")?;

@@ -7,7 +7,7 @@ use crate::coefficient::{Rate, saturated, sum, upper};
 use crate::units::{Accumulator, Signal, saturated_to_32};
 
 /// Number of ticks that the vectors of a block take.
-pub(super) const STEPS: u32 = 11;
+pub(super) const STEPS: u32 = 25;
 
 /// One, with 20 fraction bits.
 const ONE: i32 = 1 << 20;
@@ -25,8 +25,14 @@ pub(super) struct Filters {
     past: [i32; 8],
     tails: [i32; 2],
     end: i32,
-    /// The relaxed part of the model in the present block.
+    newest: usize,
+    longest: i32,
+    /// Values of the present block that several steps use: the relaxed part of the model, the low-pass of its distance from the
+    /// voltage, the voltage as a fraction `p` of the range, and `p (1 - p)`.
     relaxed: i32,
+    z: i32,
+    part: i32,
+    bow: i32,
 }
 
 /// First-order low-pass; returns the mean of its values at both ends of the block.
@@ -56,85 +62,104 @@ impl Filters {
         match step {
             0 => {
                 for (index, (nuisance, rate)) in self.nuisances.iter_mut().zip(config.decays).enumerate() {
-                    if let Some(vector) = vectors.get_mut(INITIAL + index) {
-                        *vector = upper(*nuisance).to_bits();
-                    }
+                    vectors[(INITIAL + index) & (SLOTS - 1)] = upper(*nuisance).to_bits();
                     *nuisance -= rate.step(upper(*nuisance));
                 }
+            }
+            1 => {
                 let behind = Signal::from_bits(y).saturating_sub(Signal::from_bits(u));
                 let relaxed = sum(Signal::from_bits(y)) + config.share_over_rest.times(behind);
                 self.relaxed = saturated(relaxed).to_bits();
                 vectors[GAIN] = y;
                 vectors[SHARE] = u.saturating_sub(self.relaxed);
-            }
-            1 => {
                 vectors[OFFSET] = ONE;
                 let blocks = i64::from(age.min(MOST_BLOCKS));
-                vectors[DRIFT] = ((i64::from(y) * blocks) / i64::from(MOST_BLOCKS)) as i32;
-                let behind = self.relaxed.saturating_sub(u);
-                let z = low_pass(&mut self.time_constant[0], config.rate, behind);
-                vectors[TAU] = config.relaxing(z);
-                vectors[TAU_CURVED] = config.relaxing(low_pass(&mut self.time_constant[1], config.rate, z));
+                vectors[DRIFT] = ((i64::from(y) * blocks) >> MOST_BLOCKS.trailing_zeros()) as i32;
             }
             2 => {
-                let behind = product(config.part(u), self.relaxed.saturating_sub(u));
+                self.z = low_pass(&mut self.time_constant[0], config.rate, vectors[SHARE].saturating_neg());
+                vectors[TAU] = config.relaxing(self.z);
+            }
+            3 => {
+                vectors[TAU_CURVED] = config.relaxing(low_pass(&mut self.time_constant[1], config.rate, self.z));
+            }
+            4 => {
+                self.part = times(config.per_range, u);
+                let behind = product(self.part, vectors[SHARE].saturating_neg());
                 vectors[TAU_VOLTAGE] = config.relaxing(low_pass(&mut self.time_constant[2], config.rate, behind));
+            }
+            5 => {
                 let first = low_pass(&mut self.creep[0], config.slow[0], u);
                 vectors[CREEP] = first.saturating_sub(self.relaxed);
                 vectors[CREEP_SLOWER] = low_pass(&mut self.creep[1], config.slow[1], u).saturating_sub(first);
             }
-            3 => {
+            6 => {
                 let first = low_pass(&mut self.leakage[0], config.slow[0], y);
                 vectors[LEAKAGE] = first.saturating_neg();
                 vectors[LEAKAGE_SLOWER] = first.saturating_sub(low_pass(&mut self.leakage[1], config.slow[1], y));
-                vectors[PLAY] = self.play(config, u, 0);
             }
-            4 => {
+            7 => vectors[PLAY] = self.play(config, u, 0),
+            8 => {
                 vectors[PLAY_SECOND] = self.play(config, u, 1);
                 vectors[PLAY_WIDER] = vectors[PLAY_SECOND].saturating_sub(vectors[PLAY]);
-                vectors[PLAY_WIDEST] = self.play(config, u, 2).saturating_sub(vectors[PLAY_SECOND]);
             }
-            5 => {
-                let part = config.part(u);
-                let bow = product(part, ONE.saturating_sub(part));
-                let law = product(bow.saturating_mul(4), config.range);
+            9 => vectors[PLAY_WIDEST] = self.play(config, u, 2).saturating_sub(vectors[PLAY_SECOND]),
+            10 => {
+                self.bow = product(self.part, ONE.saturating_sub(self.part));
+                let law = product(self.bow.saturating_mul(4), config.range);
                 vectors[LAW] = config.respond(&mut self.springs[3], law);
-                let cubic = product(product(bow.saturating_mul(8), part.saturating_sub(ONE / 2)), config.range);
-                vectors[LAW_CUBIC] = config.respond(&mut self.springs[4], cubic);
             }
-            6 => {
-                vectors[LIMIT] = self.limit(config, u, 0);
-                vectors[LIMIT_MIDDLE] = self.limit(config, u, 1).saturating_sub(vectors[LIMIT]);
+            11 => {
+                let cubic = product(self.bow.saturating_mul(8), self.part.saturating_sub(ONE / 2));
+                vectors[LAW_CUBIC] = config.respond(&mut self.springs[4], product(cubic, config.range));
             }
-            7 => {
-                vectors[LIMIT_TOP] = self.limit(config, u, 2).saturating_sub(vectors[LIMIT]);
+            12 => vectors[LIMIT] = self.limit(config, u, 0),
+            13 => vectors[LIMIT_MIDDLE] = self.limit(config, u, 1).saturating_sub(vectors[LIMIT]),
+            14 => vectors[LIMIT_TOP] = self.limit(config, u, 2).saturating_sub(vectors[LIMIT]),
+            15 => {
                 let pulse = times(config.jump, means.jumps).saturating_neg();
                 vectors[SLEW] = config.respond(&mut self.springs[8], pulse);
             }
-            8 => {
+            16 => {
                 vectors[SLEW_FIRST] = self.slew(config, means, 0);
-                vectors[SLEW_SECOND] = self.slew(config, means, 1);
                 vectors[SLEW_FASTER] = vectors[SLEW_FIRST].saturating_sub(vectors[SLEW]);
+            }
+            17 => {
+                vectors[SLEW_SECOND] = self.slew(config, means, 1);
                 vectors[SLEW_MIDDLE] = vectors[SLEW_SECOND].saturating_sub(vectors[SLEW_FIRST]);
             }
-            9 => {
-                vectors[SLEW_SLOWER] = self.slew(config, means, 2).saturating_sub(vectors[SLEW_SECOND]);
-                self.delays(means, vectors);
+            18 => vectors[SLEW_SLOWER] = self.slew(config, means, 2).saturating_sub(vectors[SLEW_SECOND]),
+            19 => self.short_delays(means, vectors),
+            20 => self.long_delays(y, vectors),
+            21 => {
+                for index in 0..6 {
+                    vectors[DELAY_TO_QUARTER + index] = if index < 5 {
+                        vectors[DELAY + index + 1].saturating_sub(vectors[DELAY + index])
+                    } else {
+                        self.longest.saturating_sub(vectors[DELAY_FOUR])
+                    };
+                }
+            }
+            22 => {
+                vectors[LAG] = self.lag(config, y, 0);
+                vectors[LAG_SHORTER] = vectors[LAG].saturating_sub(vectors[DELAY]);
+            }
+            23 => {
+                vectors[LAG_SECOND] = self.lag(config, y, 1);
+                vectors[LAG_MIDDLE] = vectors[LAG_SECOND].saturating_sub(vectors[LAG]);
             }
             _ => {
-                let [first, second, third] = [0, 1, 2].map(|index: usize| {
-                    let (rate, gain) = (config.series[index], config.per_lag[index]);
-                    times(gain, low_pass(&mut self.series[index], rate, y).saturating_sub(y))
-                });
-                vectors[LAG] = first;
-                vectors[LAG_SECOND] = second;
-                vectors[LAG_SHORTER] = first.saturating_sub(vectors[DELAY]);
-                vectors[LAG_MIDDLE] = second.saturating_sub(first);
-                vectors[LAG_LONGER] = third.saturating_sub(second);
+                vectors[LAG_LONGER] = self.lag(config, y, 2).saturating_sub(vectors[LAG_SECOND]);
                 vectors[PINNED] = if means.pinned { means.residual } else { 0 };
                 vectors[PINNED_BELOW] = vectors[PINNED].min(0);
             }
         }
+    }
+
+    #[inline(always)]
+    fn lag(&mut self, config: &Config, y: i32, index: usize) -> i32 {
+        let behind = low_pass(&mut self.series[index], config.series[index], y).saturating_sub(y);
+        times(config.per_lag[index], behind)
     }
 
     #[inline(always)]
@@ -158,36 +183,27 @@ impl Filters {
     }
 
     #[inline(always)]
-    fn delays(&mut self, means: &Means, vectors: &mut [i32; SLOTS]) {
-        let y = means.model;
-        let [quarter, half] = [0, 1].map(|index: usize| self.tails[index].saturating_sub(means.tails[index]));
-        let whole = [0, 1, 3, 7].map(|blocks: usize| self.past[blocks].saturating_sub(y));
-        let late = [
-            self.end.saturating_sub(means.end),
-            quarter.saturating_mul(4),
-            half.saturating_mul(2),
-            whole[0],
-            whole[1] >> 1,
-            whole[2] >> 2,
-            whole[3] >> 3,
-        ];
+    fn short_delays(&mut self, means: &Means, vectors: &mut [i32; SLOTS]) {
+        vectors[DELAY] = self.end.saturating_sub(means.end);
+        vectors[DELAY_QUARTER] = self.tails[0].saturating_sub(means.tails[0]).saturating_mul(4);
+        vectors[DELAY_HALF] = self.tails[1].saturating_sub(means.tails[1]).saturating_mul(2);
         (self.end, self.tails) = (means.end, means.tails);
-        self.past.rotate_right(1);
-        self.past[0] = y;
-        for index in 0..6 {
-            vectors[DELAY + index] = late[index];
-            vectors[DELAY_TO_QUARTER + index] = late[index + 1].saturating_sub(late[index]);
-        }
+    }
+
+    #[inline(always)]
+    fn long_delays(&mut self, y: i32, vectors: &mut [i32; SLOTS]) {
+        let newest = self.newest;
+        let late = |blocks: usize| self.past[newest.wrapping_sub(blocks) & 7].saturating_sub(y);
+        vectors[DELAY_ONE] = late(0);
+        vectors[DELAY_TWO] = late(1) >> 1;
+        vectors[DELAY_FOUR] = late(3) >> 2;
+        self.longest = late(7) >> 3;
+        self.newest = newest.wrapping_add(1);
+        self.past[self.newest & 7] = y;
     }
 }
 
 impl Config {
-    /// Returns the voltage as a fraction of the range, with 20 fraction bits.
-    #[inline(always)]
-    fn part(&self, u: i32) -> i32 {
-        times(self.per_range, u)
-    }
-
     /// Returns `(1 - share) input`.
     #[inline(always)]
     fn relaxing(&self, input: i32) -> i32 {

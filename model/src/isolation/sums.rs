@@ -1,22 +1,26 @@
 //! What is added up in each tick of a block, and the means at its end.
 
 use super::Config;
+use super::bank::{SLEW_TICKS, SMOOTH_V};
 use crate::coefficient::WideGain;
 use crate::units::{ScaledStiffness, Signal, Volts, saturated_to_32};
 
-/// Sums over the ticks of the present block; numbers in V have 20 fraction bits.
+/// Changes of the voltage that are no jump, with 20 fraction bits.
+const SMOOTH: u32 = (SMOOTH_V * 1_048_576.0) as u32;
+
+/// Sums over the ticks of the present block, divided by their number: in V with 20 fraction bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sums {
     /// Number of ticks in the sums.
     pub(super) ticks: u32,
-    voltage: i64,
-    model: i64,
+    voltage: i32,
+    model: i32,
     jumps: i64,
     residual: i64,
     readings: u32,
     identical: u32,
-    lags: [i64; 3],
-    tails: [i64; 2],
+    lags: [i32; 3],
+    tails: [i32; 2],
     slewed: [i32; 3],
     last_voltage: i32,
     last_model: i32,
@@ -49,24 +53,28 @@ impl Sums {
     #[inline(always)]
     pub(super) fn add(&mut self, config: &Config, voltage: Volts, model: ScaledStiffness, reading: Option<Signal>) {
         let (voltage, model) = (voltage.0.to_bits(), model.0.to_bits());
-        let change = i64::from(voltage.saturating_sub(self.last_voltage));
+        let change = voltage.saturating_sub(self.last_voltage);
         self.last_voltage = voltage;
         self.last_model = model;
-        self.voltage += i64::from(voltage);
-        self.model += i64::from(model);
-        if change != 0 {
+        self.voltage += voltage >> config.shift;
+        let part = model >> config.shift;
+        self.model += part;
+        if change.unsigned_abs() > SMOOTH {
+            let change = i64::from(change);
             self.jumps += (change * change.abs()) >> 20;
         }
-        let left = config.ticks - self.ticks;
-        if left <= config.ticks >> 1 {
-            self.tails[1] += i64::from(model);
-            if left <= config.ticks >> 2 {
-                self.tails[0] += i64::from(model);
+        if self.ticks >= config.half {
+            self.tails[1] += part;
+            if self.ticks >= config.three_quarters {
+                self.tails[0] += part;
             }
         }
-        for ((slewed, lag), reach) in self.slewed.iter_mut().zip(&mut self.lags).zip(config.reach) {
+        // One of the slewed voltages takes its step.
+        let index = (self.ticks % SLEW_TICKS) as usize;
+        if index < 3 {
+            let (slewed, reach) = (&mut self.slewed[index], config.reach[index]);
             *slewed = voltage.max(slewed.saturating_sub(reach)).min(slewed.saturating_add(reach));
-            *lag += i64::from(slewed.saturating_sub(voltage));
+            self.lags[index] += slewed.saturating_sub(voltage) >> config.slew_shift;
         }
         if let Some(reading) = reading {
             let reading = reading.to_bits();
@@ -81,13 +89,12 @@ impl Sums {
     /// Returns the means and starts the next block.
     #[inline(never)]
     pub(super) fn finish(&mut self, config: &Config) -> Means {
-        let mean = |sum: i64| (sum >> config.shift) as i32;
         let means = Means {
-            voltage: mean(self.voltage),
-            model: mean(self.model),
+            voltage: self.voltage,
+            model: self.model,
             jumps: saturated_to_32(self.jumps >> 10),
-            lags: self.lags.map(mean),
-            tails: self.tails.map(mean),
+            lags: self.lags,
+            tails: self.tails,
             end: self.last_model,
             residual: self.residual.checked_div(i64::from(self.readings)).unwrap_or(0) as i32,
             usable: self.readings >= config.fewest,
