@@ -26,10 +26,18 @@ enum Stage {
     Pivot,
     /// Eliminate elements.
     Eliminate,
-    /// Compare with the other hypotheses.
-    Compare,
+    /// Bound the size.
+    Bound,
+    /// Keep the best hypothesis of each cause.
+    Record,
+    /// Find how much a rival may leave.
+    Bar,
     /// Collect the causes that are not excluded.
     Rivals,
+    /// Leave out causes that contain another one.
+    Contain,
+    /// Find the two causes that leave least.
+    Pick,
     /// Come to the verdict.
     Conclude,
 }
@@ -67,6 +75,12 @@ pub(super) struct Decision {
     sizes: [Size; CAUSES],
     bar: i64,
     rivals: u32,
+    /// Leftover and size of the hypothesis in work.
+    left: i64,
+    now: Size,
+    /// The two causes that leave least.
+    first: (i64, Option<Cause>),
+    second: (i64, Option<Cause>),
     proposed: Verdict,
     agreed: u8,
     pub(super) verdict: Verdict,
@@ -99,6 +113,10 @@ impl Default for Decision {
             sizes: [Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 }; CAUSES],
             bar: 0,
             rivals: 0,
+            left: 0,
+            now: Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 },
+            first: (0, None),
+            second: (0, None),
             proposed: Verdict::Quiet,
             agreed: 0,
             verdict: Verdict::Quiet,
@@ -159,7 +177,8 @@ impl Decision {
             Stage::Load => self.load(copy, last),
             Stage::Pivot => self.divide(last),
             Stage::Eliminate => self.eliminate(last),
-            Stage::Compare => self.compare(config, hypothesis),
+            Stage::Bound => self.bound(config, last),
+            Stage::Record => self.record(hypothesis),
             _ => {}
         }
     }
@@ -196,7 +215,7 @@ impl Decision {
     fn divide(&mut self, last: u8) {
         let k = self.pivot;
         if k == last {
-            self.stage = Stage::Compare;
+            self.stage = Stage::Bound;
             return;
         }
         let diagonal = self.matrix[at(k, k)];
@@ -243,120 +262,127 @@ impl Decision {
         }
     }
 
-    fn compare(&mut self, config: &Config, hypothesis: &Hypothesis) {
-        let last = hypothesis.vectors.len() as u8;
+    fn bound(&mut self, config: &Config, last: u8) {
         let k = last - 1;
         let (mine, energy) = (self.scales[usize::from(k) & 7], self.scales[usize::from(last) & 7]);
-        let mut left = i64::from(self.matrix[at(last, last)].max(0));
-        let numerator = if self.information > 0 { self.matrix[at(k, last)] } else { 0 };
+        self.left = i64::from(self.matrix[at(last, last)].max(0));
+        let exponent = i32::from(energy) - i32::from(mine);
+        let mut numerator = 0;
         if self.information > 0 {
+            numerator = self.matrix[at(k, last)];
             let (lowest, highest) = config.bounds.get(usize::from(self.hypothesis)).copied().unwrap_or((0, 0));
-            let end = |size: i32| {
-                let product = (i64::from(size) * i64::from(self.information)) >> 16;
-                shifted(product, i32::from(mine) - i32::from(energy))
-            };
-            let at_size = i64::from(numerator);
-            let outside = (at_size - end(highest)).max(0) + (end(lowest) - at_size).max(0);
-            let outside = i64::from(saturated_to_32(outside));
+            let end = |size: i32| shifted((i64::from(size) * i64::from(self.information)) >> 16, -exponent);
+            let outside = (i64::from(numerator) - end(highest)).max(end(lowest) - i64::from(numerator)).max(0);
+            let outside = i64::from(saturated_to_32(outside)) >> 1;
             // The fit with the size at the nearer end of what is possible.
-            left += self.quotient((outside >> 1) * (outside >> 1)) << 2;
+            self.left += self.quotient(outside * outside) << 2;
         }
-        let left = shifted(left, 2 * i32::from(energy));
+        self.now = Size { numerator, denominator: self.information, exponent: exponent as i8, scale: mine };
+        self.stage = Stage::Record;
+    }
+
+    fn record(&mut self, hypothesis: &Hypothesis) {
+        let energy = i32::from(self.now.exponent) + i32::from(self.now.scale);
+        let left = shifted(self.left, 2 * energy);
         let cause = hypothesis.cause as u8;
         let entry = self.least.get_mut(usize::from(cause)).zip(self.sizes.get_mut(usize::from(cause)));
         if let Some((least, size)) = entry
             && left <= *least
         {
-            *least = left;
-            *size = Size {
-                numerator,
-                denominator: self.information,
-                exponent: (i32::from(energy) - i32::from(mine)) as i8,
-                scale: mine,
-            };
+            (*least, *size) = (left, self.now);
         }
-        let best = self.least.get(usize::from(self.best)).copied().unwrap_or(i64::MAX);
-        if left <= best {
+        if left <= self.least.get(usize::from(self.best)).copied().unwrap_or(i64::MAX) {
             self.best = cause;
         }
         self.hypothesis += 1;
-        self.stage = Stage::Scale;
-        if usize::from(self.hypothesis) == HYPOTHESES.len() {
-            (self.stage, self.row, self.rivals) = (Stage::Rivals, 0, 0);
-            let floor = i64::from(self.blocks) << 20;
-            let total = (self.none - floor).max(0);
-            let least = self.least.get(usize::from(self.best)).copied().unwrap_or(0);
-            let excess = (total >> thresholds::RIVAL_ERROR_BITS).max(thresholds::RIVAL_RATIO * (least - floor));
-            self.bar = least.max(floor) + config.margin + excess;
-        }
+        self.stage = if usize::from(self.hypothesis) == HYPOTHESES.len() { Stage::Bar } else { Stage::Scale };
+    }
+
+    /// Returns the energy of the best hypothesis, the number of blocks in the same unit, and the energy to be explained.
+    #[inline(always)]
+    fn energies_now(&self) -> (i64, i64, i64) {
+        let floor = i64::from(self.blocks) << 20;
+        let least = self.least.get(usize::from(self.best)).copied().unwrap_or(0);
+        (least, floor, (self.none - floor).max(0))
     }
 
     fn judge(&mut self, config: &Config, released: bool) {
-        if self.stage == Stage::Rivals {
-            let cause = self.row;
-            if self.least.get(usize::from(cause)).is_some_and(|left| *left < self.bar) {
-                self.rivals |= 1 << (cause & 31);
+        match self.stage {
+            Stage::Bar => {
+                let (least, floor, total) = self.energies_now();
+                let excess = (total >> thresholds::RIVAL_ERROR_BITS).max(thresholds::RIVAL_RATIO * (least - floor));
+                self.bar = least.max(floor) + config.margin + excess;
+                (self.row, self.rivals) = (0, 1 << (self.best & 31));
+                self.stage = Stage::Rivals;
             }
-            self.row += 1;
-            if usize::from(self.row) == CAUSES {
-                self.stage = Stage::Conclude;
+            Stage::Rivals => {
+                if self.least.get(usize::from(self.row)).is_some_and(|left| *left < self.bar) {
+                    self.rivals |= 1 << (self.row & 31);
+                }
+                self.next(Stage::Contain);
             }
-            return;
+            Stage::Contain => {
+                for (inner, outer) in NESTED {
+                    let certain = inner != Cause::SensorSaturation || released;
+                    if certain && self.rivals & 1 << inner as u32 != 0 {
+                        self.rivals &= !(1 << outer as u32);
+                    }
+                }
+                (self.row, self.first, self.second) = (0, (i64::MAX, None), (i64::MAX, None));
+                self.stage = Stage::Pick;
+            }
+            Stage::Pick => {
+                let known = self.least.get(usize::from(self.row)).zip(Cause::ALL.get(usize::from(self.row)));
+                if self.rivals & 1 << (self.row & 31) != 0
+                    && let Some((left, cause)) = known
+                {
+                    if *left < self.first.0 {
+                        self.second = self.first;
+                        self.first = (*left, Some(*cause));
+                    } else if *left < self.second.0 {
+                        self.second = (*left, Some(*cause));
+                    }
+                }
+                self.next(Stage::Conclude);
+            }
+            _ => self.conclude(config),
         }
-        let floor = i64::from(self.blocks) << 20;
-        let total = (self.none - floor).max(0);
-        let least = self.least.get(usize::from(self.best)).copied().unwrap_or(0);
+    }
+
+    /// Goes on to the next cause, and after the last one to `stage`.
+    fn next(&mut self, stage: Stage) {
+        self.row += 1;
+        if usize::from(self.row) == CAUSES {
+            self.stage = stage;
+        }
+    }
+
+    fn conclude(&mut self, config: &Config) {
+        let (least, floor, total) = self.energies_now();
         // sqrt(2 n) with 20 fraction bits.
-        let sigma = ((u64::from(2 * self.blocks) << 20).isqrt() as i64) << 10;
+        let sigma = i64::from((2 * self.blocks << 18).isqrt()) << 11;
         let tolerated = thresholds::NOISE_SIGMAS * sigma + (total >> thresholds::MODEL_ERROR_BITS);
         let says = if total < config.margin {
             Verdict::Alarm
         } else if least - floor > tolerated {
             Verdict::Unknown
         } else {
-            self.among(released)
+            match (self.first.1, self.second.1) {
+                (Some(cause), None) => Verdict::Named(cause),
+                (Some(cause), Some(rival)) => Verdict::Ambiguous(cause, rival),
+                (None, _) => Verdict::Unknown,
+            }
         };
         self.agreed = if says == self.proposed { self.agreed.saturating_add(1) } else { 1 };
         if self.agreed >= thresholds::AGREED {
             self.verdict = says;
         }
         self.proposed = says;
-        if let Verdict::Named(cause) | Verdict::Ambiguous(cause, _) = says {
+        if let Some(cause) = self.first.1 {
             self.size = self.sizes.get(cause as usize).copied().unwrap_or_default();
         }
         self.energies = (self.none, least);
         self.rounds = self.rounds.wrapping_add(1);
         self.stage = Stage::Idle;
-    }
-
-    /// Returns the verdict when the best explains the residual.
-    fn among(&self, released: bool) -> Verdict {
-        let mut left = self.rivals | 1 << (self.best & 31);
-        for (inner, outer) in NESTED {
-            let certain = inner != Cause::SensorSaturation || released;
-            if certain && left & 1 << inner as u32 != 0 {
-                left &= !(1 << outer as u32);
-            }
-        }
-        let first = self.least_of(left);
-        let rest = first.map_or(0, |cause| left & !(1 << cause as u32));
-        match (first, self.least_of(rest)) {
-            (Some(cause), None) => Verdict::Named(cause),
-            (Some(cause), Some(rival)) => Verdict::Ambiguous(cause, rival),
-            (None, _) => Verdict::Unknown,
-        }
-    }
-
-    /// Returns the cause of a set that leaves least.
-    #[inline(always)]
-    fn least_of(&self, set: u32) -> Option<Cause> {
-        let mut found = None;
-        let mut least = i64::MAX;
-        for (cause, left) in Cause::ALL.iter().zip(&self.least) {
-            if set & 1 << *cause as u32 != 0 && *left < least {
-                (found, least) = (Some(*cause), *left);
-            }
-        }
-        found
     }
 }

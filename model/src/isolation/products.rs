@@ -4,7 +4,7 @@ use super::SLOTS;
 use super::bank::{HYPOTHESES, VECTORS};
 
 /// Number of products that one tick adds.
-const EACH: usize = 5;
+const EACH: usize = 6;
 /// Number of products of all hypotheses.
 pub(super) const PRODUCTS: usize = count();
 /// Number of ticks that the products of a block take.
