@@ -20,6 +20,7 @@ pub mod dynamics;
 pub mod figure;
 pub mod files;
 pub mod identify;
+pub mod isolate;
 pub mod joint;
 pub mod log;
 mod page;

@@ -193,7 +193,7 @@ pub const SMALLEST: [(usize, f64); 11] = [
 ];
 
 /// Number of blocks from one decision to the next.
-pub const ROUND: u32 = 16;
+pub const ROUND: u32 = 20;
 /// Smallest number of readings of a block, as a fraction of the expected number in 256ths; a block with fewer is left out.
 pub const FEWEST: u32 = 192;
 /// Largest fraction of a distance that a low-pass covers in one block: shorter time constants count as this one.

@@ -16,11 +16,11 @@
 //! tick -> sums -> (block) -> signatures -> whitening -> sequential tests -> alarm
 //!                                              |               | below the restart threshold: restart
 //!                                              +-> products of each hypothesis, summed
-//!                                                      | every 32 blocks after the alarm
+//!                                                      | every 20 blocks after the alarm
 //!                                                      +-> elimination -> leftovers -> verdict
 //! ```
 //!
-//! The work of a block is spread over the ticks of the next one; a decision, over about 20 blocks. The verdict never acts on the
+//! The work of a block is spread over the ticks of the next one; a decision, over about 17 blocks. The verdict never acts on the
 //! output. It stays until [`State::acknowledge`].
 //!
 //! A cause is named if it leaves no more than noise and the error of its linear signature can leave, and every other cause leaves

@@ -13,9 +13,9 @@ pub struct Settings {
     pub plant: Plant,
     /// Standard deviation of one reading, 0.05 to 100 V.
     pub noise_v: f64,
-    /// Time between two readings, one sample time to 20 ms.
+    /// Time between two readings, one sample time to half a block.
     pub interval_s: f64,
-    /// Correlation time of the readings' noise, 0 for white noise, to 1 s. It whitens the residual to first order.
+    /// Correlation time of the readings' noise, 0 for white noise, to 10 s. It whitens the residual to first order.
     pub noise_correlation_s: f64,
     /// Highest voltage of the amplifier, 50 to 1000 V: the scale of the laws and limits.
     pub range_v: f64,
@@ -78,8 +78,8 @@ impl Validate for Settings {
         // A low-pass covers less than half of its distance in one block.
         OutOfRange::check("plant.time_constant_s", self.plant.time_constant_s, 2.0 * block_s..=1000.0, "s")?;
         OutOfRange::check("noise_v", self.noise_v, 0.05..=100.0, "V")?;
-        OutOfRange::check("interval_s", self.interval_s, sample_time.seconds()..=0.02, "s")?;
-        OutOfRange::check("noise_correlation_s", self.noise_correlation_s, 0.0..=1.0, "s")?;
+        OutOfRange::check("interval_s", self.interval_s, sample_time.seconds()..=0.5 * block_s, "s")?;
+        OutOfRange::check("noise_correlation_s", self.noise_correlation_s, 0.0..=10.0, "s")?;
         OutOfRange::check("range_v", self.range_v, 50.0..=1000.0, "V")?;
         OutOfRange::check("alarm_nats", self.alarm_nats, 5.0..=40.0, "nats")?;
         OutOfRange::check("margin_nats", self.margin_nats, 1.0..=100.0, "nats")

@@ -1,5 +1,5 @@
-//! Reference of [`model::isolation`] in double precision: the same equations, written independently, with the whole work of a block in
-//! its last tick.
+//! Reference of [`model::isolation`] in double precision: the same equations and constants, written independently, with the whole work
+//! of a block in its last tick.
 
 use model::isolation::bank::{self, *};
 use model::isolation::{Cause, Settings, Verdict, thresholds};
@@ -39,8 +39,11 @@ pub struct Bank {
     pub fits: Vec<(f64, f64)>,
     /// Leftover without a cause at the last decision.
     pub none: f64,
-    /// Largest statistic of the sequential tests, in nats.
-    pub highest: f64,
+    /// What the best cause leaves at the last decision.
+    pub least: f64,
+    /// Number of decisions.
+    pub rounds: u32,
+    highest: f64,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -113,6 +116,8 @@ impl Bank {
             size: (0.0, 0.0),
             fits: vec![(0.0, 0.0); HYPOTHESES.len()],
             none: 0.0,
+            least: 0.0,
+            rounds: 0,
             highest: 0.0,
         }
     }
@@ -345,6 +350,8 @@ impl Bank {
         }
         best.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (cause, least, _) = best[0];
+        self.least = least;
+        self.rounds += 1;
         let total = (self.none - n).max(0.0);
         let tolerated = thresholds::NOISE_SIGMAS as f64 * (2.0 * n).sqrt() + total / f64::from(1 << thresholds::MODEL_ERROR_BITS);
         // A rival is excluded if it leaves more than its linear signature can be wrong by, and much more than the best.
