@@ -6,12 +6,14 @@
 mod false_alarms;
 mod fault;
 mod least_squares;
+mod page;
 mod run;
 mod tables;
 
 pub use false_alarms::{Alarms, count, predicted_per_block};
 pub use fault::{Fault, SIZES};
 pub use least_squares::Thresholds;
+pub use page::page;
 pub use run::{Outcome, Says, run};
 pub use tables::{Row, rows, summary, table};
 
