@@ -20,7 +20,10 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
     let [state, config]: [u32; 2] = [values.get("bytes")?, values.get("config")?];
     if as_json {
         let instructions = json!({"min": min, "mean": mean, "max": max});
-        println!("{}", json!({"opt": opt.name(), "instructions_per_tick": instructions, "state": state, "config": config}));
+        println!(
+            "{}",
+            json!({"opt": opt.name(), "instructions_per_tick": instructions, "state": state, "config": config})
+        );
     } else {
         println!("isolation bank, opt-level {}: {min} to {max} instructions per tick, mean {mean}", opt.name());
         println!("{state} bytes of state, {config} bytes of configuration; every verdict as on the host");

@@ -27,7 +27,7 @@ pub const GAIN: usize = 3;
 pub const SHARE: usize = 4;
 /// `(1 - share) z`, `z` the low-pass of `w - u` with `tau`: the derivative by the logarithm of `tau`.
 pub const TAU: usize = 5;
-/// `(1 - share)` times the low-pass of `z`, for large changes of `tau`.
+/// `(1 - share)` times twice the low-pass of `z` minus `z`: the second derivative, for large changes of `tau`.
 pub const TAU_CURVED: usize = 6;
 /// `(1 - share)` times the low-pass of `p (w - u)`, for a `tau` that changes with the voltage.
 pub const TAU_VOLTAGE: usize = 7;

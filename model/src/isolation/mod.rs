@@ -142,7 +142,8 @@ impl Validated<'_, Settings> {
             half: ticks / 2,
             three_quarters: ticks / 4 * 3,
             fewest: ((block_s / settings.interval_s) as u32 * bank::FEWEST).div_ceil(256).max(1),
-            reach: bank::SLEW_RATES.map(|rate| signal(rate * range / tau * sample_time.seconds() * f64::from(bank::SLEW_TICKS)).to_bits()),
+            reach: bank::SLEW_RATES
+                .map(|rate| signal(rate * range / tau * sample_time.seconds() * f64::from(bank::SLEW_TICKS)).to_bits()),
             share: Gain::new(share),
             rest: Gain::new(1.0 - share),
             share_over_rest: Weight::new(share / (1.0 - share)),
@@ -239,7 +240,8 @@ impl Config {
             state.means = state.sums.finish(self);
             // A sensor that rounds coarsely repeats readings at many values; one that is stuck or saturated, at one.
             if state.means.pinned {
-                state.means.pinned = *state.pinned_at.get_or_insert(state.means.last_reading) == state.means.last_reading;
+                state.means.pinned =
+                    *state.pinned_at.get_or_insert(state.means.last_reading) == state.means.last_reading;
             }
             state.working = true;
         } else if state.working {

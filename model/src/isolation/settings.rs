@@ -57,7 +57,8 @@ impl Settings {
     pub fn block_noise(&self, block_s: f64) -> (f64, f64) {
         let count = libm::rint(block_s / self.interval_s).max(1.0);
         let readings = count as u32;
-        let next = if self.noise_correlation_s > 0.0 { libm::exp(-self.interval_s / self.noise_correlation_s) } else { 0.0 };
+        let next =
+            if self.noise_correlation_s > 0.0 { libm::exp(-self.interval_s / self.noise_correlation_s) } else { 0.0 };
         let (mut own, mut neighbour, mut power) = (count, 0.0, 1.0);
         for lag in 1..2 * readings {
             power *= next;

@@ -81,7 +81,8 @@ impl Filters {
                 vectors[TAU] = config.relaxing(self.z);
             }
             3 => {
-                vectors[TAU_CURVED] = config.relaxing(low_pass(&mut self.time_constant[1], config.rate, self.z));
+                let twice = low_pass(&mut self.time_constant[1], config.rate, self.z).saturating_mul(2);
+                vectors[TAU_CURVED] = config.relaxing(twice.saturating_sub(self.z));
             }
             4 => {
                 self.part = times(config.per_range, u);

@@ -160,11 +160,28 @@ impl Bank {
 
     fn block(&mut self) {
         let sums = self.sums.clone();
-        self.sums = Sums { ticks: 0, voltage: 0.0, model: 0.0, jumps: 0.0, residual: 0.0, readings: 0, identical: 0, lags: [0.0; 3], tails: [0.0; 2], ..sums };
+        self.sums = Sums {
+            ticks: 0,
+            voltage: 0.0,
+            model: 0.0,
+            jumps: 0.0,
+            residual: 0.0,
+            readings: 0,
+            identical: 0,
+            lags: [0.0; 3],
+            tails: [0.0; 2],
+            ..sums
+        };
         let ticks = f64::from(self.ticks);
         let expected = self.block_s / self.settings.interval_s;
         let lags = sums.lags.map(|lag| lag / ticks);
-        let vectors = self.signatures(sums.voltage / ticks, sums.model / ticks, &lags, &sums.tails.map(|tail| tail / ticks), sums.jumps);
+        let vectors = self.signatures(
+            sums.voltage / ticks,
+            sums.model / ticks,
+            &lags,
+            &sums.tails.map(|tail| tail / ticks),
+            sums.jumps,
+        );
         if f64::from(sums.readings) < 0.75 * expected {
             return;
         }
@@ -178,7 +195,8 @@ impl Bank {
 
     fn signatures(&mut self, u: f64, y: f64, lags: &[f64; 3], tails: &[f64; 2], jumps: f64) -> [f64; VECTORS] {
         let Self { settings, filters, block_s, .. } = self;
-        let (share, tau, range, block_s) = (settings.plant.share, settings.plant.time_constant_s, settings.range_v, *block_s);
+        let (share, tau, range, block_s) =
+            (settings.plant.share, settings.plant.time_constant_s, settings.range_v, *block_s);
         let lag = |tau: f64| (-(-block_s / tau).exp_m1()).min(FASTEST);
         let (rest, fraction) = (1.0 - share, lag(tau));
         let w = (y - share * u) / rest;
@@ -192,7 +210,7 @@ impl Bank {
         v[SHARE] = u - w;
         let z = low_pass(&mut filters.time_constant[0], fraction, w - u);
         v[TAU] = rest * z;
-        v[TAU_CURVED] = rest * low_pass(&mut filters.time_constant[1], fraction, z);
+        v[TAU_CURVED] = rest * (2.0 * low_pass(&mut filters.time_constant[1], fraction, z) - z);
         let part = u / range;
         v[TAU_VOLTAGE] = rest * low_pass(&mut filters.time_constant[2], fraction, part * (w - u));
         let creep: [f64; 2] = std::array::from_fn(|i| low_pass(&mut filters.creep[i], slow[i], u));
@@ -353,9 +371,11 @@ impl Bank {
         self.least = least;
         self.rounds += 1;
         let total = (self.none - n).max(0.0);
-        let tolerated = thresholds::NOISE_SIGMAS as f64 * (2.0 * n).sqrt() + total / f64::from(1 << thresholds::MODEL_ERROR_BITS);
+        let tolerated =
+            thresholds::NOISE_SIGMAS as f64 * (2.0 * n).sqrt() + total / f64::from(1 << thresholds::MODEL_ERROR_BITS);
         // A rival is excluded if it leaves more than its linear signature can be wrong by, and much more than the best.
-        let excess = (total / f64::from(1 << thresholds::RIVAL_ERROR_BITS)).max(thresholds::RIVAL_RATIO as f64 * (least - n));
+        let excess =
+            (total / f64::from(1 << thresholds::RIVAL_ERROR_BITS)).max(thresholds::RIVAL_RATIO as f64 * (least - n));
         let bar = least.max(n) + 2.0 * self.settings.margin_nats + excess;
         let rivals: Vec<Cause> = best[1..].iter().filter(|rival| rival.1 < bar).map(|rival| rival.0).collect();
         let says = if total < 2.0 * self.settings.margin_nats {

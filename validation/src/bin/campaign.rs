@@ -20,11 +20,11 @@ use validation::campaign::{
     tables, unforeseen,
 };
 use validation::criterion::{self, Criterion};
-use validation::isolation;
 use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
 use validation::ground_truth::record::Recipe;
 use validation::ground_truth::{self, Cause, LabelledRecord};
+use validation::isolation;
 
 /// Diagnose simulated records with known effects and count the causes that `vsj diagnose` names.
 ///

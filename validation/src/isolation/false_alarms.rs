@@ -1,7 +1,9 @@
 //! Time between false alarms: counted at low thresholds, computed by importance sampling at the bank's own.
 
 use model::isolation::{self, Verdict, bank, thresholds};
-use model::{Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts};
+use model::{
+    Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -38,7 +38,8 @@ pub fn page(first_seed: u64, runs: u64) -> Result<String> {
 fn thresholds(percent: f64) -> Result<Thresholds, model::OutOfRange> {
     let open = Thresholds([f64::INFINITY; 3]);
     let seeds = (RIVAL_SEEDS..RIVAL_SEEDS + RIVAL_RUNS).into_par_iter();
-    let outcomes: Vec<_> = seeds.map(|seed| run(Fault::None, SIZES[0], percent, seed, &open)).collect::<Result<_, _>>()?;
+    let outcomes: Vec<_> =
+        seeds.map(|seed| run(Fault::None, SIZES[0], percent, seed, &open)).collect::<Result<_, _>>()?;
     let largest = |index: usize| outcomes.iter().map(|outcome| outcome.deviations[index]).fold(0.0, f64::max);
     Ok(Thresholds(std::array::from_fn(|index| 1.2 * largest(index))))
 }
@@ -58,8 +59,13 @@ fn false_alarms(first_seed: u64) -> Result<String> {
             format!("{:.3}", block_s / bound / DAY_S),
         ]);
     }
-    let header =
-        ["threshold, nats", "million ticks", "alarms", "at most, by importance sampling", "days between alarms, at least"];
+    let header = [
+        "threshold, nats",
+        "million ticks",
+        "alarms",
+        "at most, by importance sampling",
+        "days between alarms, at least",
+    ];
     text += &crate::markdown::table(&header, lines);
     Ok(text)
 }

@@ -1,7 +1,9 @@
 //! One run: the controller with its sensor moves a spring between random levels, and a fault begins.
 
 use model::isolation::{self, Verdict, bank};
-use model::{Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts};
+use model::{
+    Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

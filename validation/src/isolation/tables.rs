@@ -30,7 +30,8 @@ pub fn rows(percent: f64, seeds: std::ops::Range<u64>, thresholds: &Thresholds) 
     });
     let cases: Vec<_> = cases.collect();
     let row = |&(fault, size): &(Fault, f64)| {
-        let outcomes = seeds.clone().map(|seed| run(fault, size, percent, seed, thresholds)).collect::<Result<_, _>>()?;
+        let outcomes =
+            seeds.clone().map(|seed| run(fault, size, percent, seed, thresholds)).collect::<Result<_, _>>()?;
         Ok(Row { fault, size, outcomes })
     };
     cases.par_iter().map(row).collect()
@@ -99,8 +100,17 @@ pub fn table(rows: &[Row]) -> String {
 
 /// Sums over the faults with a signature and those without.
 pub fn summary(rows: &[Row]) -> String {
-    let header =
-        ["faults", "runs", "alarm", "right", "ambiguous (one is right)", "unknown", "wrong", "first name wrong", "RLS: fault (right)"];
+    let header = [
+        "faults",
+        "runs",
+        "alarm",
+        "right",
+        "ambiguous (one is right)",
+        "unknown",
+        "wrong",
+        "first name wrong",
+        "RLS: fault (right)",
+    ];
     let line = |name: &str, known: bool| {
         let part: Vec<&Row> = rows.iter().filter(|row| row.fault.has_signature() == known).collect();
         let total = |of: &dyn Fn(&Row) -> usize| part.iter().map(|row| of(row)).sum::<usize>();
@@ -113,10 +123,7 @@ pub fn summary(rows: &[Row]) -> String {
             runs.to_string(),
             percent(total(&|row| row.count(|outcome| outcome.alarm_s.is_some()))),
             ended(Says::Right),
-            with(
-                total(&|row| row.ended(Says::Ambiguous)),
-                total(&|row| row.count(|outcome| outcome.one_of_two)),
-            ),
+            with(total(&|row| row.ended(Says::Ambiguous)), total(&|row| row.count(|outcome| outcome.one_of_two))),
             ended(Says::Unknown),
             ended(Says::Wrong),
             percent(total(&|row| row.count(|outcome| outcome.first.is_some_and(|(_, right)| !right)))),
