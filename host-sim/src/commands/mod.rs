@@ -12,7 +12,6 @@ pub(crate) mod isolate;
 pub(crate) mod joint;
 pub(crate) mod link;
 pub(crate) mod log;
-mod option_names;
 pub(crate) mod plan;
 mod record_arguments;
 pub(crate) mod reproduce;
