@@ -382,3 +382,6 @@ impl State {
         (size, 1.0 / libm::sqrt(information))
     }
 }
+
+#[cfg(test)]
+mod tests;
