@@ -360,7 +360,7 @@ impl Decision {
     fn conclude(&mut self, config: &Config) {
         let (least, floor, total) = self.energies_now();
         // sqrt(2 n) with 20 fraction bits.
-        let sigma = i64::from((2 * self.blocks << 18).isqrt()) << 11;
+        let sigma = i64::from(((2 * self.blocks) << 18).isqrt()) << 11;
         let tolerated = thresholds::NOISE_SIGMAS * sigma + (total >> thresholds::MODEL_ERROR_BITS);
         let says = if total < config.margin {
             Verdict::Alarm

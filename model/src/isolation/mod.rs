@@ -282,7 +282,7 @@ impl Config {
             let predicted = self.correlation.map_or(0, |gain| gain.times(Signal::from_bits(*last)).to_bits());
             let difference = new.saturating_sub(predicted);
             let value = ((i64::from(difference) * i64::from(self.whitening)) >> 31) as i32;
-            *whitened = value.max(-LARGEST - 1).min(LARGEST);
+            *whitened = value.clamp(-LARGEST - 1, LARGEST);
             *last = *new;
         }
     }

@@ -32,7 +32,7 @@ pub(super) struct Tests {
 /// Adds a bounded increment to a statistic.
 #[inline(always)]
 fn added(statistic: i32, nats: i64) -> i32 {
-    statistic.saturating_add(nats.max(LEAST).min(MOST) as i32).max(0)
+    statistic.saturating_add(nats.clamp(LEAST, MOST) as i32).max(0)
 }
 
 impl Tests {
