@@ -12,7 +12,7 @@ use simulation::isolation::trace::{self, noise_v};
 use simulation::plant_file::load_plain;
 use simulation::record::Record;
 
-use super::option_names::{SETTINGS, named};
+use simulation::option_names::{SETTINGS, named};
 
 /// Run the MCU's fault isolation over a record and print what it says, and when
 ///
