@@ -9,10 +9,9 @@ use host_sim::output::terminal::{json, print};
 use model::isolation::Settings;
 use simulation::bad_input;
 use simulation::isolation::trace::{self, noise_v};
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::load_plain;
 use simulation::record::Record;
-
-use simulation::option_names::{SETTINGS, named};
 
 /// Run the MCU's fault isolation over a record and print what it says, and when
 ///

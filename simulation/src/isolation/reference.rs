@@ -31,7 +31,7 @@ pub struct Bank {
     pub alarmed: bool,
     proposed: Verdict,
     agreed: u8,
-    /// The last decision that two rounds in a row agree on.
+    /// The last decision that enough rounds in a row agree on.
     pub verdict: Verdict,
     /// Size of the best hypothesis and its standard deviation.
     pub size: (f64, f64),
@@ -424,11 +424,10 @@ fn fit(products: &[Vec<f64>]) -> (f64, f64, f64) {
         if k + 1 == last {
             (size, information) = (m[k][last] / m[k][k], m[k][k]);
         }
-        for i in k + 1..=last {
-            let factor = m[i][k] / m[k][k];
-            for j in k..=last {
-                m[i][j] -= factor * m[k][j];
-            }
+        let pivot = m[k].clone();
+        for row in &mut m[k + 1..] {
+            let factor = row[k] / pivot[k];
+            row.iter_mut().zip(&pivot).for_each(|(element, above)| *element -= factor * above);
         }
     }
     (m[last][last].max(0.0), size, information)

@@ -60,11 +60,9 @@ impl LeastSquares {
             std::array::from_fn(|i| (0..PARAMETERS).map(|j| self.covariance[i][j] * phi[j]).sum());
         let scale = self.lambda + phi.iter().zip(p_phi).map(|(a, b)| a * b).sum::<f64>();
         let error = self.outputs[0] - phi.iter().zip(self.coefficients).map(|(a, b)| a * b).sum::<f64>();
-        for i in 0..PARAMETERS {
-            self.coefficients[i] += p_phi[i] / scale * error;
-            for j in 0..PARAMETERS {
-                self.covariance[i][j] = (self.covariance[i][j] - p_phi[i] * p_phi[j] / scale) / self.lambda;
-            }
+        for ((coefficient, row), p) in self.coefficients.iter_mut().zip(&mut self.covariance).zip(p_phi) {
+            *coefficient += p / scale * error;
+            row.iter_mut().zip(p_phi).for_each(|(element, q)| *element = (*element - p * q / scale) / self.lambda);
         }
     }
 
