@@ -82,7 +82,7 @@ pub fn noise_v(record: &Record) -> Option<f64> {
     (bent.len() >= 8).then(|| 1.4826 * bent[bent.len() / 2] / 6f64.sqrt())
 }
 
-/// Runs the bank over a record. The rate is 1 kHz, or 100 Hz for rows further apart than 50 ms; `settings.interval_s` is set to the
+/// Runs the bank over a record. The rate is 1 kHz, or 100 Hz for rows further apart than half a block of 1 kHz, 64 ms; `settings.interval_s` is set to the
 /// mean distance of the rows.
 ///
 /// # Errors
@@ -91,7 +91,7 @@ pub fn run(record: &Record, mut settings: Settings) -> Result<Trace> {
     let refused = |error: OutOfRange| BadInput(error.to_string());
     let [first, .., last] = &record.rows[..] else { bad_input!("{}: expected at least 2 rows", record.name) };
     settings.interval_s = (last.time_s - first.time_s) / (record.rows.len() - 1) as f64;
-    let rate_hz = if settings.interval_s > 0.05 { 100.0 } else { 1000.0 };
+    let rate_hz = if settings.interval_s > 0.064 { 100.0 } else { 1000.0 };
     if settings.interval_s > 0.6 {
         bad_input!("{}: rows {:.3} s apart; expected at most 0.6 s", record.name, settings.interval_s);
     }
