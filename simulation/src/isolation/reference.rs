@@ -15,7 +15,7 @@ pub struct Bank {
     sums: Sums,
     filters: Filters,
     /// Number of blocks since the sums were restarted.
-    pub age: u32,
+    age: u32,
     rate_hz: f64,
     since_decision: u32,
     last: ([f64; VECTORS], f64),
@@ -26,17 +26,15 @@ pub struct Bank {
     released: (bool, bool),
     pinned_at: Option<f64>,
     /// Number of blocks in the sums.
-    pub blocks: u32,
+    blocks: u32,
     /// True after a sequential test has exceeded its threshold.
-    pub alarmed: bool,
+    alarmed: bool,
     proposed: Verdict,
     agreed: u8,
     /// The last decision that enough rounds in a row agree on.
     pub verdict: Verdict,
-    /// Size of the best hypothesis and its standard deviation.
+    /// Size of the cause that leaves least, in the unit of [`Cause`], and its standard deviation.
     pub size: (f64, f64),
-    /// Leftover of each hypothesis at the last decision, and coefficient of its principal vector.
-    pub fits: Vec<(f64, f64)>,
     /// Leftover without a cause at the last decision.
     pub none: f64,
     /// What the best cause leaves at the last decision.
@@ -114,7 +112,6 @@ impl Bank {
             agreed: 0,
             verdict: Verdict::Quiet,
             size: (0.0, 0.0),
-            fits: vec![(0.0, 0.0); HYPOTHESES.len()],
             none: 0.0,
             least: 0.0,
             rounds: 0,
@@ -352,9 +349,8 @@ impl Bank {
         let gain = &self.products[0];
         self.none = gain[2][2] - if gain[0][0] > 0.0 { gain[0][2].powi(2) / gain[0][0] } else { 0.0 };
         let mut best: Vec<(Cause, f64, (f64, f64))> = Vec::new();
-        for (index, (products, hypothesis)) in self.products.iter().zip(HYPOTHESES).enumerate() {
+        for (products, hypothesis) in self.products.iter().zip(HYPOTHESES) {
             let (leftover, size, information) = fit(products);
-            self.fits[index] = (leftover, size);
             // What the fit leaves with the size at the nearer end of what is possible.
             let outside = size - size.clamp(hypothesis.lowest, hypothesis.highest);
             let leftover = leftover + outside * outside * information;
