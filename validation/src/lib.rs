@@ -13,6 +13,6 @@
 pub mod campaign;
 pub mod closed_loop;
 pub mod criterion;
-pub mod ground_truth;
+pub use ground_truth;
 pub mod isolation;
 pub mod markdown;
