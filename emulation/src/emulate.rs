@@ -10,7 +10,7 @@ use xtask::variant::Variant;
 
 use crate::qemu::comparison::Comparison;
 use crate::qemu::emulator;
-use crate::{blocks, rivals};
+use crate::{blocks, isolation, rivals};
 
 /// Options of `cargo xtask emulate`.
 #[derive(clap::Args)]
@@ -20,7 +20,7 @@ pub(crate) struct Args {
     #[arg(long)]
     json: bool,
     /// Show every line of the log, also the summaries, one for each second of the run
-    #[arg(long, conflicts_with_all = ["link", "rivals", "blocks"])]
+    #[arg(long, conflicts_with_all = ["link", "rivals", "blocks", "isolation"])]
     log: bool,
     /// Run no script: wait for `vsj link unix:PATH` on this socket until Ctrl-C
     #[arg(long, value_name = "PATH", conflicts_with = "json")]
@@ -33,6 +33,9 @@ pub(crate) struct Args {
     /// Count instructions per tick for each kind of spring under each controller
     #[arg(long, conflicts_with_all = ["link", "rivals"])]
     blocks: bool,
+    /// Count instructions per tick of the isolation bank
+    #[arg(long, conflicts_with_all = ["link", "rivals", "blocks"])]
+    isolation: bool,
     /// Goal of the optimiser
     #[arg(long, value_enum, default_value = "s")]
     opt: Opt,
@@ -46,6 +49,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     if args.blocks {
         return blocks::run(args.opt, args.json);
+    }
+    if args.isolation {
+        return isolation::run(args.opt, args.json);
     }
     let elf = build::image_with(&args.variant.features(), Board::Mps2, args.opt)?;
     if let Some(socket) = &args.link {

@@ -5,7 +5,7 @@
 //!
 //! - [`binary`] reads an image's machine code: panics, floats, stack, size.
 //! - [`qemu`] runs an image under QEMU and compares the run with the same code on the host: [`emulate`], [`rivals`],
-//!   [`blocks`], [`drill`], [`talk`], [`story`].
+//!   [`blocks`], [`isolation`], [`drill`], [`talk`], [`story`].
 //! - [`boot`] runs the image that is flashed on models of the chip's registers.
 //! - [`soak`] runs random ticks of the control on the host and checks every invariant in each.
 //! - [`proof`] is what all of `cargo xtask test` asks of the emulated board.
@@ -15,6 +15,7 @@ mod blocks;
 mod boot;
 mod drill;
 mod emulate;
+mod isolation;
 mod proof;
 mod qemu;
 mod rivals;
@@ -53,6 +54,7 @@ Examples:
   cargo xtask emulate --json | jq .instructions_per_tick
   cargo xtask emulate --rivals                         instructions per tick, compared with other controllers
   cargo xtask emulate --blocks                         instructions per tick, by spring and controller
+  cargo xtask emulate --isolation                      instructions per tick of the isolation bank
   cargo xtask emulate --link /tmp/mcu.sock             then: vsj link unix:/tmp/mcu.sock status")]
     Emulate(emulate::Args),
     /// Everything that the emulated firmware must show

@@ -49,6 +49,15 @@ impl Hysteresis {
         Self::BoucWen { alpha, beta: 2.0 * alpha / width_v.max(1e-6), h: 0.0, u: 0.0 }
     }
 
+    /// Sets the state to the one in which every operator follows the voltage `u`, in V: v = u.
+    pub fn start_at(&mut self, at: f64) {
+        match self {
+            Self::None => {}
+            Self::Plays { plays, .. } => plays.iter_mut().for_each(|(_, _, p)| *p = at),
+            Self::BoucWen { h, u, .. } => (*h, *u) = (0.0, at),
+        }
+    }
+
     /// Effective voltage v after the voltage has changed to `u`, both in V.
     pub fn step(&mut self, u: f64) -> f64 {
         match self {

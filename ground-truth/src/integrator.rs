@@ -45,6 +45,23 @@ impl Integrator {
         }
     }
 
+    /// Replaces the spring by another one that goes on from the present state. What the other one has in addition starts fresh: a
+    /// slow relaxation at the relaxed part, hysteresis at the voltage, a mode and lags in series at the stiffness, a leakage at 0 and
+    /// a drift now.
+    pub fn change(&mut self, spring: Spring) {
+        let y = self.unlagged();
+        if self.spring.creep.is_none() {
+            self.state[1] = self.state[0];
+        }
+        self.state[3] = if spring.resonance.is_some_and(|mode| mode.immediate) { spring.share * self.v } else { y };
+        self.series = [y; 2];
+        self.start_s = self.now_s;
+        self.hysteresis = spring.hysteresis.clone();
+        self.hysteresis.start_at(self.u);
+        self.spring = spring;
+        self.v = self.spring.gain * self.spring.law.at(self.hysteresis.step(self.u));
+    }
+
     /// Current time, in s.
     pub fn now_s(&self) -> f64 {
         self.now_s

@@ -37,6 +37,12 @@ impl Live {
         Self { moving, sensor: Sensor::new(effects, top_v), noise, readings: 0, random }
     }
 
+    /// Gives the spring and its sensor other effects from now on; `top_v` as in [`Live::new`].
+    pub fn change(&mut self, effects: &[Effect], top_v: f64) {
+        self.moving.change(Spring::with(effects));
+        self.sensor = Sensor::new(effects, top_v);
+    }
+
     /// Time since the start, in s.
     pub fn now_s(&self) -> f64 {
         self.moving.now_s()

@@ -33,6 +33,7 @@
 //! | [`pre_compensator`] | the proportional-integral pre-compensator |
 //! | [`time_optimal`] | the pre-compensator that is as fast as the amplifier allows |
 //! | [`feedback`] | correction of the estimate by a stiffness sensor, and detection of the sensor's faults |
+//! | [`isolation`] | which fault explains that sensor and model differ |
 //! | [`amplifier`] | slew, range, rounding to a DAC code |
 //! | [`controller`] | all of these in one tick |
 //! | [`supervisor`] | whether the output is enabled |
@@ -67,6 +68,7 @@ pub mod error;
 pub mod estimator;
 pub mod extended;
 pub mod feedback;
+pub mod isolation;
 pub mod pre_compensator;
 pub mod stiffness;
 pub mod supervisor;

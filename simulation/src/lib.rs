@@ -13,6 +13,7 @@
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
 //! | [`run`], [`has_reference`], [`experiment`] | fixed point and reference over a schedule |
 //! | [`open_loop`] | the fixed-point spring alone over a record |
+//! | [`isolation`] | the bank of fault signatures over a record, and its reference |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the shortest possible t97 |
 //! | [`spring_error`] | the tick on a spring that differs from its model, with a sensor or without |
 //! | [`robust_bound`] | the shortest possible t97 for a spring that is known only to within errors |
@@ -25,6 +26,7 @@ pub mod comparison;
 pub mod csv_table;
 pub mod experiment;
 pub mod has_reference;
+pub mod isolation;
 pub mod open_loop;
 pub mod option_names;
 pub mod plant_file;

@@ -2,6 +2,7 @@
 
 use firmware::control::Tick;
 use model::Output;
+use model::isolation::Verdict;
 
 /// Digest of the ticks so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,11 @@ impl Digest {
     pub fn add_output(&mut self, output: &Output) {
         self.bytes(&output.code.0.to_le_bytes());
         self.bytes(&output.stiffness.0.to_bits().to_le_bytes());
+    }
+
+    /// Adds what the isolation bank says, by the number of [`Verdict::code`].
+    pub fn add_verdict(&mut self, verdict: Verdict) {
+        self.bytes(&verdict.code().to_le_bytes());
     }
 
     /// The digest as a number.

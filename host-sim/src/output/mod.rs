@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`terminal`], [`screen`] | stdout and stderr; a status that is refreshed in place |
 //! | [`files`] | the files of one run: all of them or none |
-//! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
+//! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`isolate`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`recording`] | telemetry as CSV while it arrives |
 //! | [`figure`], [`plots`] | plots as SVG |
 //! | `chart`, `page` | the parts of all plots and of all report pages |
@@ -20,6 +20,7 @@ pub mod dynamics;
 pub mod figure;
 pub mod files;
 pub mod identify;
+pub mod isolate;
 pub mod joint;
 pub mod log;
 mod page;

@@ -24,6 +24,7 @@ use validation::ground_truth::noise::{Kind, Noise};
 use validation::ground_truth::out_of_model::form::Form;
 use validation::ground_truth::record::Recipe;
 use validation::ground_truth::{self, Cause, LabelledRecord};
+use validation::isolation;
 
 /// Diagnose simulated records with known effects and count the causes that `vsj diagnose` names.
 ///
@@ -44,6 +45,7 @@ Examples:
   cargo campaign equation                    the same on records that nothing explains
   cargo campaign real FOLDER                 measured records: FOLDER/NAME.csv, with an optional NAME.toml
   cargo campaign instruments                 the same on simulated instruments in their own units
+  cargo campaign isolation                   the fault isolation that runs in the tick
   RAYON_NUM_THREADS=1 cargo campaign speed   CPU time by rows and noise, one record at a time
   cargo thresholds                           every threshold at half and twice its value
 
@@ -94,6 +96,23 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Run the MCU's fault isolation on springs in which a fault begins: delays, names, false alarms, compared with recursive least
+    /// squares
+    Isolation(Isolation),
+}
+
+/// Options of the runs of the isolation bank.
+#[derive(clap::Args)]
+struct Isolation {
+    /// Runs of each fault and size
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    records: u64,
+    /// First seed; another number gives other runs
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(..500_000))]
+    first_seed: u64,
+    /// Write the page to this file
+    #[arg(long, value_name = "FILE")]
+    docs: Option<PathBuf>,
 }
 
 /// Options of the record to write.
@@ -272,6 +291,15 @@ fn run(cli: &Cli) -> Result<bool> {
             println!("{}", json!({ "real": rows }));
         } else {
             print!("{}", real::table(&rows));
+        }
+        return Ok(true);
+    }
+    if let Some(Command::Isolation(options)) = &cli.command {
+        let text = isolation::page(options.first_seed, options.records)?;
+        print!("{text}");
+        if let Some(path) = &options.docs {
+            let page = format!("{}\n{text}", include_str!("isolation.md"));
+            std::fs::write(path, page).with_context(|| format!("cannot write {}", path.display()))?;
         }
         return Ok(true);
     }

@@ -1,0 +1,80 @@
+//! `vsj isolate`: the MCU's bank of fault signatures over a record.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::output::isolate::text;
+use host_sim::output::terminal::{json, print};
+use model::isolation::Settings;
+use simulation::bad_input;
+use simulation::isolation::trace::{self, noise_v};
+use simulation::option_names::{SETTINGS, named};
+use simulation::plant_file::load_plain;
+use simulation::record::Record;
+
+/// Run the MCU's fault isolation over a record and print what it says, and when
+///
+/// The model runs on the voltages of the record, the readings are the stiffness sensor's. An alarm comes first; a cause is named when
+/// it explains the residual and no other cause does. `ambiguous` names two, `unknown` none. How rightly: docs/isolation.md.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj isolate data/sample_hysteresis.csv           the trace: alarm, names
+  vsj isolate record.csv --plant out/nominal/plant.toml --limit-v 1000
+  vsj isolate record.csv --noise-v 0.5 --json | jq .last")]
+pub(crate) struct Arguments {
+    /// The record: time_s, voltage_v (held between the rows) and the readings, rows at most 0.6 s apart
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// Column of the readings, in V of equivalent static voltage
+    #[arg(long, default_value = "stiffness", value_name = "NAME")]
+    column: String,
+    /// The nominal spring: `paper`, or a plant file with a share and one time constant only
+    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
+    plant: String,
+    /// Standard deviation of a reading, in V; default: from the readings
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    noise_v: Option<f64>,
+    /// Correlation time of the readings' noise, in s
+    #[arg(long, default_value_t = 0.0, value_name = "S", allow_negative_numbers = true)]
+    noise_correlation_s: f64,
+    /// Highest voltage of the amplifier, in V
+    #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
+    limit_v: f64,
+    /// Threshold of the alarm: logarithm of the mean number of blocks between false alarms of a test
+    #[arg(long, default_value_t = Settings::PAPER.alarm_nats, value_name = "NATS", allow_negative_numbers = true)]
+    alarm_nats: f64,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let record = Record::open(&arguments.data, &arguments.column)?;
+    if record.rows.iter().all(|row| row.measured.is_none()) {
+        bad_input!("{}: no column `{}`; expected readings", record.name, arguments.column);
+    }
+    let noise_v = match arguments.noise_v.or_else(|| noise_v(&record)) {
+        Some(noise_v) => noise_v,
+        None => bad_input!("{}: fewer than 10 readings; expected more, or --noise-v", record.name),
+    };
+    let settings = Settings {
+        plant: load_plain(&arguments.plant)?,
+        noise_v,
+        noise_correlation_s: arguments.noise_correlation_s,
+        range_v: arguments.limit_v,
+        alarm_nats: arguments.alarm_nats,
+        ..Settings::PAPER
+    };
+    let options = [
+        ("noise_v", "--noise-v"),
+        ("noise_correlation_s", "--noise-correlation-s"),
+        ("range_v", "--limit-v"),
+        ("alarm_nats", "--alarm-nats"),
+        ("plant.time_constant_s", "--plant"),
+    ];
+    let trace = trace::run(&record, settings).map_err(|error| named(named(error, SETTINGS), &options))?;
+    print(&if arguments.json { json(&trace)? } else { text(&trace) })
+}

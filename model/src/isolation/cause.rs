@@ -1,0 +1,83 @@
+//! The causes that the bank distinguishes, by their codes.
+
+/// A fault that explains the difference between the readings and the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Cause {
+    /// The static gain differs from the model's; size: relative difference.
+    GainError,
+    /// The instantaneous share differs; size: difference of the share.
+    InstantaneousShare,
+    /// The relaxation time differs; size: natural logarithm of the ratio to the model's.
+    TimeConstant,
+    /// The relaxation time changes with the voltage; size: its relative change over the range.
+    VoltageDependentTimeConstant,
+    /// Part of the response has a slower time constant; size: that share.
+    SecondRelaxation,
+    /// The stiffness decreases while the voltage stays; size: share that is lost.
+    ChargeLeakage,
+    /// Rate-independent memory; size: width between the branches, in V.
+    Hysteresis,
+    /// The sensitivity depends on the voltage; size: deviation from the straight line at half of the range, in V.
+    StaticNonlinearity,
+    /// The real voltage stops below the commanded one; size: voltage missing at the top of the range, in V.
+    AmplifierLimit,
+    /// The real voltage changes at a bounded rate; size: reciprocal of the rate, in s/V.
+    AmplifierSlew,
+    /// The response starts late; size: delay, in s.
+    Delay,
+    /// A further lag in series; size: its time constant, in s.
+    SeriesLag,
+    /// The readings are shifted by a constant; size: offset, in V.
+    ReadingOffset,
+    /// The response grows or fades with time; size: relative change per s.
+    Drift,
+    /// The readings stop at a bound; size: 1.
+    SensorSaturation,
+    /// The readings do not change.
+    StuckSensor,
+}
+
+impl Cause {
+    /// All causes, in the order of their numbers.
+    pub const ALL: [Self; 16] = [
+        Self::GainError,
+        Self::InstantaneousShare,
+        Self::TimeConstant,
+        Self::VoltageDependentTimeConstant,
+        Self::SecondRelaxation,
+        Self::ChargeLeakage,
+        Self::Hysteresis,
+        Self::StaticNonlinearity,
+        Self::AmplifierLimit,
+        Self::AmplifierSlew,
+        Self::Delay,
+        Self::SeriesLag,
+        Self::ReadingOffset,
+        Self::Drift,
+        Self::SensorSaturation,
+        Self::StuckSensor,
+    ];
+
+    /// Returns the cause code, as in the findings of `vsj diagnose`; `stuck-sensor` has none there.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::GainError => "gain-error",
+            Self::InstantaneousShare => "instantaneous-share",
+            Self::TimeConstant => "time-constant",
+            Self::VoltageDependentTimeConstant => "voltage-dependent-time-constant",
+            Self::SecondRelaxation => "second-relaxation",
+            Self::ChargeLeakage => "charge-leakage",
+            Self::Hysteresis => "hysteresis",
+            Self::StaticNonlinearity => "static-nonlinearity",
+            Self::AmplifierLimit => "amplifier-limit",
+            Self::AmplifierSlew => "amplifier-slew",
+            Self::Delay => "delay",
+            Self::SeriesLag => "series-lag",
+            Self::ReadingOffset => "reading-offset",
+            Self::Drift => "drift",
+            Self::SensorSaturation => "sensor-saturation",
+            Self::StuckSensor => "stuck-sensor",
+        }
+    }
+}

@@ -1,0 +1,388 @@
+//! The decision: each hypothesis is fitted by elimination, a small step in each tick, and the leftovers are compared.
+//!
+//! The products of a hypothesis are scaled by powers of two, so that every diagonal element has at most 29 bits. One pivot at a
+//! time is eliminated: `m_ij -= m_ki m_kj / m_kk`. What remains in the last element is the energy that the hypothesis leaves.
+
+use super::bank::{HYPOTHESES, Hypothesis, NESTED};
+use super::products::PRODUCTS;
+use super::{CAUSES, Cause, Config, Verdict, thresholds};
+use crate::units::saturated_to_32;
+
+/// Elements of the matrix that one tick eliminates.
+const EACH: u32 = 2;
+/// Bits of the scaled diagonal.
+const BITS: u32 = 29;
+
+/// What is done next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Stage {
+    #[default]
+    Idle,
+    /// Find the scales of a hypothesis.
+    Scale,
+    /// Load a row of its matrix.
+    Load,
+    /// Divide by a pivot.
+    Pivot,
+    /// Eliminate elements.
+    Eliminate,
+    /// Bound the size.
+    Bound,
+    /// Keep the best hypothesis of each cause.
+    Record,
+    /// Find how much a rival may leave.
+    Bar,
+    /// Collect the causes that are not excluded.
+    Rivals,
+    /// Leave out causes that contain another one.
+    Contain,
+    /// Find the two causes that leave least.
+    Pick,
+    /// Come to the verdict.
+    Conclude,
+}
+
+/// A size as a fraction: `numerator / denominator * 2^exponent`, in units of [`super::Settings::unit`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Size {
+    pub(super) numerator: i32,
+    pub(super) denominator: i32,
+    pub(super) exponent: i8,
+    /// Scale of the principal vector: the information is `denominator * 2^(2 scale)`.
+    pub(super) scale: u8,
+}
+
+/// State of the decision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Decision {
+    stage: Stage,
+    hypothesis: u8,
+    offset: u16,
+    pivot: u8,
+    row: u8,
+    column: u8,
+    matrix: [i32; 64],
+    own: [i32; 8],
+    scales: [u8; 8],
+    reciprocal: i32,
+    shift: u8,
+    information: i32,
+    /// Number of blocks in the copied sums.
+    blocks: u32,
+    none: i64,
+    least: [i64; CAUSES],
+    best: u8,
+    sizes: [Size; CAUSES],
+    bar: i64,
+    rivals: u32,
+    /// Leftover and size of the hypothesis in work.
+    left: i64,
+    now: Size,
+    /// The two causes that leave least.
+    first: (i64, Option<Cause>),
+    second: (i64, Option<Cause>),
+    proposed: Verdict,
+    agreed: u8,
+    pub(super) verdict: Verdict,
+    pub(super) size: Size,
+    /// Number of decisions made.
+    pub(super) rounds: u32,
+    /// Leftover without a cause and with the best one at the last decision, in variances with 20 fraction bits.
+    pub(super) energies: (i64, i64),
+}
+
+impl Default for Decision {
+    fn default() -> Self {
+        Self {
+            stage: Stage::Idle,
+            hypothesis: 0,
+            offset: 0,
+            pivot: 0,
+            row: 0,
+            column: 0,
+            matrix: [0; 64],
+            own: [0; 8],
+            scales: [0; 8],
+            reciprocal: 0,
+            shift: 0,
+            information: 0,
+            blocks: 0,
+            none: 0,
+            least: [i64::MAX; CAUSES],
+            best: 0,
+            sizes: [Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 }; CAUSES],
+            bar: 0,
+            rivals: 0,
+            left: 0,
+            now: Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 },
+            first: (0, None),
+            second: (0, None),
+            proposed: Verdict::Quiet,
+            agreed: 0,
+            verdict: Verdict::Quiet,
+            size: Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 },
+            rounds: 0,
+            energies: (0, 0),
+        }
+    }
+}
+
+/// Returns the index of an element; 8 columns.
+#[inline(always)]
+const fn at(row: u8, column: u8) -> usize {
+    (row as usize * 8 + column as usize) & 63
+}
+
+/// Shifts left by `by` bits, or right if it is negative; saturated.
+#[inline(always)]
+fn shifted(value: i64, by: i32) -> i64 {
+    if by < 0 {
+        value >> (-by).min(63)
+    } else {
+        let most = i64::MAX >> by.min(62);
+        value.max(-most).min(most) << by.min(62)
+    }
+}
+
+impl Decision {
+    /// True if no decision is being made.
+    pub(super) fn idle(&self) -> bool {
+        self.stage == Stage::Idle
+    }
+
+    /// Starts a decision on the copied sums of `blocks` blocks.
+    pub(super) fn begin(&mut self, blocks: u32) {
+        self.stage = Stage::Scale;
+        self.hypothesis = 0;
+        self.offset = 0;
+        self.blocks = blocks;
+        self.least = [i64::MAX; CAUSES];
+        self.best = 0;
+    }
+
+    /// Drops the decision and its verdict.
+    pub(super) fn reset(&mut self) {
+        *self = Self { rounds: self.rounds, ..Self::default() };
+    }
+
+    /// Does one step.
+    #[inline(never)]
+    pub(super) fn step(&mut self, config: &Config, copy: &[i64; PRODUCTS], released: bool) {
+        let Some(hypothesis) = HYPOTHESES.get(usize::from(self.hypothesis)) else {
+            return self.judge(config, released);
+        };
+        let last = hypothesis.vectors.len() as u8;
+        match self.stage {
+            Stage::Scale => self.scale(copy, last),
+            Stage::Load => self.load(copy, last),
+            Stage::Pivot => self.divide(last),
+            Stage::Eliminate => self.eliminate(last),
+            Stage::Bound => self.bound(config, last),
+            Stage::Record => self.record(hypothesis),
+            _ => {}
+        }
+    }
+
+    fn scale(&mut self, copy: &[i64; PRODUCTS], last: u8) {
+        let mut index = usize::from(self.offset);
+        for (row, scale) in self.scales.iter_mut().enumerate().take(usize::from(last) + 1) {
+            let diagonal = copy.get(index).copied().unwrap_or(0);
+            let bits = 64 - diagonal.leading_zeros();
+            *scale = (bits.saturating_sub(BITS - 1) / 2) as u8;
+            index += usize::from(last) + 1 - row;
+        }
+        (self.row, self.pivot) = (0, 0);
+        self.information = 0;
+        self.stage = Stage::Load;
+    }
+
+    fn load(&mut self, copy: &[i64; PRODUCTS], last: u8) {
+        let row = self.row;
+        let mine = self.scales[usize::from(row) & 7];
+        for column in row..=last {
+            let sum = copy.get(usize::from(self.offset)).copied().unwrap_or(0);
+            let shift = u32::from(mine) + u32::from(self.scales[usize::from(column) & 7]);
+            self.matrix[at(row, column)] = saturated_to_32(sum >> (shift & 63));
+            self.offset += 1;
+        }
+        self.own[usize::from(row) & 7] = self.matrix[at(row, row)];
+        self.row += 1;
+        if row == last {
+            self.stage = Stage::Pivot;
+        }
+    }
+
+    fn divide(&mut self, last: u8) {
+        let k = self.pivot;
+        if k == last {
+            self.stage = Stage::Bound;
+            return;
+        }
+        let diagonal = self.matrix[at(k, k)];
+        if k == 1 && self.hypothesis == 0 {
+            let double = 2 * i32::from(self.scales[usize::from(last) & 7]);
+            self.none = shifted(i64::from(self.matrix[at(last, last)].max(0)), double);
+        }
+        if diagonal <= 0 || diagonal <= self.own[usize::from(k) & 7] >> thresholds::DEPENDENT_BITS {
+            self.information = 0;
+            self.pivot += 1;
+            return;
+        }
+        self.shift = (diagonal.leading_zeros() - 2) as u8;
+        let mantissa = i64::from(diagonal) << self.shift;
+        self.reciprocal = (1i64 << 59).checked_div(mantissa).unwrap_or(0) as i32;
+        self.information = diagonal;
+        (self.row, self.column) = (k + 1, k + 1);
+        self.stage = Stage::Eliminate;
+    }
+
+    /// Returns `product / pivot`; its magnitude is below 2^31 if the product is that of two elements of the pivot's row.
+    #[inline(always)]
+    fn quotient(&self, product: i64) -> i64 {
+        let scaled = saturated_to_32(product >> (29 - i32::from(self.shift)).max(0));
+        (i64::from(scaled) * i64::from(self.reciprocal)) >> 30
+    }
+
+    fn eliminate(&mut self, last: u8) {
+        for _ in 0..EACH {
+            let (k, i, j) = (self.pivot, self.row, self.column);
+            let product = i64::from(self.matrix[at(k, i)]) * i64::from(self.matrix[at(k, j)]);
+            let new = i64::from(self.matrix[at(i, j)]) - self.quotient(product);
+            self.matrix[at(i, j)] = saturated_to_32(new);
+            if j < last {
+                self.column += 1;
+            } else if i < last {
+                self.row += 1;
+                self.column = self.row;
+            } else {
+                self.pivot += 1;
+                self.stage = Stage::Pivot;
+                return;
+            }
+        }
+    }
+
+    fn bound(&mut self, config: &Config, last: u8) {
+        let k = last - 1;
+        let (mine, energy) = (self.scales[usize::from(k) & 7], self.scales[usize::from(last) & 7]);
+        self.left = i64::from(self.matrix[at(last, last)].max(0));
+        let exponent = i32::from(energy) - i32::from(mine);
+        let mut numerator = 0;
+        if self.information > 0 {
+            numerator = self.matrix[at(k, last)];
+            let (lowest, highest) = config.bounds.get(usize::from(self.hypothesis)).copied().unwrap_or((0, 0));
+            let end = |size: i32| shifted((i64::from(size) * i64::from(self.information)) >> 16, -exponent);
+            let outside = (i64::from(numerator) - end(highest)).max(end(lowest) - i64::from(numerator)).max(0);
+            let outside = i64::from(saturated_to_32(outside)) >> 1;
+            // The fit with the size at the nearer end of what is possible.
+            self.left += self.quotient(outside * outside) << 2;
+        }
+        self.now = Size { numerator, denominator: self.information, exponent: exponent as i8, scale: mine };
+        self.stage = Stage::Record;
+    }
+
+    fn record(&mut self, hypothesis: &Hypothesis) {
+        let energy = i32::from(self.now.exponent) + i32::from(self.now.scale);
+        let left = shifted(self.left, 2 * energy);
+        let cause = hypothesis.cause as u8;
+        let entry = self.least.get_mut(usize::from(cause)).zip(self.sizes.get_mut(usize::from(cause)));
+        if let Some((least, size)) = entry
+            && left <= *least
+        {
+            (*least, *size) = (left, self.now);
+        }
+        if left <= self.least.get(usize::from(self.best)).copied().unwrap_or(i64::MAX) {
+            self.best = cause;
+        }
+        self.hypothesis += 1;
+        self.stage = if usize::from(self.hypothesis) == HYPOTHESES.len() { Stage::Bar } else { Stage::Scale };
+    }
+
+    /// Returns the energy of the best hypothesis, the number of blocks in the same unit, and the energy to be explained.
+    #[inline(always)]
+    fn energies_now(&self) -> (i64, i64, i64) {
+        let floor = i64::from(self.blocks) << 20;
+        let least = self.least.get(usize::from(self.best)).copied().unwrap_or(0);
+        (least, floor, (self.none - floor).max(0))
+    }
+
+    fn judge(&mut self, config: &Config, released: bool) {
+        match self.stage {
+            Stage::Bar => {
+                let (least, floor, total) = self.energies_now();
+                let excess = (total >> thresholds::RIVAL_ERROR_BITS).max(thresholds::RIVAL_RATIO * (least - floor));
+                self.bar = least.max(floor) + config.margin + excess;
+                (self.row, self.rivals) = (0, 1 << (self.best & 31));
+                self.stage = Stage::Rivals;
+            }
+            Stage::Rivals => {
+                if self.least.get(usize::from(self.row)).is_some_and(|left| *left < self.bar) {
+                    self.rivals |= 1 << (self.row & 31);
+                }
+                self.next(Stage::Contain);
+            }
+            Stage::Contain => {
+                for (inner, outer) in NESTED {
+                    let certain = inner != Cause::SensorSaturation || released;
+                    if certain && self.rivals & 1 << inner as u32 != 0 {
+                        self.rivals &= !(1 << outer as u32);
+                    }
+                }
+                (self.row, self.first, self.second) = (0, (i64::MAX, None), (i64::MAX, None));
+                self.stage = Stage::Pick;
+            }
+            Stage::Pick => {
+                let known = self.least.get(usize::from(self.row)).zip(Cause::ALL.get(usize::from(self.row)));
+                if self.rivals & 1 << (self.row & 31) != 0
+                    && let Some((left, cause)) = known
+                {
+                    if *left < self.first.0 {
+                        self.second = self.first;
+                        self.first = (*left, Some(*cause));
+                    } else if *left < self.second.0 {
+                        self.second = (*left, Some(*cause));
+                    }
+                }
+                self.next(Stage::Conclude);
+            }
+            _ => self.conclude(config),
+        }
+    }
+
+    /// Goes on to the next cause, and after the last one to `stage`.
+    fn next(&mut self, stage: Stage) {
+        self.row += 1;
+        if usize::from(self.row) == CAUSES {
+            self.stage = stage;
+        }
+    }
+
+    fn conclude(&mut self, config: &Config) {
+        let (least, floor, total) = self.energies_now();
+        // sqrt(2 n) with 20 fraction bits.
+        let sigma = i64::from(((2 * self.blocks) << 18).isqrt()) << 11;
+        let tolerated = thresholds::NOISE_SIGMAS * sigma + (total >> thresholds::MODEL_ERROR_BITS);
+        let says = if total < config.margin {
+            Verdict::Alarm
+        } else if least - floor > tolerated {
+            Verdict::Unknown
+        } else {
+            match (self.first.1, self.second.1) {
+                (Some(cause), None) => Verdict::Named(cause),
+                (Some(cause), Some(rival)) => Verdict::Ambiguous(cause, rival),
+                (None, _) => Verdict::Unknown,
+            }
+        };
+        self.agreed = if says == self.proposed { self.agreed.saturating_add(1) } else { 1 };
+        if self.agreed >= thresholds::AGREED {
+            self.verdict = says;
+        }
+        self.proposed = says;
+        if let Some(cause) = self.first.1 {
+            self.size = self.sizes.get(cause as usize).copied().unwrap_or_default();
+        }
+        self.energies = (self.none, least);
+        self.rounds = self.rounds.wrapping_add(1);
+        self.stage = Stage::Idle;
+    }
+}

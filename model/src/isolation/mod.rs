@@ -1,0 +1,387 @@
+//! Fault isolation in the tick: which fault explains that the readings of the stiffness sensor differ from the model.
+//!
+//! Important terms:
+//!
+//! - *residual*: reading minus the model's stiffness, in V; the mean over a *block* of ticks.
+//! - *signature*: the sensitivity of the reading to a cause; a filter of the applied voltage and of the model ([`bank`]).
+//! - *innovation*: the residual, whitened to first order and divided by its standard deviation.
+//! - *restart*: the sums begin anew as long as no sequential test is near its threshold, so that they hold what came after the
+//!   beginning of a fault.
+//! - *leftover*: the energy of the innovations that a least-squares fit with the signatures of a cause does not explain, in
+//!   variances.
+//!
+//! In each tick a [`State`] gets the applied voltage, the model's stiffness (without the sensor's correction) and the reading:
+//!
+//! ```text
+//! tick -> sums -> (block) -> signatures -> whitening -> sequential tests -> alarm
+//!                                              |               | below the restart threshold: restart
+//!                                              +-> products of each hypothesis, summed
+//!                                                      | every 20 blocks after the alarm
+//!                                                      +-> elimination -> leftovers -> verdict
+//! ```
+//!
+//! The work of a block is spread over the ticks of the next one; a decision, over about 17 blocks. The verdict never acts on the
+//! output. It stays until [`State::acknowledge`].
+//!
+//! A cause is named if it leaves no more than noise and the error of its linear signature can leave, and every other cause leaves
+//! much more. If another one does not, both are named as ambiguous; if no cause leaves so little, the verdict is unknown. Two
+//! decisions in a row have to agree.
+//!
+//! The reference in double precision is `simulation::isolation`.
+
+pub mod bank;
+mod cause;
+mod decision;
+mod products;
+mod sequential;
+mod settings;
+mod signatures;
+mod sums;
+pub mod thresholds;
+
+pub use cause::Cause;
+pub use settings::Settings;
+
+use crate::coefficient::{Gain, Rate, Weight, WideGain};
+use crate::units::{ScaledStiffness, Signal, Volts, signal, steps};
+use crate::validated::Validated;
+
+/// Length of the arrays of vectors: a power of two, so that a masked index is inside.
+const SLOTS: usize = 64;
+/// Number of causes.
+const CAUSES: usize = Cause::ALL.len();
+/// Number of vectors that one tick whitens.
+const WHITENED: u32 = 3;
+/// Largest whitened value, in standard deviations with 10 fraction bits: the products of two of them in all blocks fit 64 bits.
+const LARGEST: i32 = (1 << 24) - 1;
+
+/// What the bank says of the spring and its sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Verdict {
+    /// The readings agree with the model.
+    #[default]
+    Quiet,
+    /// They do not, and the cause is not known yet.
+    Alarm,
+    /// One cause explains them, and no other does.
+    Named(Cause),
+    /// At least these two explain them; the first leaves least.
+    Ambiguous(Cause, Cause),
+    /// No cause of the bank explains them.
+    Unknown,
+}
+
+impl Verdict {
+    /// Returns a number for frames and logs: the state in the upper byte (quiet 0, alarm 1, unknown 2, named 3, ambiguous 4), then the
+    /// numbers of the two causes, four bits each, as their places in [`Cause::ALL`].
+    pub const fn code(self) -> u16 {
+        match self {
+            Self::Quiet => 0,
+            Self::Alarm => 1 << 8,
+            Self::Unknown => 2 << 8,
+            Self::Named(cause) => 3 << 8 | cause as u16,
+            Self::Ambiguous(cause, other) => 4 << 8 | (other as u16) << 4 | cause as u16,
+        }
+    }
+}
+
+/// The bank for one spring, sensor and sample time, quantized for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    ticks: u32,
+    shift: u32,
+    slew_shift: u32,
+    half: u32,
+    three_quarters: u32,
+    fewest: u32,
+    reach: [i32; 3],
+    share: Gain,
+    rest: Gain,
+    share_over_rest: Weight,
+    rate: Rate,
+    decays: [Rate; 3],
+    slow: [Rate; 2],
+    series: [Rate; 3],
+    range: i32,
+    per_range: WideGain,
+    half_widths: [i32; 3],
+    per_width: [WideGain; 3],
+    starts: [i32; 3],
+    per_rest: [WideGain; 3],
+    jump: WideGain,
+    per_slew: [WideGain; 3],
+    per_lag: [WideGain; 3],
+    /// With 31 fraction bits.
+    whitening: i32,
+    correlation: Option<Gain>,
+    pinned_below: i32,
+    smallest: [i32; bank::SMALLEST.len()],
+    bounds: [(i32, i32); bank::HYPOTHESES.len()],
+    alarm: i32,
+    restart: i32,
+    margin: i64,
+}
+
+impl Validated<'_, Settings> {
+    /// Quantizes the bank for the tick.
+    pub fn quantize(self) -> Config {
+        let (settings, sample_time) = (self.settings(), self.sample_time());
+        let rate_hz = 1.0 / sample_time.seconds();
+        let ticks = bank::block_ticks(rate_hz);
+        let block_s = f64::from(ticks) * sample_time.seconds();
+        let (share, tau, range) = (settings.plant.share, settings.plant.time_constant_s, settings.range_v);
+        let lag = |tau_s: f64| Rate::new(crate::units::lag_fraction(block_s, tau_s).min(bank::FASTEST));
+        let slow = bank::SLOW_TAUS.map(|times| lag(times * tau));
+        let (sigma_v, correlation) = settings.block_noise(block_s);
+        let whitened_v = sigma_v * libm::sqrt(1.0 - correlation * correlation);
+        let bits = |value: f64, fraction: u32| steps(value, f64::from(1u32 << fraction)) as i32;
+        Config {
+            ticks,
+            shift: ticks.trailing_zeros(),
+            slew_shift: ticks.trailing_zeros() - bank::SLEW_TICKS.trailing_zeros(),
+            half: ticks / 2,
+            three_quarters: ticks / 4 * 3,
+            fewest: ((block_s / settings.interval_s) as u32 * bank::FEWEST).div_ceil(256).max(1),
+            reach: bank::SLEW_RATES
+                .map(|rate| signal(rate * range / tau * sample_time.seconds() * f64::from(bank::SLEW_TICKS)).to_bits()),
+            share: Gain::new(share),
+            rest: Gain::new(1.0 - share),
+            share_over_rest: Weight::new(share / (1.0 - share)),
+            rate: lag(tau),
+            decays: [lag(tau), slow[0], slow[1]],
+            slow,
+            series: bank::LAG_TAUS.map(|times| lag(times * tau)),
+            range: signal(range).to_bits(),
+            per_range: WideGain::new(1.0 / range),
+            half_widths: bank::PLAYS.map(|width| signal(0.5 * width * range).to_bits()),
+            per_width: bank::PLAYS.map(|width| WideGain::new(1.0 / width)),
+            starts: bank::LIMITS.map(|start| signal(start * range).to_bits()),
+            per_rest: bank::LIMITS.map(|start| WideGain::new(1.0 / (1.0 - start))),
+            // The jumps have 10 fraction bits.
+            jump: WideGain::new(1024.0 / (2.0 * range)),
+            per_slew: bank::SLEW_RATES.map(|rate| WideGain::new(rate * block_s / tau)),
+            per_lag: bank::LAG_TAUS.map(|times| WideGain::new(block_s / (times * tau))),
+            whitening: bits(1.0 / (1024.0 * whitened_v), 31),
+            correlation: (correlation > 0.0).then(|| Gain::new(correlation)),
+            pinned_below: signal(-3.0 * sigma_v).to_bits(),
+            smallest: bank::SMALLEST.map(|(_, size)| bits(size, 28)),
+            bounds: bank::HYPOTHESES.map(|hypothesis| (bits(hypothesis.lowest, 16), bits(hypothesis.highest, 16))),
+            alarm: bits(settings.alarm_nats, 20),
+            restart: bits(thresholds::RESTART_NATS, 20),
+            margin: i64::from(bits(2.0 * settings.margin_nats, 20)),
+        }
+    }
+}
+
+/// State of the bank; the default is a spring at rest at 0 V.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State {
+    sums: sums::Sums,
+    means: sums::Means,
+    filters: signatures::Filters,
+    vectors: [i32; SLOTS],
+    last: [i32; SLOTS],
+    whitened: [i32; SLOTS],
+    tests: sequential::Tests,
+    products: products::Products,
+    mode: products::Mode,
+    decision: decision::Decision,
+    /// True while a block is in work.
+    working: bool,
+    alarmed: bool,
+    blocks: u32,
+    age: u32,
+    since_decision: u32,
+    pinned: bool,
+    pinned_at: Option<i32>,
+    released: bool,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            sums: Default::default(),
+            means: Default::default(),
+            filters: Default::default(),
+            vectors: [0; SLOTS],
+            last: [0; SLOTS],
+            whitened: [0; SLOTS],
+            tests: Default::default(),
+            products: Default::default(),
+            mode: products::Mode { fresh: true, ..Default::default() },
+            decision: Default::default(),
+            working: false,
+            alarmed: false,
+            blocks: 0,
+            age: 0,
+            since_decision: 0,
+            pinned: false,
+            pinned_at: None,
+            released: false,
+        }
+    }
+}
+
+/// First tick of each part of a block's work.
+const WHITEN: u32 = signatures::STEPS;
+const TEST: u32 = WHITEN + (bank::VECTORS as u32 + 1).div_ceil(WHITENED);
+const ADD: u32 = TEST + sequential::STEPS;
+const DECIDE: u32 = ADD + products::STEPS;
+const _: () = assert!(DECIDE < 116 && bank::VECTORS < SLOTS, "a block of 128 ticks leaves time for the decision");
+
+impl Config {
+    /// Advances the bank by one tick: applied voltage, the model's stiffness just after it was applied without the sensor's
+    /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop.
+    #[inline]
+    pub fn tick(&self, state: &mut State, applied: Volts, model: ScaledStiffness, reading: Option<ScaledStiffness>) {
+        let step = state.sums.ticks;
+        state.sums.add(self, applied, model, reading.map(|reading| reading.0));
+        if step + 1 == self.ticks {
+            state.means = state.sums.finish(self);
+            // A sensor that rounds coarsely repeats readings at many values; one that is stuck or saturated, at one.
+            if state.means.pinned {
+                state.means.pinned =
+                    *state.pinned_at.get_or_insert(state.means.last_reading) == state.means.last_reading;
+            }
+            state.working = true;
+        } else if state.working {
+            self.work(state, step);
+        }
+    }
+
+    /// Does the work of one tick for the block before.
+    #[inline(never)]
+    fn work(&self, state: &mut State, step: u32) {
+        if step < WHITEN {
+            state.filters.step(self, &state.means, state.age, step, &mut state.vectors);
+        } else if !state.means.usable {
+            self.decide(state);
+        } else if step < TEST {
+            self.whiten(state, (step - WHITEN) * WHITENED);
+        } else if step < ADD {
+            state.tests.step(self, step - TEST, &state.whitened);
+            if step + 1 == ADD {
+                self.assess(state);
+            }
+        } else if step < DECIDE {
+            if state.blocks > 0 {
+                state.products.step(step - ADD, state.mode, &state.whitened);
+            }
+        } else {
+            if step == DECIDE {
+                self.close(state);
+            }
+            self.decide(state);
+        }
+    }
+
+    fn whiten(&self, state: &mut State, first: u32) {
+        state.vectors[bank::VECTORS] = state.means.residual;
+        let slots = state.vectors.iter().zip(&mut state.last).zip(&mut state.whitened);
+        for ((new, last), whitened) in slots.skip(first as usize).take(WHITENED as usize) {
+            let predicted = self.correlation.map_or(0, |gain| gain.times(Signal::from_bits(*last)).to_bits());
+            let difference = new.saturating_sub(predicted);
+            let value = ((i64::from(difference) * i64::from(self.whitening)) >> 31) as i32;
+            *whitened = value.clamp(-LARGEST - 1, LARGEST);
+            *last = *new;
+        }
+    }
+
+    /// Restarts the sums, or counts the block.
+    fn assess(&self, state: &mut State) {
+        let highest = state.tests.highest;
+        if !state.alarmed && highest < self.restart {
+            state.restart();
+            return;
+        }
+        state.age = state.age.saturating_add(1);
+        state.mode.fresh = state.blocks == 0;
+        state.blocks += 1;
+        if state.means.pinned && state.means.residual < self.pinned_below {
+            state.pinned = true;
+        } else if !state.means.pinned && state.pinned {
+            state.released = true;
+        }
+        if highest >= self.alarm {
+            state.alarmed = true;
+        }
+        state.since_decision += 1;
+        state.mode.copy = state.alarmed && state.since_decision >= bank::ROUND && state.decision.idle();
+        state.mode.halve = state.blocks >= bank::MOST_BLOCKS;
+    }
+
+    /// Ends the work on the sums.
+    fn close(&self, state: &mut State) {
+        if state.mode.copy {
+            state.decision.begin(state.blocks);
+            state.since_decision = 0;
+        }
+        if state.mode.halve {
+            state.blocks >>= 1;
+        }
+        state.mode = products::Mode::default();
+    }
+
+    #[inline(always)]
+    fn decide(&self, state: &mut State) {
+        if !state.decision.idle() {
+            state.decision.step(self, &state.products.copy, state.released);
+        }
+    }
+}
+
+impl State {
+    fn restart(&mut self) {
+        self.filters.restart();
+        (self.blocks, self.age, self.since_decision) = (0, 0, 0);
+        (self.pinned, self.pinned_at, self.released) = (false, None, false);
+    }
+
+    /// Ends an alarm: the bank looks for a fault anew, and one that lasts is found again.
+    pub fn acknowledge(&mut self) {
+        self.alarmed = false;
+        self.tests = Default::default();
+        self.decision.reset();
+        self.restart();
+    }
+
+    /// Returns what the bank says.
+    pub fn verdict(&self) -> Verdict {
+        match self.decision.verdict {
+            Verdict::Quiet if self.alarmed => Verdict::Alarm,
+            verdict => verdict,
+        }
+    }
+
+    /// Returns the number of decisions made since the start.
+    pub fn decisions(&self) -> u32 {
+        self.decision.rounds
+    }
+
+    /// Returns for how many blocks the fault has been there: since the last restart of the sums; 0 without an alarm.
+    pub fn since_blocks(&self) -> u32 {
+        if self.alarmed { self.age } else { 0 }
+    }
+
+    /// Returns the energy of the innovations that no cause explains and what the best cause leaves, in variances, at the last
+    /// decision. Floating point: for the host.
+    pub fn energies(&self) -> (f64, f64) {
+        let (none, least) = self.decision.energies;
+        (none as f64 / 1_048_576.0, least as f64 / 1_048_576.0)
+    }
+
+    /// Returns the size of the best cause in units of [`Settings::unit`] and its standard deviation, at the last decision. Floating
+    /// point: for the host.
+    pub fn size(&self) -> (f64, f64) {
+        let decision::Size { numerator, denominator, exponent, scale } = self.decision.size;
+        if denominator <= 0 {
+            return (0.0, 0.0);
+        }
+        let size = f64::from(numerator) / f64::from(denominator) * libm::exp2(f64::from(exponent));
+        let information = f64::from(denominator) * libm::exp2(2.0 * f64::from(scale) - 20.0);
+        (size, 1.0 / libm::sqrt(information))
+    }
+}
+
+#[cfg(test)]
+mod tests;

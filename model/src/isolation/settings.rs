@@ -1,0 +1,88 @@
+//! The bank's settings, in SI units.
+
+use super::{Cause, bank};
+use crate::error::OutOfRange;
+use crate::estimator::Plant;
+use crate::units::SampleTime;
+use crate::validated::Validate;
+
+/// A bank of residual signatures for one spring and one stiffness sensor, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The spring that the tick's estimator runs; the signatures are its sensitivities.
+    pub plant: Plant,
+    /// Standard deviation of one reading, 0.05 to 100 V.
+    pub noise_v: f64,
+    /// Time between two readings, one sample time to half a block.
+    pub interval_s: f64,
+    /// Correlation time of the readings' noise, 0 for white noise, to 10 s. It whitens the residual to first order.
+    pub noise_correlation_s: f64,
+    /// Highest voltage of the amplifier, 50 to 1000 V: the scale of the laws and limits.
+    pub range_v: f64,
+    /// Logarithm of the mean number of blocks between false alarms, 5 to 40 nats: threshold of the sequential tests.
+    pub alarm_nats: f64,
+    /// Difference of log-likelihood below which two causes are not distinguished, 1 to 100 nats.
+    pub margin_nats: f64,
+}
+
+impl Settings {
+    /// The source report's spring and range, and a sensor of 1 V noise that is read at 1 kHz.
+    pub const PAPER: Self = Self {
+        plant: Plant::PAPER,
+        noise_v: 1.0,
+        interval_s: 1e-3,
+        noise_correlation_s: 0.0,
+        range_v: 700.0,
+        alarm_nats: 20.0,
+        margin_nats: 10.0,
+    };
+}
+
+impl Settings {
+    /// Returns the factor from the coefficient of a cause's principal vector to its size in the unit of [`Cause`], for ticks of
+    /// `rate_hz`.
+    pub fn unit(&self, cause: Cause, rate_hz: f64) -> f64 {
+        let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
+        match cause {
+            Cause::Hysteresis | Cause::StaticNonlinearity | Cause::AmplifierLimit => self.range_v,
+            Cause::AmplifierSlew => block_s / self.range_v,
+            Cause::Delay | Cause::SeriesLag => block_s,
+            Cause::Drift => 1.0 / (f64::from(bank::MOST_BLOCKS) * block_s),
+            _ => 1.0,
+        }
+    }
+
+    /// Returns the standard deviation of the readings' mean over a block of `block_s` s, in V, and the correlation of
+    /// neighbouring blocks.
+    pub fn block_noise(&self, block_s: f64) -> (f64, f64) {
+        let count = libm::rint(block_s / self.interval_s).max(1.0);
+        let readings = count as u32;
+        let next =
+            if self.noise_correlation_s > 0.0 { libm::exp(-self.interval_s / self.noise_correlation_s) } else { 0.0 };
+        let (mut own, mut neighbour, mut power) = (count, 0.0, 1.0);
+        for lag in 1..2 * readings {
+            power *= next;
+            if lag < readings {
+                own += 2.0 * f64::from(readings - lag) * power;
+            }
+            neighbour += (count - libm::fabs(count - f64::from(lag))) * power;
+        }
+        (self.noise_v * libm::sqrt(own) / count, neighbour / own)
+    }
+}
+
+impl Validate for Settings {
+    fn check(&self, sample_time: SampleTime) -> Result<(), OutOfRange> {
+        self.plant.check(sample_time)?;
+        let rate_hz = 1.0 / sample_time.seconds();
+        let block_s = f64::from(bank::block_ticks(rate_hz)) * sample_time.seconds();
+        // A low-pass covers less than half of its distance in one block.
+        OutOfRange::check("plant.time_constant_s", self.plant.time_constant_s, 2.0 * block_s..=1000.0, "s")?;
+        OutOfRange::check("noise_v", self.noise_v, 0.05..=100.0, "V")?;
+        OutOfRange::check("interval_s", self.interval_s, sample_time.seconds()..=0.5 * block_s, "s")?;
+        OutOfRange::check("noise_correlation_s", self.noise_correlation_s, 0.0..=10.0, "s")?;
+        OutOfRange::check("range_v", self.range_v, 50.0..=1000.0, "V")?;
+        OutOfRange::check("alarm_nats", self.alarm_nats, 5.0..=40.0, "nats")?;
+        OutOfRange::check("margin_nats", self.margin_nats, 1.0..=100.0, "nats")
+    }
+}

@@ -1,0 +1,114 @@
+//! What is added up in each tick of a block, and the means at its end.
+
+use super::Config;
+use super::bank::{SLEW_TICKS, SMOOTH_V};
+use crate::coefficient::WideGain;
+use crate::units::{ScaledStiffness, Signal, Volts, saturated_to_32};
+
+/// Changes of the voltage that are no jump, with 20 fraction bits.
+const SMOOTH: u32 = (SMOOTH_V * 1_048_576.0) as u32;
+
+/// Sums over the ticks of the present block, divided by their number: in V with 20 fraction bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Sums {
+    /// Number of ticks in the sums.
+    pub(super) ticks: u32,
+    voltage: i32,
+    model: i32,
+    jumps: i64,
+    residual: i64,
+    readings: u32,
+    identical: u32,
+    lags: [i32; 3],
+    tails: [i32; 2],
+    slewed: [i32; 3],
+    last_voltage: i32,
+    last_model: i32,
+    last_reading: i32,
+}
+
+/// Means over a block, in V with 20 fraction bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Means {
+    pub(super) voltage: i32,
+    pub(super) model: i32,
+    /// Sum of `du |du|`, in V^2 with 10 fraction bits.
+    pub(super) jumps: i32,
+    /// Mean distance of the slewed voltages from the voltage.
+    pub(super) lags: [i32; 3],
+    /// Sums of the model over the last quarter and the last half of the block, divided by the ticks of the block.
+    pub(super) tails: [i32; 2],
+    /// The model in the last tick.
+    pub(super) end: i32,
+    pub(super) residual: i32,
+    /// True if there were enough readings.
+    pub(super) usable: bool,
+    pub(super) last_reading: i32,
+    /// True if three quarters of the readings equal the one before.
+    pub(super) pinned: bool,
+}
+
+impl Sums {
+    /// Adds one tick.
+    #[inline(always)]
+    pub(super) fn add(&mut self, config: &Config, voltage: Volts, model: ScaledStiffness, reading: Option<Signal>) {
+        let (voltage, model) = (voltage.0.to_bits(), model.0.to_bits());
+        let change = voltage.saturating_sub(self.last_voltage);
+        self.last_voltage = voltage;
+        self.last_model = model;
+        self.voltage += voltage >> config.shift;
+        let part = model >> config.shift;
+        self.model += part;
+        if change.unsigned_abs() > SMOOTH {
+            let change = i64::from(change);
+            self.jumps += (change * change.abs()) >> 20;
+        }
+        if self.ticks >= config.half {
+            self.tails[1] += part;
+            if self.ticks >= config.three_quarters {
+                self.tails[0] += part;
+            }
+        }
+        // One of the slewed voltages takes its step.
+        let index = (self.ticks % SLEW_TICKS) as usize;
+        if index < 3 {
+            let (slewed, reach) = (&mut self.slewed[index], config.reach[index]);
+            *slewed = voltage.max(slewed.saturating_sub(reach)).min(slewed.saturating_add(reach));
+            self.lags[index] += slewed.saturating_sub(voltage) >> config.slew_shift;
+        }
+        if let Some(reading) = reading {
+            let reading = reading.to_bits();
+            self.residual += i64::from(reading.saturating_sub(model));
+            self.readings += 1;
+            self.identical += u32::from(reading == self.last_reading);
+            self.last_reading = reading;
+        }
+        self.ticks += 1;
+    }
+
+    /// Returns the means and starts the next block.
+    #[inline(never)]
+    pub(super) fn finish(&mut self, config: &Config) -> Means {
+        let means = Means {
+            voltage: self.voltage,
+            model: self.model,
+            jumps: saturated_to_32(self.jumps >> 10),
+            lags: self.lags,
+            tails: self.tails,
+            end: self.last_model,
+            residual: self.residual.checked_div(i64::from(self.readings)).unwrap_or(0) as i32,
+            usable: self.readings >= config.fewest,
+            last_reading: self.last_reading,
+            pinned: self.readings >= 4 && 4 * self.identical >= 3 * self.readings,
+        };
+        let Self { slewed, last_voltage, last_model, last_reading, .. } = *self;
+        *self = Self { slewed, last_voltage, last_model, last_reading, ..Self::default() };
+        means
+    }
+}
+
+/// Returns `bits * gain`, saturated to 32 bits.
+#[inline(always)]
+pub(super) fn times(gain: WideGain, bits: i32) -> i32 {
+    gain.times(Signal::from_bits(bits)).to_bits()
+}

@@ -1,0 +1,111 @@
+use super::*;
+use crate::units::SampleTime;
+use crate::validated::Validate;
+
+fn config(rate_hz: f64) -> Config {
+    let interval_s = f64::max(1e-3, 1.0 / rate_hz);
+    let settings = Settings { interval_s, ..Settings::PAPER };
+    settings.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize()
+}
+
+/// Xorshift generator of Marsaglia.
+fn next(bits: &mut u32) -> u32 {
+    *bits ^= *bits << 13;
+    *bits ^= *bits >> 17;
+    *bits ^= *bits << 5;
+    *bits
+}
+
+#[test]
+fn a_setting_out_of_range_is_rejected_by_name() {
+    let time = SampleTime::from_rate(1000.0).unwrap();
+    let paper = Settings::PAPER;
+    let mut short = paper;
+    short.plant.time_constant_s = 0.2;
+    for (settings, field) in [
+        (short, "plant.time_constant_s"),
+        (Settings { noise_v: 0.0, ..paper }, "noise_v"),
+        (Settings { interval_s: 1.0, ..paper }, "interval_s"),
+        (Settings { noise_correlation_s: -1.0, ..paper }, "noise_correlation_s"),
+        (Settings { range_v: f64::NAN, ..paper }, "range_v"),
+        (Settings { alarm_nats: 1.0, ..paper }, "alarm_nats"),
+        (Settings { margin_nats: 0.0, ..paper }, "margin_nats"),
+    ] {
+        assert_eq!(settings.validate(time).unwrap_err().field, field);
+    }
+}
+
+#[test]
+fn the_noise_of_a_block_is_that_of_a_mean_of_correlated_readings() {
+    let white = Settings::PAPER.block_noise(0.128);
+    assert!((white.0 - 1.0 / 128f64.sqrt()).abs() < 1e-12 && white.1 == 0.0);
+    // Correlated over far more than a block: the mean is as noisy as a reading, and neighbours agree.
+    let slow = Settings { noise_correlation_s: 10.0, ..Settings::PAPER }.block_noise(0.128);
+    assert!((slow.0 - 1.0).abs() < 0.01 && (0.98..1.0).contains(&slow.1), "{slow:?}");
+}
+
+/// With overflow checks, as all tests.
+#[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
+fn no_input_overflows_and_garbage_is_not_named() {
+    for rate_hz in [100.0, 1000.0, 10_000.0] {
+        let (config, mut state, mut bits) = (config(rate_hz), State::default(), 7u32);
+        let mut any = |wild: bool| {
+            let value = next(&mut bits) as i32;
+            if wild { value } else { value >> 4 }
+        };
+        for tick in 0..400_000u32 {
+            // Stretches of values of the whole range of a signal, and of ordinary ones.
+            let wild = tick & 0x8000 == 0;
+            let applied = Volts(Signal::from_bits(any(wild)));
+            let model = ScaledStiffness(Signal::from_bits(any(wild)));
+            let reading = (tick % 7 != 0).then(|| ScaledStiffness(Signal::from_bits(any(wild))));
+            config.tick(&mut state, applied, model, reading);
+            assert!(!matches!(state.verdict(), Verdict::Named(_)), "{:?}", state.verdict());
+        }
+        assert_eq!(state.verdict(), Verdict::Unknown);
+        assert!(state.decisions() > 10);
+    }
+}
+
+#[test]
+fn a_stuck_sensor_is_named_and_an_acknowledged_alarm_comes_again() {
+    let (config, mut state, mut bits) = (config(1000.0), State::default(), 7u32);
+    let mut alarms = 0;
+    for tick in 0..80_000u32 {
+        let volts = [100, 300, 0, 200][(tick / 6000) as usize % 4];
+        let level = Signal::from_num(volts);
+        let noise = Signal::from_bits((next(&mut bits) & 0x3f_ffff) as i32 - 0x1f_ffff);
+        let reading = if tick < 20_000 { level + noise } else { Signal::from_num(150) };
+        config.tick(&mut state, Volts(level), ScaledStiffness(level), Some(ScaledStiffness(reading)));
+        if tick < 20_000 {
+            assert_eq!(state.verdict(), Verdict::Quiet);
+        }
+        if tick == 50_000 {
+            assert_eq!(state.verdict(), Verdict::Named(Cause::StuckSensor));
+            assert!((100..400).contains(&state.since_blocks()), "{}", state.since_blocks());
+            state.acknowledge();
+            assert_eq!((state.verdict(), state.since_blocks()), (Verdict::Quiet, 0));
+            alarms += 1;
+        }
+    }
+    assert_eq!((state.verdict(), alarms), (Verdict::Named(Cause::StuckSensor), 1));
+}
+
+#[test]
+fn missing_readings_leave_the_bank_quiet() {
+    let (config, mut state) = (config(1000.0), State::default());
+    for tick in 0..20_000u32 {
+        let volts = Signal::from_num((tick / 3000) * 100);
+        config.tick(&mut state, Volts(volts), ScaledStiffness(volts), None);
+    }
+    assert_eq!(state.verdict(), Verdict::Quiet);
+}
+
+#[test]
+fn numbers_of_verdicts_and_places_of_causes_agree() {
+    assert!(Cause::ALL.iter().enumerate().all(|(place, cause)| *cause as usize == place));
+    let verdict = Verdict::Ambiguous(Cause::Delay, Cause::SeriesLag);
+    assert_eq!(verdict.code(), 4 << 8 | (Cause::SeriesLag as u16) << 4 | Cause::Delay as u16);
+    assert_eq!([Verdict::Quiet, Verdict::Alarm, Verdict::Unknown].map(Verdict::code), [0, 256, 512]);
+}

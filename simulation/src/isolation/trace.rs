@@ -1,0 +1,150 @@
+//! The fixed-point bank over a record: the model runs on the voltages of the record, which are held between its rows, and the
+//! readings of its rows are the sensor's.
+
+use anyhow::Result;
+use model::estimator::Estimator;
+use model::isolation::{Cause, Settings, State, Verdict, bank};
+use model::{OutOfRange, SampleTime, ScaledStiffness, Validate, Volts};
+use serde::Serialize;
+
+use crate::bad_input;
+use crate::bad_input::BadInput;
+use crate::record::Record;
+
+/// A change of what the bank says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// Time in the record, in s.
+    pub time_s: f64,
+    /// `quiet`, `alarm`, `named`, `ambiguous` or `unknown`.
+    pub verdict: &'static str,
+    /// Code of the cause that explains most; `None` unless named or ambiguous.
+    pub cause: Option<&'static str>,
+    /// Code of the other cause if the verdict is ambiguous.
+    pub other: Option<&'static str>,
+    /// Beginning of the fault: time of the last restart of the sums, in s.
+    pub since_s: Option<f64>,
+    /// Size of the cause with its 95 % interval.
+    pub size: Option<Size>,
+    /// Part of the residual's energy above the noise that the best cause explains, 0 to 1.
+    pub explained: Option<f64>,
+}
+
+/// A size with its 95 % interval. The interval holds the noise only, not the error of the linear signature.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Size {
+    /// The size.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit; empty for a ratio.
+    pub unit: &'static str,
+}
+
+/// What the bank says of a record.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Trace {
+    /// Version of the JSON.
+    pub schema: u32,
+    /// Number of rows.
+    pub rows: usize,
+    /// Ticks per second.
+    pub rate_hz: f64,
+    /// Length of a block, in s.
+    pub block_s: f64,
+    /// Standard deviation of a reading, in V.
+    pub noise_v: f64,
+    /// What the bank says at the end.
+    pub last: Event,
+    /// Every change of what it says.
+    pub trace: Vec<Event>,
+}
+
+fn unit(cause: Cause) -> &'static str {
+    match cause {
+        Cause::Hysteresis | Cause::StaticNonlinearity | Cause::AmplifierLimit | Cause::ReadingOffset => "V",
+        Cause::AmplifierSlew => "s/V",
+        Cause::Delay | Cause::SeriesLag => "s",
+        Cause::Drift => "1/s",
+        _ => "",
+    }
+}
+
+/// Standard deviation of the readings' noise, in V, from the median of the magnitudes of their second differences; `None` for fewer
+/// than 10 readings.
+pub fn noise_v(record: &Record) -> Option<f64> {
+    let readings: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
+    let mut bent: Vec<f64> = readings.windows(3).map(|at| (at[0] - 2.0 * at[1] + at[2]).abs()).collect();
+    bent.sort_by(f64::total_cmp);
+    // Their variance is six times that of a reading.
+    (bent.len() >= 8).then(|| 1.4826 * bent[bent.len() / 2] / 6f64.sqrt())
+}
+
+/// Runs the bank over a record. The rate is 1 kHz, or 100 Hz for rows further apart than half a block of 1 kHz, 64 ms; `settings.interval_s` is set to the
+/// mean distance of the rows.
+///
+/// # Errors
+/// [`BadInput`] for settings that the bank rejects, voltages beyond +-2000 V, and rows more than 0.6 s apart.
+pub fn run(record: &Record, mut settings: Settings) -> Result<Trace> {
+    let refused = |error: OutOfRange| BadInput(error.to_string());
+    let [first, .., last] = &record.rows[..] else { bad_input!("{}: expected at least 2 rows", record.name) };
+    settings.interval_s = (last.time_s - first.time_s) / (record.rows.len() - 1) as f64;
+    let rate_hz = if settings.interval_s > 0.064 { 100.0 } else { 1000.0 };
+    if settings.interval_s > 0.6 {
+        bad_input!("{}: rows {:.3} s apart; expected at most 0.6 s", record.name, settings.interval_s);
+    }
+    let sample_time = SampleTime::from_rate(rate_hz).map_err(refused)?;
+    settings.interval_s = settings.interval_s.max(sample_time.seconds());
+    let config = settings.validate(sample_time).map_err(refused)?.quantize();
+    let plant = settings.plant.validate(sample_time).map_err(refused)?.quantize();
+    let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
+    let (mut spring, mut state) = (Default::default(), State::default());
+    let event = |state: &State, time_s: f64| {
+        let (verdict, cause, other) = match state.verdict() {
+            Verdict::Quiet => ("quiet", None, None),
+            Verdict::Alarm => ("alarm", None, None),
+            Verdict::Unknown => ("unknown", None, None),
+            Verdict::Named(cause) => ("named", Some(cause), None),
+            Verdict::Ambiguous(cause, other) => ("ambiguous", Some(cause), Some(other)),
+        };
+        let size = cause.map(|cause| {
+            let (size, deviation) = state.size();
+            let factor = settings.unit(cause, rate_hz);
+            let (value, half) = (factor * size, 1.96 * factor * deviation);
+            Size { value, low: value - half, high: value + half, unit: unit(cause) }
+        });
+        let (none, least) = state.energies();
+        Event {
+            time_s,
+            verdict,
+            cause: cause.map(Cause::name),
+            other: other.map(Cause::name),
+            since_s: (verdict != "quiet").then(|| time_s - f64::from(state.since_blocks()) * block_s),
+            size,
+            explained: cause.map(|_| 1.0 - least / none.max(least)),
+        }
+    };
+    let mut trace = vec![event(&state, first.time_s)];
+    let mut says = state.verdict();
+    let mut tick = 0u64;
+    for (row, next) in record.rows.iter().zip(record.rows.iter().skip(1)) {
+        let applied = Volts::new(row.voltage_v).map_err(refused)?;
+        let reading = |volts: f64| Volts::new(volts.clamp(-2000.0, 2000.0)).map(|volts| ScaledStiffness(volts.0));
+        let mut reading = row.measured.map(reading).transpose().map_err(refused)?;
+        let until = ((next.time_s - first.time_s) * rate_hz).round() as u64;
+        while tick < until {
+            let model = plant.run(&mut spring, applied);
+            // Only the row's first tick has its reading.
+            config.tick(&mut state, applied, model, reading.take());
+            tick += 1;
+            if state.verdict() != says {
+                says = state.verdict();
+                trace.push(event(&state, first.time_s + tick as f64 / rate_hz));
+            }
+        }
+    }
+    let last = event(&state, last.time_s);
+    Ok(Trace { schema: 1, rows: record.rows.len(), rate_hz, block_s, noise_v: settings.noise_v, last, trace })
+}

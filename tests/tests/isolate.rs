@@ -1,0 +1,70 @@
+//! `vsj isolate`.
+
+use std::fmt::Write;
+use std::fs;
+
+use end_to_end::vsj::{json, run, text};
+use tempfile::tempdir;
+
+/// A record of the paper's spring at 100 rows per second between levels held for 7 s, whose gain changes after 40 s, with noise of a
+/// third of a volt.
+fn record(gain: f64) -> String {
+    let mut csv = "time_s,voltage_v,stiffness\n".to_owned();
+    let (mut relaxed, mut bits) = (0.0, 1u32);
+    for row in 0..14_000u32 {
+        let voltage = [100.0, 400.0, 200.0, 500.0, 0.0, 300.0, 50.0][(row / 700) as usize % 7];
+        bits ^= bits << 13;
+        bits ^= bits >> 17;
+        bits ^= bits << 5;
+        let noise = (f64::from(bits) / f64::from(u32::MAX) - 0.5) * 12f64.sqrt() / 3.0;
+        let stiffness = (if row < 4000 { 1.0 } else { gain }) * (relaxed + (voltage - relaxed) / 11.0) + noise;
+        writeln!(csv, "{:.2},{voltage},{stiffness:.3}", f64::from(row) / 100.0).unwrap();
+        relaxed += (voltage - relaxed) * -f64::exp_m1(-0.01 / 5.5);
+    }
+    csv
+}
+
+#[test]
+fn a_gain_that_changes_is_named_with_size_and_beginning_and_nothing_is_not() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("changed.csv"), record(1.04)).unwrap();
+    fs::write(folder.path().join("sound.csv"), record(1.0)).unwrap();
+    let report = json(folder.path(), &["isolate", "changed.csv", "--json"]);
+    let last = &report["last"];
+    assert_eq!((last["verdict"].as_str(), last["cause"].as_str()), (Some("named"), Some("gain-error")), "{report}");
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    assert!((number(&last["size"]["value"]) - 0.04).abs() < 0.001, "{last}");
+    assert!(number(&last["size"]["low"]) < number(&last["size"]["high"]), "{last}");
+    assert!((number(&last["since_s"]) - 40.0).abs() < 3.0, "{last}");
+    assert!((number(&report["noise_v"]) - 1.0 / 3.0).abs() < 0.1, "{report}");
+    let trace: Vec<_> = report["trace"].as_array().unwrap().iter().map(|event| event["verdict"].clone()).collect();
+    assert_eq!(trace[..2], ["quiet", "alarm"], "{report}");
+    let said = text(&run(folder.path(), &["isolate", "changed.csv"]).stdout);
+    assert!(said.contains("at the end:") && said.contains("named gain-error, size 0.04"), "{said}");
+    let sound = json(folder.path(), &["isolate", "sound.csv", "--json"]);
+    assert_eq!(sound["trace"].as_array().unwrap().len(), 1, "{sound}");
+    assert_eq!(sound["last"]["verdict"], "quiet");
+}
+
+#[test]
+fn what_cannot_be_run_is_one_line_and_exit_code_2() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("sound.csv"), record(1.0)).unwrap();
+    fs::write(folder.path().join("bare.csv"), "time_s,voltage_v\n0,1\n1,2\n").unwrap();
+    fs::write(folder.path().join("slow.csv"), "time_s,voltage_v,stiffness\n0,1,1\n1,2,1\n2,3,1\n").unwrap();
+    for (arguments, expected) in [
+        (&["isolate", "no.csv"][..], "no.csv"),
+        (&["isolate", "bare.csv"], "bare.csv: no column `stiffness`; expected readings"),
+        (&["isolate", "slow.csv"], "slow.csv: fewer than 10 readings; expected more, or --noise-v"),
+        (&["isolate", "slow.csv", "--noise-v", "1"], "slow.csv: rows 1.000 s apart; expected at most 0.6 s"),
+        (&["isolate", "sound.csv", "--noise-v", "0"], "--noise-v: noise_v = 0 is not allowed: expected 0.05 to 100 V"),
+        (&["isolate", "sound.csv", "--limit-v", "9"], "--limit-v: range_v = 9 is not allowed"),
+        (&["isolate", "sound.csv", "--alarm-nats", "nan"], "--alarm-nats: alarm_nats = NaN is not allowed"),
+        (&["isolate", "sound.csv", "--plant", "no.toml"], "no.toml: cannot be read"),
+    ] {
+        let output = run(folder.path(), arguments);
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(expected) && stderr.trim_end().lines().count() == 1, "{arguments:?}: {stderr}");
+    }
+}

@@ -1,0 +1,129 @@
+//! Time between false alarms: counted at low thresholds, computed by importance sampling at the bank's own.
+
+use model::isolation::{self, Verdict, bank, thresholds};
+use model::{
+    Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::run::RATE_HZ;
+use crate::ground_truth::{Live, Noise};
+
+/// Alarms of springs without a fault.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Alarms {
+    /// Number of ticks.
+    pub ticks: u64,
+    /// Number of alarms; each is acknowledged at once.
+    pub alarms: u64,
+}
+
+/// Counts the alarms at a threshold in runs of 500 s without a fault, one for each seed.
+///
+/// # Errors
+/// The model rejects the settings.
+pub fn count(percent: f64, nats: f64, seeds: std::ops::Range<u64>) -> Result<Alarms, OutOfRange> {
+    const TICKS: u32 = 500_000;
+    let noise = Noise::white(percent);
+    let feedback = Feedback { noise_v: noise.sigma_v, ..Feedback::TYPICAL };
+    let config: Config = Settings { feedback: Some(feedback), ..Settings::PAPER }.validate()?.quantize();
+    let settings = isolation::Settings { noise_v: noise.sigma_v, alarm_nats: nats, ..isolation::Settings::PAPER };
+    let watching = settings.validate(SampleTime::from_rate(RATE_HZ)?)?.quantize();
+    let one = |seed: u64| {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut live = Live::new(&[], noise, seed, 500.0, TICKS as usize);
+        let (mut state, mut bank) = (State::default(), isolation::State::default());
+        let (mut measured, mut target, mut until, mut alarms) = (None, Volts::ZERO, 0, 0);
+        for tick in 0..TICKS {
+            if tick == until {
+                target = Volts::new(100.0 * f64::from(random.random_range(0..=5u32)))?;
+                until += random.random_range(3000..15_000);
+            }
+            let output = config.tick(&mut state, Input { target, measured });
+            let model = ScaledStiffness(output.stiffness.0 - state.correction().0);
+            let (_, reading) = live.hold(output.applied.to_f64(), 1.0 / RATE_HZ);
+            let value = ScaledStiffness(Volts::new(reading.read)?.0);
+            measured = Reading::fresh(value);
+            watching.tick(&mut bank, output.applied, model, Some(value));
+            if bank.verdict() != Verdict::Quiet {
+                alarms += 1;
+                bank.acknowledge();
+            }
+        }
+        Ok(Alarms { ticks: u64::from(TICKS), alarms })
+    };
+    let sum = |a: Alarms, b: Alarms| Alarms { ticks: a.ticks + b.ticks, alarms: a.alarms + b.alarms };
+    seeds.into_par_iter().map(one).try_reduce(Alarms::default, |a, b| Ok(sum(a, b)))
+}
+
+/// False alarms per block at a threshold, by importance sampling: the largest rate of a test over constant signatures of 0.05 to 5
+/// standard deviations, times the number of tests, plus the rate of the energy's test.
+///
+/// A cycle of a test begins at 0 and ends when the statistic returns to 0 or reaches the threshold. Its paths are drawn as if the
+/// fault were there, and weighted by the likelihood ratio (Siegmund 1976).
+pub fn predicted_per_block(nats: f64, paths: u32) -> f64 {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let shift = |size: f64| {
+        let increment = move |e: f64| size * e - 0.5 * size * size;
+        rate(nats, paths, &mut normal, move |unit| unit, move |unit| unit + size, increment)
+    };
+    let shifts = [0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0].map(shift);
+    let energy = rate(nats, paths, &mut normal, |unit| unit, |unit| 2.0 * unit, |e| 0.375 * e * e - 2f64.ln());
+    2.0 * bank::SMALLEST.len() as f64 * shifts.into_iter().fold(0.0, f64::max) + energy
+}
+
+/// Rate of alarms per block of one test. `quiet` and `tilted` turn a standard normal number into an innovation without and with the
+/// fault; `increment` is the log-likelihood ratio.
+fn rate(
+    nats: f64,
+    paths: u32,
+    normal: &mut impl FnMut() -> f64,
+    quiet: impl Fn(f64) -> f64,
+    tilted: impl Fn(f64) -> f64,
+    increment: impl Fn(f64) -> f64,
+) -> f64 {
+    let mut blocks = 0u64;
+    let mut hits = 0.0;
+    for _ in 0..paths {
+        let mut statistic = 0.0;
+        loop {
+            blocks += 1;
+            statistic += increment(quiet(normal())).min(thresholds::MOST_NATS);
+            if statistic <= 0.0 || statistic >= nats {
+                break;
+            }
+        }
+        let (mut statistic, mut log_ratio) = (0.0, 0.0);
+        loop {
+            let nats_now = increment(tilted(normal()));
+            log_ratio += nats_now;
+            statistic += nats_now.min(thresholds::MOST_NATS);
+            if statistic >= nats {
+                hits += f64::exp(-log_ratio);
+                break;
+            }
+            if statistic <= 0.0 {
+                break;
+            }
+        }
+    }
+    hits / blocks as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lorden's bound: the mean time to an alarm is at least exp(h) blocks, for each test.
+    #[test]
+    fn importance_sampling_stays_below_lordens_bound_and_falls_with_the_threshold() {
+        let tests = 2.0 * bank::SMALLEST.len() as f64 + 1.0;
+        let [low, high] = [6.0, 12.0].map(|nats| predicted_per_block(nats, 2000));
+        assert!(low < tests * f64::exp(-6.0) && low > 0.01 * f64::exp(-6.0), "{low}");
+        assert!(high < tests * f64::exp(-12.0) && high > 0.01 * f64::exp(-12.0), "{high}");
+    }
+}

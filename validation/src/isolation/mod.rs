@@ -1,0 +1,21 @@
+//! Fault isolation in the tick: how soon and how rightly the bank of `model::isolation` names faults that begin while it runs.
+//!
+//! In: seeds. Out: Markdown tables over all faults, sizes and noises, beside the limit of any detector and beside recursive least
+//! squares. The springs are those of [`ground_truth`](crate::ground_truth), which share no code with the bank.
+
+mod false_alarms;
+mod fault;
+mod least_squares;
+mod page;
+mod run;
+mod tables;
+
+pub use false_alarms::{Alarms, count, predicted_per_block};
+pub use fault::{Fault, SIZES};
+pub use least_squares::Thresholds;
+pub use page::page;
+pub use run::{Outcome, Says, run};
+pub use tables::{Row, rows, summary, table};
+
+/// Standard deviations of the noise in the tables, in percent of 500 V.
+pub const NOISES: [f64; 2] = [0.2, 1.0];

@@ -1,0 +1,177 @@
+//! One run: the controller with its sensor moves a spring between random levels, and a fault begins.
+
+use model::isolation::{self, Verdict, bank};
+use model::{
+    Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::fault::Fault;
+use super::least_squares::{LeastSquares, Thresholds};
+use crate::ground_truth::{Live, Noise};
+
+/// Ticks per second.
+pub(super) const RATE_HZ: f64 = 1000.0;
+/// Length of a run, in s.
+pub(super) const RUN_S: f64 = 180.0;
+/// Time for which the rival may settle, in s; no fault begins before.
+pub(super) const SETTLED_S: f64 = 30.0;
+
+/// What is said of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Says {
+    /// No alarm.
+    Quiet,
+    /// An alarm without a decision.
+    Alarm,
+    /// The right name.
+    Right,
+    /// Two names.
+    Ambiguous,
+    /// None of the causes.
+    Unknown,
+    /// A wrong name.
+    Wrong,
+}
+
+/// Outcome of a run; times in s after the fault began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// True if there was an alarm before the fault.
+    pub false_alarm: bool,
+    /// Time of the alarm.
+    pub alarm_s: Option<f64>,
+    /// Time at which the log-likelihood ratio of the true change is expected to reach the alarm threshold.
+    pub limit_s: Option<f64>,
+    /// Time of the first name, and whether it was right.
+    pub first: Option<(f64, bool)>,
+    /// What is said at the end.
+    pub last: Says,
+    /// What is said at the end is ambiguous, and the right name is one of the two.
+    pub one_of_two: bool,
+    /// Time at which the rival leaves its band.
+    pub rival_s: Option<f64>,
+    /// True if the rival then names the right parameter.
+    pub rival_right: bool,
+    /// Largest deviations of the rival's parameters.
+    pub deviations: [f64; 3],
+    /// Size of the fault in the unit of its cause.
+    pub magnitude: f64,
+}
+
+fn says(verdict: Verdict, fault: Fault) -> Says {
+    match verdict {
+        Verdict::Quiet => Says::Quiet,
+        Verdict::Alarm => Says::Alarm,
+        Verdict::Unknown => Says::Unknown,
+        Verdict::Ambiguous(..) => Says::Ambiguous,
+        Verdict::Named(cause) if cause.name() == fault.name() => Says::Right,
+        Verdict::Named(_) => Says::Wrong,
+    }
+}
+
+/// Steps between random levels from 0 to 500 V, in s and V.
+fn targets(random: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
+    let hold = random.random_range(4.0..12.0);
+    let mut until = 0.0;
+    let mut list = Vec::new();
+    while until < RUN_S {
+        until += hold * random.random_range(0.6..1.4);
+        list.push((until, 100.0 * f64::from(random.random_range(0..=5u32))));
+    }
+    list
+}
+
+/// Runs a fault of a size, a fraction of full size, in white noise of a percentage of 500 V. It begins after 30 to 60 s.
+///
+/// # Errors
+/// The model rejects the settings.
+pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresholds) -> Result<Outcome, OutOfRange> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let effect = fault.effect(&mut random, size);
+    let onset_s = random.random_range(SETTLED_S..2.0 * SETTLED_S);
+    let targets = targets(&mut random);
+    let noise = Noise::white(percent);
+    let feedback = Feedback { noise_v: noise.sigma_v, ..Feedback::TYPICAL };
+    let config: Config = Settings { feedback: Some(feedback), ..Settings::PAPER }.validate()?.quantize();
+    let mut state = State::default();
+    let bank_settings = isolation::Settings { noise_v: noise.sigma_v, ..isolation::Settings::PAPER };
+    let watching = bank_settings.validate(SampleTime::from_rate(RATE_HZ)?)?.quantize();
+    let mut bank = isolation::State::default();
+    let block = bank::block_ticks(RATE_HZ);
+    let mut rival = LeastSquares::new(f64::from(block) / RATE_HZ);
+    let ticks = (RUN_S * RATE_HZ) as u32;
+    let mut live = Live::new(&[], noise, seed, 500.0, ticks as usize);
+    let mut outcome = Outcome {
+        false_alarm: false,
+        alarm_s: None,
+        limit_s: None,
+        first: None,
+        last: Says::Quiet,
+        one_of_two: false,
+        rival_s: None,
+        rival_right: false,
+        deviations: [0.0; 3],
+        magnitude: effect.as_ref().map_or(0.0, |effect| effect.magnitude()),
+    };
+    let (mut begun, mut at, mut nats, mut sums) = (false, 0, 0.0, (0.0, 0.0));
+    let (mut measured, mut last_read) = (None, 0.0);
+    for tick in 0..ticks {
+        let now_s = f64::from(tick) / RATE_HZ;
+        if now_s >= onset_s && !begun {
+            begun = true;
+            live.change(effect.as_slice(), 500.0);
+        }
+        while targets[at].0 < now_s {
+            at += 1;
+        }
+        let output = config.tick(&mut state, Input { target: Volts::new(targets[at].1)?, measured });
+        let model = ScaledStiffness(output.stiffness.0 - state.correction().0);
+        let (_, reading) = live.hold(output.applied.to_f64(), 1.0 / RATE_HZ);
+        let mut read = reading.read;
+        if begun && fault == Fault::Stuck {
+            read = last_read;
+        }
+        let expected = if fault == Fault::Stuck { read } else { reading.expected };
+        last_read = read;
+        let value = ScaledStiffness(Volts::new(read.clamp(-2000.0, 2000.0))?.0);
+        measured = Reading::fresh(value);
+        watching.tick(&mut bank, output.applied, model, Some(value));
+        sums = (sums.0 + output.applied.to_f64(), sums.1 + read);
+        if (tick + 1) % block == 0 {
+            let mean = f64::from(block).recip();
+            rival.update(sums.0 * mean, sums.1 * mean);
+            sums = (0.0, 0.0);
+            if now_s > SETTLED_S {
+                let off = rival.deviations();
+                outcome.deviations = std::array::from_fn(|i| outcome.deviations[i].max(off[i].abs()));
+            }
+        }
+        let since_s = now_s - onset_s;
+        if begun {
+            nats += 0.5 * ((expected - model.to_f64()) / noise.sigma_v).powi(2);
+            if outcome.limit_s.is_none() && nats >= bank_settings.alarm_nats {
+                outcome.limit_s = Some(since_s);
+            }
+            if outcome.rival_s.is_none()
+                && (tick + 1) % block == 0
+                && let Some(name) = rival.fault(thresholds)
+            {
+                (outcome.rival_s, outcome.rival_right) = (Some(since_s), name == fault.name());
+            }
+        }
+        let verdict = bank.verdict();
+        if verdict != Verdict::Quiet && outcome.alarm_s.is_none() {
+            outcome.alarm_s = Some(since_s);
+            outcome.false_alarm = !begun;
+        }
+        if outcome.first.is_none() && matches!(verdict, Verdict::Named(_)) {
+            outcome.first = Some((since_s, says(verdict, fault) == Says::Right));
+        }
+    }
+    let verdict = bank.verdict();
+    outcome.last = says(verdict, fault);
+    outcome.one_of_two = matches!(verdict, Verdict::Ambiguous(a, b) if [a.name(), b.name()].contains(&fault.name()));
+    Ok(outcome)
+}

@@ -1,0 +1,137 @@
+//! The tables of the faults.
+
+use model::OutOfRange;
+use rayon::prelude::*;
+
+use super::fault::{Fault, SIZES};
+use super::least_squares::Thresholds;
+use super::run::{Outcome, Says, run};
+use crate::markdown;
+
+/// The runs of one fault at one size.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The fault.
+    pub fault: Fault,
+    /// Fraction of full size.
+    pub size: f64,
+    /// One outcome for each seed.
+    pub outcomes: Vec<Outcome>,
+}
+
+/// Runs every fault at every size on the same seeds.
+///
+/// # Errors
+/// The model rejects the settings.
+pub fn rows(percent: f64, seeds: std::ops::Range<u64>, thresholds: &Thresholds) -> Result<Vec<Row>, OutOfRange> {
+    let cases = Fault::all().into_iter().flat_map(|fault| {
+        let sizes = if fault == Fault::Stuck { &SIZES[..1] } else { &SIZES[..] };
+        sizes.iter().map(move |&size| (fault, size))
+    });
+    let cases: Vec<_> = cases.collect();
+    let row = |&(fault, size): &(Fault, f64)| {
+        let outcomes =
+            seeds.clone().map(|seed| run(fault, size, percent, seed, thresholds)).collect::<Result<_, _>>()?;
+        Ok(Row { fault, size, outcomes })
+    };
+    cases.par_iter().map(row).collect()
+}
+
+fn median(mut values: Vec<f64>) -> String {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.1}"))
+}
+
+impl Row {
+    fn count(&self, what: impl Fn(&Outcome) -> bool) -> usize {
+        self.outcomes.iter().filter(|outcome| what(outcome)).count()
+    }
+
+    fn ended(&self, says: Says) -> usize {
+        self.count(|outcome| outcome.last == says)
+    }
+
+    fn times(&self, time: impl Fn(&Outcome) -> Option<f64>) -> String {
+        median(self.outcomes.iter().filter_map(time).filter(|time| *time >= 0.0).collect())
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let number = |count: usize| if count == 0 { String::new() } else { count.to_string() };
+        let first_wrong = self.count(|outcome| outcome.first.is_some_and(|(_, right)| !right));
+        let rival = self.count(|outcome| outcome.rival_s.is_some());
+        let rival_right = self.count(|outcome| outcome.rival_right);
+        vec![
+            self.fault.name().to_owned(),
+            format!("{}", self.size),
+            self.times(|outcome| outcome.alarm_s),
+            self.times(|outcome| outcome.limit_s),
+            self.times(|outcome| outcome.first.map(|(time, _)| time)),
+            number(self.ended(Says::Right)),
+            format!("{} ({})", self.ended(Says::Ambiguous), self.count(|outcome| outcome.one_of_two)),
+            number(self.ended(Says::Unknown)),
+            number(self.ended(Says::Wrong)),
+            number(self.ended(Says::Quiet) + self.ended(Says::Alarm)),
+            number(first_wrong),
+            format!("{rival} ({rival_right})"),
+            self.times(|outcome| outcome.rival_s),
+        ]
+    }
+}
+
+/// The table of all faults and sizes.
+pub fn table(rows: &[Row]) -> String {
+    let header = [
+        "fault",
+        "size",
+        "alarm s",
+        "limit s",
+        "name s",
+        "right",
+        "ambiguous (one is right)",
+        "unknown",
+        "wrong",
+        "none",
+        "first name wrong",
+        "RLS: fault (right)",
+        "RLS s",
+    ];
+    markdown::table(&header, rows.iter().map(Row::cells))
+}
+
+/// Sums over the faults with a signature and those without.
+pub fn summary(rows: &[Row]) -> String {
+    let header = [
+        "faults",
+        "runs",
+        "alarm",
+        "right",
+        "ambiguous (one is right)",
+        "unknown",
+        "wrong",
+        "first name wrong",
+        "RLS: fault (right)",
+    ];
+    let line = |name: &str, known: bool| {
+        let part: Vec<&Row> = rows.iter().filter(|row| row.fault.has_signature() == known).collect();
+        let total = |of: &dyn Fn(&Row) -> usize| part.iter().map(|row| of(row)).sum::<usize>();
+        let runs = total(&|row| row.outcomes.len());
+        let percent = |count: usize| format!("{:.1} %", 100.0 * count as f64 / runs as f64);
+        let ended = |says: Says| percent(total(&|row| row.ended(says)));
+        let with = |first: usize, second: usize| format!("{} ({})", percent(first), percent(second));
+        vec![
+            name.to_owned(),
+            runs.to_string(),
+            percent(total(&|row| row.count(|outcome| outcome.alarm_s.is_some()))),
+            ended(Says::Right),
+            with(total(&|row| row.ended(Says::Ambiguous)), total(&|row| row.count(|outcome| outcome.one_of_two))),
+            ended(Says::Unknown),
+            ended(Says::Wrong),
+            percent(total(&|row| row.count(|outcome| outcome.first.is_some_and(|(_, right)| !right)))),
+            with(
+                total(&|row| row.count(|outcome| outcome.rival_s.is_some())),
+                total(&|row| row.count(|outcome| outcome.rival_right)),
+            ),
+        ]
+    };
+    markdown::table(&header, [line("with a signature", true), line("without", false)])
+}
