@@ -36,6 +36,7 @@
 //! | [`amplifier`] | slew, range, rounding to a DAC code |
 //! | [`controller`] | all of these in one tick |
 //! | [`supervisor`] | whether the output is enabled |
+//! | [`device`] | settings of a controller on an MCU |
 //! | [`validated`] | settings are validated before they are quantized |
 //! | [`units`], [`coefficient`] | number formats |
 //!
@@ -63,6 +64,7 @@ extern crate std;
 pub mod amplifier;
 pub mod coefficient;
 pub mod controller;
+pub mod device;
 pub mod error;
 pub mod estimator;
 pub mod extended;
