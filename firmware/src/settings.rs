@@ -1,10 +1,12 @@
-//! Settings of an image: spring, controller, amplifier, supervision and timing.
+//! Settings that are built into an image: spring, controller, amplifier, supervision and timing. A block of settings in flash
+//! replaces those of [`link::WireSettings`], see [`crate::start`]; the others need another image.
 
+use model::device::{self, Watchdogs};
 use model::{Amplifier, Feedback, Settings, supervisor};
 #[cfg(feature = "fast")]
 use model::{Approach, Compensation};
 
-/// Rate of the control tick, in Hz.
+/// Rate of the control tick that is built in, in Hz.
 pub const RATE_HZ: u32 = 1000;
 
 /// Longest time without a tick before the hang guard performs the emergency stop, in ms. It exceeds the overrun that the
@@ -41,6 +43,17 @@ const SENSOR: Option<Feedback> = None;
 const SENSOR: Option<Feedback> = Some(Feedback::TYPICAL);
 /// Settings of the supervisor in every run.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
+
+/// Times of the watchdogs.
+pub const WATCHDOGS: Watchdogs =
+    Watchdogs { hang_ms: LONGEST_HANG_MS, stall_ms: LONGEST_STALL_MS, reset_ms: WATCHDOG_MS };
+/// All settings of the flashed image.
+pub const BUILT_IN: device::Settings = built_in(FLASHED);
+
+/// All settings of an image with the settings `control` of its loop.
+pub const fn built_in(control: Settings) -> device::Settings {
+    device::Settings { control, supervision: SUPERVISION, watchdogs: WATCHDOGS }
+}
 
 /// The paper's controller with `amplifier`, without a sensor.
 pub const fn paper(amplifier: Amplifier) -> Settings {

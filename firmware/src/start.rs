@@ -1,6 +1,6 @@
 //! Construction of the controller at the start, from the stored model and the fault of the last run.
 
-use link::{ModelId, Reason, WireModel};
+use link::{BlockId, Reason, WireModel};
 use model::supervisor::Fault;
 use model::{Amplifier, OutOfRange, Settings};
 
@@ -12,9 +12,9 @@ use crate::settings::{FLASHED, SUPERVISION};
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     /// Running model.
-    pub model: ModelId,
+    pub model: BlockId,
     /// Stored model, even if its validation failed; the built-in model if none is stored.
-    pub stored: ModelId,
+    pub stored: BlockId,
     /// Amplifier with the limits of the running model.
     pub amplifier: Amplifier,
     /// Fault of the last run.
@@ -30,12 +30,12 @@ pub struct Start {
 #[inline(never)]
 pub fn control<'a>(
     settings: &Settings,
-    stored: Option<(ModelId, &[u8])>,
+    stored: Option<(BlockId, &[u8])>,
     cause: &Cause,
     place: &'a mut Option<Control>,
 ) -> Result<(&'a mut Control, Start), OutOfRange> {
     let control = build(settings, place)?;
-    let (builtin, amplifier) = (ModelId::default(), settings.amplifier);
+    let (builtin, amplifier) = (BlockId::default(), settings.amplifier);
     let mut start = Start { model: builtin, stored: builtin, amplifier, last_fault: cause.fault, rejected: None };
     if let Some((stored, payload)) = stored {
         start.stored = stored;
@@ -59,7 +59,7 @@ pub fn control<'a>(
 #[inline(never)]
 pub fn check(payload: &[u8]) -> Result<(), Reason> {
     let model = WireModel::read(payload);
-    let Some(model) = &model else { return Err(Reason::ModelDamaged) };
+    let Some(model) = &model else { return Err(Reason::Damaged) };
     Control::check(&FLASHED, model).map_err(|error| Reason::of_model(&error))
 }
 
@@ -92,7 +92,7 @@ mod tests {
     fn a_rejected_model_is_a_config_fault_and_the_last_fault_stands_as_well() {
         let start = |stored: Option<&[u8]>, last_fault: Option<Fault>| {
             let mut place = None;
-            let stored = stored.map(|payload| (ModelId::of(3, payload), payload));
+            let stored = stored.map(|payload| (BlockId::of(3, payload), payload));
             let standing = last_fault.map_or(Faults::NONE, |_| Faults::NONE.with(Fault::Panic).with(Fault::Interlock));
             let cause = Cause { name: "software", fault: last_fault, standing };
             let (control, start) = control(&SETTINGS, stored, &cause, &mut place).unwrap();
@@ -115,7 +115,7 @@ mod tests {
             assert_eq!((is, start.rejected, start.amplifier.max_v), (state, rejected, limit_v));
             assert_eq!(start.last_fault, last_fault, "reported in any case");
             assert_eq!(start.stored.number, if stored.is_some() { 3 } else { 0 }, "valid or not");
-            assert_eq!(start.model, if rejected.is_some() { ModelId::default() } else { start.stored });
+            assert_eq!(start.model, if rejected.is_some() { BlockId::default() } else { start.stored });
         }
     }
 
@@ -123,8 +123,8 @@ mod tests {
     fn a_model_is_checked_before_it_is_stored() {
         let payload = |share| model(share).payload().unwrap();
         assert_eq!(check(&payload(0.1)), Ok(()));
-        assert_eq!(check(b"noise"), Err(Reason::ModelDamaged));
-        assert!(matches!(check(&payload(2.0)), Err(reason) if reason != Reason::ModelDamaged));
+        assert_eq!(check(b"noise"), Err(Reason::Damaged));
+        assert!(matches!(check(&payload(2.0)), Err(reason) if reason != Reason::Damaged));
     }
 
     /// The first byte of a payload is the version of its format.
@@ -133,12 +133,12 @@ mod tests {
         let mut newer = model(0.1).payload().unwrap();
         for version in (0..=u8::MAX).filter(|version| *version != FORMAT) {
             newer[0] = version;
-            assert_eq!(check(&newer), Err(Reason::ModelDamaged), "format {version}");
+            assert_eq!(check(&newer), Err(Reason::Damaged), "format {version}");
             let mut place = None;
-            let stored = Some((ModelId::of(3, &newer), &newer[..]));
+            let stored = Some((BlockId::of(3, &newer), &newer[..]));
             let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
             let (control, start) = control(&SETTINGS, stored, &cause, &mut place).unwrap();
-            assert_eq!((start.rejected, start.model), (Some("format"), ModelId::default()));
+            assert_eq!((start.rejected, start.model), (Some("format"), BlockId::default()));
             assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config));
         }
     }

@@ -255,7 +255,7 @@ fn refusal_table() -> String {
         Reason::HostSilent,
         Reason::Armed,
         Reason::PartMissing(2),
-        Reason::ModelDamaged,
+        Reason::Damaged,
         Reason::BadModel { field: Field::named("leakage.share"), lowest: 0.0, highest: 1.0 },
         Reason::NotStored,
         Reason::Live,

@@ -11,7 +11,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use host_sim::link::{Client, Failure, Patience, Port};
 use host_sim::log::{Item, Level, Summary};
 use link::{
-    Desired, Fault, Frame, ModelId, Nonce, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts,
+    Desired, Fault, Frame, BlockId, Nonce, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts,
 };
 use simulation::plant_file;
 
@@ -218,7 +218,7 @@ fn recording(name: &str) -> Result<String> {
 /// Sends a model with `vsj link`, to a board without a file for its flash, as `cargo xtask emulate --link` starts it.
 fn model(vsj: &Path, name: &str) -> Result<String> {
     let payload = plant_file::load(&shell::root().join(PLANT).display().to_string())?.wire()?.payload();
-    let sent = ModelId::of(1, &payload.context("a model that does not fit")?);
+    let sent = BlockId::of(1, &payload.context("a model that does not fit")?);
     let mut command = shell::command(vsj);
     let models = shell::json(command.args(["link", name, "model", PLANT, "--timeout", "10", "--json"]))?;
     let expected = serde_json::to_value(sent)?;

@@ -5,12 +5,12 @@ use core::cell::Cell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use link::{ModelId, ModelUpdate, Reason};
+use link::{BlockId, ModelUpdate, Reason};
 
 use crate::start;
 use crate::store::{Pages, Store};
 
-type UpdateResult = Result<Option<ModelId>, Reason>;
+type UpdateResult = Result<Option<BlockId>, Reason>;
 
 static PENDING: Mutex<CriticalSectionRawMutex, Cell<Option<ModelUpdate>>> = Mutex::new(Cell::new(None));
 static RESULT: Signal<CriticalSectionRawMutex, UpdateResult> = Signal::new();

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use link::wire_model::PART;
 use link::{
-    FaultReport, Frame, ModelId, Models, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry,
+    FaultReport, Frame, BlockId, Blocks, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry,
     Unreadable, WireModel,
 };
 
@@ -59,9 +59,9 @@ pub enum Failure {
     /// The MCU has taken a model, but after its restart it does not run it.
     OtherModel {
         /// The model that was sent, with the number that it runs as.
-        sent: ModelId,
+        sent: BlockId,
         /// The models after the restart.
-        models: Models,
+        models: Blocks,
     },
     /// The port failed.
     Port(io::Error),
@@ -79,8 +79,8 @@ impl fmt::Display for Failure {
             Self::NoAnswer { tries, bytes } => {
                 write!(f, "no valid answer to {tries} requests, but {bytes} bytes; is the baud rate right?")
             }
-            Self::OtherModel { sent: ModelId { format, length, checksum, .. }, models } => {
-                let Models { active, stored } = models;
+            Self::OtherModel { sent: BlockId { format, length, checksum, .. }, models } => {
+                let Blocks { active, stored } = models;
                 write!(
                     f,
                     "the MCU has restarted and does not run the model that was sent (format {format}, {length} bytes, CRC \
@@ -195,7 +195,7 @@ impl Client {
     ///
     /// # Errors
     /// [`Failure`]
-    pub fn models(&mut self) -> Result<Models, Failure> {
+    pub fn models(&mut self) -> Result<Blocks, Failure> {
         match self.ask(Request::Model)? {
             Reply::Model(models) => Ok(models),
             other => Err(Failure::Unexpected(Box::new(other))),
@@ -206,7 +206,7 @@ impl Client {
     ///
     /// # Errors
     /// [`Failure`]; if the model is rejected, the old one stays. [`Failure::OtherModel`] if another one runs.
-    pub fn install(&mut self, model: &WireModel) -> Result<Models, Failure> {
+    pub fn install(&mut self, model: &WireModel) -> Result<Blocks, Failure> {
         // An oversized payload is not sent; the MCU then rejects the model as incomplete.
         let payload = model.payload().unwrap_or_default();
         for (number, part) in (0..).zip(payload.chunks(PART)) {
@@ -218,8 +218,8 @@ impl Client {
         self.order(Request::Restart)?;
         self.begin()?;
         let models = self.models()?;
-        let sent = ModelId::of(models.active.number, &payload);
-        if models.active == ModelId::default() || models.active != sent {
+        let sent = BlockId::of(models.active.number, &payload);
+        if models.active == BlockId::default() || models.active != sent {
             return Err(Failure::OtherModel { sent, models });
         }
         Ok(models)

@@ -330,7 +330,7 @@ impl Chip {
 
 /// The check of a model, as in the firmware.
 fn check(payload: &[u8]) -> Result<(), Reason> {
-    let found = WireModel::read(payload).ok_or(Reason::ModelDamaged)?;
+    let found = WireModel::read(payload).ok_or(Reason::Damaged)?;
     Control::check(&Settings::PAPER, &found).map_err(|error| Reason::of_model(&error))
 }
 
