@@ -15,10 +15,11 @@
 //! | [`clock_test`] | Test of the processor's clock at the start: the plausible range. |
 //! | [`pace`] | Time of the next tick, and the number of missed ticks. |
 //! | [`reset_cause`] | Cause of the last reset, from the chip's flags and the crash record. |
-//! | [`settings`] | Settings of spring, controller and amplifier in an image. |
-//! | [`start`] | Construction of the controller at the start, from the stored model. |
-//! | [`store`] | Storage of a model in flash, safe against power cuts. |
+//! | [`settings`] | Settings that are built into an image. |
+//! | [`start`] | Settings and controller at the start, from the stored settings and model. |
+//! | [`store`] | Storage of a model and of settings in flash, safe against power cuts. |
 //! | [`task_watchdog`] | Check that every task is alive, before the hardware watchdog is fed. |
+//! | [`update`] | Updates of the store by the host, with the check before they are sealed. |
 //! | `crash_record` | Memory of the crash record. |
 //! | `guards` | Check of RAM and image, and start of both guards. |
 //! | `hang_guard` | Stop of a control task that hangs. |
@@ -51,6 +52,7 @@ pub mod settings;
 pub mod start;
 pub mod store;
 pub mod task_watchdog;
+pub mod update;
 
 #[cfg(feature = "mcu")]
 pub mod crash_record;

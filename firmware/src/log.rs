@@ -13,9 +13,7 @@ use embassy_time::Instant;
 use link::Controller;
 use micromath::F32Ext;
 use model::supervisor::{Fault, Mismatch};
-use model::{Sensor, Volts};
-
-use crate::settings::{AMPLIFIER, RATE_HZ};
+use model::{Amplifier, Sensor, Volts, device};
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
@@ -41,6 +39,8 @@ pub enum Event {
 pub struct Summary {
     /// Number of ticks since boot.
     pub tick: u32,
+    /// Number of ticks in the last second.
+    pub ticks: u32,
     /// Number of missed ticks since boot.
     pub overruns: u32,
     /// Largest delay of a tick since boot, in us.
@@ -70,8 +70,8 @@ pub fn queue(event: Event) {
     }
 }
 
-/// Logs the first lines after a reset: its cause, the code of the last fault, and the controller in use.
-pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
+/// Logs the first lines after a reset: its cause, the code of the last fault, and rate, controller and amplifier in use.
+pub fn boot(reset: &'static str, last_fault: u8, settings: &device::Settings) {
     let (version, git) = (env!("CARGO_PKG_VERSION"), env!("GIT_REVISION"));
     info!(
         "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32} controller={=str}",
@@ -79,12 +79,13 @@ pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
         git,
         reset,
         last_fault,
-        RATE_HZ,
-        controller.name()
+        settings.rate_hz(),
+        Controller::of(&settings.control.compensation).name()
     );
     // Only if it differs from the source report's.
-    if cfg!(feature = "kilovolt") {
-        info!("amplifier limit_v={=u16}", const { AMPLIFIER.max_v as u16 });
+    let limit_v = settings.control.amplifier.max_v;
+    if limit_v != Amplifier::PAPER.max_v {
+        info!("amplifier limit_v={=u16}", limit_v as u16);
     }
 }
 
@@ -130,7 +131,7 @@ pub fn event(event: Event) {
             s.tick,
             s.overruns,
             s.worst_lateness_us,
-            rms_us(s.squared_lateness_us2),
+            rms_us(s.squared_lateness_us2, s.ticks),
             s.limited_ticks,
             s.state,
             millivolts(s.target),
@@ -140,9 +141,9 @@ pub fn event(event: Event) {
     }
 }
 
-/// Root mean square of one second's delays, in us, from the sum of their squares. Accurate to 6 %, in steps of 0.1 us.
-fn rms_us(sum_us2: u32) -> f32 {
-    let mean = sum_us2 as f32 / RATE_HZ as f32;
+/// Root mean square of the delays of `ticks` ticks, in us, from the sum of their squares. Accurate to 6 %, in steps of 0.1 us.
+fn rms_us(sum_us2: u32, ticks: u32) -> f32 {
+    let mean = sum_us2 as f32 / ticks as f32;
     (mean.sqrt() * 10.0).round() / 10.0
 }
 

@@ -12,7 +12,6 @@ use crate::fault::Fault;
 use crate::reason::Reason;
 use crate::value::WireVolts;
 
-
 /// Reply to a request, with the sequence number of that request. Telemetry has sequence numbers of its own.
 ///
 /// The order of the variants defines their codes on the wire.

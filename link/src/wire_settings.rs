@@ -15,7 +15,7 @@ use crate::reply::Controller;
 /// Version of the payload's format.
 pub const FORMAT: u8 = 1;
 /// Largest number of parts of a payload.
-pub const MOST_PARTS: u8 = 8;
+pub const MOST_PARTS: u8 = 7;
 /// Length of the longest payload, in bytes.
 pub const MOST_BYTES: usize = PART * MOST_PARTS as usize;
 
@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn the_longest_settings_fit_and_survive_a_round_trip() {
         let payload = longest().payload().unwrap();
-        assert_eq!((payload.len(), WireSettings::read(&payload)), (204, Some(longest())));
+        assert_eq!((payload.len(), WireSettings::read(&payload)), (205, Some(longest())));
         assert!(payload.len() <= MOST_BYTES);
     }
 
@@ -254,11 +254,8 @@ mod tests {
         let amplifier = Amplifier { dac_bits: 10, ..Amplifier::PAPER };
         let supervision = supervisor::Settings { lowest_supply_v: 2.0, ..BUILT_IN.supervision };
         let plant = model::Plant { share: 0.2, ..model::Plant::PAPER };
-        let board = device::Settings {
-            control: Settings { amplifier, plant, ..BUILT_IN.control },
-            supervision,
-            ..BUILT_IN
-        };
+        let board =
+            device::Settings { control: Settings { amplifier, plant, ..BUILT_IN.control }, supervision, ..BUILT_IN };
         assert_eq!(WireSettings::new(&BUILT_IN).over(&board), Ok(board));
     }
 }

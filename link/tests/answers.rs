@@ -1,7 +1,7 @@
 //! What an answer of the MCU carries, what a session counts, and what both ends compute from the same bytes.
 
 use link::frame::{MAX_FRAME, checksum};
-use link::{Action, Frame, BlockId, Nonce, Reason, Receiver, Reply, Request, Sequence, Session, State, WireVolts};
+use link::{Action, BlockId, Frame, Nonce, Reason, Receiver, Reply, Request, Sequence, Session, State, WireVolts};
 use model::ScaledStiffness;
 use model::units::Signal;
 

@@ -150,10 +150,7 @@ fn replies() {
             }),
             "060102ac020405060708",
         ),
-        (
-            Reply::SettingsPart { number: 2, length: 300, bytes: [0xa5; 32] },
-            &format!("0702ac02{}", "a5".repeat(32)),
-        ),
+        (Reply::SettingsPart { number: 2, length: 300, bytes: [0xa5; 32] }, &format!("0702ac02{}", "a5".repeat(32))),
     ] {
         check(&reply, b'A', golden);
         if let Reply::Refused(reason) = reply {

@@ -38,8 +38,10 @@ fn every_field_of_the_settings_that_a_check_can_name_has_a_code() {
         include_str!("../../model/src/feedback/enabled/settings.rs"),
         include_str!("../../model/src/supervisor/settings.rs"),
     ];
-    let named = |source: &'static str| source.split("OutOfRange::check(\"").skip(1).filter_map(|rest| rest.split('"').next());
-    let listed = settings.split("(\"").skip(1).filter_map(|rest| rest.split('"').next()).filter(|name| name.ends_with("_ms"));
+    let named =
+        |source: &'static str| source.split("OutOfRange::check(\"").skip(1).filter_map(|rest| rest.split('"').next());
+    let listed =
+        settings.split("(\"").skip(1).filter_map(|rest| rest.split('"').next()).filter(|name| name.ends_with("_ms"));
     let names: Vec<&str> = others.into_iter().chain([settings]).flat_map(named).chain(listed).collect();
     assert!(names.len() >= 25, "{names:?}");
     // What is the board's own cannot be sent.

@@ -11,7 +11,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use host_sim::link::{Client, Failure, Patience, Port};
 use host_sim::log::{Item, Level, Summary};
 use link::{
-    Desired, Fault, Frame, BlockId, Nonce, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts,
+    BlockId, Desired, Fault, Frame, Nonce, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts,
 };
 use simulation::plant_file;
 

@@ -3,11 +3,12 @@
 use embassy_time::{Duration, Timer, with_timeout};
 use link::{Server, Step, View};
 
-use super::model_store::update_model;
 use super::shared_mailbox::{hand_over, with_mailbox};
+use super::shared_store;
 use crate::board::Line;
 use crate::stop;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
+use crate::update;
 
 /// Longest wait for a byte, and thereby the period of the check whether telemetry is due.
 const READ_TIMEOUT: Duration = Duration::from_millis(1);
@@ -34,9 +35,13 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                     report_faults(line, server, &after).await;
                     send(line, server.command_done(&after)).await;
                 }
-                Some(Step::UpdateModel(update)) => {
-                    let result = update_model(update).await;
-                    send(line, server.model_updated(result, &view)).await;
+                Some(Step::Update(block, update)) => {
+                    let result = shared_store::update(block, update).await;
+                    send(line, server.updated(block, result, &view)).await;
+                }
+                Some(Step::ReadBuiltIn(number)) => {
+                    let part = update::with_built_in(|payload| server.settings_part(number, payload));
+                    send(line, part).await;
                 }
                 Some(Step::Restart(bytes)) => {
                     send(line, bytes).await;

@@ -183,9 +183,7 @@ impl<P: Pages> Store<P> {
     }
 
     fn find(&self, block: Block) -> Option<(Side, BlockId, &[u8])> {
-        let found = |side| {
-            open(block, self.pages.bytes(Page { block, side })).map(|(id, bytes)| (side, id, bytes))
-        };
+        let found = |side| open(block, self.pages.bytes(Page { block, side })).map(|(id, bytes)| (side, id, bytes));
         let [a, b] = self.pages.tolerate_bit_errors(|| [Side::A, Side::B].map(found));
         match (a, b) {
             (Some(a), Some(b)) => Some(if b.1.number > a.1.number { b } else { a }),

@@ -154,7 +154,10 @@ fn a_power_cut_preserves_the_old_or_the_new_block() {
                     (cuts + 1, old_ones + u32::from(found == old), new_ones + u32::from(found != old));
                 // The next attempt succeeds.
                 let (repaired, stored) = store_block(&again, block, &new, Ok(()));
-                assert!(stored.is_ok() && newest_block(&repaired, block).as_ref() == Some(&new), "step {cut}, {torn:?}");
+                assert!(
+                    stored.is_ok() && newest_block(&repaired, block).as_ref() == Some(&new),
+                    "step {cut}, {torn:?}"
+                );
             }
             before = after;
         }

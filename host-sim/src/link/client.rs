@@ -10,7 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use link::wire_model::PART;
 use link::{
-    FaultReport, Frame, BlockId, Blocks, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry,
+    BlockId, Blocks, FaultReport, Frame, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry,
     Unreadable, WireModel,
 };
 

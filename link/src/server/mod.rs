@@ -112,9 +112,11 @@ impl Server {
         Self { session, spring, about, running: Payload::new(), pending: None, reports: Reports::NEW }
     }
 
-    /// Takes the payload of the running settings, which the host can read.
-    pub fn show_settings(&mut self, running: &Payload) {
-        self.running.clone_from(running);
+    /// Takes the payload of the running settings, which the host can read. A payload that is too long is none.
+    pub fn show_settings(&mut self, running: &[u8]) {
+        self.running.clear();
+        // A longer payload is not read as settings either, so that it does not run.
+        let _ = self.running.extend_from_slice(running);
     }
 
     /// Processes a received byte.

@@ -45,9 +45,15 @@ fn stamped(bytes: &[u8]) -> (Nonce, Reply) {
 
 fn server() -> Server {
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
-    let about = About { silence_limit_ticks: 500, rate_hz: 1000, model: Blocks { stored: REJECTED, ..Blocks::default() }, seed: 7, ..About::default() };
+    let about = About {
+        silence_limit_ticks: 500,
+        rate_hz: 1000,
+        model: Blocks { stored: REJECTED, ..Blocks::default() },
+        seed: 7,
+        ..About::default()
+    };
     let mut server = Server::new(spring, about);
-    server.show_settings(&Payload::from_slice(&[b'r'; 40]).unwrap());
+    server.show_settings(&[b'r'; 40]);
     server
 }
 

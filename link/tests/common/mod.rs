@@ -3,7 +3,7 @@
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    Controller, Desired, Fault, FaultReport, Field, Mismatch, BlockId, Blocks, Reason, Reply, Request, Sensor, State,
+    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Mismatch, Reason, Reply, Request, Sensor, State,
     Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
