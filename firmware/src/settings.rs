@@ -11,13 +11,13 @@ pub const RATE_HZ: u32 = 1000;
 
 /// Longest time without a tick before the hang guard performs the emergency stop, in ms. It exceeds the overrun that the
 /// supervisor tolerates, so that a late control task still reports its overrun itself.
-pub const LONGEST_HANG_MS: u32 = 12;
+pub const LONGEST_HANG_MS: u32 = WATCHDOGS.hang_ms;
 
 /// Time without a complete round of the task watchdog after which the output is disabled, in ms.
-pub const LONGEST_STALL_MS: u32 = 50;
+pub const LONGEST_STALL_MS: u32 = WATCHDOGS.stall_ms;
 
 /// Period of the hardware watchdog, in ms. It resets the chip if it is not fed.
-pub const WATCHDOG_MS: u32 = 100;
+pub const WATCHDOG_MS: u32 = WATCHDOGS.reset_ms;
 
 /// An amplifier for 1000 V, which the source report's requirement (97 % within 0.6 s) needs.
 pub const KILOVOLT: Amplifier = Amplifier::up_to(1000.0);
@@ -44,9 +44,8 @@ const SENSOR: Option<Feedback> = Some(Feedback::TYPICAL);
 /// Settings of the supervisor in every run.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 
-/// Times of the watchdogs.
-pub const WATCHDOGS: Watchdogs =
-    Watchdogs { hang_ms: LONGEST_HANG_MS, stall_ms: LONGEST_STALL_MS, reset_ms: WATCHDOG_MS };
+/// Times of the watchdogs in every run.
+pub const WATCHDOGS: Watchdogs = Watchdogs::DEFAULT;
 /// All settings of the flashed image.
 pub const BUILT_IN: device::Settings = built_in(FLASHED);
 

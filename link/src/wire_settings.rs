@@ -176,11 +176,7 @@ impl WireSettings {
 mod tests {
     use super::*;
 
-    const BUILT_IN: device::Settings = device::Settings {
-        control: Settings::PAPER,
-        supervision: supervisor::Settings::DEFAULT,
-        watchdogs: Watchdogs { hang_ms: 12, stall_ms: 50, reset_ms: 100 },
-    };
+    const BUILT_IN: device::Settings = device::Settings::PAPER;
 
     fn longest() -> WireSettings {
         let most = u32::MAX;

@@ -51,7 +51,19 @@ pub struct Watchdogs {
     pub reset_ms: u32,
 }
 
+impl Watchdogs {
+    /// 12 ms, 50 ms and 100 ms.
+    pub const DEFAULT: Self = Self { hang_ms: 12, stall_ms: 50, reset_ms: 100 };
+}
+
 impl Settings {
+    /// The source report's loop with the default supervision and watchdogs.
+    pub const PAPER: Self = Self {
+        control: controller::Settings::PAPER,
+        supervision: supervisor::Settings::DEFAULT,
+        watchdogs: Watchdogs::DEFAULT,
+    };
+
     /// Returns the rate of the tick, in whole Hz.
     pub fn rate_hz(&self) -> u32 {
         self.control.rate_hz as u32
@@ -96,11 +108,7 @@ mod tests {
     use super::*;
     use std::string::ToString;
 
-    const GOOD: Settings = Settings {
-        control: controller::Settings::PAPER,
-        supervision: supervisor::Settings::DEFAULT,
-        watchdogs: Watchdogs { hang_ms: 12, stall_ms: 50, reset_ms: 100 },
-    };
+    const GOOD: Settings = Settings::PAPER;
 
     fn at(rate_hz: f64, watchdogs: Watchdogs) -> Settings {
         Settings { control: controller::Settings { rate_hz, ..GOOD.control }, watchdogs, ..GOOD }

@@ -7,6 +7,7 @@ mod mcu;
 mod model;
 #[cfg(target_os = "linux")]
 mod output;
+mod settings;
 mod vsj;
 #[cfg(target_os = "linux")]
 mod watch;

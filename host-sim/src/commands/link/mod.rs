@@ -3,6 +3,7 @@
 mod model;
 pub(super) mod record;
 pub(super) mod session;
+mod settings;
 mod watch;
 
 use anyhow::{Context, Result};
@@ -13,7 +14,7 @@ use link::{Desired, Fault, Request};
 use session::{Session, seconds};
 use simulation::bad_input;
 
-/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, model
+/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, model, settings
 #[derive(Args, Debug)]
 #[command(
     arg_required_else_help = false,
@@ -25,6 +26,7 @@ Examples:
   vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
+  vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate, watchdogs
 
 The MCU ramps the voltage down when the host is silent for longer than its limit (see `status`): a target is kept only while \
 a command stays connected: --keep, watch or record. A request is repeated every 0.1 s until it is answered, for --timeout \
@@ -75,6 +77,8 @@ enum Command {
     Record(record::Arguments),
     /// Show the MCU's model of the spring; with a plant file, send it to be checked and stored, and restart
     Model(model::Arguments),
+    /// Show the MCU's settings; with a settings file, send it to be checked and stored, and restart
+    Settings(settings::Arguments),
 }
 
 #[derive(Args, Debug)]
@@ -133,6 +137,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Model(arguments) => arguments.read()?,
         _ => None,
     };
+    let source = match &arguments.command {
+        Command::Settings(arguments) => arguments.read()?,
+        _ => None,
+    };
 
     let port = Port::open(&arguments.port, arguments.baud, timeout)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
@@ -170,6 +178,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Watch(arguments) => watch::run(&mut session, arguments),
         Command::Record(record) => record::run(&mut session, record, arguments.baud),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
+        Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
     }
 }
 
