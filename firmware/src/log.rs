@@ -39,8 +39,6 @@ pub enum Event {
 pub struct Summary {
     /// Number of ticks since boot.
     pub tick: u32,
-    /// Number of ticks in the last second.
-    pub ticks: u32,
     /// Number of missed ticks since boot.
     pub overruns: u32,
     /// Largest delay of a tick since boot, in us.
@@ -62,6 +60,8 @@ pub struct Summary {
 /// Events from the control task to the housekeeping task.
 pub static EVENTS: Channel<CriticalSectionRawMutex, Event, 16> = Channel::new();
 static DROPPED: AtomicU32 = AtomicU32::new(0);
+/// Number of ticks in a second, from [`boot`] on.
+static RATE_HZ: AtomicU32 = AtomicU32::new(0);
 
 /// Queues an event. If the queue is full, the event is dropped and counted.
 pub fn queue(event: Event) {
@@ -72,6 +72,7 @@ pub fn queue(event: Event) {
 
 /// Logs the first lines after a reset: its cause, the code of the last fault, and rate, controller and amplifier in use.
 pub fn boot(reset: &'static str, last_fault: u8, settings: &device::Settings) {
+    RATE_HZ.store(settings.rate_hz(), Ordering::Relaxed);
     let (version, git) = (env!("CARGO_PKG_VERSION"), env!("GIT_REVISION"));
     info!(
         "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32} controller={=str}",
@@ -131,7 +132,7 @@ pub fn event(event: Event) {
             s.tick,
             s.overruns,
             s.worst_lateness_us,
-            rms_us(s.squared_lateness_us2, s.ticks),
+            rms_us(s.squared_lateness_us2),
             s.limited_ticks,
             s.state,
             millivolts(s.target),
@@ -141,9 +142,9 @@ pub fn event(event: Event) {
     }
 }
 
-/// Root mean square of the delays of `ticks` ticks, in us, from the sum of their squares. Accurate to 6 %, in steps of 0.1 us.
-fn rms_us(sum_us2: u32, ticks: u32) -> f32 {
-    let mean = sum_us2 as f32 / ticks as f32;
+/// Root mean square of one second's delays, in us, from the sum of their squares. Accurate to 6 %, in steps of 0.1 us.
+fn rms_us(sum_us2: u32) -> f32 {
+    let mean = sum_us2 as f32 / RATE_HZ.load(Ordering::Relaxed) as f32;
     (mean.sqrt() * 10.0).round() / 10.0
 }
 

@@ -138,7 +138,6 @@ impl Report {
         if number.is_multiple_of(self.rate_hz) {
             queue(Event::Summary(Summary {
                 tick: number,
-                ticks: self.rate_hz,
                 overruns: self.overruns,
                 worst_lateness_us: self.worst_lateness_us,
                 squared_lateness_us2: core::mem::take(&mut self.squared_lateness_us2),

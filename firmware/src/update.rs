@@ -1,8 +1,8 @@
 //! Updates of the store by the host: parts of a block, and the check of the whole before it is sealed.
 
-use link::{Block, BlockId, Reason, Update, WireSettings};
+use link::{Block, BlockId, Part, Reason, Update, WireSettings};
+use model::device;
 
-use crate::settings::BUILT_IN;
 use crate::start;
 use crate::store::{Pages, Store};
 
@@ -22,8 +22,9 @@ pub fn execute<P: Pages>(store: &mut Store<P>, block: Block, update: Update) -> 
     }
 }
 
-/// Calls `each` with the payload of the built-in settings, which is in RAM only meanwhile.
+/// Part `number` of the payload of `settings`, which is in RAM only meanwhile. What the chosen controller does not use is not
+/// kept, and has its default value here.
 #[inline(never)]
-pub fn with_built_in<T>(each: impl FnOnce(&[u8]) -> T) -> T {
-    each(&WireSettings::new(&BUILT_IN).payload().unwrap_or_default())
+pub fn settings_part(settings: &device::Settings, number: u8) -> Part {
+    Part::of(number, &WireSettings::new(settings).payload().unwrap_or_default())
 }

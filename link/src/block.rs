@@ -37,6 +37,29 @@ pub struct BlockId {
     pub checksum: u32,
 }
 
+/// A part of a payload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Part {
+    /// Number of the part, counted from 0.
+    pub number: u8,
+    /// Length of the whole payload, in bytes.
+    pub length: u16,
+    /// Content; zeros behind the end of the payload.
+    pub bytes: [u8; PART],
+}
+
+impl Part {
+    /// Part `number` of a payload.
+    pub fn of(number: u8, payload: &[u8]) -> Self {
+        let mut bytes = [0; PART];
+        let from = payload.get(PART * usize::from(number)..).unwrap_or_default();
+        for (byte, from) in bytes.iter_mut().zip(from) {
+            *byte = *from;
+        }
+        Self { number, length: payload.len() as u16, bytes }
+    }
+}
+
 /// The running and the stored content of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Blocks {

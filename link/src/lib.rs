@@ -59,7 +59,7 @@ pub mod value;
 pub mod wire_model;
 pub mod wire_settings;
 
-pub use block::{Block, BlockId, Blocks};
+pub use block::{Block, BlockId, Blocks, Part};
 pub use command::Command;
 pub use diagnosis::{Mismatch, Sensor};
 pub use fault::Fault;

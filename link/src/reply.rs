@@ -6,7 +6,7 @@ use model::Compensation;
 use model::supervisor::{self, Faults, Supervisor};
 use serde::{Deserialize, Serialize};
 
-use crate::block::{Blocks, PART};
+use crate::block::{Blocks, Part};
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::fault::Fault;
 use crate::reason::Reason;
@@ -37,14 +37,7 @@ pub enum Reply {
     /// The running and the stored settings.
     Settings(Blocks),
     /// A part of the payload of settings.
-    SettingsPart {
-        /// Number of the part, counted from 0.
-        number: u8,
-        /// Length of the whole payload, in bytes.
-        length: u16,
-        /// Content; the last part is padded with zeros.
-        bytes: [u8; PART],
-    },
+    SettingsPart(Part),
 }
 
 /// Report of the faults that have come since the start.

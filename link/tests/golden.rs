@@ -7,8 +7,8 @@ use by_hand::by_hand;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, Message, Mismatch, Nonce, Reason, Reply,
-    Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
+    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, Message, Mismatch, Nonce, Part, Reason,
+    Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
 };
 
 fn check<M: Message>(message: &M, kind: u8, golden: &str) {
@@ -150,7 +150,10 @@ fn replies() {
             }),
             "060102ac020405060708",
         ),
-        (Reply::SettingsPart { number: 2, length: 300, bytes: [0xa5; 32] }, &format!("0702ac02{}", "a5".repeat(32))),
+        (
+            Reply::SettingsPart(Part { number: 2, length: 300, bytes: [0xa5; 32] }),
+            &format!("0702ac02{}", "a5".repeat(32)),
+        ),
     ] {
         check(&reply, b'A', golden);
         if let Reply::Refused(reason) = reply {

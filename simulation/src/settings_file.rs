@@ -318,12 +318,14 @@ impl Source {
     /// # Errors
     /// [`BadInput`] with file, line, column and the allowed range.
     pub fn over(&self, built_in: &WireSettings) -> Result<WireSettings> {
-        let wire = self.file.over(built_in);
-        match wire.over(&device::Settings::PAPER) {
-            Ok(settings) => settings.check().map_err(|error| self.error(&error))?,
+        match self.file.over(built_in).over(&device::Settings::PAPER) {
+            Ok(settings) => {
+                settings.check().map_err(|error| self.error(&error))?;
+                // Without what the controller does not use, which the MCU does not keep.
+                Ok(WireSettings::new(&settings))
+            }
             Err(field) => bad_input!("{}: this program does not know this {field}", self.name),
         }
-        Ok(wire)
     }
 
     fn error(&self, error: &OutOfRange) -> anyhow::Error {

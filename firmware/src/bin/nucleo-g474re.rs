@@ -82,7 +82,7 @@ fn main() -> ! {
         }
     }
     loop {
-        host::serve_store(&mut store);
+        host::serve_store(&mut store, &loaded.settings);
         cortex_m::asm::wfi();
     }
 }

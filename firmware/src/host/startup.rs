@@ -11,7 +11,6 @@ use crate::log;
 use crate::reset_cause::Cause;
 use crate::start::{self, Loaded, Start};
 use crate::store::{Pages, Store};
-use crate::update;
 
 /// Builds controller and server from the settings and the stored model; `None` from the second call on. The nonces of the link's sessions
 /// follow from `seed`, which has to be another one at every start.
@@ -29,12 +28,7 @@ pub fn open<P: Pages>(
     for field in loaded.rejected.into_iter().chain(start.rejected) {
         log::refused(field);
     }
-    let Some(server) = server(&start, loaded, seed)? else { return Ok(None) };
-    match store.newest(Block::Settings).filter(|(id, _)| *id == loaded.blocks.active) {
-        Some((_, payload)) => server.show_settings(payload),
-        None => update::with_built_in(|payload| server.show_settings(payload)),
-    }
-    Ok(Some((control, server)))
+    Ok(server(&start, loaded, seed)?.map(|server| (control, server)))
 }
 
 /// Builds the server. Not inlined, so that its stack frame is released.

@@ -8,7 +8,6 @@ use super::shared_store;
 use crate::board::Line;
 use crate::stop;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
-use crate::update;
 
 /// Longest wait for a byte, and thereby the period of the check whether telemetry is due.
 const READ_TIMEOUT: Duration = Duration::from_millis(1);
@@ -39,9 +38,9 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                     let result = shared_store::update(block, update).await;
                     send(line, server.updated(block, result, &view)).await;
                 }
-                Some(Step::ReadBuiltIn(number)) => {
-                    let part = update::with_built_in(|payload| server.settings_part(number, payload));
-                    send(line, part).await;
+                Some(Step::ReadSettings { built_in, number }) => {
+                    let part = shared_store::settings_part(built_in, number).await;
+                    send(line, server.settings_part(part)).await;
                 }
                 Some(Step::Restart(bytes)) => {
                     send(line, bytes).await;

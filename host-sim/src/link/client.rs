@@ -10,8 +10,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 use link::block::PART;
 use link::{
-    Block, BlockId, Blocks, FaultReport, Frame, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status,
-    Telemetry, Unreadable, WireModel, WireSettings,
+    Block, BlockId, Blocks, FaultReport, Frame, Nonce, Packet, Part, Reason, Receiver, Reply, Request, Sequence,
+    Status, Telemetry, Unreadable, WireModel, WireSettings,
 };
 
 use crate::link::Port;
@@ -238,7 +238,7 @@ impl Client {
         let mut payload = Vec::new();
         for number in 0.. {
             match self.ask(Request::ReadSettings { built_in, number })? {
-                Reply::SettingsPart { number: of, length, bytes } if of == number => {
+                Reply::SettingsPart(Part { number: of, length, bytes }) if of == number => {
                     payload.extend(bytes);
                     if payload.len() >= usize::from(length) {
                         payload.truncate(usize::from(length));

@@ -12,14 +12,15 @@ use std::time::{Duration, Instant};
 
 use firmware::control::{Control, Sensors, Untimed};
 use firmware::reset_cause::Cause;
-use firmware::start::{self, Loaded, Start};
+use firmware::settings::BUILT_IN;
+use firmware::start::{self, Start};
 use firmware::store::{FlashError, PAGE, PAGES, Page, Pages, Store, WORD};
 use firmware::update;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{About, Block, Command, Controller, Fault, Server, State, Step, Telemetry, View};
 use model::stiffness::{Cantilever, YoungsModulus};
-use model::{Spring, supervisor};
+use model::{Spring, device, supervisor};
 use serialport::{SerialPort, TTYPort};
 
 /// Properties of the MCU and its line.
@@ -245,6 +246,7 @@ struct Chip {
     control: Control,
     store: Store<Flash>,
     view: View,
+    settings: device::Settings,
     /// Time between two ticks.
     period: Duration,
 }
@@ -254,13 +256,14 @@ impl Chip {
         let store = Store::new(shared.lock().unwrap().flash.clone());
         let mut loaded = start::load(&store);
         assert_eq!(loaded.rejected, None);
+        let settings = loaded.settings;
         loaded.settings.supervision.host_timeout_s = f64::from(setup.silence_ms) / 1000.0;
         let cause = Cause { name: "power-on", fault: None, standing: supervisor::Faults::NONE };
         let mut place = None;
         let (_, start) = start::control(&loaded, store.newest(Block::Model), &cause, &mut place).unwrap();
         let control = place.unwrap();
         let Start { amplifier, model, .. } = start;
-        let Loaded { settings, blocks, .. } = loaded;
+        let blocks = loaded.blocks;
         let controller = Controller::of(&settings.control.compensation);
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, amplifier.min_v, amplifier.max_v).unwrap();
         let about = About {
@@ -272,15 +275,11 @@ impl Chip {
             settings: blocks,
             seed: shared.lock().unwrap().seed,
         };
-        let mut server = Server::new(spring, about);
-        match store.newest(Block::Settings) {
-            Some((_, payload)) => server.show_settings(payload),
-            None => update::with_built_in(|payload| server.show_settings(payload)),
-        }
+        let server = Server::new(spring, about);
         let (state, standing) = (supervisor::State::Disarmed, supervisor::Faults::NONE);
         let view = View { sample: Telemetry::default(), state, standing, refusal: None, overruns: 0 };
         let period = Duration::from_secs(1) / settings.rate_hz();
-        let mut chip = Self { setup, shared, server, control, store, view, period };
+        let mut chip = Self { setup, shared, server, control, store, view, settings, period };
         chip.tick(Command::default());
         chip
     }
@@ -325,8 +324,9 @@ impl Chip {
                 let kept = update::execute(&mut self.store, block, update);
                 out.extend_from_slice(self.server.updated(block, kept, &self.view));
             }
-            Some(Step::ReadBuiltIn(number)) => {
-                update::with_built_in(|payload| out.extend_from_slice(self.server.settings_part(number, payload)));
+            Some(Step::ReadSettings { built_in, number }) => {
+                let settings = if built_in { &BUILT_IN } else { &self.settings };
+                out.extend_from_slice(self.server.settings_part(update::settings_part(settings, number)));
             }
             Some(Step::Restart(bytes)) => {
                 out.extend_from_slice(bytes);

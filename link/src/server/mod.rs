@@ -5,7 +5,7 @@
 //! 1. Pass each received byte to [`Server::on_byte`] with the latest [`View`]. [`Step::Send`]: send the bytes.
 //!    [`Step::Command`]: pass the command to the control tick, wait until that tick has run, then send what
 //!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::Update`]: likewise with the
-//!    store and [`Server::updated`]. [`Step::ReadBuiltIn`]: send what [`Server::settings_part`] returns.
+//!    store and [`Server::updated`]. [`Step::ReadSettings`]: send what [`Server::settings_part`] returns.
 //!    [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
 //! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns.
@@ -18,7 +18,7 @@ mod reports;
 use model::Spring;
 use model::supervisor::{self, Faults, Refusal};
 
-use crate::block::{Block, BlockId, Blocks, PART};
+use crate::block::{Block, BlockId, Blocks, PART, Part};
 use crate::command::Command;
 use crate::fault::Fault;
 use crate::reason::Reason;
@@ -26,7 +26,6 @@ use crate::reply::{Firmware, Reply, Status, Telemetry};
 use crate::request::Request;
 use crate::session::{Action, Counters, Session};
 use crate::value::WireVolts;
-use crate::wire_settings::Payload;
 use reports::Reports;
 
 /// State of the control loop after a tick.
@@ -72,8 +71,13 @@ pub enum Step<'a> {
     Send(&'a [u8]),
     /// Pass the update to the store, then call [`Server::updated`] for the same block.
     Update(Block, Update),
-    /// Call [`Server::settings_part`] with this number and the payload of the built-in settings.
-    ReadBuiltIn(u8),
+    /// Call [`Server::settings_part`] with a part of the settings.
+    ReadSettings {
+        /// True for the settings that are built in, false for those that run.
+        built_in: bool,
+        /// Number of the part.
+        number: u8,
+    },
     /// Send the bytes, then restart.
     Restart(&'a [u8]),
 }
@@ -98,8 +102,6 @@ pub struct Server {
     session: Session,
     spring: Spring,
     about: About,
-    /// Payload of the running settings.
-    running: Payload,
     /// Request whose command is being executed.
     pending: Option<Request>,
     reports: Reports,
@@ -109,14 +111,7 @@ impl Server {
     /// A server before its first frame; `spring` defines the range of the targets.
     pub const fn new(spring: Spring, about: About) -> Self {
         let session = Session::new(about.silence_limit_ticks, about.seed);
-        Self { session, spring, about, running: Payload::new(), pending: None, reports: Reports::NEW }
-    }
-
-    /// Takes the payload of the running settings, which the host can read. A payload that is too long is none.
-    pub fn show_settings(&mut self, running: &[u8]) {
-        self.running.clear();
-        // A longer payload is not read as settings either, so that it does not run.
-        let _ = self.running.extend_from_slice(running);
+        Self { session, spring, about, pending: None, reports: Reports::NEW }
     }
 
     /// Processes a received byte.
@@ -126,8 +121,7 @@ impl Server {
                 Request::Hello | Request::Status => Reply::Status(self.status(view)),
                 Request::Model => Reply::Model(self.about.model),
                 Request::Settings => Reply::Settings(self.about.settings),
-                Request::ReadSettings { built_in: true, number } => return Some(Step::ReadBuiltIn(number)),
-                Request::ReadSettings { built_in: false, number } => part(number, &self.running),
+                Request::ReadSettings { built_in, number } => return Some(Step::ReadSettings { built_in, number }),
                 Request::ModelPart { .. }
                 | Request::ModelEnd { .. }
                 | Request::SettingsPart { .. }
@@ -210,9 +204,9 @@ impl Server {
         self.session.answer(&reply)
     }
 
-    /// The reply to the request of the last [`Step::ReadBuiltIn`].
-    pub fn settings_part(&mut self, number: u8, payload: &[u8]) -> &[u8] {
-        self.session.answer(&part(number, payload))
+    /// The reply to the request of the last [`Step::ReadSettings`].
+    pub fn settings_part(&mut self, part: Part) -> &[u8] {
+        self.session.answer(&Reply::SettingsPart(part))
     }
 
     /// The report of faults to send ahead of everything else, if one is due: immediately after a new fault, then ten times per
@@ -263,16 +257,6 @@ impl Server {
             counters: self.counters(),
         }
     }
-}
-
-/// Part `number` of a payload; zeros behind its end.
-fn part(number: u8, payload: &[u8]) -> Reply {
-    let mut bytes = [0; PART];
-    let from = payload.get(PART * usize::from(number)..).unwrap_or_default();
-    for (byte, from) in bytes.iter_mut().zip(from) {
-        *byte = *from;
-    }
-    Reply::SettingsPart { number, length: payload.len() as u16, bytes }
 }
 
 fn done(view: &View) -> Reply {

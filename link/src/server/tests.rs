@@ -52,9 +52,7 @@ fn server() -> Server {
         seed: 7,
         ..About::default()
     };
-    let mut server = Server::new(spring, about);
-    server.show_settings(&[b'r'; 40]);
-    server
+    Server::new(spring, about)
 }
 
 /// The nonce that a Hello is offered.
@@ -82,7 +80,10 @@ fn exchange(request: Request, before: &View, after: &View) -> (Option<Command>, 
             }
             Some(Step::Send(bytes) | Step::Restart(bytes)) => answer = Some(reply(bytes)),
             Some(Step::Update(block, _)) => answer = Some(reply(server.updated(block, Ok(None), after))),
-            Some(Step::ReadBuiltIn(number)) => answer = Some(reply(server.settings_part(number, b"built in"))),
+            Some(Step::ReadSettings { built_in, number }) => {
+                let payload: &[u8] = if built_in { b"built in" } else { &[b'r'; 40] };
+                answer = Some(reply(server.settings_part(Part::of(number, payload))));
+            }
             None => {}
         }
     }
@@ -178,7 +179,7 @@ fn the_running_and_the_built_in_settings_can_be_read_in_any_state() {
     let padded = |text: &[u8]| -> [u8; PART] { core::array::from_fn(|at| text.get(at).copied().unwrap_or(0)) };
     for view in [ARMED, DISARMED, FAULTED] {
         let read = |built_in, number| exchange(Request::ReadSettings { built_in, number }, &view, &view).1;
-        let part = |number, length, bytes| Reply::SettingsPart { number, length, bytes };
+        let part = |number, length, bytes| Reply::SettingsPart(Part { number, length, bytes });
         assert_eq!(read(false, 0), part(0, 40, [b'r'; PART]));
         assert_eq!(read(false, 1), part(1, 40, padded(b"rrrrrrrr")));
         assert_eq!(read(false, 2), part(2, 40, [0; PART]), "behind the end");

@@ -3,8 +3,8 @@
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Mismatch, Reason, Reply, Request, Sensor, State,
-    Status, Telemetry, WireVolts,
+    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Mismatch, Part, Reason, Reply, Request, Sensor,
+    State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
@@ -158,6 +158,10 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
             Reply::Fault(FaultReport { number, tick, fault, standing, mismatch })
         }),
         (model(), model()).prop_map(|(active, stored)| Reply::Settings(Blocks { active, stored })),
-        any::<(u8, u16, [u8; 32])>().prop_map(|(number, length, bytes)| Reply::SettingsPart { number, length, bytes }),
+        any::<(u8, u16, [u8; 32])>().prop_map(|(number, length, bytes)| Reply::SettingsPart(Part {
+            number,
+            length,
+            bytes
+        })),
     ]
 }

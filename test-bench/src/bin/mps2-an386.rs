@@ -133,7 +133,7 @@ fn main() -> ! {
             // Without sleeping: while the processor sleeps, the emulator's clock can follow the real one and skip ticks; while it
             // runs, the instructions alone determine the time.
             loop {
-                host::serve_store(&mut store);
+                host::serve_store(&mut store, &loaded.settings);
             }
         }
     }
