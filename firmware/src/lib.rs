@@ -12,6 +12,7 @@
 //! | [`board`] | Traits that a board implements. |
 //! | [`control`] | One control tick: supervisor, model, supervisor. |
 //! | [`mailbox`] | Hand-over of commands to the control tick; drops commands that a fault has made obsolete. |
+//! | [`capture`] | The fast capture: every tick in a row of RAM. |
 //! | [`clock_test`] | Test of the processor's clock at the start: the plausible range. |
 //! | [`pace`] | Time of the next tick, and the number of missed ticks. |
 //! | [`reset_cause`] | Cause of the last reset, from the chip's flags and the crash record. |
@@ -20,6 +21,7 @@
 //! | [`store`] | Storage of a model and of settings in flash, safe against power cuts. |
 //! | [`task_watchdog`] | Check that every task is alive, before the hardware watchdog is fed. |
 //! | [`update`] | Updates of the store by the host, with the check before they are sealed. |
+//! | `capture_memory` | Memory of the fast capture. |
 //! | `crash_record` | Memory of the crash record. |
 //! | `guards` | Check of RAM and image, and start of both guards. |
 //! | `hang_guard` | Stop of a control task that hangs. |
@@ -43,6 +45,7 @@
 extern crate std;
 
 pub mod board;
+pub mod capture;
 pub mod clock_test;
 pub mod control;
 pub mod mailbox;
@@ -54,6 +57,8 @@ pub mod store;
 pub mod task_watchdog;
 pub mod update;
 
+#[cfg(feature = "mcu")]
+pub mod capture_memory;
 #[cfg(feature = "mcu")]
 pub mod crash_record;
 #[cfg(feature = "mcu")]

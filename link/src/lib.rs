@@ -23,6 +23,7 @@
 //! | [`request`], [`reply`], [`reason`] | The messages. |
 //! | [`value`] | Voltages and desired stiffness in their wire format. |
 //! | [`block`] | Blocks that the MCU stores: their identity, and the parts in which they are sent. |
+//! | [`capture`] | Rows of the fast capture, and the requests that start and read it. |
 //! | [`wire_model`], [`wire_settings`] | A spring's model and the MCU's settings in the format in which they are sent and stored. |
 //! | [`fault`], [`field`] | Numeric codes of the MCU's faults and of the fields of a model or of settings. |
 //! | [`diagnosis`] | Numeric codes of what the amplifier's monitors and the sensor show. |
@@ -40,6 +41,7 @@
 extern crate std;
 
 pub mod block;
+pub mod capture;
 pub mod checksum;
 pub mod command;
 pub mod diagnosis;

@@ -80,6 +80,11 @@ pub enum Reason {
     },
     /// The given setting asks for a part of the program that the image does not contain.
     NotBuiltIn(Field),
+    /// The MCU's RAM has no room for the rows of the capture.
+    TooManyRows {
+        /// Number of rows that fit.
+        most: u32,
+    },
 }
 
 impl Reason {
@@ -108,6 +113,7 @@ impl Reason {
             Self::Reference => 19,
             Self::BadSettings { .. } => 20,
             Self::NotBuiltIn(_) => 21,
+            Self::TooManyRows { .. } => 22,
         }
     }
 }
@@ -145,6 +151,7 @@ impl fmt::Display for Reason {
             Self::NotBuiltIn(field) => {
                 write!(f, "the MCU's image is built without it: {field}; flash an image that has it")
             }
+            Self::TooManyRows { most } => write!(f, "the MCU's RAM has room for {most} rows of a capture"),
         }
     }
 }

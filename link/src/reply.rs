@@ -7,6 +7,7 @@ use model::supervisor::{self, Faults, Supervisor};
 use serde::{Deserialize, Serialize};
 
 use crate::block::{Blocks, Part};
+use crate::capture::{Captured, Rows};
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::fault::Fault;
 use crate::reason::Reason;
@@ -38,6 +39,10 @@ pub enum Reply {
     Settings(Blocks),
     /// A part of the payload of settings.
     SettingsPart(Part),
+    /// How far the fast capture is.
+    Captured(Captured),
+    /// Rows of the fast capture.
+    Rows(Rows),
 }
 
 /// Report of the faults that have come since the start.

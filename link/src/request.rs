@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::block::PART;
+use crate::capture::Capture;
 use crate::fault::Fault;
 use crate::value::Desired;
 
@@ -79,6 +80,8 @@ pub enum Request {
         /// Number of the part, counted from 0.
         number: u8,
     },
+    /// Starts or reads the fast capture.
+    Capture(Capture),
 }
 
 impl Request {

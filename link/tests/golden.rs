@@ -4,6 +4,7 @@
 mod by_hand;
 
 use by_hand::by_hand;
+use link::capture::{Capture, Captured, ROWS, Rows};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
@@ -44,6 +45,9 @@ fn requests() {
         (Request::SettingsEnd { length: 300, checksum: 128 }, "0fac028001"),
         (Request::ReadSettings { built_in: false, number: 2 }, "100002"),
         (Request::ReadSettings { built_in: true, number: 7 }, "100107"),
+        (Request::Capture(Capture::Start { rows: 10_000 }), "1100904e"),
+        (Request::Capture(Capture::State), "1101"),
+        (Request::Capture(Capture::Read { first: 300 }), "1102ac02"),
     ] {
         check(&request, b'Q', golden);
     }
@@ -117,6 +121,7 @@ fn replies() {
             "0114270000000000000000000000000000f03f",
         ),
         (Reply::Refused(Reason::NotBuiltIn(Field::named("controller"))), "011512"),
+        (Reply::Refused(Reason::TooManyRows { most: 300 }), "0116ac02"),
         (
             Reply::Status(status),
             "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f0903040a0b0c0d0e0f1011",

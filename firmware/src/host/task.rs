@@ -3,7 +3,7 @@
 use embassy_time::{Duration, Timer, with_timeout};
 use link::{Server, Step, View};
 
-use super::shared_mailbox::{hand_over, with_mailbox};
+use super::shared_mailbox::{capture, hand_over, with_mailbox};
 use super::shared_store;
 use crate::board::Line;
 use crate::stop;
@@ -41,6 +41,10 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                 Some(Step::ReadSettings { built_in, number }) => {
                     let part = shared_store::settings_part(built_in, number).await;
                     send(line, server.settings_part(part)).await;
+                }
+                Some(Step::Capture(request)) => {
+                    let reply = capture(request);
+                    send(line, server.captured(&reply)).await;
                 }
                 Some(Step::Restart(bytes)) => {
                     send(line, bytes).await;

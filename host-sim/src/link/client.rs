@@ -9,6 +9,7 @@ use std::io;
 use std::time::{Duration, Instant, SystemTime};
 
 use link::block::PART;
+use link::capture::{Capture, Captured, Row};
 use link::{
     Block, BlockId, Blocks, FaultReport, Frame, Nonce, Packet, Part, Reason, Receiver, Reply, Request, Sequence,
     Status, Telemetry, Unreadable, WireModel, WireSettings,
@@ -265,6 +266,41 @@ impl Client {
             return Err(Failure::NotRun { what: "settings", sent, blocks });
         }
         Ok(blocks)
+    }
+
+    /// How far the fast capture is, and for how many rows the MCU has room.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn capture_state(&mut self) -> Result<Captured, Failure> {
+        self.ask_capture(Capture::State)
+    }
+
+    /// Starts a fast capture of this number of ticks.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn capture(&mut self, rows: u32) -> Result<Captured, Failure> {
+        self.ask_capture(Capture::Start { rows })
+    }
+
+    fn ask_capture(&mut self, request: Capture) -> Result<Captured, Failure> {
+        match self.ask(Request::Capture(request))? {
+            Reply::Captured(captured) => Ok(captured),
+            other => Err(Failure::Unexpected(Box::new(other))),
+        }
+    }
+
+    /// Reads rows of the fast capture, from number `first` on; none if it has not come that far. A frame that is damaged
+    /// is asked for again.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn rows(&mut self, first: u32) -> Result<Vec<Row>, Failure> {
+        match self.ask(Request::Capture(Capture::Read { first }))? {
+            Reply::Rows(rows) if rows.first == first => Ok(rows.iter().collect()),
+            other => Err(Failure::Unexpected(Box::new(other))),
+        }
     }
 
     /// Sends a block, restarts the MCU, connects again, and checks that it runs the block.

@@ -1,6 +1,7 @@
 //! `vsj link` against an MCU in the test process.
 #![cfg(unix)]
 
+mod capture;
 mod command;
 mod damage;
 mod mcu;

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use firmware::capture::Recorder;
 use firmware::control::{Control, Sensors, Untimed};
 use firmware::reset_cause::Cause;
 use firmware::settings::BUILT_IN;
@@ -109,6 +110,9 @@ fn next_seed() -> u32 {
     static SEED: AtomicU32 = AtomicU32::new(0);
     SEED.fetch_add(1 << 20, Ordering::Relaxed)
 }
+
+/// Rows for which the MCU has room.
+pub(crate) const ROWS: usize = 2000;
 
 const POLL: Duration = Duration::from_micros(500);
 
@@ -247,6 +251,8 @@ struct Chip {
     store: Store<Flash>,
     view: View,
     settings: device::Settings,
+    recorder: Recorder,
+    memory: Vec<AtomicU32>,
     /// Time between two ticks.
     period: Duration,
 }
@@ -279,7 +285,9 @@ impl Chip {
         let (state, standing) = (supervisor::State::Disarmed, supervisor::Faults::NONE);
         let view = View { sample: Telemetry::default(), state, standing, refusal: None, overruns: 0 };
         let period = Duration::from_secs(1) / settings.rate_hz();
-        let mut chip = Self { setup, shared, server, control, store, view, settings, period };
+        let memory = (0..2 * ROWS).map(|_| AtomicU32::new(0)).collect();
+        let mut chip =
+            Self { setup, shared, server, control, store, view, settings, recorder: Recorder::new(), memory, period };
         chip.tick(Command::default());
         chip
     }
@@ -305,6 +313,7 @@ impl Chip {
             mismatch: supervisor.mismatch().into(),
             sensor: link::Sensor(u8::from(self.setup.sensor)),
         };
+        self.recorder.tick(&self.memory, &sample, 0);
         let mut shared = self.shared.lock().unwrap();
         (shared.sample, shared.counters) = (sample, self.server.counters());
         let (state, standing) = (supervisor.state(), supervisor.standing());
@@ -327,6 +336,10 @@ impl Chip {
             Some(Step::ReadSettings { built_in, number }) => {
                 let settings = if built_in { &BUILT_IN } else { &self.settings };
                 out.extend_from_slice(self.server.settings_part(update::settings_part(settings, number)));
+            }
+            Some(Step::Capture(request)) => {
+                let reply = self.recorder.execute(&self.memory, request);
+                out.extend_from_slice(self.server.captured(&reply));
             }
             Some(Step::Restart(bytes)) => {
                 out.extend_from_slice(bytes);

@@ -5,7 +5,8 @@
 //! 1. Pass each received byte to [`Server::on_byte`] with the latest [`View`]. [`Step::Send`]: send the bytes.
 //!    [`Step::Command`]: pass the command to the control tick, wait until that tick has run, then send what
 //!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::Update`]: likewise with the
-//!    store and [`Server::updated`]. [`Step::ReadSettings`]: send what [`Server::settings_part`] returns.
+//!    store and [`Server::updated`]. [`Step::ReadSettings`], [`Step::Capture`]: send what
+//!    [`Server::settings_part`], [`Server::captured`] returns.
 //!    [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
 //! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns.
@@ -19,6 +20,7 @@ use model::Spring;
 use model::supervisor::{self, Faults, Refusal};
 
 use crate::block::{Block, BlockId, Blocks, PART, Part};
+use crate::capture::Capture;
 use crate::command::Command;
 use crate::fault::Fault;
 use crate::reason::Reason;
@@ -78,6 +80,8 @@ pub enum Step<'a> {
         /// Number of the part.
         number: u8,
     },
+    /// Execute the request, then call [`Server::captured`] with the reply.
+    Capture(Capture),
     /// Send the bytes, then restart.
     Restart(&'a [u8]),
 }
@@ -121,6 +125,7 @@ impl Server {
                 Request::Hello | Request::Status => Reply::Status(self.status(view)),
                 Request::Model => Reply::Model(self.about.model),
                 Request::Settings => Reply::Settings(self.about.settings),
+                Request::Capture(capture) => return Some(Step::Capture(capture)),
                 Request::ReadSettings { built_in, number } => return Some(Step::ReadSettings { built_in, number }),
                 Request::ModelPart { .. }
                 | Request::ModelEnd { .. }
@@ -207,6 +212,11 @@ impl Server {
     /// The reply to the request of the last [`Step::ReadSettings`].
     pub fn settings_part(&mut self, part: Part) -> &[u8] {
         self.session.answer(&Reply::SettingsPart(part))
+    }
+
+    /// The reply to the request of the last [`Step::Capture`].
+    pub fn captured(&mut self, reply: &Reply) -> &[u8] {
+        self.session.answer(reply)
     }
 
     /// The report of faults to send ahead of everything else, if one is due: immediately after a new fault, then ten times per

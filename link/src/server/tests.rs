@@ -1,6 +1,7 @@
 //! Tests of the replies, and of the commands for the control tick.
 
 use super::*;
+use crate::capture::Captured;
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::frame::Frame;
 use crate::nonce::Nonce;
@@ -79,6 +80,7 @@ fn exchange(request: Request, before: &View, after: &View) -> (Option<Command>, 
                 answer = Some(reply(server.command_done(after)));
             }
             Some(Step::Send(bytes) | Step::Restart(bytes)) => answer = Some(reply(bytes)),
+            Some(Step::Capture(_)) => answer = Some(reply(server.captured(&Reply::Captured(Captured::default())))),
             Some(Step::Update(block, _)) => answer = Some(reply(server.updated(block, Ok(None), after))),
             Some(Step::ReadSettings { built_in, number }) => {
                 let payload: &[u8] = if built_in { b"built in" } else { &[b'r'; 40] };
@@ -185,6 +187,16 @@ fn the_running_and_the_built_in_settings_can_be_read_in_any_state() {
         assert_eq!(read(false, 2), part(2, 40, [0; PART]), "behind the end");
         assert_eq!(read(false, 255), part(255, 40, [0; PART]), "behind the end");
         assert_eq!(read(true, 0), part(0, 8, padded(b"built in")));
+    }
+}
+
+#[test]
+fn a_capture_is_started_and_read_in_any_state() {
+    for view in [ARMED, DISARMED, FAULTED] {
+        for capture in [Capture::Start { rows: 9 }, Capture::State, Capture::Read { first: 3 }] {
+            let (command, reply) = exchange(Request::Capture(capture), &view, &view);
+            assert_eq!((command, reply), (None, Reply::Captured(Captured::default())));
+        }
     }
 }
 

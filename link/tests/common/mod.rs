@@ -1,5 +1,6 @@
 //! Strategies that generate every kind of message.
 
+use link::capture::{Capture, Captured, ROWS, Rows};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
@@ -42,6 +43,9 @@ pub(crate) fn request() -> impl Strategy<Value = Request> {
         any::<(u8, [u8; 32])>().prop_map(|(number, bytes)| Request::SettingsPart { number, bytes }),
         any::<(u16, u32)>().prop_map(|(length, checksum)| Request::SettingsEnd { length, checksum }),
         any::<(bool, u8)>().prop_map(|(built_in, number)| Request::ReadSettings { built_in, number }),
+        any::<u32>().prop_map(|rows| Request::Capture(Capture::Start { rows })),
+        Just(Request::Capture(Capture::State)),
+        any::<u32>().prop_map(|first| Request::Capture(Capture::Read { first })),
     ]
 }
 
@@ -81,6 +85,7 @@ fn reason() -> impl Strategy<Value = Reason> {
             highest
         }),
         any::<u8>().prop_map(|field| Reason::NotBuiltIn(Field(field))),
+        any::<u32>().prop_map(|most| Reason::TooManyRows { most }),
     ]
 }
 
@@ -157,6 +162,8 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
             let (fault, mismatch) = (Fault(fault), Mismatch(mismatch));
             Reply::Fault(FaultReport { number, tick, fault, standing, mismatch })
         }),
+        any::<[u32; 3]>().prop_map(|[most, wanted, captured]| Reply::Captured(Captured { most, wanted, captured })),
+        any::<(u32, u8, [[u8; 8]; ROWS])>().prop_map(|(first, count, rows)| Reply::Rows(Rows { first, count, rows })),
         (model(), model()).prop_map(|(active, stored)| Reply::Settings(Blocks { active, stored })),
         any::<(u8, u16, [u8; 32])>().prop_map(|(number, length, bytes)| Reply::SettingsPart(Part {
             number,

@@ -1,5 +1,6 @@
 //! `vsj link`: the MCU over its serial link.
 
+mod capture;
 mod model;
 pub(super) mod record;
 pub(super) mod session;
@@ -14,7 +15,7 @@ use link::{Desired, Fault, Request};
 use session::{Session, seconds};
 use simulation::bad_input;
 
-/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, model, settings
+/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, capture, model, settings
 #[derive(Args, Debug)]
 #[command(
     arg_required_else_help = false,
@@ -25,6 +26,7 @@ Examples:
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
   vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
+  vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
   vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate, watchdogs
 
@@ -75,6 +77,8 @@ enum Command {
     Watch(watch::Arguments),
     /// Record time, voltage and stiffness as CSV for `vsj diagnose`
     Record(record::Arguments),
+    /// Record every tick of a few seconds in the MCU's RAM, then send it as CSV for `vsj diagnose`
+    Capture(capture::Arguments),
     /// Show the MCU's model of the spring; with a plant file, send it to be checked and stored, and restart
     Model(model::Arguments),
     /// Show the MCU's settings; with a settings file, send it to be checked and stored, and restart
@@ -129,6 +133,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if let Command::Record(arguments) = &arguments.command {
         arguments.check()?;
     }
+    if let Command::Capture(arguments) = &arguments.command {
+        arguments.check()?;
+    }
     if let Command::Watch(arguments) = &arguments.command {
         arguments.check()?;
     }
@@ -177,6 +184,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         }
         Command::Watch(arguments) => watch::run(&mut session, arguments),
         Command::Record(record) => record::run(&mut session, record, arguments.baud),
+        Command::Capture(arguments) => capture::run(&mut session, arguments),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
         Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
     }
