@@ -14,10 +14,7 @@ unsafe extern "C" {
 
 /// The memory. The start-up code does not clear it, and the test of the RAM does not cover it.
 pub fn words() -> &'static [AtomicU32] {
-    // SAFETY: only the address is taken.
-    let begin = unsafe { &raw const __euninit };
-    // SAFETY: as above.
-    let end = unsafe { &raw const _ram_end };
+    let (begin, end) = (&raw const __euninit, &raw const _ram_end);
     let length = (end as usize).saturating_sub(begin as usize) / size_of::<AtomicU32>();
     // SAFETY: aligned words of RAM in which the linker places nothing, and of which every pattern of bits is valid.
     unsafe { core::slice::from_raw_parts(begin, length) }
