@@ -43,8 +43,9 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                     send(line, server.settings_part(part)).await;
                 }
                 Some(Step::Capture(request)) => {
-                    let reply = capture(request);
-                    send(line, server.captured(&reply)).await;
+                    // The reply is not kept while the frame is sent.
+                    let bytes = server.captured(&capture(request));
+                    send(line, bytes).await;
                 }
                 Some(Step::Restart(bytes)) => {
                     send(line, bytes).await;
