@@ -12,7 +12,7 @@ fn stdout(output: Output) -> String {
 }
 
 #[test]
-fn every_shell_is_told_of_every_command() {
+fn each_completion_script_has_every_command() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let script = stdout(vsj(&["completions", shell]));
         for command in ["stair", "diagnose", "watch", "acknowledge"] {

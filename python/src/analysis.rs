@@ -108,15 +108,10 @@ pub(crate) fn diagnose<'py>(
     let records = copied(records);
     let stop = deadline(within).map_err(crate::error::exception)?;
     let answer = interrupt::run(py, &stop.clone(), move || {
-        let effort = match effort.as_str() {
-            "quick" => Effort::Quick,
-            "normal" => Effort::Normal,
-            "thorough" => Effort::Thorough,
-            other => bad_input!("--effort {other}: expected quick, normal or thorough"),
-        };
+        let effort: Effort = effort.parse()?;
         let records = options.open(&records)?;
-        records.check_stair()?;
         let rows = records.rows();
+        rows.iter().try_for_each(|record| records.input.check(record))?;
         let units = records.measured[0].units.clone();
         let (plant, file, linear) = match plant {
             Plant::Named(name) if name == "identify" => {
@@ -184,21 +179,9 @@ pub(crate) fn plan<'py>(
     slew_v_per_s: Option<f64>,
 ) -> PyResult<(String, Bound<'py, PyDict>)> {
     let (json, course) = interrupt::run(py, &Stop::default(), move || {
-        for (option, value) in [("--minutes", minutes), ("--limit-v", limit_v), ("--slew-v-per-s", slew_v_per_s)] {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                bad_input!("{option} {value}: expected a number above 0");
-            }
-        }
-        let basis: Basis = match serde_json::from_str(&diagnosis) {
-            Ok(basis) => basis,
-            Err(error) => {
-                let what = error.to_string();
-                let what = what.rsplit_once(" at line ").map_or(what.as_str(), |(what, _)| what);
-                let (line, column) = (error.line(), error.column());
-                bad_input!("{name}, line {line}, column {column}: {what}; expected the JSON of `vsj diagnose`")
-            }
-        };
-        let plan = ::identify::plan::plan(&basis, &Request { minutes, limit_v, slew_v_per_s }, &name)?;
+        let request = Request { minutes, limit_v, slew_v_per_s };
+        request.check()?;
+        let plan = ::identify::plan::plan(&Basis::from_json(&name, &diagnosis)?, &request, &name)?;
         let course: Course = vec![
             ("time_s", plan.commands.iter().map(|command| command.time_s).collect()),
             ("voltage_v", plan.commands.iter().map(|command| command.voltage_v).collect()),

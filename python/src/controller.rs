@@ -17,6 +17,7 @@ use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::experiment::with_plant;
 use simulation::open_loop;
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{Record, Row};
 
@@ -53,32 +54,9 @@ pub(crate) struct Sensor {
     fade_s: f64,
 }
 
-/// Field names of the model's errors, and the options that set them.
-const FIELDS: &[(&str, &str)] = &[
-    ("rate_hz", "--rate-hz"),
-    ("full_scale_v", "--limit-v"),
-    ("max_v", "--limit-v"),
-    ("slew_v_per_s", "--slew-v-per-s"),
-    ("share", "--plant"),
-    ("time_constant_s", "--plant"),
-    ("relaxation.", "--plant"),
-    ("memory.", "--plant"),
-    ("law.", "--plant"),
-    ("leakage.", "--plant"),
-    ("min_v", "--min-v"),
-    ("dac_bits", "--dac-bits"),
-    ("proportional_gain", "--kp"),
-    ("integral_gain_per_s", "--ki"),
-    ("approach_s", "--approach-s"),
-];
-
-fn refused(error: OutOfRange) -> BadInput {
-    let text = error.to_string();
-    let table = error.field.split_inclusive('.').next().unwrap_or_default();
-    match FIELDS.iter().find(|(name, _)| *name == error.field || *name == table) {
-        Some((_, option)) => BadInput(format!("{option}: {text}")),
-        None => BadInput(text),
-    }
+/// The error of the settings, with the option of the command that sets the field.
+fn refused(error: OutOfRange) -> anyhow::Error {
+    named(BadInput(error.to_string()).into(), SETTINGS)
 }
 
 /// Loads a spring that the tick simulates.
@@ -312,7 +290,7 @@ pub(crate) fn predict<'py>(
         let record = Record { name: "X".into(), rows: (0..time_s.len()).map(row).collect() };
         let map = file.reading.unwrap_or_default();
         let base = Base::new(file)?;
-        let data = Data::new(&record, crate::records::input(Some(&input))?);
+        let data = Data::new(&record, input.parse()?);
         let mut readings = Vec::new();
         Simulator::new(&data, &base).run(&Model::default(), &mut readings);
         readings.iter_mut().for_each(|reading| *reading = map.zero + map.gain * *reading);

@@ -6,15 +6,11 @@ use anyhow::Result;
 use identify::Input;
 use pyo3::prelude::*;
 use simulation::bad_input;
+use simulation::csv_table::dialect::Dialect;
 use simulation::csv_table::text::Source;
-use simulation::record::gaps::missed_turns;
-use simulation::record::{Format, MeasuredRecord, Record, columns_file};
-use simulation::schedule::Schedule;
+use simulation::record::{ColumnNames, Format, MeasuredRecord, Record, columns_file, remarks_on};
 
 use crate::table::{Cells, Column, source};
-
-/// Tolerance in s within which a row of the stair may have the voltage before or after a step, as in `vsj diagnose`.
-const RAMP_S: f64 = 0.1;
 
 /// A record as Python hands it over: its name and columns, or the path of a file and no columns.
 pub(crate) type Given<'py> = (String, Option<Vec<(String, Cells<'py>)>>);
@@ -53,19 +49,6 @@ pub(crate) fn copied(records: Vec<Given<'_>>) -> Vec<Owned> {
     records.into_iter().map(|(name, columns)| (name, columns.map(copied))).collect()
 }
 
-/// The course of the voltage between the rows by its name.
-///
-/// # Errors
-/// [`simulation::BadInput`] for another name.
-pub(crate) fn input(name: Option<&str>) -> Result<Input> {
-    Ok(match name {
-        None | Some("hold") => Input::Hold,
-        Some("linear") => Input::Linear,
-        Some("stair") => Input::Stair,
-        Some(other) => bad_input!("--input {other}: expected hold, linear or stair"),
-    })
-}
-
 impl Options {
     /// Reads records, all in the same way.
     ///
@@ -83,21 +66,10 @@ impl Options {
             }
         };
         let measured: Vec<MeasuredRecord> = records.iter().map(read).collect::<Result<_>>()?;
-        let Some((first, others)) = measured.split_first() else { bad_input!("no record; expected one or more") };
-        for record in others {
-            record.expect_quantities_of(first)?;
+        if measured.is_empty() {
+            bad_input!("no record; expected one or more");
         }
-        let mut remarks: Vec<String> = measured.iter().flat_map(|record| record.remarks.clone()).collect();
-        for MeasuredRecord { record, .. } in &measured {
-            let turns = missed_turns(&record.rows);
-            if turns > 0 {
-                remarks.push(format!(
-                    "{}: the voltage turns in {turns} gap(s) between the rows; what it did there is not in the record and may be \
-                     taken for a property of the spring",
-                    record.name
-                ));
-            }
-        }
+        let remarks = remarks_on(&measured)?;
         Ok(Records { measured, input, remarks })
     }
 
@@ -106,23 +78,17 @@ impl Options {
         if self.reading.is_some() && self.column.is_some() {
             bad_input!("--column and --reading: both name the reading; expected one of them");
         }
-        let (mut format, named) = match &self.columns {
+        let columns =
+            ColumnNames { time: self.time, voltage: self.voltage, reading: self.reading, stiffness: self.column };
+        let separator = self.separator.map(|it| it.parse()).transpose()?;
+        let decimal = self.decimal.map(|it| it.parse()).transpose()?;
+        let given = Format { columns, dialect: Dialect { separator, decimal }, sort: self.sort };
+        let (in_file, named) = match &self.columns {
             Some(path) => columns_file::open(path)?,
             None => (Format::default(), None),
         };
-        let columns = &mut format.columns;
-        for (option, column) in [
-            (self.time, &mut columns.time),
-            (self.voltage, &mut columns.voltage),
-            (self.reading, &mut columns.reading),
-            (self.column, &mut columns.stiffness),
-        ] {
-            *column = option.or(column.take());
-        }
-        format.dialect.separator = self.separator.map(|it| it.parse()).transpose()?.or(format.dialect.separator);
-        format.dialect.decimal = self.decimal.map(|it| it.parse()).transpose()?.or(format.dialect.decimal);
-        format.sort |= self.sort;
-        Ok((format, input(self.input.or(named).as_deref())?))
+        let input = self.input.or(named).map(|name| name.parse()).transpose()?;
+        Ok((given.or(in_file), input.unwrap_or_default()))
     }
 }
 
@@ -130,18 +96,5 @@ impl Records {
     /// The rows alone.
     pub(crate) fn rows(&self) -> Vec<Record> {
         self.measured.iter().map(|measured| measured.record.clone()).collect()
-    }
-
-    /// Checks that records under the report's stair have its voltages.
-    ///
-    /// # Errors
-    /// [`simulation::BadInput`] with the first row that has another voltage.
-    pub(crate) fn check_stair(&self) -> Result<()> {
-        if self.input == Input::Stair {
-            for MeasuredRecord { record, .. } in &self.measured {
-                Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
-            }
-        }
-        Ok(())
     }
 }

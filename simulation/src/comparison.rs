@@ -107,15 +107,17 @@ fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>) -> Result<Vec<S
         let settings = Settings { compensation, ..settings };
         let experiment =
             Experiment { name: "the stair of ideal steps".to_owned(), schedule: Schedule::ideal_stair(), settings };
-        let run = experiment.run(|_, _| ())?;
         Ok::<_, anyhow::Error>(match on {
-            None => (responses(&experiment, &run, &run.with), responses(&experiment, &run, &run.without)),
+            None => {
+                let run = experiment.run(|_, _| ())?;
+                (responses(&experiment, &run, &run.with), responses(&experiment, &run, &run.without))
+            }
             Some((spring, sensor_noise_v)) => {
                 let without = Experiment {
                     settings: Settings { compensation: Compensation::None, ..settings },
                     ..experiment.clone()
                 };
-                (on_spring(&experiment, &run, (spring, sensor_noise_v))?, on_spring(&without, &run, (spring, None))?)
+                (on_spring(&experiment, (spring, sensor_noise_v))?, on_spring(&without, (spring, None))?)
             }
         })
     };
@@ -125,29 +127,26 @@ fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>) -> Result<Vec<S
     Ok(together.map(|((none, paper), fast)| Step { none, paper, fast }).collect())
 }
 
-/// Responses of the controller of an experiment on a spring that differs from its model; `run` has the times.
-fn on_spring<P: HasReference>(
-    experiment: &Experiment<P>,
-    run: &Run,
-    (actual, sensor_noise_v): On,
-) -> Result<Vec<Response>> {
+/// Responses of the controller of an experiment on a spring that differs from its model.
+fn on_spring<P: HasReference>(experiment: &Experiment<P>, (actual, sensor_noise_v): On) -> Result<Vec<Response>> {
     let Experiment { schedule, settings, .. } = experiment;
-    let interval_s = 1.0 / settings.rate_hz;
+    let rate_hz = settings.rate_hz;
+    let interval_s = 1.0 / rate_hz;
     let feedback = sensor_noise_v.map(|noise_v| Feedback { noise_v, interval_s, ..Feedback::TYPICAL });
     let settings = Settings { feedback, ..*settings };
     let config = settings.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
-    let targets = schedule.at_ticks(settings.rate_hz);
-    let samples = actual.closed_loop(&config, &targets, interval_s, sensor_noise_v)?;
+    let with = actual.closed_loop(&config, &experiment.targets()?, interval_s, sensor_noise_v)?;
+    let run = Run { start_s: schedule.start_s(), rate_hz, with, without: Vec::new() };
     let changes = schedule.changes();
-    let moved: Vec<Change> = changes.iter().map(|change| from_present(run, &samples, change)).collect();
+    let moved: Vec<Change> = changes.iter().map(|change| from_present(&run, &run.with, change)).collect();
     // The bound is that of the spring without its gain.
     let less = |v: f64| v / actual.gain;
     let scaled: Vec<Change> =
         moved.iter().map(|of| Change { from_v: less(of.from_v), to_v: less(of.to_v), ..*of }).collect();
-    let bounds = ExtendedPlant::bounds(&with_plant(&settings, actual.file.extended()), run, &samples, &scaled);
+    let bounds = ExtendedPlant::bounds(&with_plant(&settings, actual.file.extended()), &run, &run.with, &scaled);
     let each = changes.iter().zip(&moved).zip(bounds).map(|((change, moved), bound)| {
         let (from_v, to_v) = (change.from_v, change.to_v);
-        Response { from_v, to_v, ..measure(run, &samples, moved, bound) }
+        Response { from_v, to_v, ..measure(&run, &run.with, moved, bound) }
     });
     Ok(each.collect())
 }

@@ -40,14 +40,7 @@ impl<P: HasReference> Experiment<P> {
         let uncontrolled = Settings { compensation: Compensation::None, ..self.settings };
         let controlled = self.settings.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
         let alone = uncontrolled.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
-        self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;
-
-        let last = self.schedule.last_tick(rate_hz);
-        if last >= MOST_TICKS {
-            let (name, ticks) = (&self.name, number(last));
-            bad_input!("{name} takes {ticks} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}");
-        }
-        let targets = self.schedule.at_ticks(rate_hz);
+        let targets = self.targets()?;
         let ticks = targets.len();
         let mut run = Run { start_s: self.schedule.start_s(), rate_hz, with: Vec::new(), without: Vec::new() };
         run.with = one_loop(&controlled, &targets, |done| progress(done, 2 * ticks))?;
@@ -59,6 +52,21 @@ impl<P: HasReference> Experiment<P> {
             }
         }
         Ok(run)
+    }
+
+    /// Targets in V, one per tick.
+    ///
+    /// # Errors
+    /// [`BadInput`] for schedules beyond the amplifier's range, and more than 10 million ticks.
+    pub fn targets(&self) -> Result<Vec<f64>> {
+        let rate_hz = self.settings.rate_hz;
+        self.schedule.check_range(&self.name, self.settings.amplifier.min_v, P::highest_target(&self.settings))?;
+        let last = self.schedule.last_tick(rate_hz);
+        if last >= MOST_TICKS {
+            let (name, ticks) = (&self.name, number(last));
+            bad_input!("{name} takes {ticks} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}");
+        }
+        Ok(self.schedule.at_ticks(rate_hz))
     }
 }
 

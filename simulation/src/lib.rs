@@ -6,6 +6,7 @@
 //! | [`schedule`], [`record`] | the commanded voltage over time: the report's stair, or a file |
 //! | [`units`] | units in which a user reads times, voltages and readings |
 //! | [`csv_table`], [`mod@bad_input`] | CSV tables, and errors that name what was expected |
+//! | [`option_names`] | the options that set the fields which errors name |
 //! | [`bounded_file`] | other files, up to a bound on their size |
 //! | [`plant_file`], [`settings_file`] | the spring and the settings of an MCU as a file |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
@@ -25,6 +26,7 @@ pub mod csv_table;
 pub mod experiment;
 pub mod has_reference;
 pub mod open_loop;
+pub mod option_names;
 pub mod plant_file;
 pub mod record;
 pub mod reference;

@@ -7,7 +7,7 @@ mod measured;
 mod names;
 mod times;
 
-pub use measured::{Format, MeasuredRecord};
+pub use measured::{Format, MeasuredRecord, remarks_on};
 pub use names::ColumnNames;
 
 use std::path::Path;

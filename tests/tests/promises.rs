@@ -13,8 +13,13 @@ use model::{Config, Input, Settings, Volts};
 use test_bench::script::FaultInjection;
 
 const PAGE: &str = "docs/promises.md";
-/// Commands of the emulation that count as evidence, each a file or folder in `emulation/src`.
-const COMMANDS: [(&str, &str); 3] = [("proof", "proof.rs"), ("talk", "talk"), ("size", "binary/size.rs")];
+/// Commands of `cargo xtask` that count as evidence, and where each is.
+const COMMANDS: [(&str, &str); 4] = [
+    ("proof", "emulation/src/proof.rs"),
+    ("prove", "xtask/src/prove.rs"),
+    ("talk", "emulation/src/talk"),
+    ("size", "emulation/src/binary/size.rs"),
+];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
@@ -69,7 +74,7 @@ fn fault_of(evidence: &str) -> Option<String> {
         return (!played || !checked).then(|| format!("no boot run {name}"));
     }
     if let Some((_, file)) = COMMANDS.into_iter().find(|(name, _)| *name == evidence) {
-        return (!root().join("emulation/src").join(file).exists()).then(|| format!("no command {evidence}"));
+        return (!root().join(file).exists()).then(|| format!("no command {evidence}"));
     }
     let Some((file, name)) = evidence.trim_matches('`').split_once("::") else {
         return Some(format!("{evidence} is no evidence"));

@@ -1,7 +1,7 @@
 //! `cargo xtask image`: the MCU's images as ELF, bin and hex, each with its software bill of materials.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use xtask::build::{self, Board, Opt};
@@ -28,17 +28,23 @@ fn board(name: &str) -> Result<Board, String> {
 /// Builds the image of each board and prints the paths of its four files, the ELF file first.
 pub(crate) fn run(Args { variant, board }: Args) -> Result<()> {
     for board in Board::ALL.into_iter().filter(|each| board.is_none_or(|only| *each == only)) {
-        let path = build::image_with(&variant.features(), board, Opt::S)?;
-        let flash = segments::flash(&build::read(&path)?).with_context(|| format!("in {}", path.display()))?;
-        let (bin, hex) = (path.with_extension("bin"), path.with_extension("hex"));
-        write(&bin, &flash.bytes)?;
-        write(&hex, intel_hex(flash.address, &flash.bytes).as_bytes())?;
-        let bom = path.with_extension("cdx.json");
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        write(&bom, sbom::of_image(board, &variant.features(), &name)?.as_bytes())?;
-        println!("{}\n{}\n{}\n{}", path.display(), bin.display(), hex.display(), bom.display());
+        for path in files(variant, board)? {
+            println!("{}", path.display());
+        }
     }
     Ok(())
+}
+
+/// Builds an image; returns the paths of the ELF file, the bin, the hex, and the bill of materials.
+pub(crate) fn files(variant: Variant, board: Board) -> Result<[PathBuf; 4]> {
+    let path = build::image_with(&variant.features(), board, Opt::S)?;
+    let flash = segments::flash(&build::read(&path)?).with_context(|| format!("in {}", path.display()))?;
+    let [bin, hex, bom] = ["bin", "hex", "cdx.json"].map(|extension| path.with_extension(extension));
+    write(&bin, &flash.bytes)?;
+    write(&hex, intel_hex(flash.address, &flash.bytes).as_bytes())?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    write(&bom, sbom::of_image(board, &variant.features(), &name)?.as_bytes())?;
+    Ok([path, bin, hex, bom])
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {

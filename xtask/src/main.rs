@@ -6,13 +6,16 @@ mod bench_records;
 mod check;
 mod counts;
 mod deny;
+mod dist;
 mod emulation;
 mod flash;
 mod fuzz;
 mod image;
+mod manual;
 mod mutants;
 mod nightly;
 mod package;
+mod prove;
 mod reproducible;
 mod sanitize;
 mod sbom;
@@ -122,6 +125,12 @@ Examples:
     Bench(bench::Args),
     /// Install the Python package in a virtual environment and run its tests
     Python,
+    /// Build the documents as a book, with a page for each command
+    ///
+    /// Into target/manual/book; prints the path of its first page. Installs mdbook under the target directory unless it is
+    /// there.
+    #[command(verbatim_doc_comment)]
+    Manual,
     /// Change the code in one place at a time; count what no test notices
     ///
     /// Over model, link and the parts of the firmware that a host can run. Fails below 95 % caught, or if a change lives
@@ -164,6 +173,32 @@ Examples:
   cargo xtask counts --run pairs power-cuts"
     )]
     Counts(counts::Args),
+    /// Pack a release: vsj, images, documents, licences, checksums
+    ///
+    /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the images of
+    /// both boards for each controller and amplifier with their bills of materials, the documents, the changes of this version,
+    /// the licences of all dependencies, SHA256SUMS.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Example:
+  cargo xtask dist
+  cd target/releases/vsj-*/ && sha256sum --check SHA256SUMS"
+    )]
+    Dist,
+    /// Prove by an SMT solver what holds for every setting, state and input of the plain tick
+    ///
+    /// No overflow, codes and voltages in range, slew kept, the estimator's state within the range: one inductive step over the
+    /// tick in model/proof/tick.py, which is compared with the one in Rust on random settings and targets. Installs the solver
+    /// (z3) in a virtual environment.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Examples:
+  cargo xtask prove
+  cargo xtask prove --verbose --ticks 1000000"
+    )]
+    Prove(prove::Args),
     /// Build the images in two folders and compare every byte
     #[command(after_help = "\
 Examples:
@@ -216,8 +251,8 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Counts, Deny, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
-    use Command::{Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
+    use Command::{Bench, Boot, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
+    use Command::{Manual, Prove, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -227,7 +262,10 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
         Python => package::run(),
+        Manual => manual::run(),
+        Prove(args) => prove::run(&args),
         Counts(args) => counts::run(&args),
+        Dist => dist::run(),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),
         Sanitize(args) => sanitize::run(&args),

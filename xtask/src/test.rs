@@ -5,6 +5,7 @@ use xtask::{setup, shell};
 
 use crate::emulation;
 use crate::package;
+use crate::prove;
 use crate::steps::{self, Progress, Step};
 
 /// Calls of cargo, the quick ones first. Without a board the firmware's library is an ordinary one. Each image is
@@ -47,14 +48,14 @@ const fn lint(package: &'static str, features: &'static str) -> [&'static str; 1
 /// The steps for `--help`.
 pub(crate) fn help() -> String {
     let emulation: String = EMULATION.iter().map(|(name, line, _)| format!("  {name:<10} {line}\n")).collect();
-    let python = "  python     cargo xtask python\n";
+    let python = "  python     cargo xtask python\n  prove      cargo xtask prove --ticks 1000000\n";
     let setup = "  setup      cargo xtask setup\n";
     format!("Steps, stopping at the first that fails:\n{setup}{}{python}{emulation}", steps::help(STEPS))
 }
 
 /// Runs every step; an error names the first that fails.
 pub(crate) fn run() -> Result<()> {
-    let mut progress = Progress::of(2 + STEPS.len() + EMULATION.len());
+    let mut progress = Progress::of(3 + STEPS.len() + EMULATION.len());
     progress.begin("setup");
     setup::run()?;
     for step in STEPS {
@@ -63,6 +64,8 @@ pub(crate) fn run() -> Result<()> {
     }
     progress.begin("python");
     package::run()?;
+    progress.begin("prove");
+    prove::run(&prove::Args::SHARE)?;
     for (name, _, commands) in EMULATION {
         progress.begin(name);
         commands.iter().try_for_each(|args| emulation::run(args))?;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 
 use crate::shell;
 
-/// A subcommand of cargo that is no part of the toolchain.
+/// A program that is no part of the toolchain.
 #[derive(Clone, Copy, Debug)]
 pub struct Tool {
     /// Name of the package and of its program.
@@ -37,11 +37,12 @@ impl Tool {
     /// Whether `program` starts and is of this version.
     fn is(&self, program: &PathBuf) -> bool {
         // `cargo-NAME` expects the name of the subcommand first.
-        let subcommand = self.name.trim_start_matches("cargo-");
-        let output = Command::new(program).args([subcommand, "--version"]).output();
+        let output = Command::new(program).args(self.name.strip_prefix("cargo-")).arg("--version").output();
         output.is_ok_and(|output| {
             output.status.success()
-                && String::from_utf8_lossy(&output.stdout).split_whitespace().any(|word| word == self.version)
+                && String::from_utf8_lossy(&output.stdout)
+                    .split_whitespace()
+                    .any(|word| word.trim_start_matches('v') == self.version)
         })
     }
 }

@@ -15,8 +15,7 @@ use paper::beam::slip::tips;
 use paper::beam::stack::{self, ORDER, Stack, TABLE2};
 use simulation::bad_input;
 use simulation::csv_table::read;
-
-use super::option_names::named;
+use simulation::option_names::named;
 
 /// The leaf spring's statics: beam experiment, deflection small and large, layers that slip
 #[derive(Args, Debug)]

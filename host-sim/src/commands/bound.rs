@@ -10,11 +10,11 @@ use model::Amplifier;
 use serde::Deserialize;
 use simulation::bad_input;
 use simulation::bounded_file::read_text;
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file;
 use simulation::robust_bound::{Allowed, Question, answer};
 use simulation::spring_error::{Parameter, SpringError};
 
-use super::option_names::{SETTINGS, named};
 use super::spring_error::{ErrorOf, together};
 
 /// Compute how fast any controller without a sensor can be on a spring that is known only to within errors, and how well the spring has

@@ -7,9 +7,9 @@ use host_sim::output::terminal::{json, print};
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::comparison::{Actual, compare};
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file;
 
-use super::option_names::{SETTINGS, named};
 use super::spring_error::{ErrorOf, together};
 
 /// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller

@@ -16,13 +16,9 @@ use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identif
 use indicatif::{ProgressBar, ProgressStyle};
 use simulation::plant_file;
 use simulation::record::{MeasuredRecord, Record};
-use simulation::schedule::Schedule;
 
 use super::choice::{EFFORT, duration, one_of};
 use super::record_arguments::RecordArguments;
-
-/// Tolerance in s within which a row of the stair may have the voltage before or after a step.
-const RAMP_S: f64 = 0.1;
 
 /// Find out how the simulation differs from measured data, name the cause, and measure the held-out improvement
 ///
@@ -153,11 +149,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let stop = stop(arguments.within);
     let (measured, input) = arguments.record.open()?;
     let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
-    if input == Input::Stair {
-        for record in &records {
-            Schedule::stair().check_commanded("the report's stair (--input stair)", record, RAMP_S)?;
-        }
-    }
+    records.iter().try_for_each(|record| input.check(record))?;
     let options = arguments.options(&measured, &records, input, stop)?;
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;

@@ -11,10 +11,10 @@ use paper::dynamics::input::Input;
 use paper::dynamics::plant::PlantGains;
 use paper::dynamics::report::{self, Model, Setup};
 use paper::dynamics::zener::{Changes, Start, Zener};
+use simulation::option_names::named;
 use simulation::schedule::Between;
 
 use super::choice::{BETWEEN, CHANGES, MODEL, one_of};
-use super::option_names::named;
 
 /// Run one of the report's dynamic models, and give the equivalent parameters of the others
 #[derive(Args, Debug)]

@@ -10,11 +10,11 @@ use host_sim::output::terminal::{json, print, wrote};
 use paper::beam::cantilever::Beam;
 use paper::joint::report::{self, Requirement};
 use paper::joint::{Joint, MOST_SPRINGS, OuterEnd};
+use simulation::option_names::named;
 use simulation::plant_file;
 use simulation::reference::Loop;
 
 use super::choice::{OUTER_END, one_of};
-use super::option_names::named;
 
 /// Joint stiffness of springs set radially between two rings, compared with the report's requirement
 #[derive(Args, Debug)]

@@ -11,7 +11,6 @@ pub(crate) mod identify;
 pub(crate) mod joint;
 pub(crate) mod link;
 pub(crate) mod log;
-mod option_names;
 pub(crate) mod plan;
 mod record_arguments;
 pub(crate) mod reproduce;

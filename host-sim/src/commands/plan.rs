@@ -1,6 +1,6 @@
 //! `vsj plan`: the next experiment after a diagnosis.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
@@ -8,7 +8,6 @@ use host_sim::output::files::Files;
 use host_sim::output::plan::{self as output, SCHEDULE_FILE, text};
 use host_sim::output::terminal::{json, print, wrote};
 use identify::plan::{Basis, Request, plan};
-use simulation::bad_input;
 use simulation::bounded_file::read_text;
 
 use super::diagnose::command_line;
@@ -53,35 +52,16 @@ pub(crate) struct Arguments {
 /// Largest size of a diagnosis, in MiB; one of a record of a million rows has less.
 const MOST_MIB: usize = 64;
 
-/// Reads the parts of a diagnosis that a plan needs.
-fn read(path: &Path) -> Result<Basis> {
-    let name = path.display();
-    let text = read_text(path, MOST_MIB, "the JSON of `vsj diagnose`")?;
-    match serde_json::from_str(&text) {
-        Ok(basis) => Ok(basis),
-        Err(error) => {
-            let what = error.to_string();
-            // The position is at the front of the message.
-            let what = what.rsplit_once(" at line ").map_or(what.as_str(), |(what, _)| what);
-            let (line, column) = (error.line(), error.column());
-            bad_input!("{name}, line {line}, column {column}: {what}; expected the JSON of `vsj diagnose`")
-        }
-    }
-}
-
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let Arguments { minutes, limit_v, slew_v_per_s, .. } = *arguments;
-    for (option, value) in [("--minutes", minutes), ("--limit-v", limit_v), ("--slew-v-per-s", slew_v_per_s)] {
-        if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-            bad_input!("{option} {value}: expected a number above 0");
-        }
-    }
-    let basis = read(&arguments.diagnosis)?;
+    let request = Request { minutes, limit_v, slew_v_per_s };
+    request.check()?;
+    let name = arguments.diagnosis.display().to_string();
+    let basis = Basis::from_json(&name, &read_text(&arguments.diagnosis, MOST_MIB, "the JSON of `vsj diagnose`")?)?;
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
-    let request = Request { minutes, limit_v, slew_v_per_s };
-    let mut plan = plan(&basis, &request, &arguments.diagnosis.display().to_string())?;
+    let mut plan = plan(&basis, &request, &name)?;
     plan.schedule = arguments.out.as_deref().map(|folder| folder.join(SCHEDULE_FILE).display().to_string());
     let paths = match files {
         Some(files) => output::write(files, &plan, &command_line())?,

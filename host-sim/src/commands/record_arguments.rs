@@ -6,10 +6,9 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::output::terminal::remark;
 use identify::Input;
-use simulation::bad_input;
-use simulation::csv_table::dialect::{Decimal, Separator};
-use simulation::record::gaps::missed_turns;
-use simulation::record::{Format, MeasuredRecord, columns_file};
+use simulation::bad_input::BadInput;
+use simulation::csv_table::dialect::{Decimal, Dialect, Separator};
+use simulation::record::{ColumnNames, Format, MeasuredRecord, columns_file, remarks_on};
 
 use super::choice::{INPUT, one_of};
 
@@ -59,51 +58,26 @@ impl RecordArguments {
     pub(crate) fn open(&self) -> Result<(Vec<MeasuredRecord>, Input)> {
         let (format, input) = self.format()?;
         let records: Vec<MeasuredRecord> = self.data.iter().map(|path| format.open(path)).collect::<Result<_>>()?;
-        for record in &records[1..] {
-            record.expect_quantities_of(&records[0])?;
-        }
-        for text in records.iter().flat_map(|record| &record.remarks) {
-            remark(text);
-        }
-        for MeasuredRecord { record, .. } in &records {
-            let turns = missed_turns(&record.rows);
-            if turns > 0 {
-                remark(&format!(
-                    "{}: the voltage turns in {turns} gap(s) between the rows; what it did there is not in the record and may be \
-                     taken for a property of the spring",
-                    record.name
-                ));
-            }
+        for text in remarks_on(&records)? {
+            remark(&text);
         }
         Ok((records, input))
     }
 
     /// The options together with those of the file `--columns`.
     fn format(&self) -> Result<(Format, Input)> {
-        let (mut format, named) = match &self.columns {
-            Some(path) => columns_file::open(path)?,
-            None => (Format::default(), None),
+        let columns = ColumnNames {
+            time: self.time.clone(),
+            voltage: self.voltage.clone(),
+            reading: self.reading.clone(),
+            stiffness: self.column.clone(),
         };
-        let columns = &mut format.columns;
-        for (option, column) in [
-            (&self.time, &mut columns.time),
-            (&self.voltage, &mut columns.voltage),
-            (&self.reading, &mut columns.reading),
-            (&self.column, &mut columns.stiffness),
-        ] {
-            *column = option.clone().or(column.take());
-        }
-        format.dialect.separator = self.separator.or(format.dialect.separator);
-        format.dialect.decimal = self.decimal.or(format.dialect.decimal);
-        format.sort |= self.sort;
-        let input = match (self.input, &named, &self.columns) {
-            (Some(input), ..) => input,
-            (None, Some(name), Some(path)) => match INPUT.iter().find(|(known, ..)| known == name) {
-                Some((.., input)) => *input,
-                None => bad_input!("{}, [columns]: input = {name:?}; expected hold, linear or stair", path.display()),
-            },
-            _ => Input::default(),
-        };
-        Ok((format, input))
+        let dialect = Dialect { separator: self.separator, decimal: self.decimal };
+        let given = Format { columns, dialect, sort: self.sort };
+        let Some(path) = &self.columns else { return Ok((given, self.input.unwrap_or_default())) };
+        let (in_file, input) = columns_file::open(path)?;
+        let in_table = |error| BadInput(format!("{}, [columns]: {error}", path.display()));
+        let input = input.map(|name| name.parse().map_err(in_table)).transpose()?;
+        Ok((given.or(in_file), self.input.or(input).unwrap_or_default()))
     }
 }

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use super::choice::{BETWEEN, one_of};
-use super::option_names::{SETTINGS, named};
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::output::files::{Files, write_csv};
@@ -16,6 +15,7 @@ use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::bad_input::number;
 use simulation::experiment::{Experiment, HasReference, Run, paper_spring, with_plant};
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::{Between, Schedule};
@@ -188,7 +188,7 @@ fn run_plant<P: HasReference>(
     };
     let experiment = Experiment { name, schedule, settings };
     if let Err(error) = experiment.settings.validate() {
-        return Err(named(BadInput(error.to_string()).into(), &[SETTINGS, OWN].concat()));
+        return Err(named(BadInput(error.to_string()).into(), SETTINGS));
     }
 
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
@@ -213,15 +213,6 @@ fn run_plant<P: HasReference>(
     };
     print(&if arguments.json { json(&report)? } else { stair::text(&report) + &wrote(&paths) })
 }
-
-/// The options, other than [`SETTINGS`], that set fields of the settings.
-const OWN: &[(&str, &str)] = &[
-    ("min_v", "--min-v"),
-    ("dac_bits", "--dac-bits"),
-    ("proportional_gain", "--kp"),
-    ("integral_gain_per_s", "--ki"),
-    ("approach_s", "--approach-s"),
-];
 
 /// True if the settings are those of the report, so that Table 3's simulated columns should be reproduced.
 fn is_the_reports(settings: &Settings) -> bool {

@@ -9,10 +9,9 @@ use host_sim::output::terminal::{json, print, wrote};
 use host_sim::output::tune as output;
 use model::Amplifier;
 use simulation::bad_input;
+use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file;
 use simulation::tune::{Specification, tune};
-
-use super::option_names::{SETTINGS, named};
 
 /// Choose gains and settings for a spring and an amplifier, with stability margins and the effect of model errors
 #[derive(Args, Debug)]

@@ -13,7 +13,7 @@ const LONGEST: usize = 24;
 
 /// The keys with what they do, for the help.
 pub(super) const KEYS: [(&str, &str); 12] = [
-    ("space", "STOP: disarm at once, in every mode"),
+    ("space", "STOP: disarm immediately, in every mode"),
     ("a", "arm; the target starts at 0 V"),
     ("s, digits", "set the target: V, or with a unit as 1.5e9Pa, 0.25N/m"),
     ("up, down", "step the target by 10 V"),

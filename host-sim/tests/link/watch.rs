@@ -174,7 +174,7 @@ fn keys_arm_set_step_and_stop() {
     assert_eq!(mcu.wait_for(State::Disarmed).code, 0);
     terminal.wait_for(" DISARMED ");
     terminal.press("?");
-    terminal.wait_for("STOP: disarm at once, in every mode");
+    terminal.wait_for("STOP: disarm immediately, in every mode");
     terminal.press("x");
     terminal.press("a");
     mcu.wait_for(State::Armed);

@@ -6,7 +6,10 @@
 //! budget = WORK (rows / 4000)^0.55 for more than 4000 rows, WORK for fewer; a quarter if quick, ten times if thorough
 //! ```
 
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use simulation::bad_input::BadInput;
 
 use crate::fit::stop::Stop;
 
@@ -20,6 +23,15 @@ pub enum Effort {
     Normal,
     /// Ten times the normal effort.
     Thorough,
+}
+
+impl FromStr for Effort {
+    type Err = BadInput;
+
+    fn from_str(name: &str) -> Result<Self, BadInput> {
+        let found = [Self::Quick, Self::Normal, Self::Thorough].into_iter().find(|effort| effort.name() == name);
+        found.ok_or_else(|| BadInput(format!("--effort {name}: expected quick, normal or thorough")))
+    }
 }
 
 impl Effort {

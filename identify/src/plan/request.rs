@@ -3,7 +3,7 @@
 use anyhow::Result;
 use serde::Deserialize;
 use simulation::bad_input;
-use simulation::bad_input::number;
+use simulation::bad_input::{BadInput, number};
 use simulation::plant_file::PlantFile;
 
 use crate::answer::SCHEMA;
@@ -48,6 +48,22 @@ const FEWEST_ROWS: f64 = 40.0;
 const MOST_ROWS: f64 = 1e7;
 
 impl Basis {
+    /// Reads the parts of a diagnosis that a plan needs.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] with the line and column of what is no diagnosis; `name` is what the message calls the
+    /// file.
+    pub fn from_json(name: &str, json: &str) -> Result<Self> {
+        serde_json::from_str(json).map_err(|error| {
+            let what = error.to_string();
+            // The position is at the front of the message.
+            let what = what.rsplit_once(" at line ").map_or(what.as_str(), |(what, _)| what);
+            let (line, column) = (error.line(), error.column());
+            BadInput(format!("{name}, line {line}, column {column}: {what}; expected the JSON of `vsj diagnose`"))
+                .into()
+        })
+    }
+
     /// Returns the experiment behind the diagnosis.
     ///
     /// # Errors
@@ -65,11 +81,27 @@ impl Basis {
 }
 
 impl Request {
+    /// Checks what needs no experiment.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] with the option, its value and what was expected.
+    pub fn check(&self) -> Result<()> {
+        for (option, value) in
+            [("--minutes", self.minutes), ("--limit-v", self.limit_v), ("--slew-v-per-s", self.slew_v_per_s)]
+        {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                bad_input!("{option} {value}: expected a number above 0");
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the frame of the schedules that this request allows after an experiment with a nominal spring.
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] with the option, its value and the allowed range.
     pub(super) fn frame(&self, experiment: &Experiment, plant: &PlantFile) -> Result<Frame> {
+        self.check()?;
         let second_s = experiment.coordinates.second_s;
         let duration_s = self.minutes.map_or(DEFAULT_DURATION_S * second_s, |minutes| 60.0 * minutes);
         // A time between readings that is computed from decimal times is off by a rounding error.
@@ -98,9 +130,6 @@ impl Request {
             bad_input!("--limit-v: expected, because the voltage of the record is always 0 V");
         }
         let slew = self.slew_v_per_s.unwrap_or(f64::INFINITY);
-        if slew.is_nan() || slew <= 0.0 {
-            bad_input!("--slew-v-per-s {}: expected a rate above 0 V/s", number(slew));
-        }
         let volt_v = experiment.coordinates.volt_v;
         let frame = Frame {
             rows: rows as usize,

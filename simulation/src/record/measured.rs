@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::gaps::median_interval;
+use super::gaps::{median_interval, missed_turns};
 use super::names::{Column, ColumnNames, Columns};
 use super::times::{Clock, Time};
 use super::{MOST_READING, MOST_V, Record, Row};
@@ -59,6 +59,28 @@ impl MeasuredRecord {
     }
 }
 
+/// Checks that the records can be of one spring; returns what the user should know about all of them, one line each.
+///
+/// # Errors
+/// [`BadInput`] with the first record whose quantities are not those of the first one.
+pub fn remarks_on(records: &[MeasuredRecord]) -> Result<Vec<String>, BadInput> {
+    for record in records.iter().skip(1) {
+        record.expect_quantities_of(&records[0])?;
+    }
+    let missed = |MeasuredRecord { record, .. }: &MeasuredRecord| {
+        let turns = missed_turns(&record.rows);
+        (turns > 0).then(|| {
+            format!(
+                "{}: the voltage turns in {turns} gap(s) between the rows; what it did there is not in the record and may be taken \
+                 for a property of the spring",
+                record.name
+            )
+        })
+    };
+    let of_files = records.iter().flat_map(|record| record.remarks.iter().cloned());
+    Ok(of_files.chain(records.iter().filter_map(missed)).collect())
+}
+
 /// Longest record, in s: beyond, squares of times approach the end of the doubles.
 const LONGEST_S: f64 = 1e15;
 /// Longest record, in median intervals between its rows: doubles then still resolve a thousandth of an interval.
@@ -68,6 +90,25 @@ const LONGEST_INTERVALS: f64 = 1e12;
 const NO_UNIT: &str = "units";
 
 impl Format {
+    /// Returns this format, with what it does not say taken from `other`.
+    pub fn or(self, other: Self) -> Self {
+        let ColumnNames { time, voltage, reading, stiffness } = other.columns;
+        let own = self.columns;
+        Self {
+            columns: ColumnNames {
+                time: own.time.or(time),
+                voltage: own.voltage.or(voltage),
+                reading: own.reading.or(reading),
+                stiffness: own.stiffness.or(stiffness),
+            },
+            dialect: Dialect {
+                separator: self.dialect.separator.or(other.dialect.separator),
+                decimal: self.dialect.decimal.or(other.dialect.decimal),
+            },
+            sort: self.sort || other.sort,
+        }
+    }
+
     /// Reads a record from a file.
     ///
     /// # Errors

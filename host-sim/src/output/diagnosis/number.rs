@@ -1,6 +1,6 @@
 //! Numbers and parameters as texts and pages show them.
 
-use identify::answer::Parameter;
+use identify::answer::{LinearError, Parameter};
 use identify::dimension::{Dimension, significant};
 use identify::record::scales::Scales;
 
@@ -31,6 +31,11 @@ pub(in crate::output) fn with_interval([value, low, high]: [f64; 3]) -> [String;
 /// The words after a parameter that is the value of a curve where the record has not been.
 pub(super) fn extrapolated(parameter: &Parameter) -> &'static str {
     if parameter.extrapolated_from_v.is_some() { " (extrapolated)" } else { "" }
+}
+
+/// Name of the best linear model in tables of errors.
+pub(super) fn linear_name(linear: &LinearError) -> String {
+    format!("linear, order {}", linear.order)
 }
 
 /// Formats a number with four significant digits.

@@ -3,8 +3,7 @@
 use maud::{Markup, html};
 
 use crate::output::diagnosis::extension::is_extended;
-use crate::output::diagnosis::number::{interval, number, shown_name};
-use crate::output::diagnosis::text::linear_name;
+use crate::output::diagnosis::number::{interval, linear_name, number, shown_name};
 use crate::output::page::{Row, Table};
 use identify::answer::{Finding, LinearError};
 use identify::dimension::Dimension;

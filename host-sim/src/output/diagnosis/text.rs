@@ -10,7 +10,7 @@ use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
 use crate::output::diagnosis::equation;
-use crate::output::diagnosis::number::{interval, shown_name};
+use crate::output::diagnosis::number::{interval, linear_name, shown_name};
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
 
@@ -59,11 +59,6 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
         let _ = writeln!(text, "{sentence}");
     }
     text
-}
-
-/// Name of the best linear model in tables of errors.
-pub fn linear_name(linear: &LinearError) -> String {
-    format!("linear, order {}", linear.order)
 }
 
 /// States where the record shows the curves of the extended spring: its static law, and parameters that are values of a curve.

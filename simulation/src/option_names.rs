@@ -1,10 +1,10 @@
 //! Errors of the libraries name a field; users know the option that sets it.
 
-use simulation::bad_input::BadInput;
+use crate::bad_input::BadInput;
 
 /// Puts the option in front of an error that begins with a field's name. `options` holds pairs of field and option; a field
 /// that ends in `.` stands for a whole table.
-pub(crate) fn named(error: anyhow::Error, options: &[(&str, &str)]) -> anyhow::Error {
+pub fn named(error: anyhow::Error, options: &[(&str, &str)]) -> anyhow::Error {
     let text = error.to_string();
     let field = text.split(' ').next().unwrap_or_default();
     let table = field.split_inclusive('.').next().unwrap_or_default();
@@ -14,12 +14,17 @@ pub(crate) fn named(error: anyhow::Error, options: &[(&str, &str)]) -> anyhow::E
     }
 }
 
-/// The fields of [`model::Settings`] whose options `stair`, `compare` and `tune` have in common.
-pub(crate) const SETTINGS: &[(&str, &str)] = &[
+/// The fields of [`model::Settings`] and the options of a controlled loop that set them.
+pub const SETTINGS: &[(&str, &str)] = &[
     ("rate_hz", "--rate-hz"),
     ("full_scale_v", "--limit-v"),
     ("max_v", "--limit-v"),
+    ("min_v", "--min-v"),
     ("slew_v_per_s", "--slew-v-per-s"),
+    ("dac_bits", "--dac-bits"),
+    ("proportional_gain", "--kp"),
+    ("integral_gain_per_s", "--ki"),
+    ("approach_s", "--approach-s"),
     ("share", "--plant"),
     ("time_constant_s", "--plant"),
     ("relaxation.", "--plant"),

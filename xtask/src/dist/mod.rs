@@ -1,0 +1,177 @@
+//! `cargo xtask dist`: the files of a release.
+//!
+//! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the
+//! images of both boards for each controller and amplifier, the manual, this version's changes, the licences of all
+//! dependencies, and the SHA-256 of every file.
+
+mod licences;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use sha2::{Digest, Sha256};
+use xtask::build::{self, Board};
+use xtask::shell;
+use xtask::variant::Variant;
+
+use crate::{image, manual};
+
+/// The project's own texts.
+const TEXTS: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"];
+/// Shells and the usual names of their completions.
+const COMPLETIONS: [(&str, &str); 3] = [("bash", "vsj.bash"), ("zsh", "_vsj"), ("fish", "vsj.fish")];
+/// File with the checksums, in the form that `sha256sum --check` reads.
+const CHECKSUMS: &str = "SHA256SUMS";
+
+/// Makes folder and archive, and prints their paths. A folder of an earlier run is replaced once the new one is complete.
+pub(crate) fn run() -> Result<()> {
+    let target = shell::target_directory()?;
+    let (version, host) = (env!("CARGO_PKG_VERSION"), host()?);
+    let name = format!("vsj-{version}-{host}");
+    let releases = target.join("releases");
+    let (folder, new) = (releases.join(&name), releases.join("new"));
+    remove(&new)?;
+    make(&new)?;
+    let program = program(&target)?;
+    copy(&program, &new.join(program.file_name().context("a program has a name")?))?;
+    commands(&program, &new)?;
+    images(&new.join("firmware"))?;
+    for text in TEXTS {
+        copy(&shell::root().join(text), &new.join(text))?;
+    }
+    copy_folder(&manual::build()?, &new.join("manual"))?;
+    let changes = fs::read_to_string(shell::root().join("CHANGELOG.md")).context("cannot read CHANGELOG.md")?;
+    write(&new.join("CHANGES.md"), section(&changes, version)?.as_bytes())?;
+    write(&new.join("THIRD-PARTY.txt"), licences::all(&["host-sim", "firmware", "test-bench"])?.as_bytes())?;
+    write(&new.join(CHECKSUMS), checksums(&new)?.as_bytes())?;
+    remove(&folder)?;
+    fs::rename(&new, &folder).with_context(|| format!("cannot write {}", folder.display()))?;
+    let archive = releases.join(format!("{name}.tar.gz"));
+    shell::run(shell::command("tar").arg("-C").arg(&releases).arg("-czf").args([archive.as_os_str(), name.as_ref()]))?;
+    println!("{}\n{}", folder.display(), archive.display());
+    Ok(())
+}
+
+/// The target triple of this machine.
+fn host() -> Result<String> {
+    let about = shell::output(shell::command("rustc").arg("-vV"))?;
+    let line = about.lines().find_map(|line| line.strip_prefix("host: "));
+    Ok(line.context("`rustc -vV` names no host")?.to_owned())
+}
+
+/// Builds `vsj` without symbols. Returns its path.
+fn program(target: &Path) -> Result<PathBuf> {
+    let mut command = shell::cargo();
+    command.args(["build", "--quiet", "--locked", "--profile", "dist", "-p", "host-sim", "--bin", "vsj"]);
+    shell::run(&mut command)?;
+    Ok(target.join("dist").join(format!("vsj{}", std::env::consts::EXE_SUFFIX)))
+}
+
+/// Writes manual pages and completions, which `vsj` itself makes.
+fn commands(program: &Path, folder: &Path) -> Result<()> {
+    shell::output(shell::command(program).arg("man").arg("--out").arg(folder.join("man")))?;
+    let completions = folder.join("completions");
+    make(&completions)?;
+    for (shell_name, file) in COMPLETIONS {
+        let script = shell::output(shell::command(program).args(["completions", shell_name]))?;
+        write(&completions.join(file), script.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Copies the images of both boards for each controller and amplifier.
+fn images(folder: &Path) -> Result<()> {
+    make(folder)?;
+    for variant in Variant::ALL {
+        for board in Board::ALL {
+            for file in image::files(variant, board)? {
+                let mut name = file.file_name().context("an image has a name")?.to_owned();
+                if file.extension().is_none() {
+                    name.push(".elf");
+                }
+                copy(&file, &folder.join(name))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Copies a folder with all that it contains.
+fn copy_folder(from: &Path, to: &Path) -> Result<()> {
+    let mut files = Vec::new();
+    list(from, &mut files)?;
+    for file in files {
+        let to = to.join(file.strip_prefix(from)?);
+        make(to.parent().context("a file in a folder")?)?;
+        copy(&file, &to)?;
+    }
+    Ok(())
+}
+
+/// The part of the changes that is about a version, without its heading.
+fn section<'a>(changes: &'a str, version: &str) -> Result<&'a str> {
+    let heading = format!("\n## [{version}]");
+    let Some((_, after)) = changes.split_once(&heading) else {
+        bail!("CHANGELOG.md: no section `## [{version}]`; expected the changes of the version that is packed");
+    };
+    let after = after.split_once('\n').map_or("", |(_, after)| after);
+    let section = after.split("\n## [").next().unwrap_or_default().trim();
+    ensure!(!section.is_empty(), "CHANGELOG.md: the section `## [{version}]` is empty; expected the changes");
+    Ok(section)
+}
+
+/// One line for each file below a folder: SHA-256 and path.
+fn checksums(folder: &Path) -> Result<String> {
+    let mut files = Vec::new();
+    list(folder, &mut files)?;
+    files.sort();
+    let line = |file: &PathBuf| -> Result<String> {
+        let sum: String = Sha256::digest(build::read(file)?).iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(format!("{sum}  {}\n", file.strip_prefix(folder)?.display()))
+    };
+    files.iter().map(line).collect()
+}
+
+fn list(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    for entry in fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
+        let path = entry?.path();
+        if path.is_dir() { list(&path, files)? } else { files.push(path) }
+    }
+    Ok(())
+}
+
+fn make(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
+}
+
+fn remove(folder: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder).with_context(|| format!("cannot remove {}", folder.display()))?;
+    }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    fs::copy(from, to).map(drop).with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_changes_of_one_version_end_at_the_next_heading() {
+        let changes = "# Changelog\n\n## [0.2.0] - soon\n\n### Added\n- b\n\n## [0.1.0] - once\n- a\n\n## [0.0.1]\n";
+        assert_eq!(section(changes, "0.2.0").unwrap(), "### Added\n- b");
+        assert_eq!(section(changes, "0.1.0").unwrap(), "- a");
+        for version in ["0.0.1", "0.3.0"] {
+            assert!(section(changes, version).unwrap_err().to_string().contains("expected the changes"));
+        }
+        assert!(section(include_str!("../../../CHANGELOG.md"), env!("CARGO_PKG_VERSION")).is_ok());
+    }
+}

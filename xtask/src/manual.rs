@@ -1,0 +1,141 @@
+//! `cargo xtask manual`: the documents as a book with contents, search and a page for each command.
+//!
+//! In: the documents as git tracks them, in the order of `docs/SUMMARY.md`, and the help of every command. Out: a folder of pages
+//! that opens from a disk or from any static host.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use xtask::build;
+use xtask::shell;
+use xtask::tool::Tool;
+
+/// The renderer.
+const MDBOOK: Tool = Tool { name: "mdbook", version: "0.4.52" };
+/// What git tracks and the book contains; the links between them stay as they are.
+const SOURCES: [&str; 5] = ["docs", "data", "README.md", "CONTRIBUTING.md", "CHANGELOG.md"];
+/// Contents, relative to the documents.
+const CONTENTS: &str = "docs/SUMMARY.md";
+/// Lines of the contents that are replaced by lists.
+const CAUSES: &str = "<!-- causes -->";
+const COMMANDS: &str = "<!-- commands -->";
+
+const BOOK: &str = "\
+[book]
+title = \"vsj\"
+description = \"Real-time stiffness controller for a variable-stiffness joint, and the diagnosis of measured records\"
+language = \"en\"
+
+[build]
+build-dir = \"book\"
+create-missing = false
+
+[output.html]
+default-theme = \"light\"
+preferred-dark-theme = \"navy\"
+";
+
+/// Builds the book. Returns the folder of its pages.
+pub(crate) fn build() -> Result<PathBuf> {
+    let target = shell::target_directory()?;
+    let mdbook = MDBOOK.program()?;
+    let folder = target.join("manual");
+    let sources = folder.join("src");
+    if sources.exists() {
+        fs::remove_dir_all(&sources).with_context(|| format!("cannot remove {}", sources.display()))?;
+    }
+    copy(&sources)?;
+    let commands = commands(&build::vsj()?, &sources.join("commands"))?;
+    let contents =
+        fs::read_to_string(shell::root().join(CONTENTS)).with_context(|| format!("cannot read {CONTENTS}"))?;
+    write(&sources.join("SUMMARY.md"), &contents_of_book(&contents, &causes()?, &commands)?)?;
+    write(&folder.join("book.toml"), BOOK)?;
+    shell::run(shell::command(&mdbook).arg("build").arg(&folder))?;
+    Ok(folder.join("book"))
+}
+
+/// Builds the book and prints the path of its first page.
+pub(crate) fn run() -> Result<()> {
+    println!("{}", build()?.join("index.html").display());
+    Ok(())
+}
+
+/// Copies the documents that git tracks, as they are now.
+fn copy(to: &Path) -> Result<()> {
+    let files = shell::output(shell::command("git").args(["ls-files", "-z"]).args(SOURCES))?;
+    for file in files.split('\0').filter(|file| !file.is_empty() && *file != CONTENTS) {
+        let (from, to) = (shell::root().join(file), to.join(file));
+        let parent = to.parent().context("a file in a folder")?;
+        fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
+        fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
+    }
+    Ok(())
+}
+
+/// Writes a page with the help of each command of `vsj`, and one with those of `cargo xtask`. Returns their lines of the contents.
+fn commands(vsj: &Path, folder: &Path) -> Result<String> {
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let pages = folder.join("man");
+    shell::output(shell::command(vsj).arg("man").arg("--out").arg(&pages))?;
+    let mut names = Vec::new();
+    for entry in fs::read_dir(&pages).with_context(|| format!("cannot read {}", pages.display()))? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        names.extend(name.strip_suffix(".1").map(str::to_owned));
+    }
+    fs::remove_dir_all(&pages).with_context(|| format!("cannot remove {}", pages.display()))?;
+    names.sort();
+    let mut lines = String::new();
+    let mut page = |name: &str, file: &str, help: &str, depth: usize| {
+        lines += &format!("{}- [{name}](commands/{file}.md)\n", "  ".repeat(depth));
+        write(&folder.join(format!("{file}.md")), &format!("# {name}\n\n```text\n{}\n```\n", help.trim_end()))
+    };
+    for file in &names {
+        let words: Vec<&str> = file.split('-').collect();
+        let help = shell::output(shell::command(vsj).args(&words[1..]).arg("--help"))?;
+        page(&words.join(" "), file, &help, words.len().saturating_sub(2))?;
+    }
+    let mut help = shell::cargo();
+    page("cargo xtask", "cargo-xtask", &shell::output(help.args(["xtask", "--help"]))?, 0)?;
+    Ok(lines)
+}
+
+/// The lines of the contents for the causes, the page about all of them first.
+fn causes() -> Result<String> {
+    let files = shell::output(shell::command("git").args(["ls-files", "-z", "docs/causes/*.md"]))?;
+    let mut names: Vec<&str> =
+        files.split('\0').filter_map(|file| file.rsplit('/').next()?.strip_suffix(".md")).collect();
+    names.sort_by_key(|name| (*name != "README", *name));
+    ensure!(names.first() == Some(&"README"), "docs/causes has no README.md");
+    let title = |name: &str| if name == "README" { "All causes".to_owned() } else { name.to_owned() };
+    Ok(names.iter().map(|name| format!("- [{}](causes/{name}.md)\n", title(name))).collect())
+}
+
+/// The contents with links relative to the book instead of the documents' folder, and with the lists in their places.
+fn contents_of_book(contents: &str, causes: &str, commands: &str) -> Result<String> {
+    for place in [CAUSES, COMMANDS] {
+        ensure!(contents.contains(place), "{CONTENTS} has no line {place}");
+    }
+    let with_causes = contents.replace(CAUSES, causes.trim_end());
+    let relative = with_causes.replace("](", "](docs/").replace("](docs/../", "](");
+    Ok(relative.replace(COMMANDS, commands.trim_end()))
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_of_the_contents_start_at_the_root_of_the_book() {
+        let contents = "[vsj](../README.md)\n- [Stair](stair.md)\n<!-- causes -->\n<!-- commands -->\n";
+        let book = contents_of_book(contents, "- [All](causes/README.md)\n", "- [vsj](commands/vsj.md)\n").unwrap();
+        let expected =
+            "[vsj](README.md)\n- [Stair](docs/stair.md)\n- [All](docs/causes/README.md)\n- [vsj](commands/vsj.md)\n";
+        assert_eq!(book, expected);
+        assert!(contents_of_book("<!-- causes -->", "", "").is_err());
+    }
+}
