@@ -155,6 +155,11 @@ fn replies() {
             }),
             "060102ac020405060708",
         ),
+        (Reply::Captured(Captured { most: 300, wanted: 10_000, captured: 5 }), "08ac02904e05"),
+        (
+            Reply::Rows(Rows { first: 300, count: 2, rows: [[0xa5; 8]; ROWS] }),
+            &format!("09ac0202{}", "a5".repeat(8 * ROWS)),
+        ),
         (
             Reply::SettingsPart(Part { number: 2, length: 300, bytes: [0xa5; 32] }),
             &format!("0702ac02{}", "a5".repeat(32)),
