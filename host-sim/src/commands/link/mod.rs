@@ -28,7 +28,7 @@ Examples:
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
   vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
-  vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate, watchdogs
+  vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate
 
 The MCU ramps the voltage down when the host is silent for longer than its limit (see `status`): a target is kept only while \
 a command stays connected: --keep, watch or record. A request is repeated every 0.1 s until it is answered, for --timeout \
