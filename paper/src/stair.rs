@@ -1,5 +1,7 @@
 //! The answer of `vsj stair`: a run of the stair experiment compared with the report's printed and measured values.
 
+pub mod request;
+
 use anyhow::Result;
 use model::{Compensation, Limits, Settings};
 use serde::Serialize;

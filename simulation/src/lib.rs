@@ -31,6 +31,7 @@ pub mod plant_file;
 pub mod record;
 pub mod reference;
 pub mod response;
+#[cfg(not(target_family = "wasm"))]
 pub mod robust_bound;
 pub mod run;
 pub mod sampled;

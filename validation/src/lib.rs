@@ -12,5 +12,5 @@
 pub mod campaign;
 pub mod closed_loop;
 pub mod criterion;
-pub mod ground_truth;
+pub use ground_truth;
 pub mod markdown;

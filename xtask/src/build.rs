@@ -123,17 +123,22 @@ pub fn image_of_copy(root: &Path, features: &[&str], board: Board) -> Result<Pat
     Ok(target.join(shell::MCU).join(Opt::S.profile()).join(board.name()))
 }
 
-/// The command that compiles a package for the MCU. No path of this machine gets into what is built: the sources are
-/// named as if they were in `/vsj`, and those of the registry as if they were in `/cargo`.
+/// The command that compiles a package for the MCU.
 fn cargo_build(root: &Path, package: &str, features: &str, opt: Opt) -> Command {
     let mut command = shell::cargo();
     command.current_dir(root).args(["build", "--quiet", "--package", package]);
     command.args(["--features", features, "--profile", opt.profile(), "--target", shell::MCU]);
+    without_paths(&mut command, root);
+    command
+}
+
+/// Keeps the paths of this machine out of what a command of cargo builds: the sources in `root` are named as if they were in `/vsj`,
+/// and those of the registry as if they were in `/cargo`.
+pub fn without_paths(command: &mut Command, root: &Path) {
     let remapped = [(root.to_owned(), "/vsj"), (cargo_home(), "/cargo")];
     let flags = remapped.map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()));
     // Separated as cargo wants it, so that a path may contain spaces.
     command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
-    command
 }
 
 /// The folder in which cargo keeps the sources of dependencies.

@@ -21,7 +21,7 @@ pub(crate) fn help() -> String {
 
 /// Runs every step; an error names the first that fails.
 pub(crate) fn run() -> Result<()> {
-    let mut progress = Progress::of(STEPS.len());
+    let progress = Progress::of(STEPS.len());
     for step in STEPS {
         progress.begin(step.name);
         step.run()?;

@@ -5,8 +5,11 @@ use std::convert::Infallible;
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::process::Command;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail};
 
 /// Arguments that are handed on as they are, `--help` included.
 #[derive(clap::Args)]
@@ -23,11 +26,33 @@ fn command() -> Command {
     command
 }
 
-/// Runs a command line of the emulation to its end. An exit code other than 0 is an error.
-pub(crate) fn run(args: &[&str]) -> Result<()> {
-    let status = command().args(args).status().context("cannot start cargo")?;
-    ensure!(status.success(), "`cargo xtask {}` failed ({status})", args.join(" "));
-    Ok(())
+/// Runs command lines of the emulation, each with a name for `begin`, two at a time, since each of them needs one core. What one
+/// prints is printed when it ends. An exit code other than 0 is an error, after which no other is begun.
+pub(crate) fn run_all(lines: &[(&str, &[&str])], begin: impl Fn(&str) + Sync) -> Result<()> {
+    let (next, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let printing = Mutex::new(());
+    let work = || -> Result<()> {
+        while let Some((name, args)) = lines.get(next.fetch_add(1, Ordering::Relaxed))
+            && !failed.load(Ordering::Relaxed)
+        {
+            begin(name);
+            let output = command().args(*args).output().context("cannot start cargo")?;
+            let turn = printing.lock();
+            eprint!("{}", String::from_utf8_lossy(&output.stderr));
+            eprint!("{}", String::from_utf8_lossy(&output.stdout));
+            drop(turn);
+            if !output.status.success() {
+                failed.store(true, Ordering::Relaxed);
+                bail!("`cargo xtask {}` failed ({})", args.join(" "), output.status);
+            }
+        }
+        Ok(())
+    };
+    thread::scope(|scope| {
+        let other = scope.spawn(work);
+        let own = work();
+        own.and(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })
 }
 
 /// Replaces this process by the emulation, so that signals and the exit code are the emulation's own. Returns on

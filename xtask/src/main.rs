@@ -15,6 +15,7 @@ mod manual;
 mod mutants;
 mod nightly;
 mod package;
+mod page;
 mod prove;
 mod reproducible;
 mod sanitize;
@@ -131,6 +132,15 @@ Examples:
     /// there.
     #[command(verbatim_doc_comment)]
     Manual,
+    /// Build the page to try the product in a browser, in target/site
+    ///
+    /// WebAssembly of the controller and the diagnosis, inlined, so that target/site/index.html also opens from a disk. Fails if the
+    /// page is larger than 2 MB, compressed.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "Examples:\n  cargo xtask page\n  cargo xtask page --test            and compare it with vsj, in headless Chromium"
+    )]
+    Page(page::Args),
     /// Change the code in one place at a time; count what no test notices
     ///
     /// Over model, link and the parts of the firmware that a host can run. Fails below 95 % caught, or if a change lives
@@ -176,8 +186,8 @@ Examples:
     /// Pack a release: vsj, images, documents, licences, checksums
     ///
     /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the images of
-    /// both boards for each controller and amplifier with their bills of materials, the documents, the changes of this version,
-    /// the licences of all dependencies, SHA256SUMS.
+    /// both boards for each controller and amplifier with their bills of materials, the manual, the page for a browser, the changes of
+    /// this version, the licences of all dependencies, SHA256SUMS.
     #[command(
         verbatim_doc_comment,
         after_help = "\
@@ -251,8 +261,8 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Proof, Python};
-    use Command::{Manual, Prove, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
+    use Command::{Bench, Boot, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof};
+    use Command::{Manual, Prove, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -263,6 +273,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Fuzz(args) => fuzz::run(&args),
         Python => package::run(),
         Manual => manual::run(),
+        Page(args) => page::run(&args),
         Prove(args) => prove::run(&args),
         Counts(args) => counts::run(&args),
         Dist => dist::run(),

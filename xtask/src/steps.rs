@@ -1,6 +1,7 @@
 //! Calls of cargo in sequence, for `cargo xtask check` and `cargo xtask test`.
 
 use std::fmt::Write;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::Result;
@@ -38,18 +39,18 @@ pub(crate) fn help(steps: &[Step]) -> String {
 /// Counts steps on stderr, each with the time since the start.
 pub(crate) struct Progress {
     start: Instant,
-    number: usize,
+    number: AtomicUsize,
     total: usize,
 }
 
 impl Progress {
     pub(crate) fn of(total: usize) -> Self {
-        Self { start: Instant::now(), number: 0, total }
+        Self { start: Instant::now(), number: AtomicUsize::new(0), total }
     }
 
-    pub(crate) fn begin(&mut self, name: &str) {
-        self.number += 1;
-        eprintln!("[{}/{}] {name}, after {} s", self.number, self.total, self.start.elapsed().as_secs());
+    pub(crate) fn begin(&self, name: &str) {
+        let number = 1 + self.number.fetch_add(1, Ordering::Relaxed);
+        eprintln!("[{number}/{}] {name}, after {} s", self.total, self.start.elapsed().as_secs());
     }
 
     pub(crate) fn end(self) {

@@ -23,20 +23,14 @@ const STEPS: &[Step] = &[
     Step::new("build vsj", &["build", "--release", "-p", "host-sim", "--bin", "vsj"]),
 ];
 
-/// Command lines of the emulation, each with its name and its line in `--help`. `boot` runs every variant of the image.
-const EMULATION: &[(&str, &str, &[&[&str]])] = &[
-    ("firmware", "cargo xtask proof", &[&["proof"]]),
-    (
-        "boot",
-        "cargo xtask boot; --limit-v 1000; --controller fast; --controller fast --limit-v 1000",
-        &[
-            &["boot"],
-            &["boot", "--limit-v", "1000"],
-            &["boot", "--controller", "fast"],
-            &["boot", "--controller", "fast", "--limit-v", "1000"],
-        ],
-    ),
-    ("story", "cargo xtask story --check", &[&["story", "--check"]]),
+/// Command lines of the emulation, the long ones first. `boot` runs every variant of the image.
+const EMULATION: &[(&str, &[&str])] = &[
+    ("firmware", &["proof"]),
+    ("boot", &["boot"]),
+    ("boot 1000", &["boot", "--limit-v", "1000"]),
+    ("boot fast", &["boot", "--controller", "fast"]),
+    ("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
+    ("story", &["story", "--check"]),
 ];
 
 #[rustfmt::skip]
@@ -47,15 +41,20 @@ const fn lint(package: &'static str, features: &'static str) -> [&'static str; 1
 
 /// The steps for `--help`.
 pub(crate) fn help() -> String {
-    let emulation: String = EMULATION.iter().map(|(name, line, _)| format!("  {name:<10} {line}\n")).collect();
+    let line = |(name, args): &(&str, &[&str])| format!("  {name:<10} cargo xtask {}\n", args.join(" "));
+    let emulation: String = EMULATION.iter().map(line).collect();
     let python = "  python     cargo xtask python\n  prove      cargo xtask prove --ticks 1000000\n";
     let setup = "  setup      cargo xtask setup\n";
-    format!("Steps, stopping at the first that fails:\n{setup}{}{python}{emulation}", steps::help(STEPS))
+    format!(
+        "Steps, stopping at the first that fails, the last {} two at a time:\n{setup}{}{python}{emulation}",
+        EMULATION.len(),
+        steps::help(STEPS)
+    )
 }
 
 /// Runs every step; an error names the first that fails.
 pub(crate) fn run() -> Result<()> {
-    let mut progress = Progress::of(3 + STEPS.len() + EMULATION.len());
+    let progress = Progress::of(3 + STEPS.len() + EMULATION.len());
     progress.begin("setup");
     setup::run()?;
     for step in STEPS {
@@ -66,10 +65,7 @@ pub(crate) fn run() -> Result<()> {
     package::run()?;
     progress.begin("prove");
     prove::run(&prove::Args::SHARE)?;
-    for (name, _, commands) in EMULATION {
-        progress.begin(name);
-        commands.iter().try_for_each(|args| emulation::run(args))?;
-    }
+    emulation::run_all(EMULATION, |name| progress.begin(name))?;
     progress.end();
     Ok(())
 }

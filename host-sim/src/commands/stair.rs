@@ -9,16 +9,15 @@ use host_sim::output::files::{Files, write_csv};
 use host_sim::output::terminal::{json, print, remark, wrote};
 use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
-use model::{Amplifier, Approach, Compensation, ExtendedPlant, Gains, Plant, Settings};
-use paper::stair::Rows;
+use model::{Amplifier, Approach, Compensation, Gains};
+use paper::stair::request::{Answer, Request, Target};
 use simulation::bad_input;
-use simulation::bad_input::BadInput;
 use simulation::bad_input::number;
-use simulation::experiment::{Experiment, HasReference, Run, paper_spring, with_plant};
+use simulation::experiment::paper_spring;
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
-use simulation::schedule::{Between, Schedule};
+use simulation::schedule::Between;
 
 /// Run the stair experiment in closed loop on the fixed-point controller, compared with the report's Table 3
 #[derive(Args, Debug)]
@@ -107,24 +106,26 @@ impl Arguments {
         Defaults::parse_from(["vsj", "--out", "out/stair"]).arguments
     }
 
-    /// The settings of a plant file's spring, behind the stricter of its amplifier and the options'.
-    fn settings<'a>(&self, file: &'a PlantFile) -> Settings<ExtendedPlant<'a>> {
-        Settings {
-            rate_hz: self.rate_hz,
-            plant: file.extended(),
+    /// The experiment on a plant file's spring.
+    fn request<'a>(&self, plant: &'a PlantFile, target: Target<'a>) -> Request<'a> {
+        Request {
+            plant,
+            paper: self.plant == "paper",
+            target,
             compensation: match self.controller {
                 Controller::Fast => {
                     Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s.unwrap_or(0.0) })
                 }
                 _ => Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki }),
             },
-            amplifier: file.behind(Amplifier {
+            controlled: self.controller != Controller::None,
+            amplifier: Amplifier {
                 min_v: self.min_v,
                 slew_v_per_s: self.slew_v_per_s,
                 dac_bits: self.dac_bits,
                 ..Amplifier::up_to(self.limit_v)
-            }),
-            feedback: None,
+            },
+            rate_hz: self.rate_hz,
         }
     }
 
@@ -160,77 +161,33 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if !left_out.is_empty() {
         remark(&format!("{}: not simulated: {}", arguments.plant, left_out.join(", ")));
     }
-    let settings = arguments.settings(&file);
-    // Where the range ends below the limit asked for, only the sampled reference accepts targets at its end.
-    match settings.plant.plain().filter(|_| settings.amplifier.max_v == arguments.limit_v) {
-        Some(plant) => run_plant(arguments, with_plant(&settings, plant), is_the_reports),
-        None => run_plant(arguments, settings, |_| false),
-    }
-}
-
-/// Runs the command for one kind of spring; `is_the_reports` tells whether Table 3's simulated columns should be
-/// reproduced.
-fn run_plant<P: HasReference>(
-    arguments: &Arguments,
-    settings: Settings<P>,
-    is_the_reports: impl Fn(&Settings<P>) -> bool,
-) -> Result<()> {
     let stride = arguments.stride()?;
-    let mut record = None;
-    let (name, schedule) = match arguments.input.as_str() {
-        "stair" => ("the stair".to_owned(), Schedule::stair()),
-        "step" => ("the stair of ideal steps".to_owned(), Schedule::ideal_stair()),
-        file => {
-            let read = record.insert(Record::open(Path::new(file), arguments.column.as_deref().unwrap_or(MEASURED))?);
-            read.check_range(arguments.min_v, arguments.limit_v)?;
-            (file.to_owned(), Schedule::from_record(read, arguments.between.unwrap_or_default()))
-        }
+    let record = match arguments.input.as_str() {
+        "stair" | "step" => None,
+        file => Some(Record::open(Path::new(file), arguments.column.as_deref().unwrap_or(MEASURED))?),
     };
-    let experiment = Experiment { name, schedule, settings };
-    if let Err(error) = experiment.settings.validate() {
-        return Err(named(BadInput(error.to_string()).into(), SETTINGS));
-    }
-
+    let target = match &record {
+        Some(record) => Target::Record(record, arguments.between.unwrap_or_default()),
+        None if arguments.input == "stair" => Target::Stair,
+        None => Target::Step,
+    };
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
-    let run = experiment.run(|done, all| {
+    let request = arguments.request(&file, target);
+    request.check().map_err(|error| named(error, SETTINGS))?;
+    let answer = request.run(|done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-
-    let rows = match &record {
-        Some(record) => Rows::Record(record),
-        None => Rows::Table3 {
-            same: arguments.input == "stair" && is_the_reports(&experiment.settings),
-            spring: arguments.plant == "paper",
-        },
-    };
-    let controlled = arguments.controller != Controller::None;
-    let report = paper::stair::Report::new(&experiment, &run, &rows, controlled)?;
     let paths = match &arguments.out {
-        Some(folder) => write(folder, &experiment, &run, &report, controlled, stride)?,
+        Some(folder) => write(folder, &answer, arguments.controller != Controller::None, stride)?,
         None => Vec::new(),
     };
-    print(&if arguments.json { json(&report)? } else { stair::text(&report) + &wrote(&paths) })
+    print(&if arguments.json { json(&answer.report)? } else { stair::text(&answer.report) + &wrote(&paths) })
 }
 
-/// True if the settings are those of the report, so that Table 3's simulated columns should be reproduced.
-fn is_the_reports(settings: &Settings) -> bool {
-    settings.plant == Plant::PAPER
-        && settings.compensation == Compensation::ProportionalIntegral(Gains::PAPER)
-        && settings.amplifier.slew_v_per_s.is_none()
-        && settings.amplifier.min_v == 0.0
-        && settings.amplifier.max_v >= 700.0
-}
-
-fn write<P>(
-    folder: &Path,
-    experiment: &Experiment<P>,
-    run: &Run,
-    report: &paper::stair::Report,
-    controlled: bool,
-    stride: usize,
-) -> Result<Vec<PathBuf>> {
+fn write(folder: &Path, answer: &Answer, controlled: bool, stride: usize) -> Result<Vec<PathBuf>> {
+    let Answer { experiment, run, report } = answer;
     let samples = if controlled { &run.with } else { &run.without };
     let spring = paper_spring()?;
     let mut files = Files::new(folder)?;

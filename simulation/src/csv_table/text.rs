@@ -27,14 +27,25 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a file once, since it may be a pipe, and no further than its limits.
+    /// Reads a file; `name` is its path.
+    ///
+    /// # Errors
+    /// [`BadInput`] if the file cannot be opened, and the errors of [`Source::read`].
+    pub fn open(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        match File::open(path) {
+            Ok(file) => Self::read(&name, BufReader::new(file)),
+            Err(error) => bad_input!("{name}: cannot be read: {error}"),
+        }
+    }
+
+    /// Reads the bytes of a file once, since it may be a pipe, and no further than its limits.
     ///
     /// # Errors
     /// [`BadInput`] if the file cannot be read, is too large, has more than a million rows or a very long line, or is binary.
-    pub fn open(path: &Path) -> Result<Self> {
-        let name = path.display().to_string();
+    pub fn read(name: &str, mut file: impl BufRead) -> Result<Self> {
+        let name = name.to_owned();
         let unreadable = |error| BadInput(format!("{name}: cannot be read: {error}"));
-        let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
         let mut bytes = Vec::new();
         // Lines end with a line feed, a carriage return or both.
         let (mut feeds, mut returns, mut line_start) = (0, 0, 0);

@@ -1,6 +1,6 @@
 //! The identification campaign: diagnoses many records with known effects and counts the causes that are named.
 //!
-//! In: records of [`ground_truth`](crate::ground_truth). Out: counts, accuracies and detection limits with their
+//! In: records of [`ground_truth`]. Out: counts, accuracies and detection limits with their
 //! acceptance criteria, as Markdown and as data to serialise.
 //!
 //! | module | contents |

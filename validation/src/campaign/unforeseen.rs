@@ -1,4 +1,4 @@
-//! Diagnoses of the laws of [`ground_truth::unforeseen`](crate::ground_truth::unforeseen), graded by the names that are true of each.
+//! Diagnoses of the laws of [`ground_truth::unforeseen`], graded by the names that are true of each.
 
 use std::fmt::Write;
 

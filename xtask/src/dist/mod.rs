@@ -1,7 +1,7 @@
 //! `cargo xtask dist`: the files of a release.
 //!
 //! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the
-//! images of both boards for each controller and amplifier, the manual, this version's changes, the licences of all
+//! images of both boards for each controller and amplifier, the manual, the page for a browser, this version's changes, the licences of all
 //! dependencies, and the SHA-256 of every file.
 
 mod licences;
@@ -15,7 +15,7 @@ use xtask::build::{self, Board};
 use xtask::shell;
 use xtask::variant::Variant;
 
-use crate::{image, manual};
+use crate::{image, manual, page};
 
 /// The project's own texts.
 const TEXTS: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"];
@@ -41,9 +41,10 @@ pub(crate) fn run() -> Result<()> {
         copy(&shell::root().join(text), &new.join(text))?;
     }
     copy_folder(&manual::build()?, &new.join("manual"))?;
+    copy_folder(&page::build()?, &new.join("page"))?;
     let changes = fs::read_to_string(shell::root().join("CHANGELOG.md")).context("cannot read CHANGELOG.md")?;
     write(&new.join("CHANGES.md"), section(&changes, version)?.as_bytes())?;
-    write(&new.join("THIRD-PARTY.txt"), licences::all(&["host-sim", "firmware", "test-bench"])?.as_bytes())?;
+    write(&new.join("THIRD-PARTY.txt"), licences::all(&["host-sim", "firmware", "test-bench", "page"])?.as_bytes())?;
     write(&new.join(CHECKSUMS), checksums(&new)?.as_bytes())?;
     remove(&folder)?;
     fs::rename(&new, &folder).with_context(|| format!("cannot write {}", folder.display()))?;

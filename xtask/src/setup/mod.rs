@@ -10,10 +10,10 @@ use anyhow::{Context, Result};
 
 use crate::shell;
 
-/// The emulator's program.
-const QEMU: &str = "qemu-system-arm";
-/// Package of the emulator in Debian and Ubuntu.
-const QEMU_PACKAGE: &str = "qemu-system-arm";
+/// The emulator: program and package in Debian and Ubuntu.
+const QEMU: [&str; 2] = ["qemu-system-arm"; 2];
+/// A browser for the tests of the page.
+const CHROMIUM: [&str; 2] = ["chromium"; 2];
 
 /// Installs the missing parts of the toolchain, then the emulator.
 pub fn run() -> Result<()> {
@@ -21,13 +21,28 @@ pub fn run() -> Result<()> {
     emulator()
 }
 
+/// Has rustup add a target to the pinned toolchain unless it is there.
+pub fn target(name: &str) -> Result<()> {
+    toolchain::add_target(name)
+}
+
 /// Installs QEMU with apt-get unless it starts.
 pub fn emulator() -> Result<()> {
-    if let Ok(version) = shell::command(QEMU).arg("--version").output() {
+    program(QEMU)
+}
+
+/// Installs Chromium with apt-get unless it starts.
+pub fn browser() -> Result<()> {
+    program(CHROMIUM)
+}
+
+/// Installs the package of a program with apt-get unless the program starts.
+fn program([name, package]: [&str; 2]) -> Result<()> {
+    if let Ok(version) = shell::command(name).arg("--version").output() {
         let text = String::from_utf8_lossy(&version.stdout);
-        eprintln!("setup: {} is installed", text.lines().next().unwrap_or(QEMU));
+        eprintln!("setup: {} is installed", text.lines().next().unwrap_or(name));
         return Ok(());
     }
-    eprintln!("setup: {QEMU} is missing, installing it with apt-get");
-    apt::install(QEMU_PACKAGE).with_context(|| format!("install {QEMU} by hand, then repeat this command"))
+    eprintln!("setup: {name} is missing, installing it with apt-get");
+    apt::install(package).with_context(|| format!("install {name} by hand, then repeat this command"))
 }

@@ -32,6 +32,16 @@ pub(super) fn install() -> Result<()> {
     missing.iter().try_for_each(|args| shell::run(rustup().args(args)))
 }
 
+/// Adds a target that the toolchain file does not list, because only one command needs it.
+pub(super) fn add_target(name: &str) -> Result<()> {
+    let installed = shell::output(rustup().args(["target", "list", "--installed"]))
+        .context("rustup does not start: install it from https://rustup.rs, then repeat this command")?;
+    if installed.lines().any(|line| line.trim() == name) {
+        return Ok(());
+    }
+    shell::run(rustup().args(["target", "add", name]))
+}
+
 /// Content of a toolchain file.
 #[derive(Debug)]
 struct Wanted {

@@ -1,0 +1,68 @@
+//! The requests by name.
+
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use simulation::bad_input;
+
+use crate::control::{self, Control};
+use crate::diagnose::{self, Records};
+use crate::hide::{self, Hidden};
+
+/// A request, as JSON with the field `command`.
+#[derive(Deserialize)]
+#[serde(tag = "command", rename_all = "kebab-case")]
+enum Request {
+    /// Runs a target through the controller.
+    Control(Control),
+    /// Lists the effects that [`Request::Hide`] knows.
+    Effects,
+    /// Makes a record of a spring with an effect.
+    Hide(Hidden),
+    /// Identifies the spring of the file.
+    Identify(Records),
+    /// Diagnoses the file.
+    Diagnose(Records),
+}
+
+/// Answers a request about a file, which may be empty. The answer is a JSON object with one field, `ok` or `error`; an error is the
+/// line that the command prints. `progress` receives JSON on the way.
+pub fn answer(request: &[u8], file: &[u8], progress: &mut dyn FnMut(&str)) -> String {
+    let answer = match of(request, file, progress) {
+        Ok(answer) => json!({ "ok": answer }),
+        Err(error) => json!({ "error": format!("{error:#}").replace(['\n', '\r'], " ") }),
+    };
+    answer.to_string()
+}
+
+fn of(request: &[u8], file: &[u8], progress: &mut dyn FnMut(&str)) -> Result<Value> {
+    let request = match serde_json::from_slice(request) {
+        Ok(request) => request,
+        Err(error) => bad_input!("request: {error}"),
+    };
+    Ok(match request {
+        Request::Control(control) => value(&control::run(&control)?)?,
+        Request::Effects => value(&hide::effects())?,
+        Request::Hide(hidden) => value(&hide::record(&hidden)?)?,
+        Request::Identify(records) => value(&diagnose::identify(&records, file)?)?,
+        Request::Diagnose(records) => value(&diagnose::diagnose(&records, file, progress)?)?,
+    })
+}
+
+fn value(answer: &impl Serialize) -> Result<Value> {
+    Ok(serde_json::to_value(answer)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_request_is_refused_in_one_line() {
+        for request in ["", "{}", r#"{"command":"launch"}"#, r#"{"command":"control"}"#, "\u{0}"] {
+            let answer: Value = serde_json::from_str(&answer(request.as_bytes(), b"", &mut |_| ())).unwrap();
+            let error = answer["error"].as_str().expect("an error");
+            assert!(error.starts_with("request: ") && !error.contains('\n'), "{error}");
+        }
+    }
+}

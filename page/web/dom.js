@@ -1,0 +1,56 @@
+// Elements of the page.
+
+/** The element with an id. */
+export const byId = (id) => document.getElementById(id);
+
+/** A new HTML element with attributes and children, which are elements or texts. */
+export function html(name, attributes = {}, ...children) {
+  return filled(document.createElement(name), attributes, children);
+}
+
+/** A new SVG element. */
+export function svg(name, attributes = {}, ...children) {
+  return filled(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
+}
+
+function filled(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (value !== false && value != null) element.setAttribute(name, value === true ? "" : value);
+  }
+  element.append(...children.filter((child) => child != null));
+  return element;
+}
+
+/** Offers a text as a file to be saved. */
+export function save(name, text, type = "text/plain") {
+  const url = URL.createObjectURL(new Blob([text], { type }));
+  const link = html("a", { href: url, download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}
+
+/** A table with its head; it folds on a narrow screen. A cell is a number as a text, or { text, class }. */
+export function table(names, rows, caption) {
+  const parts = (value) => (typeof value === "object" ? value : { text: value, class: "number" });
+  const cell = (value, index) => html("td", { class: parts(value).class, "data-name": names[index] }, parts(value).text);
+  const head = (name, index) => html("th", { scope: "col", class: rows[0] && parts(rows[0][index]).class === "number" ? "number" : null }, name);
+  return html(
+    "table",
+    {},
+    html("caption", { class: "small" }, caption),
+    html("thead", {}, html("tr", {}, ...names.map(head))),
+    html("tbody", {}, ...rows.map((row) => html("tr", {}, ...row.map(cell)))),
+  );
+}
+
+/** A number with some decimals; a dash for none. */
+export const decimals = (value, count) => (value == null ? "-" : value.toFixed(count));
+
+/** A number with some significant digits. */
+export function digits(value, count = 4) {
+  if (value == null || !Number.isFinite(value)) return "-";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  return size >= 1e6 || size < 1e-3 ? value.toExponential(count - 1) : String(Number(value.toPrecision(count)));
+}

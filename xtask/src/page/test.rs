@@ -1,0 +1,341 @@
+//! The page in a browser, by clicks and keys, compared with the command `vsj`.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
+use xtask::{build, shell};
+
+use super::browser::Browser;
+
+/// Longest run of the control panel and of a diagnosis.
+const CONTROL: Duration = Duration::from_secs(30);
+const DIAGNOSIS: Duration = Duration::from_secs(300);
+/// Relative difference between numbers of the page and of the command: their functions in double precision (`exp`, `sin`) are of
+/// different libraries. The fixed-point tick has none.
+const ROUNDING: f64 = 1e-12;
+/// The same after a search, whose steps end when they gain little.
+const CONVERGENCE: f64 = 1e-5;
+/// The same between the numbers of steps of a search.
+const WORK: f64 = 0.02;
+/// A record in the repository.
+const RECORD: &str = "data/sample_hysteresis.csv";
+
+/// The browser, the command and a folder for the command's files.
+struct Test {
+    browser: Browser,
+    vsj: PathBuf,
+    folder: PathBuf,
+}
+
+/// One test.
+type Check = fn(&mut Test) -> Result<()>;
+
+/// Runs all tests on the page in a folder; pictures of it go to the folder `page-test` beside it.
+pub(super) fn run(page: &Path) -> Result<()> {
+    let vsj = build::vsj()?;
+    let folder = env::temp_dir().join(format!("vsj-page-{}", std::process::id()));
+    let mut test = Test { browser: Browser::start(folder.join("browser"))?, vsj, folder };
+    let tests: [(&str, Check); 8] = [
+        ("the stair has the command's numbers", Test::stair),
+        ("every field has a label", Test::labels),
+        ("a target drawn by pointer and keys has the command's numbers", Test::drawn),
+        ("settings out of range show the command's error", Test::refused),
+        ("a hidden effect is diagnosed like the command's", Test::hidden),
+        ("a file is diagnosed like the command's", Test::file),
+        ("cancel ends a diagnosis", Test::cancel),
+        ("a damaged file shows the command's error", Test::damaged),
+    ];
+    test.browser.screen(1400, "light")?;
+    test.browser.open(&page.join("index.html"))?;
+    let paint = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime";
+    test.browser.wait(&format!("{paint} > 0"), CONTROL)?;
+    println!("first paint after {:.0} ms", test.browser.value(paint)?.as_f64().context("nothing was painted")?);
+    for (name, of) in tests {
+        let begin = Instant::now();
+        of(&mut test).with_context(|| name.to_owned())?;
+        println!("ok, {:.1} s: {name}", begin.elapsed().as_secs_f64());
+    }
+    test.screens(&page.with_file_name("page-test"))?;
+    ensure!(test.browser.errors.is_empty(), "errors in the page: {:?}", test.browser.errors);
+    fs::remove_dir_all(&test.folder).with_context(|| format!("cannot remove {}", test.folder.display()))
+}
+
+impl Test {
+    /// Waits until the control panel has shown what the settings make, and returns its JSON.
+    fn control(&mut self) -> Result<Value> {
+        // Longer than the panel's pause after a change.
+        std::thread::sleep(Duration::from_millis(300));
+        self.browser.wait("document.body.dataset.control === 'done'", CONTROL)?;
+        Ok(serde_json::from_str(&self.browser.text("stair-json")?)?)
+    }
+
+    /// The answer of the command in the folder of its files.
+    fn command(&self, args: &[&str]) -> Result<Value> {
+        shell::json(shell::command(&self.vsj).args(args).arg("--json").current_dir(&self.folder))
+    }
+
+    /// The command's refusal, without its name.
+    fn refusal(&self, args: &[&str]) -> Result<String> {
+        let output = shell::command(&self.vsj).args(args).current_dir(&self.folder).output()?;
+        ensure!(output.status.code() == Some(2), "`vsj {}` is not refused", args.join(" "));
+        let text = String::from_utf8(output.stderr)?;
+        Ok(text.trim().trim_start_matches("vsj: ").to_owned())
+    }
+
+    fn stair(&mut self) -> Result<()> {
+        self.browser.wait("document.body.dataset.control === 'done'", CONTROL)?;
+        same("stair", &self.control()?, &self.command(&["stair", "--input", "step"])?, ROUNDING)?;
+        self.browser.set("controller", "fast")?;
+        self.browser.set("limit", "1000")?;
+        let args = ["stair", "--input", "step", "--controller", "fast", "--limit-v", "1000"];
+        same("stair", &self.control()?, &self.command(&args)?, ROUNDING)?;
+        self.browser.set("target", "stair")?;
+        self.browser.set("tau", "4")?;
+        self.browser.set("slew", "400")?;
+        self.write("p.toml", "schema = 1\n[relaxation]\nshare = 0.0909\ntau_s = 4\n")?;
+        let args = [&["stair", "--plant", "p.toml", "--slew-v-per-s", "400"], &args[3..]].concat();
+        same("stair", &self.control()?, &self.command(&args)?, ROUNDING)?;
+        self.browser.click("report-spring")?;
+        self.browser.set("slew", "")?;
+        self.browser.set("limit", "700")?;
+        self.browser.set("controller", "paper")?;
+        let answer = self.control()?;
+        ensure!(answer["printed_agree"] == 32, "of Table 3 agree {}", answer["printed_agree"]);
+        Ok(())
+    }
+
+    fn labels(&mut self) -> Result<()> {
+        let fields = "[...document.querySelectorAll('input, select, textarea')].filter((of) => !of.labels.length).map((of) => of.id)";
+        let buttons =
+            "[...document.querySelectorAll('button')].filter((of) => !of.textContent.trim()).map((of) => of.id)";
+        for unnamed in [fields, buttons] {
+            let found = self.browser.value(unnamed)?;
+            ensure!(found.as_array().is_some_and(Vec::is_empty), "without a name: {found}");
+        }
+        let images = self.browser.value("document.querySelectorAll('svg[role=img][aria-label]').length")?;
+        ensure!(images.as_u64() >= Some(2), "{images} plots have a description");
+        Ok(())
+    }
+
+    fn drawn(&mut self) -> Result<()> {
+        self.browser.set("target", "drawn")?;
+        self.control()?;
+        self.browser.set("points", "0 0\n5 300\n20,100\n 35 450\n60 450\n")?;
+        self.control()?;
+        let before = self.points()?;
+        ensure!(before == [[0.0, 0.0], [5.0, 300.0], [20.0, 100.0], [35.0, 450.0], [60.0, 450.0]], "typed: {before:?}");
+        self.browser.drag("#drawing [data-index='1']", [20.0, 30.0])?;
+        let moved = self.points()?;
+        ensure!(moved[1][0] > before[1][0] && moved[1][1] < before[1][1], "not moved: {moved:?}");
+        for key in ["ArrowUp", "ArrowRight", "+"] {
+            self.browser.key(key)?;
+        }
+        let pressed = self.points()?;
+        ensure!(
+            pressed[1] == [moved[1][0] + 0.5, moved[1][1] + 10.0] && pressed.len() == moved.len() + 1,
+            "the keys made {pressed:?} of {moved:?}"
+        );
+        self.browser.drag("#drawing", [60.0, -40.0])?;
+        ensure!(self.points()?.len() > pressed.len() + 3, "nothing was drawn");
+        let page = self.control()?;
+        self.browser.click("save-target")?;
+        let csv = self.browser.downloaded("target.csv")?;
+        self.write("target.csv", &csv)?;
+        same("drawn", &page, &self.command(&["stair", "--input", "target.csv"])?, ROUNDING)?;
+        self.browser.set("linear", "true")?;
+        let args = ["stair", "--input", "target.csv", "--between", "linear"];
+        same("drawn", &self.control()?, &self.command(&args)?, ROUNDING)
+    }
+
+    /// The points of the drawing, in s and V.
+    fn points(&mut self) -> Result<Vec<[f64; 2]>> {
+        let text = self.browser.value("document.getElementById('points').value")?;
+        let point = |line: &str| {
+            let (time, volts) = line.split_once(' ')?;
+            Some([time.parse().ok()?, volts.parse().ok()?])
+        };
+        text.as_str().context("a text")?.lines().map(|line| point(line).with_context(|| line.to_owned())).collect()
+    }
+
+    fn refused(&mut self) -> Result<()> {
+        self.browser.set("target", "step")?;
+        self.browser.set("limit", "5")?;
+        self.browser.wait("document.body.dataset.control === 'refused'", CONTROL)?;
+        let shown = self.browser.text("control-error")?;
+        let refusal = self.refusal(&["stair", "--input", "step", "--limit-v", "5"])?;
+        ensure!(refusal == shown, "the page shows `{shown}`, the command `{refusal}`");
+        self.browser.set("limit", "700")?;
+        self.control().map(drop)
+    }
+
+    fn hidden(&mut self) -> Result<()> {
+        self.browser.set("target", "stair")?;
+        self.browser.set("effect", "hysteresis")?;
+        self.control()?;
+        self.browser.wait("!document.getElementById('save-record').hidden", CONTROL)?;
+        self.browser.click("save-record")?;
+        let csv = self.browser.downloaded("record.csv")?;
+        self.write("record.csv", &csv)?;
+        self.browser.click("diagnose-hidden")?;
+        let page = self.found()?;
+        same("diagnosis", &page, &self.command(&["diagnose", "record.csv"])?, CONVERGENCE)?;
+        let cause = &page["findings"][0]["cause"];
+        ensure!(cause == "hysteresis", "the first finding is {cause}");
+        let text = self.browser.text("answer")?;
+        ensure!(text.contains("hysteresis") && text.contains("width_v"), "the table shows {text}");
+        Ok(())
+    }
+
+    /// Waits for the end of a diagnosis and returns its JSON.
+    fn found(&mut self) -> Result<Value> {
+        self.browser.wait("document.body.dataset.record === 'idle'", DIAGNOSIS)?;
+        let error = self.browser.text("record-error")?;
+        ensure!(error.is_empty(), "{error}");
+        Ok(serde_json::from_str(&self.browser.text("diagnosis-json")?)?)
+    }
+
+    fn file(&mut self) -> Result<()> {
+        let record = shell::root().join(RECORD);
+        let name = record.file_name().and_then(|name| name.to_str()).context("a name")?;
+        fs::copy(&record, self.folder.join(name))?;
+        self.browser.choose("file", &record)?;
+        self.browser.wait("!document.getElementById('diagnose').disabled", CONTROL)?;
+        for (command, nominal) in [("identify", "paper"), ("diagnose", "identify"), ("diagnose", "paper")] {
+            self.browser.set("nominal", nominal)?;
+            let begin = Instant::now();
+            self.browser.click(command)?;
+            let page = self.found()?;
+            let browser = begin.elapsed().as_secs_f64();
+            let begin = Instant::now();
+            let plant: &[&str] = if command == "diagnose" { &["--plant", nominal] } else { &[] };
+            let answer = self.command(&[&[command, name], plant].concat())?;
+            println!(
+                "{command} takes {browser:.1} s in the page, {:.1} s on the command line",
+                begin.elapsed().as_secs_f64()
+            );
+            same(command, &page, &answer, CONVERGENCE)?;
+        }
+        self.browser.click("use-plant")?;
+        self.control().map(drop)
+    }
+
+    fn cancel(&mut self) -> Result<()> {
+        self.browser.set("effort", "thorough")?;
+        self.browser.click("diagnose")?;
+        self.browser.wait("document.body.dataset.record === 'running'", CONTROL)?;
+        let begin = Instant::now();
+        self.browser.click("cancel")?;
+        self.browser.wait("document.body.dataset.record === 'idle'", Duration::from_secs(5))?;
+        let status = self.browser.text("record-status")?;
+        ensure!(status == "Cancelled.", "`{status}` after {:?}", begin.elapsed());
+        self.browser.set("effort", "quick")?;
+        self.browser.click("diagnose")?;
+        self.found().map(drop)
+    }
+
+    fn damaged(&mut self) -> Result<()> {
+        for (name, text) in [
+            ("column.csv", "time_s,volts\n0,0\n1,1\n"),
+            ("number.csv", "time_s,voltage_v,stiffness\n0,0,0\n1,x,0\n2,0,0\n"),
+            ("binary.csv", "time_s\u{0}"),
+            ("empty.csv", ""),
+            ("few.csv", "time_s,voltage_v,stiffness\n0,0,0\n1,100,20\n"),
+        ] {
+            self.write(name, text)?;
+            self.browser.drop_file(name, text)?;
+            self.browser
+                .wait(&format!("document.getElementById('file-name').textContent.startsWith('{name}')"), CONTROL)?;
+            self.browser.set("nominal", "paper")?;
+            self.browser.click("diagnose")?;
+            self.browser.wait("document.getElementById('record-error').textContent !== ''", CONTROL)?;
+            let shown = self.browser.text("record-error")?;
+            let refusal = self.refusal(&["diagnose", name])?;
+            ensure!(refusal == shown, "the page shows `{shown}`, the command `{refusal}`");
+        }
+        Ok(())
+    }
+
+    /// Pictures on a phone and on a wide screen; nothing may be wider than the screen.
+    fn screens(&mut self, pictures: &Path) -> Result<()> {
+        fs::create_dir_all(pictures)?;
+        let record = shell::root().join(RECORD);
+        self.browser.choose("file", &record)?;
+        self.browser.set("effort", "normal")?;
+        self.browser.wait("document.getElementById('file-name').textContent.startsWith('sample')", CONTROL)?;
+        self.browser.click("diagnose")?;
+        self.found()?;
+        self.browser.click("report-spring")?;
+        self.browser.set("target", "drawn")?;
+        self.browser.set("effect", "charge-leakage")?;
+        self.control()?;
+        for (width, scheme) in [(360, "dark"), (1400, "light"), (1920, "dark")] {
+            self.browser.screen(width, scheme)?;
+            std::thread::sleep(Duration::from_millis(500));
+            let wide = self.browser.value("document.documentElement.scrollWidth")?;
+            let picture = pictures.join(format!("{width}-{scheme}.png"));
+            fs::write(&picture, STANDARD.decode(self.browser.picture()?)?)?;
+            println!("{}", picture.display());
+            ensure!(wide.as_u64() <= Some(u64::from(width)), "the page is {wide} pixels wide on a screen of {width}");
+        }
+        Ok(())
+    }
+
+    fn write(&self, name: &str, text: &str) -> Result<PathBuf> {
+        let path = self.folder.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+}
+
+/// True for numbers within a relative tolerance of the larger or of 1e-6.
+fn are_near(a: f64, b: f64, tolerance: f64) -> bool {
+    (a - b).abs() <= tolerance * a.abs().max(b.abs()).max(1e-6)
+}
+
+/// Compares two answers: the same fields and words, and near numbers; those of the fixed-point tick are equal.
+fn same(place: &str, page: &Value, command: &Value, tolerance: f64) -> Result<()> {
+    let at = |name: &dyn std::fmt::Display| format!("{place}.{name}");
+    match (page, command) {
+        (Value::Object(page), Value::Object(command)) => {
+            ensure!(page.keys().eq(command.keys()), "{place}: {:?} and {:?}", page.keys(), command.keys());
+            let tolerance = |name: &str| match name {
+                "with_fixed" | "without_fixed" => 0.0,
+                "work" => WORK,
+                _ => tolerance,
+            };
+            page.iter().try_for_each(|(name, value)| same(&at(name), value, &command[name], tolerance(name)))
+        }
+        (Value::Array(page), Value::Array(command)) if page.len() == command.len() => {
+            page.iter().zip(command).enumerate().try_for_each(|(index, (a, b))| same(&at(&index), a, b, tolerance))
+        }
+        (Value::Number(a), Value::Number(b)) => {
+            let (a, b) = (a.as_f64().unwrap_or(f64::NAN), b.as_f64().unwrap_or(f64::NAN));
+            ensure!(are_near(a, b, tolerance), "{place}: {a} in the page, {b} of the command");
+            Ok(())
+        }
+        // A plant file, or a sentence with numbers.
+        (Value::String(a), Value::String(b)) => {
+            let words = |text: &str| -> Vec<String> {
+                text.split(|letter: char| letter.is_whitespace() || "[](),;%".contains(letter))
+                    .map(str::to_owned)
+                    .collect()
+            };
+            let near = |(a, b): (&String, &String)| match (a.parse(), b.parse()) {
+                (Ok(a), Ok(b)) => are_near(a, b, tolerance),
+                _ => a == b,
+            };
+            let (words_a, words_b) = (words(a), words(b));
+            let same = words_a.len() == words_b.len() && words_a.iter().zip(&words_b).all(near);
+            ensure!(same, "{place}: `{a}` in the page, `{b}` of the command");
+            Ok(())
+        }
+        _ if page == command => Ok(()),
+        _ => bail!("{place}: {page} in the page, {command} of the command"),
+    }
+}
