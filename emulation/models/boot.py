@@ -16,7 +16,7 @@ from board import BUTTON, FLASH, HZ, LSI, POWER_ON, RAM, Board
 
 FAULT_TICK = 300
 GUARD = 256  # Bytes at the end of the stack.
-STORE = [FLASH + 0x7F000 + page * 0x800 for page in range(2)]  # First word of each page, half written at a power cut.
+STORE = [FLASH + 0x7E000 + page * 0x800 for page in range(4)]  # First word of each page, half written at a power cut.
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 

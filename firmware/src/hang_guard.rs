@@ -1,4 +1,5 @@
-//! Stop of a control task that hangs, within [`LONGEST_HANG_MS`] instead of the watchdog's 100 ms.
+//! Stop of a control task that hangs, within [`LONGEST_HANG_MS`](crate::LONGEST_HANG_MS) instead of the watchdog's 100 ms, or
+//! within what the stored settings say.
 //!
 //! The SysTick interrupt has a higher priority than all tasks. It counts milliseconds down and every tick restarts the count;
 //! at zero it performs the emergency stop. A task that hangs with interrupts off is left to the watchdog.
@@ -9,7 +10,6 @@ use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use model::supervisor::Fault;
 
-use crate::settings::LONGEST_HANG_MS;
 use crate::stop;
 
 /// Remaining milliseconds, or 0 while the guard is inactive.
@@ -24,9 +24,9 @@ pub fn start(clock: &mut SYST, core_hz: u32) {
     clock.enable_counter();
 }
 
-/// Restarts the count after a tick.
-pub fn feed() {
-    LEFT.store(LONGEST_HANG_MS, Ordering::Relaxed);
+/// Restarts the count after a tick: the next one has to end within `ms`.
+pub fn feed(ms: u32) {
+    LEFT.store(ms, Ordering::Relaxed);
 }
 
 /// Deactivates the guard after the last tick of a run.

@@ -12,13 +12,16 @@
 //! | [`board`] | Traits that a board implements. |
 //! | [`control`] | One control tick: supervisor, model, supervisor. |
 //! | [`mailbox`] | Hand-over of commands to the control tick; drops commands that a fault has made obsolete. |
+//! | [`capture`] | The fast capture: every tick in a row of RAM. |
 //! | [`clock_test`] | Test of the processor's clock at the start: the plausible range. |
 //! | [`pace`] | Time of the next tick, and the number of missed ticks. |
 //! | [`reset_cause`] | Cause of the last reset, from the chip's flags and the crash record. |
-//! | [`settings`] | Settings of spring, controller and amplifier in an image. |
-//! | [`start`] | Construction of the controller at the start, from the stored model. |
-//! | [`store`] | Storage of a model in flash, safe against power cuts. |
+//! | [`settings`] | Settings that are built into an image. |
+//! | [`start`] | Settings and controller at the start, from the stored settings and model. |
+//! | [`store`] | Storage of a model and of settings in flash, safe against power cuts. |
 //! | [`task_watchdog`] | Check that every task is alive, before the hardware watchdog is fed. |
+//! | [`update`] | Updates of the store by the host, with the check before they are sealed. |
+//! | `capture_memory` | Memory of the fast capture. |
 //! | `crash_record` | Memory of the crash record. |
 //! | `guards` | Check of RAM and image, and start of both guards. |
 //! | `hang_guard` | Stop of a control task that hangs. |
@@ -42,6 +45,7 @@
 extern crate std;
 
 pub mod board;
+pub mod capture;
 pub mod clock_test;
 pub mod control;
 pub mod mailbox;
@@ -51,7 +55,10 @@ pub mod settings;
 pub mod start;
 pub mod store;
 pub mod task_watchdog;
+pub mod update;
 
+#[cfg(feature = "mcu")]
+pub mod capture_memory;
 #[cfg(feature = "mcu")]
 pub mod crash_record;
 #[cfg(feature = "mcu")]

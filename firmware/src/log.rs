@@ -13,9 +13,7 @@ use embassy_time::Instant;
 use link::Controller;
 use micromath::F32Ext;
 use model::supervisor::{Fault, Mismatch};
-use model::{Sensor, Volts};
-
-use crate::settings::{AMPLIFIER, RATE_HZ};
+use model::{Amplifier, Sensor, Volts, device};
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
@@ -62,6 +60,8 @@ pub struct Summary {
 /// Events from the control task to the housekeeping task.
 pub static EVENTS: Channel<CriticalSectionRawMutex, Event, 16> = Channel::new();
 static DROPPED: AtomicU32 = AtomicU32::new(0);
+/// Number of ticks in a second, from [`boot`] on.
+static RATE_HZ: AtomicU32 = AtomicU32::new(0);
 
 /// Queues an event. If the queue is full, the event is dropped and counted.
 pub fn queue(event: Event) {
@@ -70,8 +70,9 @@ pub fn queue(event: Event) {
     }
 }
 
-/// Logs the first lines after a reset: its cause, the code of the last fault, and the controller in use.
-pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
+/// Logs the first lines after a reset: its cause, the code of the last fault, and rate, controller and amplifier in use.
+pub fn boot(reset: &'static str, last_fault: u8, settings: &device::Settings) {
+    RATE_HZ.store(settings.rate_hz(), Ordering::Relaxed);
     let (version, git) = (env!("CARGO_PKG_VERSION"), env!("GIT_REVISION"));
     info!(
         "boot version={=str} git={=str} reset={=str} last_fault={=u8} rate_hz={=u32} controller={=str}",
@@ -79,12 +80,13 @@ pub fn boot(reset: &'static str, last_fault: u8, controller: Controller) {
         git,
         reset,
         last_fault,
-        RATE_HZ,
-        controller.name()
+        settings.rate_hz(),
+        Controller::of(&settings.control.compensation).name()
     );
     // Only if it differs from the source report's.
-    if cfg!(feature = "kilovolt") {
-        info!("amplifier limit_v={=u16}", const { AMPLIFIER.max_v as u16 });
+    let limit_v = settings.control.amplifier.max_v;
+    if limit_v != Amplifier::PAPER.max_v {
+        info!("amplifier limit_v={=u16}", limit_v as u16);
     }
 }
 
@@ -142,7 +144,7 @@ pub fn event(event: Event) {
 
 /// Root mean square of one second's delays, in us, from the sum of their squares. Accurate to 6 %, in steps of 0.1 us.
 fn rms_us(sum_us2: u32) -> f32 {
-    let mean = sum_us2 as f32 / RATE_HZ as f32;
+    let mean = sum_us2 as f32 / RATE_HZ.load(Ordering::Relaxed) as f32;
     (mean.sqrt() * 10.0).round() / 10.0
 }
 

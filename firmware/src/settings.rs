@@ -1,21 +1,23 @@
-//! Settings of an image: spring, controller, amplifier, supervision and timing.
+//! Settings that are built into an image: spring, controller, amplifier, supervision and timing. A block of settings in flash
+//! replaces those of [`link::WireSettings`], see [`crate::start`]; the others need another image.
 
+use model::device::{self, Watchdogs};
 use model::{Amplifier, Feedback, Settings, supervisor};
 #[cfg(feature = "fast")]
 use model::{Approach, Compensation};
 
-/// Rate of the control tick, in Hz.
+/// Rate of the control tick that is built in, in Hz.
 pub const RATE_HZ: u32 = 1000;
 
 /// Longest time without a tick before the hang guard performs the emergency stop, in ms. It exceeds the overrun that the
 /// supervisor tolerates, so that a late control task still reports its overrun itself.
-pub const LONGEST_HANG_MS: u32 = 12;
+pub const LONGEST_HANG_MS: u32 = WATCHDOGS.hang_ms;
 
 /// Time without a complete round of the task watchdog after which the output is disabled, in ms.
-pub const LONGEST_STALL_MS: u32 = 50;
+pub const LONGEST_STALL_MS: u32 = WATCHDOGS.stall_ms;
 
 /// Period of the hardware watchdog, in ms. It resets the chip if it is not fed.
-pub const WATCHDOG_MS: u32 = 100;
+pub const WATCHDOG_MS: u32 = WATCHDOGS.reset_ms;
 
 /// An amplifier for 1000 V, which the source report's requirement (97 % within 0.6 s) needs.
 pub const KILOVOLT: Amplifier = Amplifier::up_to(1000.0);
@@ -41,6 +43,16 @@ const SENSOR: Option<Feedback> = None;
 const SENSOR: Option<Feedback> = Some(Feedback::TYPICAL);
 /// Settings of the supervisor in every run.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
+
+/// Times of the watchdogs in every run.
+pub const WATCHDOGS: Watchdogs = Watchdogs::DEFAULT;
+/// All settings of the flashed image.
+pub const BUILT_IN: device::Settings = built_in(FLASHED);
+
+/// All settings of an image with the settings `control` of its loop.
+pub const fn built_in(control: Settings) -> device::Settings {
+    device::Settings { control, supervision: SUPERVISION, watchdogs: WATCHDOGS }
+}
 
 /// The paper's controller with `amplifier`, without a sensor.
 pub const fn paper(amplifier: Amplifier) -> Settings {

@@ -1,20 +1,33 @@
-//! Construction of the controller at the start, from the stored model and the fault of the last run.
+//! Settings, model and fault of the last run at the start, and the controller that is built from them.
+//!
+//! Stored settings run from the start on, or not at all: those that are damaged, of another format, out of range or beyond what
+//! the image contains are a `config` fault, and the built-in ones run.
 
-use link::{ModelId, Reason, WireModel};
+use link::{Block, BlockId, Blocks, Reason, WireModel, WireSettings};
 use model::supervisor::Fault;
-use model::{Amplifier, OutOfRange, Settings};
+use model::{Amplifier, OutOfRange, device};
 
 use crate::control::Control;
 use crate::reset_cause::Cause;
-use crate::settings::{FLASHED, SUPERVISION};
+use crate::settings::BUILT_IN;
+use crate::store::{Pages, Store};
+
+/// Settings of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Loaded {
+    /// Settings that run.
+    pub settings: device::Settings,
+    /// Their identity, and that of the stored ones, even if their validation failed.
+    pub blocks: Blocks,
+    /// Invalid field of the stored settings, or `format`; `None` if they are valid.
+    pub rejected: Option<&'static str>,
+}
 
 /// Result of the start.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
-    /// Running model.
-    pub model: ModelId,
-    /// Stored model, even if its validation failed; the built-in model if none is stored.
-    pub stored: ModelId,
+    /// Model that runs, and the stored one, even if its validation failed.
+    pub model: Blocks,
     /// Amplifier with the limits of the running model.
     pub amplifier: Amplifier,
     /// Fault of the last run.
@@ -23,65 +36,152 @@ pub struct Start {
     pub rejected: Option<&'static str>,
 }
 
+impl Loaded {
+    /// Settings that do not come from the store.
+    pub const fn fixed(settings: device::Settings) -> Self {
+        let builtin = BlockId { number: 0, format: 0, length: 0, checksum: 0 };
+        Self { settings, blocks: Blocks { active: builtin, stored: builtin }, rejected: None }
+    }
+}
+
+/// The settings in the store if they are valid, otherwise those that are built in.
+#[inline(never)]
+pub fn load<P: Pages>(store: &Store<P>) -> Loaded {
+    let mut loaded = Loaded::fixed(BUILT_IN);
+    if let Some((stored, payload)) = store.newest(Block::Settings) {
+        loaded.blocks.stored = stored;
+        match read(payload) {
+            Ok(settings) => (loaded.settings, loaded.blocks.active) = (settings, stored),
+            Err(Reason::NotBuiltIn(field) | Reason::BadSettings { field, .. }) => loaded.rejected = Some(field.name()),
+            Err(_) => loaded.rejected = Some("format"),
+        }
+    }
+    loaded
+}
+
 /// Builds the controller in `place`, with the `stored` model if it is valid, otherwise with the built-in one.
 ///
 /// # Errors
 /// [`OutOfRange`] names the invalid setting.
 #[inline(never)]
 pub fn control<'a>(
-    settings: &Settings,
-    stored: Option<(ModelId, &[u8])>,
+    loaded: &Loaded,
+    stored: Option<(BlockId, &[u8])>,
     cause: &Cause,
     place: &'a mut Option<Control>,
 ) -> Result<(&'a mut Control, Start), OutOfRange> {
+    let settings = &loaded.settings;
     let control = build(settings, place)?;
-    let (builtin, amplifier) = (ModelId::default(), settings.amplifier);
-    let mut start = Start { model: builtin, stored: builtin, amplifier, last_fault: cause.fault, rejected: None };
+    let (model, amplifier) = (Blocks::default(), settings.control.amplifier);
+    let mut start = Start { model, amplifier, last_fault: cause.fault, rejected: None };
     if let Some((stored, payload)) = stored {
-        start.stored = stored;
+        start.model.stored = stored;
         match use_model(settings, control, payload) {
-            Ok(amplifier) => (start.model, start.amplifier) = (stored, amplifier),
+            Ok(amplifier) => (start.model.active, start.amplifier) = (stored, amplifier),
             Err(field) => start.rejected = Some(field),
         }
     }
     // Every one of them has to be acknowledged; the state shows the first.
-    let rejected = start.rejected.map(|_| Fault::Config);
+    let rejected = start.rejected.or(loaded.rejected).map(|_| Fault::Config);
     for fault in rejected.into_iter().chain(cause.fault).chain(cause.standing.iter()) {
         control.fault(fault);
     }
     Ok((control, start))
 }
 
-/// Validates the model in `payload` for the flashed settings.
+/// Validates the model in `payload` for the settings of the next start.
 ///
 /// # Errors
 /// The [`Reason`] for rejecting the model.
 #[inline(never)]
-pub fn check(payload: &[u8]) -> Result<(), Reason> {
+pub fn check_model<P: Pages>(store: &Store<P>, payload: &[u8]) -> Result<(), Reason> {
     let model = WireModel::read(payload);
-    let Some(model) = &model else { return Err(Reason::ModelDamaged) };
-    Control::check(&FLASHED, model).map_err(|error| Reason::of_model(&error))
+    let Some(model) = &model else { return Err(Reason::Damaged) };
+    Control::check(&load(store).settings.control, model).map_err(|error| Reason::of_model(&error))
+}
+
+/// Validates the settings in `payload`, also for the stored model.
+///
+/// # Errors
+/// The [`Reason`] for rejecting the settings.
+#[inline(never)]
+pub fn check_settings<P: Pages>(store: &Store<P>, payload: &[u8]) -> Result<(), Reason> {
+    let settings = read(payload)?;
+    let model = store.newest(Block::Model).and_then(|(_, payload)| WireModel::read(payload));
+    let Some(model) = &model else { return Ok(()) };
+    Control::check(&settings.control, model).map_err(|error| Reason::of_settings(&error))
+}
+
+/// Reads and validates settings.
+#[inline(never)]
+fn read(payload: &[u8]) -> Result<device::Settings, Reason> {
+    let wire = WireSettings::read(payload);
+    let Some(wire) = &wire else { return Err(Reason::Damaged) };
+    let settings = wire.over(&BUILT_IN).map_err(Reason::NotBuiltIn)?;
+    settings.check().map_err(|error| Reason::of_settings(&error))?;
+    Ok(settings)
 }
 
 #[inline(never)]
-fn use_model(settings: &Settings, control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
+fn use_model(settings: &device::Settings, control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
     let model = WireModel::read(payload);
     let Some(model) = &model else { return Err("format") };
-    control.use_model(settings, model).map_err(|error| error.field)?;
-    Ok(model.behind(settings.amplifier))
+    control.use_model(&settings.control, model).map_err(|error| error.field)?;
+    Ok(model.behind(settings.control.amplifier))
 }
 
 #[inline(never)]
-fn build<'a>(settings: &Settings, place: &'a mut Option<Control>) -> Result<&'a mut Control, OutOfRange> {
-    Ok(place.insert(Control::new(settings, &SUPERVISION, None)?))
+fn build<'a>(settings: &device::Settings, place: &'a mut Option<Control>) -> Result<&'a mut Control, OutOfRange> {
+    Ok(place.insert(Control::new(&settings.control, &settings.supervision, None)?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::SETTINGS;
+    use crate::settings::{SETTINGS, built_in};
+    use crate::store::{FlashError, PAGE, PAGES, Page, WORD};
     use link::wire_model::FORMAT;
+    use link::{Controller, Field, frame, wire_settings};
     use model::supervisor::{Faults, State};
+    use std::vec::Vec;
+
+    const PAPER: Loaded = Loaded::fixed(built_in(SETTINGS));
+
+    /// Flash that never fails.
+    struct Flash([[u8; PAGE]; PAGES]);
+
+    impl Pages for Flash {
+        fn bytes(&self, page: Page) -> &[u8; PAGE] {
+            &self.0[page.index()]
+        }
+
+        fn erase(&mut self, page: Page) -> Result<(), FlashError> {
+            self.0[page.index()].fill(0xff);
+            Ok(())
+        }
+
+        fn program(&mut self, page: Page, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+            self.0[page.index()][at..at + WORD].copy_from_slice(&word);
+            Ok(())
+        }
+    }
+
+    /// A store with these payloads, as an earlier firmware may have left them.
+    fn store(contents: &[(Block, &[u8])]) -> Store<Flash> {
+        let mut store = Store::new(Flash([[0xff; PAGE]; PAGES]));
+        for (block, payload) in contents {
+            for (number, part) in (0..).zip(payload.chunks(link::block::PART)) {
+                let bytes: Vec<u8> = part.iter().copied().chain([0; link::block::PART]).collect();
+                store.part(*block, number, bytes.first_chunk().unwrap()).unwrap();
+            }
+            store.end(*block, payload.len() as u16, frame::checksum(payload), |_, _| Ok(())).unwrap();
+        }
+        store
+    }
+
+    fn built_in_settings() -> WireSettings {
+        WireSettings::new(&BUILT_IN)
+    }
 
     fn model(share: f64) -> WireModel {
         let time_constants_s = [5.5].into_iter().collect();
@@ -92,10 +192,10 @@ mod tests {
     fn a_rejected_model_is_a_config_fault_and_the_last_fault_stands_as_well() {
         let start = |stored: Option<&[u8]>, last_fault: Option<Fault>| {
             let mut place = None;
-            let stored = stored.map(|payload| (ModelId::of(3, payload), payload));
+            let stored = stored.map(|payload| (BlockId::of(3, payload), payload));
             let standing = last_fault.map_or(Faults::NONE, |_| Faults::NONE.with(Fault::Panic).with(Fault::Interlock));
             let cause = Cause { name: "software", fault: last_fault, standing };
-            let (control, start) = control(&SETTINGS, stored, &cause, &mut place).unwrap();
+            let (control, start) = control(&PAPER, stored, &cause, &mut place).unwrap();
             let stands = start.rejected.map_or(standing, |_| standing.with(Fault::Config));
             assert_eq!(control.supervisor().standing(), stands);
             (control.supervisor().state(), start)
@@ -114,17 +214,18 @@ mod tests {
             let (is, start) = start(stored, last_fault);
             assert_eq!((is, start.rejected, start.amplifier.max_v), (state, rejected, limit_v));
             assert_eq!(start.last_fault, last_fault, "reported in any case");
-            assert_eq!(start.stored.number, if stored.is_some() { 3 } else { 0 }, "valid or not");
-            assert_eq!(start.model, if rejected.is_some() { ModelId::default() } else { start.stored });
+            assert_eq!(start.model.stored.number, if stored.is_some() { 3 } else { 0 }, "valid or not");
+            assert_eq!(start.model.active, if rejected.is_some() { BlockId::default() } else { start.model.stored });
         }
     }
 
     #[test]
     fn a_model_is_checked_before_it_is_stored() {
         let payload = |share| model(share).payload().unwrap();
+        let check = |payload: &[u8]| check_model(&store(&[]), payload);
         assert_eq!(check(&payload(0.1)), Ok(()));
-        assert_eq!(check(b"noise"), Err(Reason::ModelDamaged));
-        assert!(matches!(check(&payload(2.0)), Err(reason) if reason != Reason::ModelDamaged));
+        assert_eq!(check(b"noise"), Err(Reason::Damaged));
+        assert!(matches!(check(&payload(2.0)), Err(Reason::BadModel { .. })));
     }
 
     /// The first byte of a payload is the version of its format.
@@ -133,13 +234,87 @@ mod tests {
         let mut newer = model(0.1).payload().unwrap();
         for version in (0..=u8::MAX).filter(|version| *version != FORMAT) {
             newer[0] = version;
-            assert_eq!(check(&newer), Err(Reason::ModelDamaged), "format {version}");
+            assert_eq!(check_model(&store(&[]), &newer), Err(Reason::Damaged), "format {version}");
             let mut place = None;
-            let stored = Some((ModelId::of(3, &newer), &newer[..]));
+            let stored = Some((BlockId::of(3, &newer), &newer[..]));
             let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
-            let (control, start) = control(&SETTINGS, stored, &cause, &mut place).unwrap();
-            assert_eq!((start.rejected, start.model), (Some("format"), ModelId::default()));
+            let (control, start) = control(&PAPER, stored, &cause, &mut place).unwrap();
+            assert_eq!((start.rejected, start.model.active), (Some("format"), BlockId::default()));
             assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config));
         }
+    }
+
+    #[test]
+    fn stored_settings_run_and_the_board_keeps_its_own() {
+        let wire = WireSettings { full_scale_v: 450.0, max_v: 400.0, rate_hz: 1250, ..built_in_settings() };
+        let loaded = load(&store(&[(Block::Settings, &wire.payload().unwrap())]));
+        assert_eq!((loaded.rejected, loaded.blocks.active), (None, loaded.blocks.stored));
+        assert_eq!((loaded.blocks.active.number, loaded.settings.rate_hz()), (1, 1250));
+        let amplifier = Amplifier { full_scale_v: 450.0, max_v: 400.0, ..BUILT_IN.control.amplifier };
+        let control = model::Settings { rate_hz: 1250.0, amplifier, ..BUILT_IN.control };
+        assert_eq!(loaded.settings, device::Settings { control, ..BUILT_IN });
+        assert_eq!(load(&store(&[])).settings, BUILT_IN, "without stored ones the built-in settings run");
+    }
+
+    #[test]
+    fn rejected_settings_are_a_config_fault_and_the_built_in_ones_run() {
+        let wire = built_in_settings();
+        let good = wire.payload().unwrap();
+        let newer = [&[wire_settings::FORMAT + 1], &good[1..]].concat();
+        let longer = [&good[..], &[0]].concat();
+        for (payload, rejected) in [
+            (&newer[..], "format"),
+            (&longer, "format"),
+            (b"noise", "format"),
+            (&WireSettings { max_v: f64::NAN, ..wire }.payload().unwrap(), "max_v"),
+            (&WireSettings { rate_hz: 0, ..wire }.payload().unwrap(), "rate_hz"),
+            (&WireSettings { rate_hz: u32::MAX, ..wire }.payload().unwrap(), "rate_hz"),
+            (&WireSettings { watchdogs_ms: [0; 3], ..wire }.payload().unwrap(), "reset_ms"),
+            (&WireSettings { missed_ticks_allowed: u32::MAX, ..wire }.payload().unwrap(), "missed_ticks_allowed"),
+        ] {
+            let store = store(&[(Block::Settings, payload)]);
+            let loaded = load(&store);
+            assert_eq!((loaded.rejected, loaded.settings), (Some(rejected), BUILT_IN));
+            assert_eq!((loaded.blocks.active, loaded.blocks.stored.number), (BlockId::default(), 1));
+            assert!(check_settings(&store, payload).is_err(), "{rejected}: it is not stored either");
+            let mut place = None;
+            let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
+            let (control, _) = control(&loaded, None, &cause, &mut place).unwrap();
+            assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config), "{rejected}");
+        }
+    }
+
+    /// The features of this build decide, as those of an image do.
+    #[test]
+    fn what_the_image_does_not_contain_is_refused_by_its_name() {
+        let check = |wire: WireSettings| check_settings(&store(&[]), &wire.payload().unwrap());
+        let fast = WireSettings { controller: Controller::Fast, ..built_in_settings() };
+        let sensor =
+            WireSettings { sensor: Some([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]), ..built_in_settings() };
+        let contains =
+            |feature: bool, field| if feature { Ok(()) } else { Err(Reason::NotBuiltIn(Field::named(field))) };
+        let fast_is_there = model::Approach::new(0.0).is_some();
+        let sensor_is_there = model::Feedback::from_values([1.0; 8]).is_some();
+        assert_eq!(check(fast), contains(fast_is_there, "controller"));
+        assert_eq!(check(sensor), contains(sensor_is_there, "sensor"));
+        assert_eq!(check(WireSettings { controller: Controller::None, ..built_in_settings() }), Ok(()));
+    }
+
+    #[test]
+    fn model_and_settings_are_checked_with_each_other() {
+        let model = model(0.5).payload().unwrap();
+        let wire = built_in_settings();
+        let strong = WireSettings { proportional: 90.0, ..wire }.payload().unwrap();
+        assert_eq!(check_settings(&store(&[]), &strong), Ok(()), "with the built-in model");
+        let short = WireModel { time_constants_s: [0.01].into_iter().collect(), ..WireModel::default() };
+        let short = short.payload().unwrap();
+        assert_eq!(check_settings(&store(&[(Block::Model, &model)]), &strong), Ok(()));
+        let refused = check_settings(&store(&[(Block::Model, &short)]), &strong);
+        assert!(
+            matches!(refused, Err(Reason::BadSettings { field, .. }) if field == Field::named("proportional_gain"))
+        );
+        let refused = check_model(&store(&[(Block::Settings, &strong)]), &short);
+        assert!(matches!(refused, Err(Reason::BadModel { field, .. }) if field == Field::named("proportional_gain")));
+        assert_eq!(check_model(&store(&[]), &short), Ok(()));
     }
 }

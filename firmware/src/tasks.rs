@@ -4,18 +4,33 @@ use core::sync::atomic::Ordering;
 
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use model::supervisor::{Fault, Faults, State};
-use model::{Limits, Sensor, Volts};
+use model::{Limits, Sensor, Volts, device};
 
 use crate::board::{Amplifier, Board};
 use crate::control::{Control, Sensors, Source, Stopwatch, Tick};
 use crate::log::{self, EVENTS, Event, Summary, queue};
 use crate::pace::Pace;
-use crate::settings::{LONGEST_STALL_MS, RATE_HZ};
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
 use crate::{crash_record, hang_guard, stop};
 
-/// Ticks without a complete round of the task watchdog after which the output is disabled.
-const INCOMPLETE_TICKS: u32 = RATE_HZ * LONGEST_STALL_MS / 1000;
+/// Times of the control task.
+#[derive(Clone, Copy, Debug)]
+pub struct Timing {
+    rate_hz: u32,
+    /// Time after a tick in which the next one has to end, in ms.
+    hang_ms: u32,
+    /// Ticks without a complete round of the task watchdog after which the output is disabled.
+    incomplete_ticks: u32,
+}
+
+impl Timing {
+    /// The times of valid `settings`.
+    pub fn of(settings: &device::Settings) -> Self {
+        let rate_hz = settings.rate_hz();
+        let device::Watchdogs { hang_ms, stall_ms, .. } = settings.watchdogs;
+        Self { rate_hz, hang_ms, incomplete_ticks: rate_hz * stall_ms / 1000 }
+    }
+}
 
 /// Runs control ticks until `source` ends. Returns the numbers of executed and of missed ticks.
 pub async fn control<B: Board>(
@@ -23,10 +38,12 @@ pub async fn control<B: Board>(
     control: &mut Control,
     source: &mut impl Source,
     stopwatch: &mut impl Stopwatch,
+    timing: Timing,
 ) -> (u32, u32) {
     TASK_WATCHDOG.register(Task::Control);
-    let mut pace = Pace::new(Instant::now().as_micros(), u64::from(1_000_000 / RATE_HZ));
-    let mut report = Report { state: link::State::from(control.supervisor()).name(), ..Report::default() };
+    let mut pace = Pace::new(Instant::now().as_micros(), u64::from(1_000_000 / timing.rate_hz.max(1)));
+    let state = link::State::from(control.supervisor()).name();
+    let mut report = Report { rate_hz: timing.rate_hz, state, ..Report::default() };
     let mut incomplete: u32 = 0;
     let mut ticks: u32 = 0;
     loop {
@@ -37,7 +54,7 @@ pub async fn control<B: Board>(
             interlock_closed: board.interlock_closed(),
             missed_ticks: arrival.missed_ticks,
             monitors: board.amplifier().monitors(),
-            fault: (incomplete > INCOMPLETE_TICKS).then_some(Fault::Watchdog).or(board.fault()),
+            fault: (incomplete > timing.incomplete_ticks).then_some(Fault::Watchdog).or(board.fault()),
             measured: board.amplifier().measured(),
         };
         let tick = control.tick(&command, &sensors, stopwatch);
@@ -51,7 +68,7 @@ pub async fn control<B: Board>(
         report.late(arrival.lateness_us);
         report.tick(ticks, control, &tick);
 
-        hang_guard::feed();
+        hang_guard::feed(timing.hang_ms);
         TASK_WATCHDOG.check_in(Task::Control);
         if TASK_WATCHDOG.complete() {
             incomplete = 0;
@@ -67,6 +84,7 @@ pub async fn control<B: Board>(
 /// The last reported values, so that only changes are logged.
 #[derive(Default)]
 struct Report {
+    rate_hz: u32,
     state: &'static str,
     standing: Faults,
     limits: Limits,
@@ -117,7 +135,7 @@ impl Report {
             self.sensor = Some(sensor);
         }
         self.limited_ticks = self.limited_ticks.saturating_add(u32::from(limits != Limits::NONE));
-        if number.is_multiple_of(RATE_HZ) {
+        if number.is_multiple_of(self.rate_hz) {
             queue(Event::Summary(Summary {
                 tick: number,
                 overruns: self.overruns,

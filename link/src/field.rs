@@ -1,4 +1,4 @@
-//! Numeric codes of the fields that a model's validation can reject.
+//! Numeric codes of the fields of a model or of settings that a validation can reject.
 
 use core::fmt;
 
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Field(pub u8);
 
 /// Names in the order of their codes. The order is part of the protocol: new names are appended.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 42] = [
     "memory.direct",
     "memory.thresholds_v",
     "memory.weights",
@@ -29,18 +29,42 @@ const NAMES: [&str; 18] = [
     "slew_v_per_s",
     "proportional_gain",
     "integral_gain_per_s",
+    "controller",
+    "sensor",
+    "rate_hz",
+    "full_scale_v",
+    "approach_s",
+    "noise_v",
+    "model_uncertainty",
+    "fastest_s",
+    "interval_s",
+    "oldest_s",
+    "lowest_v",
+    "highest_v",
+    "fade_s",
+    "host_timeout_s",
+    "ramp_v_per_s",
+    "missed_ticks_allowed",
+    "forget_missed_s",
+    "monitor_tolerance_v",
+    "max_current_a",
+    "monitor_time_s",
+    "discharge_time_s",
+    "hang_ms",
+    "stall_ms",
+    "reset_ms",
 ];
 
 impl Field {
     /// Code of a field without an entry in the list.
     pub const OTHER: Self = Self(u8::MAX);
 
-    /// Code of the field that the model's validation calls `name`, [`Field::OTHER`] if the list does not contain it.
+    /// Code of the field that the validation calls `name`, [`Field::OTHER`] if the list does not contain it.
     pub fn named(name: &str) -> Self {
         NAMES.iter().position(|known| *known == name).map_or(Self::OTHER, |number| Self(number as u8))
     }
 
-    /// Name that the model's validation uses, `another setting` for an unknown code.
+    /// Name that the validation uses, `another setting` for an unknown code.
     pub fn name(self) -> &'static str {
         NAMES.get(usize::from(self.0)).unwrap_or(&"another setting")
     }

@@ -22,8 +22,10 @@
 //! | --- | --- |
 //! | [`request`], [`reply`], [`reason`] | The messages. |
 //! | [`value`] | Voltages and desired stiffness in their wire format. |
-//! | [`wire_model`] | A spring's model in the format in which it is sent and stored. |
-//! | [`fault`], [`field`] | Numeric codes of the MCU's faults and of a model's fields. |
+//! | [`block`] | Blocks that the MCU stores: their identity, and the parts in which they are sent. |
+//! | [`capture`] | Rows of the fast capture, and the requests that start and read it. |
+//! | [`wire_model`], [`wire_settings`] | A spring's model and the MCU's settings in the format in which they are sent and stored. |
+//! | [`fault`], [`field`] | Numeric codes of the MCU's faults and of the fields of a model or of settings. |
 //! | [`diagnosis`] | Numeric codes of what the amplifier's monitors and the sensor show. |
 //! | [`frame`] | Encoding of a message and decoding of a packet. |
 //! | [`checksum`](mod@checksum) | CRC-32C. |
@@ -38,6 +40,8 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod block;
+pub mod capture;
 pub mod checksum;
 pub mod command;
 pub mod diagnosis;
@@ -55,7 +59,9 @@ pub mod session;
 mod stuffing;
 pub mod value;
 pub mod wire_model;
+pub mod wire_settings;
 
+pub use block::{Block, BlockId, Blocks, Part};
 pub use command::Command;
 pub use diagnosis::{Mismatch, Sensor};
 pub use fault::Fault;
@@ -64,13 +70,14 @@ pub use frame::{Frame, Message, Packet, Unreadable};
 pub use nonce::{Nonce, Stamp};
 pub use reason::Reason;
 pub use receiver::Receiver;
-pub use reply::{Controller, FaultReport, Models, Reply, State, Status, Telemetry};
+pub use reply::{Controller, FaultReport, Reply, State, Status, Telemetry};
 pub use request::Request;
 pub use sequence::Sequence;
-pub use server::{About, ModelUpdate, Server, Step, View};
+pub use server::{About, Server, Step, Update, View};
 pub use session::{Action, Session};
 pub use value::{Desired, WireVolts};
-pub use wire_model::{ModelId, WireModel};
+pub use wire_model::WireModel;
+pub use wire_settings::WireSettings;
 
 /// Version of the protocol. Any change of a golden frame in `tests/golden.rs` requires a new number.
 pub const VERSION: u8 = 5;

@@ -46,10 +46,10 @@ pub enum Reason {
     HostSilent,
     /// The request requires the disarmed state.
     Armed,
-    /// Parts of the model are missing; the number of the next expected part is given.
+    /// Parts of the model or of the settings are missing; the number of the next expected part is given.
     PartMissing(u8),
-    /// The model's checksum is wrong, or the format of its payload is unknown.
-    ModelDamaged,
+    /// The checksum of the model or of the settings is wrong, or the format of the payload is unknown.
+    Damaged,
     /// The model failed its validation.
     BadModel {
         /// Field that is out of bounds.
@@ -59,7 +59,7 @@ pub enum Reason {
         /// Highest permitted value.
         highest: f64,
     },
-    /// The flash could not be written; the previously stored model remains valid.
+    /// The flash could not be written; what was stored before remains valid.
     NotStored,
     /// The monitors show a voltage or a current although the amplifier is switched off.
     Live,
@@ -69,6 +69,22 @@ pub enum Reason {
     OtherSession,
     /// The supply of the converters is out of its range.
     Reference,
+    /// The settings failed their validation.
+    BadSettings {
+        /// Field that is out of bounds.
+        field: Field,
+        /// Lowest permitted value.
+        lowest: f64,
+        /// Highest permitted value.
+        highest: f64,
+    },
+    /// The given setting asks for a part of the program that the image does not contain.
+    NotBuiltIn(Field),
+    /// The MCU's RAM has no room for the rows of the capture.
+    TooManyRows {
+        /// Number of rows that fit.
+        most: u32,
+    },
 }
 
 impl Reason {
@@ -88,13 +104,16 @@ impl Reason {
             Self::HostSilent => 10,
             Self::Armed => 11,
             Self::PartMissing(_) => 12,
-            Self::ModelDamaged => 13,
+            Self::Damaged => 13,
             Self::BadModel { .. } => 14,
             Self::NotStored => 15,
             Self::Live => 16,
             Self::CausePresent(_) => 17,
             Self::OtherSession => 18,
             Self::Reference => 19,
+            Self::BadSettings { .. } => 20,
+            Self::NotBuiltIn(_) => 21,
+            Self::TooManyRows { .. } => 22,
         }
     }
 }
@@ -116,16 +135,23 @@ impl fmt::Display for Reason {
             Self::OtherFault(fault) => write!(f, "a different fault is present: {fault}"),
             Self::HostSilent => f.write_str("the host was silent for too long"),
             Self::Armed => f.write_str("armed; disarm it first"),
-            Self::PartMissing(expected) => write!(f, "a part of the model is missing; expected part {expected}"),
-            Self::ModelDamaged => f.write_str("the model arrived damaged, or the MCU does not know its format"),
+            Self::PartMissing(expected) => write!(f, "a part is missing; expected part {expected}"),
+            Self::Damaged => f.write_str("it arrived damaged, or the MCU does not know its format"),
             Self::BadModel { field, lowest, highest } => {
                 write!(f, "the model cannot be run: {field} has to lie within {lowest} to {highest}")
             }
-            Self::NotStored => f.write_str("the flash could not be written; the previous model stays"),
+            Self::NotStored => f.write_str("the flash could not be written; what it held before stays"),
             Self::Live => f.write_str("the amplifier is off, and its monitors still show a voltage or a current"),
             Self::CausePresent(fault) => write!(f, "the cause of the fault is still there: {fault}"),
             Self::OtherSession => f.write_str("the MCU is in a session with another program"),
             Self::Reference => f.write_str("the supply of the MCU's converters is out of its range"),
+            Self::BadSettings { field, lowest, highest } => {
+                write!(f, "the settings cannot be run: {field} has to lie within {lowest} to {highest}")
+            }
+            Self::NotBuiltIn(field) => {
+                write!(f, "the MCU's image is built without it: {field}; flash an image that has it")
+            }
+            Self::TooManyRows { most } => write!(f, "the MCU's RAM has room for {most} rows of a capture"),
         }
     }
 }
@@ -134,6 +160,11 @@ impl Reason {
     /// The reason that reports an error of the model's validation.
     pub fn of_model(error: &OutOfRange) -> Self {
         Self::BadModel { field: Field::named(error.field), lowest: error.lowest, highest: error.highest }
+    }
+
+    /// The reason that reports an error of the settings' validation.
+    pub fn of_settings(error: &OutOfRange) -> Self {
+        Self::BadSettings { field: Field::named(error.field), lowest: error.lowest, highest: error.highest }
     }
 }
 

@@ -6,11 +6,12 @@ use model::Compensation;
 use model::supervisor::{self, Faults, Supervisor};
 use serde::{Deserialize, Serialize};
 
+use crate::block::{Blocks, Part};
+use crate::capture::{Captured, Rows};
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::fault::Fault;
 use crate::reason::Reason;
 use crate::value::WireVolts;
-use crate::wire_model::ModelId;
 
 /// Reply to a request, with the sequence number of that request. Telemetry has sequence numbers of its own.
 ///
@@ -31,9 +32,17 @@ pub enum Reply {
     /// One sample of the control loop.
     Telemetry(Telemetry),
     /// The running and the stored model.
-    Model(Models),
+    Model(Blocks),
     /// New faults; sent without a request, and again and again until the host has heard of them.
     Fault(FaultReport),
+    /// The running and the stored settings.
+    Settings(Blocks),
+    /// A part of the payload of settings.
+    SettingsPart(Part),
+    /// How far the fast capture is.
+    Captured(Captured),
+    /// Rows of the fast capture.
+    Rows(Rows),
 }
 
 /// Report of the faults that have come since the start.
@@ -56,15 +65,6 @@ impl FaultReport {
     pub fn faults(&self) -> impl Iterator<Item = Fault> {
         Faults::from_bits(self.standing).iter().map(Fault::from)
     }
-}
-
-/// The running and the stored model of an MCU.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Models {
-    /// Model that runs since the start.
-    pub active: ModelId,
-    /// Model that the next start will use.
-    pub stored: ModelId,
 }
 
 /// State of the output.

@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::block::PART;
+use crate::capture::Capture;
 use crate::fault::Fault;
 use crate::value::Desired;
-use crate::wire_model::PART;
 
 /// Request of the host. The MCU sends exactly one [`crate::Reply`] to each, with the same sequence number.
 ///
@@ -48,7 +49,7 @@ pub enum Request {
         /// CRC-32C of the payload.
         checksum: u32,
     },
-    /// Restarts the MCU with the stored model. Rejected unless disarmed.
+    /// Restarts the MCU with the stored model and settings. Rejected unless disarmed.
     Restart,
     /// Informs the MCU that the report of faults with this number has arrived, so that it is not repeated. It acknowledges
     /// no fault.
@@ -56,6 +57,31 @@ pub enum Request {
         /// Number of the report, see [`crate::FaultReport::number`].
         number: u32,
     },
+    /// Reads the identities of the running and of the stored settings.
+    Settings,
+    /// Sends a part of the settings' payload, as [`Request::ModelPart`].
+    SettingsPart {
+        /// Number of the part, counted from 0.
+        number: u8,
+        /// Content; the last part is padded with zeros.
+        bytes: [u8; PART],
+    },
+    /// Ends the transfer of settings, as [`Request::ModelEnd`].
+    SettingsEnd {
+        /// Length of the payload, in bytes.
+        length: u16,
+        /// CRC-32C of the payload.
+        checksum: u32,
+    },
+    /// Reads a part of the payload of settings.
+    ReadSettings {
+        /// True for the settings that are built into the image, false for those that run.
+        built_in: bool,
+        /// Number of the part, counted from 0.
+        number: u8,
+    },
+    /// Starts or reads the fast capture.
+    Capture(Capture),
 }
 
 impl Request {

@@ -1,13 +1,7 @@
 //! A spring's model in the format in which it is sent and stored: the fields of a plant file that control uses.
 //!
-//! ```text
-//! payload = FORMAT, postcard(WireModel)          checksum = CRC-32C(payload)
-//! ```
-//!
-//! A payload is sent in parts of [`PART`] bytes, the last one padded with zeros. The numbers have the same bits as those of
-//! the file. Decoding does not validate them; that is done by the model's own validation.
-
-use core::fmt;
+//! The numbers have the same bits as those of the file. Decoding does not validate them; that is done by the model's own
+//! validation.
 
 use heapless::Vec;
 use model::extended::{Law, Leakage, Memory, Relaxation};
@@ -15,12 +9,10 @@ use model::extended::{lags::MAX_LAGS, law::MAX_POINTS, memory::MAX_PLAYS};
 use model::{Amplifier, ExtendedPlant};
 use serde::{Deserialize, Serialize};
 
-use crate::checksum::checksum;
+use crate::block::PART;
 
 /// Version of the payload's format.
 pub const FORMAT: u8 = 1;
-/// Length of a part, in bytes; a multiple of the flash's word.
-pub const PART: usize = 32;
 /// Largest number of parts of a payload.
 pub const MOST_PARTS: u8 = 13;
 /// Length of the longest payload, in bytes.
@@ -60,19 +52,6 @@ pub struct WireMemory {
     pub thresholds_v: List<MAX_PLAYS>,
     /// Weight of each play operator.
     pub weights: List<MAX_PLAYS>,
-}
-
-/// Identity of a model on an MCU. The default value is the built-in model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ModelId {
-    /// Number of the stored model, counted from 1; 0 is the built-in model.
-    pub number: u32,
-    /// Format of the payload.
-    pub format: u8,
-    /// Length of the payload, in bytes.
-    pub length: u16,
-    /// CRC-32C of the payload.
-    pub checksum: u32,
 }
 
 impl WireModel {
@@ -147,24 +126,6 @@ impl WireModel {
                 _ => None,
             },
             _ => None,
-        }
-    }
-}
-
-impl ModelId {
-    /// Identity of the model with this `number` and `payload`.
-    pub fn of(number: u32, payload: &[u8]) -> Self {
-        let format = payload.first().copied().unwrap_or(0);
-        Self { number, format, length: payload.len() as u16, checksum: checksum(payload) }
-    }
-}
-
-impl fmt::Display for ModelId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { number, format, length, checksum } = self;
-        match number {
-            0 => f.write_str("the one that is built in"),
-            _ => write!(f, "number {number}, format {format}, {length} bytes, CRC {checksum:08x}"),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What an answer of the MCU carries, what a session counts, and what both ends compute from the same bytes.
 
 use link::frame::{MAX_FRAME, checksum};
-use link::{Action, Frame, ModelId, Nonce, Reason, Receiver, Reply, Request, Sequence, Session, State, WireVolts};
+use link::{Action, BlockId, Frame, Nonce, Reason, Receiver, Reply, Request, Sequence, Session, State, WireVolts};
 use model::ScaledStiffness;
 use model::units::Signal;
 
@@ -88,8 +88,8 @@ fn a_session_says_how_long_its_host_may_be_silent() {
 #[test]
 fn a_model_is_identified_by_number_format_length_and_checksum() {
     // "123456789", whose CRC-32C is in every catalogue.
-    let id = ModelId::of(3, b"123456789");
-    assert_eq!(id, ModelId { number: 3, format: b'1', length: 9, checksum: 0xe306_9283 });
+    let id = BlockId::of(3, b"123456789");
+    assert_eq!(id, BlockId { number: 3, format: b'1', length: 9, checksum: 0xe306_9283 });
 }
 
 #[test]

@@ -4,11 +4,12 @@
 mod by_hand;
 
 use by_hand::by_hand;
+use link::capture::{Capture, Captured, ROWS, Rows};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    Controller, Desired, Fault, FaultReport, Field, Frame, Message, Mismatch, ModelId, Models, Nonce, Reason, Reply,
-    Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
+    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, Message, Mismatch, Nonce, Part, Reason,
+    Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
 };
 
 fn check<M: Message>(message: &M, kind: u8, golden: &str) {
@@ -39,6 +40,14 @@ fn requests() {
         (Request::ModelEnd { length: 300, checksum: 128 }, "0aac028001"),
         (Request::Restart, "0b"),
         (Request::Heard { number: 300 }, "0cac02"),
+        (Request::Settings, "0d"),
+        (Request::SettingsPart { number: 3, bytes: [0xa5; 32] }, &format!("0e03{}", "a5".repeat(32))),
+        (Request::SettingsEnd { length: 300, checksum: 128 }, "0fac028001"),
+        (Request::ReadSettings { built_in: false, number: 2 }, "100002"),
+        (Request::ReadSettings { built_in: true, number: 7 }, "100107"),
+        (Request::Capture(Capture::Start { rows: 10_000 }), "1100904e"),
+        (Request::Capture(Capture::State), "1101"),
+        (Request::Capture(Capture::Read { first: 300 }), "1102ac02"),
     ] {
         check(&request, b'Q', golden);
     }
@@ -97,7 +106,7 @@ fn replies() {
         (Reply::Refused(Reason::HostSilent), "010a"),
         (Reply::Refused(Reason::Armed), "010b"),
         (Reply::Refused(Reason::PartMissing(3)), "010c03"),
-        (Reply::Refused(Reason::ModelDamaged), "010d"),
+        (Reply::Refused(Reason::Damaged), "010d"),
         (
             Reply::Refused(Reason::BadModel { field: Field::named("leakage.share"), lowest: 0.0, highest: 1.0 }),
             "010e050000000000000000000000000000f03f",
@@ -108,6 +117,12 @@ fn replies() {
         (Reply::Refused(Reason::OtherSession), "0112"),
         (Reply::Refused(Reason::Reference), "0113"),
         (
+            Reply::Refused(Reason::BadSettings { field: Field::named("hang_ms"), lowest: 0.0, highest: 1.0 }),
+            "0114270000000000000000000000000000f03f",
+        ),
+        (Reply::Refused(Reason::NotBuiltIn(Field::named("controller"))), "011512"),
+        (Reply::Refused(Reason::TooManyRows { most: 300 }), "0116ac02"),
+        (
             Reply::Status(status),
             "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f0903040a0b0c0d0e0f1011",
         ),
@@ -117,9 +132,9 @@ fn replies() {
             "03f0a20401808080ac0201040106ff1f090304",
         ),
         (
-            Reply::Model(Models {
-                active: ModelId { number: 1, format: 2, length: 300, checksum: 4 },
-                stored: ModelId { number: 5, format: 6, length: 7, checksum: 8 },
+            Reply::Model(Blocks {
+                active: BlockId { number: 1, format: 2, length: 300, checksum: 4 },
+                stored: BlockId { number: 5, format: 6, length: 7, checksum: 8 },
             }),
             "040102ac020405060708",
         ),
@@ -132,6 +147,22 @@ fn replies() {
                 mismatch: Mismatch(3),
             }),
             "05ac02f0a204062403",
+        ),
+        (
+            Reply::Settings(Blocks {
+                active: BlockId { number: 1, format: 2, length: 300, checksum: 4 },
+                stored: BlockId { number: 5, format: 6, length: 7, checksum: 8 },
+            }),
+            "060102ac020405060708",
+        ),
+        (Reply::Captured(Captured { most: 300, wanted: 10_000, captured: 5 }), "08ac02904e05"),
+        (
+            Reply::Rows(Rows { first: 300, count: 2, rows: [[0xa5; 8]; ROWS] }),
+            &format!("09ac0202{}", "a5".repeat(8 * ROWS)),
+        ),
+        (
+            Reply::SettingsPart(Part { number: 2, length: 300, bytes: [0xa5; 32] }),
+            &format!("0702ac02{}", "a5".repeat(32)),
         ),
     ] {
         check(&reply, b'A', golden);

@@ -145,7 +145,7 @@ impl Limits {
 
 impl Validated<'_, Amplifier> {
     /// Quantizes the amplifier for the tick.
-    pub(crate) fn quantize(self) -> Config {
+    pub fn quantize(self) -> Config {
         let amplifier = self.settings();
         let step_v = amplifier.slew_per_tick_v(self.sample_time());
         let unit = amplifier.volts_per_code();

@@ -37,6 +37,7 @@
 //! | [`amplifier`] | slew, range, rounding to a DAC code |
 //! | [`controller`] | all of these in one tick |
 //! | [`supervisor`] | whether the output is enabled |
+//! | [`device`] | settings of a controller on an MCU |
 //! | [`validated`] | settings are validated before they are quantized |
 //! | [`units`], [`coefficient`] | number formats |
 //!
@@ -64,6 +65,7 @@ extern crate std;
 pub mod amplifier;
 pub mod coefficient;
 pub mod controller;
+pub mod device;
 pub mod error;
 pub mod estimator;
 pub mod extended;

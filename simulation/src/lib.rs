@@ -8,7 +8,7 @@
 //! | [`csv_table`], [`mod@bad_input`] | CSV tables, and errors that name what was expected |
 //! | [`option_names`] | the options that set the fields which errors name |
 //! | [`bounded_file`] | other files, up to a bound on their size |
-//! | [`plant_file`] | the spring as a file |
+//! | [`plant_file`], [`settings_file`] | the spring and the settings of an MCU as a file |
 //! | [`mod@reference`] | the loop in continuous time, solved exactly in double precision |
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
 //! | [`run`], [`has_reference`], [`experiment`] | fixed point and reference over a schedule |
@@ -38,6 +38,7 @@ pub mod robust_bound;
 pub mod run;
 pub mod sampled;
 pub mod schedule;
+pub mod settings_file;
 pub mod spring_error;
 pub mod tune;
 pub mod units;

@@ -260,13 +260,16 @@ fn refusal_table() -> String {
         Reason::HostSilent,
         Reason::Armed,
         Reason::PartMissing(2),
-        Reason::ModelDamaged,
+        Reason::Damaged,
         Reason::BadModel { field: Field::named("leakage.share"), lowest: 0.0, highest: 1.0 },
         Reason::NotStored,
         Reason::Live,
         Reason::CausePresent(fault),
         Reason::OtherSession,
         Reason::Reference,
+        Reason::BadSettings { field: Field::named("hang_ms"), lowest: 7.0, highest: 99.0 },
+        Reason::NotBuiltIn(Field::named("controller")),
+        Reason::TooManyRows { most: 14_342 },
     ];
     let mut table = "| code | text |\n| --- | --- |\n".to_owned();
     for (code, reason) in (0..).zip(reasons) {

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use link::{ModelId, WireModel};
+use link::{BlockId, WireModel};
 use model::Plant;
 use serde::Serialize;
 use serde_json::Value;
@@ -141,7 +141,7 @@ impl Demonstration {
         };
         let (models, _) = emulator::obey_in(folder, &self.stage.elf, &socket, |_| {}, send)?;
         let payload = model.payload().context("a model that does not fit")?;
-        let expected = serde_json::to_value(ModelId::of(1, &payload))?;
+        let expected = serde_json::to_value(BlockId::of(1, &payload))?;
         for which in ["active", "stored"] {
             if models[which] != expected {
                 bail!("the {which} model is {} instead of {expected}", models[which]);

@@ -1,8 +1,10 @@
 //! `cargo xtask talk`: a host commands the emulated firmware. Valid requests are followed, hostile frames are not, no
-//! tick is missed, and a model that `vsj link` sends is run after the restart.
+//! tick is missed, a model and settings that `vsj link` sends are run after the restart, and a capture has every tick at the
+//! highest rate.
 
 mod hostile;
 
+use std::fs;
 use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -11,7 +13,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use host_sim::link::{Client, Failure, Patience, Port};
 use host_sim::log::{Item, Level, Summary};
 use link::{
-    Desired, Fault, Frame, ModelId, Nonce, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts,
+    BlockId, Desired, Fault, Frame, Nonce, Reason, Receiver, Reply, Request, Sequence, State, Status, WireVolts,
 };
 use simulation::plant_file;
 
@@ -57,7 +59,8 @@ pub(crate) fn run(elf: &Path) -> Result<String> {
             let (hostile, armed) = hostility(&name)?;
             let old = recording(&name)?;
             let kept = model(&vsj, &name)?;
-            Ok((format!("{polite}; {hostile}; {old}; {kept}"), 4 + armed))
+            let fast = settings(&vsj, &name)?;
+            Ok((format!("{polite}; {hostile}; {old}; {kept}; {fast}"), 5 + armed))
         },
     )?;
     let mut summary = Summary::default();
@@ -218,7 +221,7 @@ fn recording(name: &str) -> Result<String> {
 /// Sends a model with `vsj link`, to a board without a file for its flash, as `cargo xtask emulate --link` starts it.
 fn model(vsj: &Path, name: &str) -> Result<String> {
     let payload = plant_file::load(&shell::root().join(PLANT).display().to_string())?.wire()?.payload();
-    let sent = ModelId::of(1, &payload.context("a model that does not fit")?);
+    let sent = BlockId::of(1, &payload.context("a model that does not fit")?);
     let mut command = shell::command(vsj);
     let models = shell::json(command.args(["link", name, "model", PLANT, "--timeout", "10", "--json"]))?;
     let expected = serde_json::to_value(sent)?;
@@ -226,6 +229,43 @@ fn model(vsj: &Path, name: &str) -> Result<String> {
         ensure!(models[which] == expected, "the {which} model is {} instead of {expected}", models[which]);
     }
     Ok(format!("runs the model that was sent, {sent}"))
+}
+
+/// Sends settings with the highest rate, captures every tick of five seconds with them, and goes back to the built-in ones.
+fn settings(vsj: &Path, name: &str) -> Result<String> {
+    const RATE_HZ: u64 = 2000;
+    const CAPTURE_S: u64 = 5;
+    let folder = tempfile::tempdir()?;
+    let path = |file: &str| folder.path().join(file);
+    let run = |arguments: &[&str]| {
+        let mut command = shell::command(vsj);
+        shell::json(command.args(["link", name, "--timeout", "10", "--json"]).args(arguments))
+    };
+    let (file, input, out) = (path("settings.toml"), path("input.csv"), path("capture.csv"));
+    let [file, input, out] = [&file, &input, &out].map(|path| path.display().to_string());
+    let reach_v = 400.0;
+    fs::write(&file, format!("schema = 1\nrate_hz = {RATE_HZ}\n[amplifier]\nfull_scale_v = 450\nmax_v = {reach_v}\n"))?;
+    fs::write(&input, format!("time_s,voltage_v\n0,100\n2,300\n4,50\n{CAPTURE_S},50\n"))?;
+    let sent = run(&["settings", &file])?;
+    ensure!(sent["active"]["number"] == 1 && sent["active"] == sent["stored"], "other settings run: {sent}");
+    let status = run(&["status"])?;
+    let runs = status["rate_hz"] == RATE_HZ && status["highest_v"] == reach_v && status["overruns"] == 0;
+    ensure!(runs, "the settings do not run: {status}");
+
+    let captured = run(&["capture", "--input", &input, "--arm", "--out", &out])?;
+    let (rows, room) = (&captured["rows"], &captured["room"]);
+    ensure!(*rows == RATE_HZ * CAPTURE_S && captured["lost"] == 0, "rows are missing: {captured}");
+    let text = fs::read_to_string(&out)?;
+    let voltages: Vec<f64> = text.lines().skip(2).filter_map(|row| row.split(',').nth(1)?.parse().ok()).collect();
+    let highest_v = voltages.iter().copied().fold(0.0, f64::max);
+    ensure!(*rows == voltages.len(), "{} rows in the file: {captured}", voltages.len());
+    ensure!(highest_v > 0.9 * reach_v && highest_v <= reach_v, "the highest voltage is {highest_v} V");
+    let overruns = &run(&["status"])?["overruns"];
+    ensure!(*overruns == 0, "{overruns} ticks missed at {RATE_HZ} Hz");
+
+    let back = run(&["settings", "--default"])?;
+    ensure!(back["settings"]["rate_hz"] == 1000 && back["active"]["number"] == 2, "other settings run: {back}");
+    Ok(format!("runs settings that were sent; {rows} rows at {RATE_HZ} Hz captured, none missing, room for {room}"))
 }
 
 /// Opens the serial line to the board. Tries again for two seconds while the emulator is starting.

@@ -13,15 +13,11 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, random, reset, switch_amplifier_off};
-use firmware::settings::FLASHED;
 use firmware::store::Store;
-use firmware::tasks;
-use firmware::{crash_record, guards, log};
-use link::{Controller, Server};
+use firmware::tasks::{self, Timing};
+use firmware::{crash_record, guards, log, start};
+use link::Server;
 use model::supervisor::Fault;
-
-/// Controller of this image.
-const CONTROLLER: Controller = Controller::of(&FLASHED.compensation);
 
 /// Executor of the control task, on the interrupt of an unused peripheral.
 static HIGH: InterruptExecutor = InterruptExecutor::new();
@@ -45,7 +41,10 @@ fn main() -> ! {
     switch_amplifier_off();
     let cause = crash_record::reset_cause(Some(reset()));
     let (mut board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
-    log::boot(cause.name, cause.fault.map_or(0, Fault::code), CONTROLLER);
+    let mut store = Store::new(flash);
+    let loaded = start::load(&store);
+    board.start_watchdog(loaded.settings.watchdogs.reset_ms);
+    log::boot(cause.name, cause.fault.map_or(0, Fault::code), &loaded.settings);
     if guards::start(clocks::CORE_HZ).is_none() {
         // As after rejected settings: the output stays at zero and off until the watchdog resets the chip.
         loop {
@@ -58,16 +57,16 @@ fn main() -> ! {
     interrupt::FMAC.set_priority(Priority::P12);
     let low = LOW.start(interrupt::FMAC);
     let high = HIGH.start(interrupt::CORDIC);
-    let mut store = Store::new(flash);
     let seed = random::seed();
     if seed.is_none() {
         log::refused("random");
     }
-    match host::open(&FLASHED, &store, &cause, seed.unwrap_or(0)) {
+    match host::open(&loaded, &store, &cause, seed.unwrap_or(0)) {
         // Impossible: this is the first call.
         Ok(None) => {}
         Ok(Some((control, server))) => {
-            if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control)) {
+            if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control, Timing::of(&loaded.settings)))
+            {
                 low.spawn(housekeeping);
                 high.spawn(control);
             }
@@ -83,15 +82,15 @@ fn main() -> ! {
         }
     }
     loop {
-        host::serve_model_store(&mut store);
+        host::serve_store(&mut store, &loaded.settings);
         cortex_m::asm::wfi();
     }
 }
 
 #[embassy_executor::task]
-async fn run(mut board: Nucleo, control: &'static mut Control) {
+async fn run(mut board: Nucleo, control: &'static mut Control, timing: Timing) {
     let mut host = Host::new(control);
-    tasks::control(&mut board, control, &mut host, &mut Untimed).await;
+    tasks::control(&mut board, control, &mut host, &mut Untimed, timing).await;
     // Returning would drop the DAC, and its pin would float.
     pending().await
 }

@@ -1,19 +1,30 @@
-//! The mailbox between the host's task and the control task.
+//! The mailbox between the host's task and the control task, and the rows of the fast capture.
 
 use core::cell::Cell;
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use link::{Command, Telemetry, View};
+use link::capture::Capture;
+use link::{Command, Reply, Telemetry, View};
 use model::supervisor::State;
 
+use crate::capture::Recorder;
+use crate::capture_memory;
 use crate::control::{Control, Source, Tick};
 use crate::mailbox::Mailbox;
 
 static MAILBOX: Mutex<CriticalSectionRawMutex, Cell<Mailbox>> = Mutex::new(Cell::new(Mailbox::EMPTY));
 /// View of the tick that has taken a command.
 static DONE: Signal<CriticalSectionRawMutex, View> = Signal::new();
+
+/// The fast capture.
+static RECORDER: Recorder = Recorder::new();
+
+/// Executes a request about the capture.
+pub(super) fn capture(request: Capture) -> Reply {
+    RECORDER.execute(capture_memory::words(), request)
+}
 
 /// Runs `work` on the mailbox, with interrupts off.
 pub(super) fn with_mailbox<T>(work: impl FnOnce(&mut Mailbox) -> T) -> T {
@@ -71,6 +82,7 @@ impl Source for Host {
             mismatch: supervisor.mismatch().into(),
             sensor: output.sensor.into(),
         };
+        RECORDER.tick(capture_memory::words(), &sample, overruns);
         let (state, standing) = (self.state, supervisor.standing());
         let view = View { sample, state, standing, refusal: supervisor.refusal(), overruns };
         with_mailbox(|mailbox| mailbox.show(view));

@@ -3,8 +3,8 @@
 use embassy_time::{Duration, Timer, with_timeout};
 use link::{Server, Step, View};
 
-use super::model_store::update_model;
-use super::shared_mailbox::{hand_over, with_mailbox};
+use super::shared_mailbox::{capture, hand_over, with_mailbox};
+use super::shared_store;
 use crate::board::Line;
 use crate::stop;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
@@ -34,9 +34,18 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                     report_faults(line, server, &after).await;
                     send(line, server.command_done(&after)).await;
                 }
-                Some(Step::UpdateModel(update)) => {
-                    let result = update_model(update).await;
-                    send(line, server.model_updated(result, &view)).await;
+                Some(Step::Update(block, update)) => {
+                    let result = shared_store::update(block, update).await;
+                    send(line, server.updated(block, result, &view)).await;
+                }
+                Some(Step::ReadSettings { built_in, number }) => {
+                    let part = shared_store::settings_part(built_in, number).await;
+                    send(line, server.settings_part(part)).await;
+                }
+                Some(Step::Capture(request)) => {
+                    // The reply is not kept while the frame is sent.
+                    let bytes = server.captured(&capture(request));
+                    send(line, bytes).await;
                 }
                 Some(Step::Restart(bytes)) => {
                     send(line, bytes).await;

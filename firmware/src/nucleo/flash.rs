@@ -1,4 +1,4 @@
-//! The last two pages of the chip's flash, for the model store. They are in its second bank: the program, which the linker
+//! The last four pages of the chip's flash, for the store. They are in its second bank: the program, which the linker
 //! places in the first bank only, continues while a page is erased (22 ms) or written.
 //!
 //! A word whose writing was interrupted by a power cut can have more wrong bits than the flash's error correction (ECC) can
@@ -16,14 +16,15 @@ use embassy_stm32::peripherals;
 use model::supervisor::Fault;
 
 use crate::stop;
-use crate::store::{FlashError, PAGE, Pages, Side, WORD};
+use crate::store::{FlashError, PAGE, PAGES, Page, Pages, WORD};
+use link::Block;
 
 /// Address of the flash.
 const BASE: u32 = 0x0800_0000;
-/// Offset of the first of the two pages, in bytes.
-const OFFSET: u32 = (512 << 10) - 2 * PAGE as u32;
+/// Offset of the first of the pages, in bytes.
+const OFFSET: u32 = (512 << 10) - (PAGES * PAGE) as u32;
 
-/// True while the pages are read. The output is disabled during that time, before the first tick or while a model is stored,
+/// True while the pages are read. The output is disabled during that time, before the first tick or while a block is stored,
 /// and the thread does nothing else.
 static READING: AtomicBool = AtomicBool::new(false);
 
@@ -37,14 +38,19 @@ impl Flash {
     }
 }
 
-const fn offset(side: Side) -> u32 {
-    OFFSET + side as u32 * PAGE as u32
+/// Offset of a page: the settings come first, so that the model stays in the last two pages.
+const fn offset(page: Page) -> u32 {
+    let first = match page.block {
+        Block::Settings => 0,
+        Block::Model => 2,
+    };
+    OFFSET + (first + page.side as u32) * PAGE as u32
 }
 
 impl Pages for Flash {
-    fn bytes(&self, side: Side) -> &[u8; PAGE] {
+    fn bytes(&self, page: Page) -> &[u8; PAGE] {
         // SAFETY: an aligned page of the flash, which is written through `self` only.
-        unsafe { &*((BASE + offset(side)) as *const [u8; PAGE]) }
+        unsafe { &*((BASE + offset(page)) as *const [u8; PAGE]) }
     }
 
     fn tolerate_bit_errors<T>(&self, read: impl FnOnce() -> T) -> T {
@@ -57,17 +63,17 @@ impl Pages for Flash {
         result
     }
 
-    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
-        let from = offset(side);
+    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
+        let from = offset(page);
         self.0.blocking_erase(from, from + PAGE as u32).map_err(|_| FlashError)
     }
 
-    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
-        self.0.blocking_write(offset(side) + at as u32, &word).map_err(|_| FlashError)
+    fn program(&mut self, page: Page, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+        self.0.blocking_write(offset(page) + at as u32, &word).map_err(|_| FlashError)
     }
 }
 
-/// Handles a word with an uncorrectable error, which is tolerated in the model store only. The flag decides, not the address
+/// Handles a word with an uncorrectable error, which is tolerated in the store only. The flag decides, not the address
 /// and bank in the register: ST's EEPROM emulation for this chip does not rely on those either.
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {

@@ -9,7 +9,7 @@
 //! | [`clocks`] | Clock configuration, without a crystal. |
 //! | [`amplifier`] | Amplifier port: DAC, enable, monitors. |
 //! | [`uart`] | Line to the host. |
-//! | [`flash`] | Two pages for the model store. |
+//! | [`flash`] | Four pages for the store. |
 //! | [`reset`] | Source of the last reset. |
 //! | [`random`] | Random number generator. |
 //! | [`clock_test`] | Measurement of the processor's clock. |
@@ -24,15 +24,14 @@ pub mod random;
 pub mod reset;
 pub mod uart;
 
-use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{Peri, Peripherals};
 use model::supervisor::Fault;
 
 use crate::board::Board;
 use crate::log;
-use crate::settings::WATCHDOG_MS;
 
 pub use amplifier::switch_amplifier_off;
 pub use reset::reset;
@@ -41,7 +40,9 @@ pub use reset::reset;
 pub struct Nucleo {
     amplifier: amplifier::Amplifier,
     interlock: Input<'static>,
-    watchdog: IndependentWatchdog<'static, IWDG>,
+    /// Until [`Nucleo::start_watchdog`].
+    idle_watchdog: Option<Peri<'static, IWDG>>,
+    watchdog: Option<IndependentWatchdog<'static, IWDG>>,
     led: Output<'static>,
     fault: Option<Fault>,
 }
@@ -51,12 +52,11 @@ impl Nucleo {
     /// returned separately because other tasks own them.
     pub fn init(p: Peripherals) -> (Self, Option<uart::Uart>, flash::Flash) {
         let amplifier = amplifier::Amplifier::new(p.DAC1, p.PA4, p.PB5, p.ADC1, p.PA0, p.PA1);
-        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_MS * 1000);
-        watchdog.unleash();
         let board = Self {
             amplifier,
             interlock: Input::new(p.PB10, Pull::Down),
-            watchdog,
+            idle_watchdog: Some(p.IWDG),
+            watchdog: None,
             led: Output::new(p.PA5, Level::Low, Speed::Low),
             fault: None,
         };
@@ -65,6 +65,13 @@ impl Nucleo {
 }
 
 impl Nucleo {
+    /// Starts the hardware watchdog: the chip is reset after `reset_ms` without feeding.
+    pub fn start_watchdog(&mut self, reset_ms: u32) {
+        if let Some(idle) = self.idle_watchdog.take() {
+            self.watchdog.insert(IndependentWatchdog::new(idle, reset_ms * 1000)).unleash();
+        }
+    }
+
     /// Compares the processor's clock with the watchdog's, and reads the level of the brown-out reset. A wrong clock is a
     /// `self-test` fault until the restart, another level is logged only.
     pub fn test(&mut self) {
@@ -90,7 +97,9 @@ impl Board for Nucleo {
     }
 
     fn feed_watchdog(&mut self) {
-        self.watchdog.pet();
+        if let Some(watchdog) = &mut self.watchdog {
+            watchdog.pet();
+        }
     }
 
     fn fault(&self) -> Option<Fault> {

@@ -1,7 +1,8 @@
-//! Power cuts at every step of storing a model, with eight ways of interrupting the step.
+//! Power cuts at every step of storing a model or settings, with eight ways of interrupting the step.
 
 use std::vec::Vec;
 
+use link::Block::{Model, Settings};
 use link::wire_model::MOST_PARTS;
 
 use super::*;
@@ -11,7 +12,7 @@ mod other_store;
 /// Simulated flash with a power cut.
 #[derive(Clone, Debug)]
 struct Flash {
-    pages: [[u8; PAGE]; 2],
+    pages: [[u8; PAGE]; PAGES],
     /// Number of steps until the power cut; `None` without one.
     steps: Option<usize>,
     torn: Torn,
@@ -40,7 +41,7 @@ const TORN: [Torn; 8] = [
 ];
 
 impl Flash {
-    const BLANK: Self = Self { pages: [[0xff; PAGE]; 2], steps: None, torn: Torn::Nothing };
+    const BLANK: Self = Self { pages: [[0xff; PAGE]; PAGES], steps: None, torn: Torn::Nothing };
 
     /// The bits that this step changes, and whether the power is still on after it.
     fn power(&mut self) -> Result<(u64, bool), FlashError> {
@@ -61,21 +62,21 @@ impl Flash {
 }
 
 impl Pages for Flash {
-    fn bytes(&self, side: Side) -> &[u8; PAGE] {
-        &self.pages[side as usize]
+    fn bytes(&self, page: Page) -> &[u8; PAGE] {
+        &self.pages[page.index()]
     }
 
-    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
+    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
         let (done, whole) = self.power()?;
-        for word in self.pages[side as usize].as_chunks_mut::<WORD>().0 {
+        for word in self.pages[page.index()].as_chunks_mut::<WORD>().0 {
             *word = (u64::from_le_bytes(*word) | done).to_le_bytes();
         }
         if whole { Ok(()) } else { Err(FlashError) }
     }
 
-    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+    fn program(&mut self, page: Page, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
         let (done, whole) = self.power()?;
-        let place = &mut self.pages[side as usize].as_chunks_mut::<WORD>().0[at / WORD];
+        let place = &mut self.pages[page.index()].as_chunks_mut::<WORD>().0[at / WORD];
         assert!(*place == [0xff; WORD] || self.steps.is_some(), "a word is written only once");
         *place = (u64::from_le_bytes(*place) & (u64::from_le_bytes(word) | !done)).to_le_bytes();
         if whole { Ok(()) } else { Err(FlashError) }
@@ -86,20 +87,33 @@ fn payload(seed: u8) -> Vec<u8> {
     (0..100 + u32::from(seed)).map(|i| (i as u8).wrapping_mul(31).wrapping_add(seed)).collect()
 }
 
-fn store(flash: &Flash, payload: &[u8], check: Result<(), Reason>) -> (Flash, Result<ModelId, Reason>) {
+fn store(flash: &Flash, payload: &[u8], check: Result<(), Reason>) -> (Flash, Result<BlockId, Reason>) {
+    store_block(flash, Model, payload, check)
+}
+
+fn store_block(
+    flash: &Flash,
+    block: Block,
+    payload: &[u8],
+    check: Result<(), Reason>,
+) -> (Flash, Result<BlockId, Reason>) {
     let mut store = Store::new(flash.clone());
     let mut sent = Ok(());
     for (number, part) in (0..).zip(payload.chunks(PART)) {
         let mut bytes = [0; PART];
         bytes[..part.len()].copy_from_slice(part);
-        sent = sent.and_then(|()| store.part(number, &bytes));
+        sent = sent.and_then(|()| store.part(block, number, &bytes));
     }
-    let ended = sent.and_then(|()| store.end(payload.len() as u16, frame::checksum(payload), |_| check));
+    let ended = sent.and_then(|()| store.end(block, payload.len() as u16, frame::checksum(payload), |_, _| check));
     (store.pages, ended)
 }
 
 fn newest(flash: &Flash) -> Option<Vec<u8>> {
-    Store::new(flash.clone()).newest().map(|(_, payload)| payload.to_vec())
+    newest_block(flash, Model)
+}
+
+fn newest_block(flash: &Flash, block: Block) -> Option<Vec<u8>> {
+    Store::new(flash.clone()).newest(block).map(|(_, payload)| payload.to_vec())
 }
 
 #[test]
@@ -116,50 +130,79 @@ fn the_model_with_the_highest_number_is_valid() {
 
 #[test]
 #[cfg_attr(miri, ignore = "slow under Miri")]
-fn a_power_cut_preserves_the_old_or_the_new_model() {
-    let mut before = Flash::BLANK;
+fn a_power_cut_preserves_the_old_or_the_new_block() {
     let (mut cuts, mut old_ones, mut new_ones) = (0, 0, 0);
-    for number in 1..4 {
-        let (old, new) = (newest(&before), payload(number));
-        let (after, _) = store(&before, &new, Ok(()));
-        // One erase, the words of the parts, and two words of the header.
-        let steps = 1 + new.len().div_ceil(PART) * PART / WORD + 2;
-        for (cut, torn) in (1..=steps).flat_map(|cut| TORN.map(|torn| (cut, torn))) {
-            let (cut_off, stored) = store(&Flash { steps: Some(cut), torn, ..before.clone() }, &new, Ok(()));
-            assert!(stored.is_err(), "success is never reported after a power cut");
-            let again = Flash { steps: None, ..cut_off };
-            let found = newest(&again);
-            assert!(found == old || found.as_ref() == Some(&new), "step {cut}, {torn:?}: {found:?}");
-            assert!(cut == steps || found == old, "only the last step makes the new model valid");
-            (cuts, old_ones, new_ones) =
-                (cuts + 1, old_ones + u32::from(found == old), new_ones + u32::from(found != old));
-            // The next attempt succeeds.
-            let (repaired, stored) = store(&again, &new, Ok(()));
-            assert!(stored.is_ok() && newest(&repaired).as_ref() == Some(&new), "step {cut}, {torn:?}");
+    for (block, other) in [(Model, Settings), (Settings, Model)] {
+        // The other block has a content that no cut may touch.
+        let kept = payload(9);
+        let mut before = store_block(&Flash::BLANK, other, &kept, Ok(())).0;
+        for number in 1..4 {
+            let (old, new) = (newest_block(&before, block), payload(number));
+            let (after, _) = store_block(&before, block, &new, Ok(()));
+            // One erase, the words of the parts, and two words of the header.
+            let steps = 1 + new.len().div_ceil(PART) * PART / WORD + 2;
+            for (cut, torn) in (1..=steps).flat_map(|cut| TORN.map(|torn| (cut, torn))) {
+                let until = Flash { steps: Some(cut), torn, ..before.clone() };
+                let (cut_off, stored) = store_block(&until, block, &new, Ok(()));
+                assert!(stored.is_err(), "success is never reported after a power cut");
+                let again = Flash { steps: None, ..cut_off };
+                let found = newest_block(&again, block);
+                assert!(found == old || found.as_ref() == Some(&new), "step {cut}, {torn:?}: {found:?}");
+                assert!(cut == steps || found == old, "only the last step makes the new block valid");
+                assert_eq!(newest_block(&again, other).as_ref(), Some(&kept), "step {cut}, {torn:?}: the other block");
+                (cuts, old_ones, new_ones) =
+                    (cuts + 1, old_ones + u32::from(found == old), new_ones + u32::from(found != old));
+                // The next attempt succeeds.
+                let (repaired, stored) = store_block(&again, block, &new, Ok(()));
+                assert!(
+                    stored.is_ok() && newest_block(&repaired, block).as_ref() == Some(&new),
+                    "step {cut}, {torn:?}"
+                );
+            }
+            before = after;
         }
-        before = after;
     }
-    std::println!("count: {cuts} power cuts while a model is written, the old or the new one found each time");
-    assert!(cuts > 400 && new_ones >= 3 && old_ones > new_ones, "{cuts} {old_ones} {new_ones}");
+    std::println!("count: {cuts} power cuts while a block is written, the old or the new one found each time");
+    assert!(cuts > 800 && new_ones >= 6 && old_ones > new_ones, "{cuts} {old_ones} {new_ones}");
+}
+
+#[test]
+fn a_transfer_of_one_block_ends_that_of_the_other() {
+    let mut store = Store::new(Flash::BLANK);
+    store.part(Model, 0, &[0; PART]).unwrap();
+    assert_eq!(store.part(Settings, 1, &[0; PART]), Err(Reason::PartMissing(0)), "of another block");
+    assert_eq!(store.part(Model, 1, &[0; PART]), Err(Reason::PartMissing(0)), "the transfer has ended");
+    store.part(Model, 0, &[0; PART]).unwrap();
+    assert_eq!(store.end(Settings, 20, 0, |_, _| Ok(())), Err(Reason::PartMissing(0)));
+    assert_eq!(store.end(Model, 20, 0, |_, _| Ok(())), Err(Reason::PartMissing(0)));
+}
+
+/// A page of settings in the place of a model is none.
+#[test]
+fn a_page_of_one_block_is_none_of_the_other() {
+    let (mut flash, _) = store_block(&Flash::BLANK, Settings, &payload(1), Ok(()));
+    let [a, _, c, _] = &mut flash.pages;
+    a.copy_from_slice(c);
+    assert_eq!((newest_block(&flash, Model), newest_block(&flash, Settings)), (None, Some(payload(1))));
 }
 
 #[test]
 fn an_invalid_or_incomplete_model_is_not_stored() {
     let (flash, _) = store(&Flash::BLANK, &payload(1), Ok(()));
-    let bad = Reason::ModelDamaged;
+    let bad = Reason::Damaged;
     let (after, stored) = store(&flash, &payload(2), Err(bad));
     assert_eq!((stored, newest(&after)), (Err(bad), Some(payload(1))), "rejected by its validation");
 
     let mut store = Store::new(flash);
-    assert_eq!(store.part(1, &[0; PART]), Err(Reason::PartMissing(0)), "the first part is missing");
-    store.part(0, &[0; PART]).unwrap();
-    assert_eq!(store.part(2, &[0; PART]), Err(Reason::PartMissing(1)), "a part is missing");
-    assert_eq!(store.part(13, &[0; PART]), Err(Reason::PartMissing(1)), "beyond the longest payload");
-    assert_eq!(store.end(40, 0, |_| Ok(())), Err(Reason::PartMissing(1)), "the end is missing");
-    store.part(0, &[0; PART]).unwrap();
-    assert_eq!(store.end(20, 1, |_| Ok(())), Err(Reason::ModelDamaged), "another checksum");
-    assert_eq!(store.end(20, 1, |_| Ok(())), Err(Reason::PartMissing(0)), "an end without parts");
-    assert_eq!(store.newest().map(|(id, _)| id.number), Some(1));
+    assert_eq!(store.part(Model, 1, &[0; PART]), Err(Reason::PartMissing(0)), "the first part is missing");
+    store.part(Model, 0, &[0; PART]).unwrap();
+    assert_eq!(store.part(Model, 2, &[0; PART]), Err(Reason::PartMissing(1)), "a part is missing");
+    assert_eq!(store.part(Model, 13, &[0; PART]), Err(Reason::PartMissing(1)), "beyond the longest payload");
+    assert_eq!(store.end(Model, 40, 0, |_, _| Ok(())), Err(Reason::PartMissing(1)), "the end is missing");
+    store.part(Model, 0, &[0; PART]).unwrap();
+    assert_eq!(store.end(Model, 20, 1, |_, _| Ok(())), Err(Reason::Damaged), "another checksum");
+    assert_eq!(store.end(Model, 20, 1, |_, _| Ok(())), Err(Reason::PartMissing(0)), "an end without parts");
+    assert_eq!(store.newest(Model).map(|(id, _)| id.number), Some(1));
 }
 
 /// Random bits in a page cause neither a panic nor a valid model.
@@ -176,7 +219,7 @@ fn random_pages_contain_no_model() {
             *byte = bits as u8;
         }
         if round % 2 == 0 {
-            flash.pages[0][..4].copy_from_slice(&MARK.to_le_bytes());
+            flash.pages[0][..4].copy_from_slice(&mark(Model));
         }
         assert_eq!(newest(&flash), None);
     }
@@ -192,10 +235,10 @@ fn the_longest_payload_fills_all_parts_and_no_further_part_is_written() {
 
     let mut store = Store::new(flash);
     for (number, part) in (0..).zip(longest.as_chunks().0) {
-        store.part(number, part).unwrap();
+        store.part(Model, number, part).unwrap();
     }
-    assert_eq!(store.part(MOST_PARTS, &[0; PART]), Err(Reason::PartMissing(MOST_PARTS)));
-    assert_eq!(store.newest().map(|(_, payload)| payload.len()), Some(MOST_BYTES), "the old one stays");
+    assert_eq!(store.part(Model, MOST_PARTS, &[0; PART]), Err(Reason::PartMissing(MOST_PARTS)));
+    assert_eq!(store.newest(Model).map(|(_, payload)| payload.len()), Some(MOST_BYTES), "the old one stays");
 }
 
 /// Flash that reports success and writes nothing from a number of steps on.
@@ -205,18 +248,18 @@ struct Deaf {
 }
 
 impl Pages for Deaf {
-    fn bytes(&self, side: Side) -> &[u8; PAGE] {
-        self.flash.bytes(side)
+    fn bytes(&self, page: Page) -> &[u8; PAGE] {
+        self.flash.bytes(page)
     }
 
-    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
+    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
         self.hears = self.hears.saturating_sub(1);
-        if self.hears > 0 { self.flash.erase(side) } else { Ok(()) }
+        if self.hears > 0 { self.flash.erase(page) } else { Ok(()) }
     }
 
-    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+    fn program(&mut self, page: Page, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
         self.hears = self.hears.saturating_sub(1);
-        if self.hears > 0 { self.flash.program(side, at, word) } else { Ok(()) }
+        if self.hears > 0 { self.flash.program(page, at, word) } else { Ok(()) }
     }
 }
 
@@ -230,12 +273,12 @@ fn success_is_reported_only_for_a_model_that_can_be_read_back() {
         for (number, part) in (0..).zip(new.chunks(PART)) {
             let mut bytes = [0; PART];
             bytes[..part.len()].copy_from_slice(part);
-            store.part(number, &bytes).unwrap();
+            store.part(Model, number, &bytes).unwrap();
         }
-        let stored = store.end(new.len() as u16, frame::checksum(&new), |_| Ok(()));
+        let stored = store.end(Model, new.len() as u16, frame::checksum(&new), |_, _| Ok(()));
         let expected = if hears > steps { &new } else { &old };
         assert_eq!(stored.is_ok(), hears > steps, "deaf from step {hears} on: {stored:?}");
-        assert_eq!(store.newest().map(|(_, payload)| payload), Some(&expected[..]), "deaf from step {hears} on");
+        assert_eq!(store.newest(Model).map(|(_, payload)| payload), Some(&expected[..]), "deaf from step {hears} on");
     }
 }
 
@@ -244,9 +287,9 @@ fn success_is_reported_only_for_a_model_that_can_be_read_back() {
 fn the_last_number_is_the_end_and_keeps_its_model() {
     let mut flash = Flash::BLANK;
     let last = payload(1);
-    let id = ModelId::of(u32::MAX, &last);
+    let id = BlockId::of(u32::MAX, &last);
     flash.pages[0][HEADER..HEADER + last.len()].copy_from_slice(&last);
-    for (word, bytes) in header(&id).iter().enumerate() {
+    for (word, bytes) in header(Model, &id).iter().enumerate() {
         flash.pages[0][word * WORD..][..WORD].copy_from_slice(bytes);
     }
     assert_eq!(newest(&flash), Some(last.clone()));

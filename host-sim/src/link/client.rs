@@ -8,10 +8,11 @@ use std::fmt;
 use std::io;
 use std::time::{Duration, Instant, SystemTime};
 
-use link::wire_model::PART;
+use link::block::PART;
+use link::capture::{Capture, Captured, Row};
 use link::{
-    FaultReport, Frame, ModelId, Models, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry,
-    Unreadable, WireModel,
+    Block, BlockId, Blocks, FaultReport, Frame, Nonce, Packet, Part, Reason, Receiver, Reply, Request, Sequence,
+    Status, Telemetry, Unreadable, WireModel, WireSettings,
 };
 
 use crate::link::Port;
@@ -56,13 +57,17 @@ pub enum Failure {
         /// Number of bytes that arrived nevertheless.
         bytes: u64,
     },
-    /// The MCU has taken a model, but after its restart it does not run it.
-    OtherModel {
-        /// The model that was sent, with the number that it runs as.
-        sent: ModelId,
-        /// The models after the restart.
-        models: Models,
+    /// The MCU has taken a model or settings, but after its restart it does not run them.
+    NotRun {
+        /// `model` or `settings`.
+        what: &'static str,
+        /// What was sent, with the number that it runs as.
+        sent: BlockId,
+        /// What runs and what is stored after the restart.
+        blocks: Blocks,
     },
+    /// The MCU's settings are of a format that this program does not know.
+    UnknownSettings,
     /// The port failed.
     Port(io::Error),
 }
@@ -79,14 +84,18 @@ impl fmt::Display for Failure {
             Self::NoAnswer { tries, bytes } => {
                 write!(f, "no valid answer to {tries} requests, but {bytes} bytes; is the baud rate right?")
             }
-            Self::OtherModel { sent: ModelId { format, length, checksum, .. }, models } => {
-                let Models { active, stored } = models;
+            Self::NotRun {
+                what,
+                sent: BlockId { format, length, checksum, .. },
+                blocks: Blocks { active, stored },
+            } => {
                 write!(
                     f,
-                    "the MCU has restarted and does not run the model that was sent (format {format}, {length} bytes, CRC \
+                    "the MCU has restarted and does not run what was sent as {what} (format {format}, {length} bytes, CRC \
                      {checksum:08x}): it runs {active}, and has stored {stored}"
                 )
             }
+            Self::UnknownSettings => f.write_str("the MCU's settings are of a format that this program does not know"),
             Self::Port(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                 f.write_str("the other side closed the connection")
             }
@@ -195,7 +204,7 @@ impl Client {
     ///
     /// # Errors
     /// [`Failure`]
-    pub fn models(&mut self) -> Result<Models, Failure> {
+    pub fn models(&mut self) -> Result<Blocks, Failure> {
         match self.ask(Request::Model)? {
             Reply::Model(models) => Ok(models),
             other => Err(Failure::Unexpected(Box::new(other))),
@@ -205,24 +214,121 @@ impl Client {
     /// Sends a model to be checked and stored, restarts the MCU, connects again, and checks that it runs this model.
     ///
     /// # Errors
-    /// [`Failure`]; if the model is rejected, the old one stays. [`Failure::OtherModel`] if another one runs.
-    pub fn install(&mut self, model: &WireModel) -> Result<Models, Failure> {
+    /// [`Failure`]; if the model is rejected, the old one stays. [`Failure::NotRun`] if another one runs.
+    pub fn install(&mut self, model: &WireModel) -> Result<Blocks, Failure> {
         // An oversized payload is not sent; the MCU then rejects the model as incomplete.
-        let payload = model.payload().unwrap_or_default();
+        self.send(Block::Model, &model.payload().unwrap_or_default())
+    }
+
+    /// The settings that run now, and those stored for the next start.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn settings(&mut self) -> Result<Blocks, Failure> {
+        match self.ask(Request::Settings)? {
+            Reply::Settings(blocks) => Ok(blocks),
+            other => Err(Failure::Unexpected(Box::new(other))),
+        }
+    }
+
+    /// Reads the settings that run, or those that are built into the MCU's image.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn read_settings(&mut self, built_in: bool) -> Result<WireSettings, Failure> {
+        let mut payload = Vec::new();
+        for number in 0.. {
+            match self.ask(Request::ReadSettings { built_in, number })? {
+                Reply::SettingsPart(Part { number: of, length, bytes }) if of == number => {
+                    payload.extend(bytes);
+                    if payload.len() >= usize::from(length) {
+                        payload.truncate(usize::from(length));
+                        break;
+                    }
+                }
+                other => return Err(Failure::Unexpected(Box::new(other))),
+            }
+        }
+        WireSettings::read(&payload).ok_or(Failure::UnknownSettings)
+    }
+
+    /// Sends settings to be checked and stored, restarts the MCU, connects again, and checks that it runs them: by their
+    /// identity, and value by value.
+    ///
+    /// # Errors
+    /// [`Failure`]; if the settings are rejected, the old ones stay. [`Failure::NotRun`] if others run.
+    pub fn install_settings(&mut self, settings: &WireSettings) -> Result<Blocks, Failure> {
+        let payload = settings.payload().unwrap_or_default();
+        let blocks = self.send(Block::Settings, &payload)?;
+        let running = self.read_settings(false)?;
+        if running.payload().is_none_or(|running| running != payload) {
+            let sent = BlockId::of(blocks.active.number, &payload);
+            return Err(Failure::NotRun { what: "settings", sent, blocks });
+        }
+        Ok(blocks)
+    }
+
+    /// How far the fast capture is, and for how many rows the MCU has room.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn capture_state(&mut self) -> Result<Captured, Failure> {
+        self.ask_capture(Capture::State)
+    }
+
+    /// Starts a fast capture of this number of ticks.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn capture(&mut self, rows: u32) -> Result<Captured, Failure> {
+        self.ask_capture(Capture::Start { rows })
+    }
+
+    fn ask_capture(&mut self, request: Capture) -> Result<Captured, Failure> {
+        match self.ask(Request::Capture(request))? {
+            Reply::Captured(captured) => Ok(captured),
+            other => Err(Failure::Unexpected(Box::new(other))),
+        }
+    }
+
+    /// Reads rows of the fast capture, from number `first` on; none if it has not come that far. A frame that is damaged
+    /// is asked for again.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn rows(&mut self, first: u32) -> Result<Vec<Row>, Failure> {
+        match self.ask(Request::Capture(Capture::Read { first }))? {
+            Reply::Rows(rows) if rows.first == first => Ok(rows.iter().collect()),
+            other => Err(Failure::Unexpected(Box::new(other))),
+        }
+    }
+
+    /// Sends a block, restarts the MCU, connects again, and checks that it runs the block.
+    fn send(&mut self, block: Block, payload: &[u8]) -> Result<Blocks, Failure> {
         for (number, part) in (0..).zip(payload.chunks(PART)) {
             let mut bytes = [0; PART];
             bytes[..part.len()].copy_from_slice(part);
-            self.order(Request::ModelPart { number, bytes })?;
+            self.order(match block {
+                Block::Model => Request::ModelPart { number, bytes },
+                Block::Settings => Request::SettingsPart { number, bytes },
+            })?;
         }
-        self.order(Request::ModelEnd { length: payload.len() as u16, checksum: link::frame::checksum(&payload) })?;
+        let (length, checksum) = (payload.len() as u16, link::frame::checksum(payload));
+        self.order(match block {
+            Block::Model => Request::ModelEnd { length, checksum },
+            Block::Settings => Request::SettingsEnd { length, checksum },
+        })?;
         self.order(Request::Restart)?;
         self.begin()?;
-        let models = self.models()?;
-        let sent = ModelId::of(models.active.number, &payload);
-        if models.active == ModelId::default() || models.active != sent {
-            return Err(Failure::OtherModel { sent, models });
+        let (what, blocks) = match block {
+            Block::Model => ("model", self.models()?),
+            Block::Settings => ("settings", self.settings()?),
+        };
+        let sent = BlockId::of(blocks.active.number, payload);
+        if blocks.active == BlockId::default() || blocks.active != sent {
+            return Err(Failure::NotRun { what, sent, blocks });
         }
-        Ok(models)
+        Ok(blocks)
     }
 
     /// Waits for `wait` and returns all telemetry received.

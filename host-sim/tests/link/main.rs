@@ -1,12 +1,14 @@
 //! `vsj link` against an MCU in the test process.
 #![cfg(unix)]
 
+mod capture;
 mod command;
 mod damage;
 mod mcu;
 mod model;
 #[cfg(target_os = "linux")]
 mod output;
+mod settings;
 mod vsj;
 #[cfg(target_os = "linux")]
 mod watch;

@@ -10,13 +10,18 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use firmware::capture::Recorder;
 use firmware::control::{Control, Sensors, Untimed};
-use firmware::store::{FlashError, PAGE, Pages, Side, Store, WORD};
+use firmware::reset_cause::Cause;
+use firmware::settings::BUILT_IN;
+use firmware::start::{self, Start};
+use firmware::store::{FlashError, PAGE, PAGES, Page, Pages, Store, WORD};
+use firmware::update;
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{About, Command, Controller, Fault, ModelUpdate, Reason, Server, State, Step, Telemetry, View, WireModel};
+use link::{About, Block, Command, Controller, Fault, Server, State, Step, Telemetry, View};
 use model::stiffness::{Cantilever, YoungsModulus};
-use model::{Settings, Spring, supervisor};
+use model::{Spring, device, supervisor};
 use serialport::{SerialPort, TTYPort};
 
 /// Properties of the MCU and its line.
@@ -62,28 +67,28 @@ pub(crate) struct Shared {
     pub(crate) flash: Flash,
 }
 
-/// Two pages of flash memory.
+/// Pages of flash memory.
 #[derive(Clone, Debug)]
-pub(crate) struct Flash([[u8; PAGE]; 2]);
+pub(crate) struct Flash([[u8; PAGE]; PAGES]);
 
 impl Default for Flash {
     fn default() -> Self {
-        Self([[0xff; PAGE]; 2])
+        Self([[0xff; PAGE]; PAGES])
     }
 }
 
 impl Pages for Flash {
-    fn bytes(&self, side: Side) -> &[u8; PAGE] {
-        &self.0[side as usize]
+    fn bytes(&self, page: Page) -> &[u8; PAGE] {
+        &self.0[page.index()]
     }
 
-    fn erase(&mut self, side: Side) -> Result<(), FlashError> {
-        self.0[side as usize].fill(0xff);
+    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
+        self.0[page.index()].fill(0xff);
         Ok(())
     }
 
-    fn program(&mut self, side: Side, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
-        self.0[side as usize][at..at + WORD].copy_from_slice(&word);
+    fn program(&mut self, page: Page, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
+        self.0[page.index()][at..at + WORD].copy_from_slice(&word);
         Ok(())
     }
 }
@@ -105,6 +110,9 @@ fn next_seed() -> u32 {
     static SEED: AtomicU32 = AtomicU32::new(0);
     SEED.fetch_add(1 << 20, Ordering::Relaxed)
 }
+
+/// Rows for which the MCU has room.
+pub(crate) const ROWS: usize = 2000;
 
 const POLL: Duration = Duration::from_micros(500);
 
@@ -213,7 +221,7 @@ impl Mcu {
                     chip.shared.lock().unwrap().seed = next_seed();
                     (chip, start) = (Chip::new(setup, chip.shared), Instant::now());
                 }
-                while u128::from(chip.view.sample.tick) < start.elapsed().as_millis() {
+                while chip.view.sample.tick as f64 * chip.period.as_secs_f64() < start.elapsed().as_secs_f64() {
                     chip.tick(Command::default());
                 }
                 for byte in &bytes[..count] {
@@ -242,34 +250,44 @@ struct Chip {
     control: Control,
     store: Store<Flash>,
     view: View,
+    settings: device::Settings,
+    recorder: Recorder,
+    memory: Vec<AtomicU32>,
+    /// Time between two ticks.
+    period: Duration,
 }
 
 impl Chip {
     fn new(setup: Setup, shared: Arc<Mutex<Shared>>) -> Self {
-        let host_timeout_s = f64::from(setup.silence_ms) / 1000.0;
-        let supervision = supervisor::Settings { host_timeout_s, ..supervisor::Settings::DEFAULT };
         let store = Store::new(shared.lock().unwrap().flash.clone());
-        let stored = store.newest().map(|(id, payload)| (id, WireModel::read(payload).unwrap()));
-        let (id, found) = stored.unzip();
-        let model = id.unwrap_or_default();
-        let mut control = Control::new(&Settings::PAPER, &supervision, None).unwrap();
-        if let Some(found) = found {
-            control.use_model(&Settings::PAPER, &found).unwrap();
-        }
-        let seed = shared.lock().unwrap().seed;
-        let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
+        let mut loaded = start::load(&store);
+        assert_eq!(loaded.rejected, None);
+        let settings = loaded.settings;
+        loaded.settings.supervision.host_timeout_s = f64::from(setup.silence_ms) / 1000.0;
+        let cause = Cause { name: "power-on", fault: None, standing: supervisor::Faults::NONE };
+        let mut place = None;
+        let (_, start) = start::control(&loaded, store.newest(Block::Model), &cause, &mut place).unwrap();
+        let control = place.unwrap();
+        let Start { amplifier, model, .. } = start;
+        let blocks = loaded.blocks;
+        let controller = Controller::of(&settings.control.compensation);
+        let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, amplifier.min_v, amplifier.max_v).unwrap();
         let about = About {
-            firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd, controller: Controller::Paper },
-            rate_hz: 1000,
-            silence_limit_ticks: setup.silence_ms,
+            firmware: Firmware { major: 0, minor: 1, patch: 0, revision: 0xabcd, controller },
+            rate_hz: settings.rate_hz(),
+            silence_limit_ticks: setup.silence_ms * settings.rate_hz() / 1000,
             last_fault: Fault::NONE,
             model,
-            stored: model,
-            seed,
+            settings: blocks,
+            seed: shared.lock().unwrap().seed,
         };
+        let server = Server::new(spring, about);
         let (state, standing) = (supervisor::State::Disarmed, supervisor::Faults::NONE);
         let view = View { sample: Telemetry::default(), state, standing, refusal: None, overruns: 0 };
-        let mut chip = Self { setup, shared, server: Server::new(spring, about), control, store, view };
+        let period = Duration::from_secs(1) / settings.rate_hz();
+        let memory = (0..2 * ROWS).map(|_| AtomicU32::new(0)).collect();
+        let mut chip =
+            Self { setup, shared, server, control, store, view, settings, recorder: Recorder::new(), memory, period };
         chip.tick(Command::default());
         chip
     }
@@ -295,6 +313,7 @@ impl Chip {
             mismatch: supervisor.mismatch().into(),
             sensor: link::Sensor(u8::from(self.setup.sensor)),
         };
+        self.recorder.tick(&self.memory, &sample, 0);
         let mut shared = self.shared.lock().unwrap();
         (shared.sample, shared.counters) = (sample, self.server.counters());
         let (state, standing) = (supervisor.state(), supervisor.standing());
@@ -310,12 +329,17 @@ impl Chip {
                 out.extend_from_slice(self.server.command_done(&self.view));
             }
             Some(Step::Send(bytes)) => out.extend_from_slice(bytes),
-            Some(Step::UpdateModel(update)) => {
-                let kept = match update {
-                    ModelUpdate::Part(number, bytes) => self.store.part(number, &bytes).map(|()| None),
-                    ModelUpdate::End { length, checksum } => self.store.end(length, checksum, check).map(Some),
-                };
-                out.extend_from_slice(self.server.model_updated(kept, &self.view));
+            Some(Step::Update(block, update)) => {
+                let kept = update::execute(&mut self.store, block, update);
+                out.extend_from_slice(self.server.updated(block, kept, &self.view));
+            }
+            Some(Step::ReadSettings { built_in, number }) => {
+                let settings = if built_in { &BUILT_IN } else { &self.settings };
+                out.extend_from_slice(self.server.settings_part(update::settings_part(settings, number)));
+            }
+            Some(Step::Capture(request)) => {
+                let reply = self.recorder.execute(&self.memory, request);
+                out.extend_from_slice(self.server.captured(&reply));
             }
             Some(Step::Restart(bytes)) => {
                 out.extend_from_slice(bytes);
@@ -326,12 +350,6 @@ impl Chip {
             None => {}
         }
     }
-}
-
-/// The check of a model, as in the firmware.
-fn check(payload: &[u8]) -> Result<(), Reason> {
-    let found = WireModel::read(payload).ok_or(Reason::ModelDamaged)?;
-    Control::check(&Settings::PAPER, &found).map_err(|error| Reason::of_model(&error))
 }
 
 /// Damage on the line, the same in every run.

@@ -50,6 +50,6 @@ fn a_model_is_sent_checked_stored_and_run() {
 fn an_mcu_that_does_not_run_the_model_that_was_sent_is_a_failure() {
     let mcu = Mcu::on_socket(Setup { forgets: true, ..Setup::default() });
     let text = bad(1, &mcu.port, &["model", "paper"]);
-    assert!(text.contains("does not run the model that was sent (format 1, 25 bytes, CRC "), "{text}");
+    assert!(text.contains("does not run what was sent as model (format 1, 25 bytes, CRC "), "{text}");
     assert!(text.contains("it runs the one that is built in, and has stored the one that is built in"), "{text}");
 }

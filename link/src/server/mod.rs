@@ -4,8 +4,10 @@
 //!
 //! 1. Pass each received byte to [`Server::on_byte`] with the latest [`View`]. [`Step::Send`]: send the bytes.
 //!    [`Step::Command`]: pass the command to the control tick, wait until that tick has run, then send what
-//!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::UpdateModel`]: likewise with the
-//!    model store and [`Server::model_updated`]. [`Step::Restart`]: send the bytes and restart.
+//!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::Update`]: likewise with the
+//!    store and [`Server::updated`]. [`Step::ReadSettings`], [`Step::Capture`]: send what
+//!    [`Server::settings_part`], [`Server::captured`] returns.
+//!    [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
 //! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns.
 //! 4. Periodically send what [`Server::telemetry`] returns; [`Server::telemetry_lost`] if that does not succeed.
@@ -17,14 +19,15 @@ mod reports;
 use model::Spring;
 use model::supervisor::{self, Faults, Refusal};
 
+use crate::block::{Block, BlockId, Blocks, PART, Part};
+use crate::capture::Capture;
 use crate::command::Command;
 use crate::fault::Fault;
 use crate::reason::Reason;
-use crate::reply::{Firmware, Models, Reply, Status, Telemetry};
+use crate::reply::{Firmware, Reply, Status, Telemetry};
 use crate::request::Request;
 use crate::session::{Action, Counters, Session};
 use crate::value::WireVolts;
-use crate::wire_model::{ModelId, PART};
 use reports::Reports;
 
 /// State of the control loop after a tick.
@@ -53,10 +56,10 @@ pub struct About {
     pub silence_limit_ticks: u32,
     /// Fault that caused the last reset, or [`Fault::NONE`].
     pub last_fault: Fault,
-    /// Running model.
-    pub model: ModelId,
-    /// Model that was stored at the start, even if its validation failed.
-    pub stored: ModelId,
+    /// Model that runs, and the one that was stored at the start, even if its validation failed.
+    pub model: Blocks,
+    /// Settings that run, and those that were stored at the start, even if their validation failed.
+    pub settings: Blocks,
     /// Number from which the nonces of the sessions follow: another one at every start.
     pub seed: u32,
 }
@@ -68,15 +71,24 @@ pub enum Step<'a> {
     Command(Command),
     /// Send the bytes.
     Send(&'a [u8]),
-    /// Pass the update to the model store, then call [`Server::model_updated`].
-    UpdateModel(ModelUpdate),
+    /// Pass the update to the store, then call [`Server::updated`] for the same block.
+    Update(Block, Update),
+    /// Call [`Server::settings_part`] with a part of the settings.
+    ReadSettings {
+        /// True for the settings that are built in, false for those that run.
+        built_in: bool,
+        /// Number of the part.
+        number: u8,
+    },
+    /// Execute the request, then call [`Server::captured`] with the reply.
+    Capture(Capture),
     /// Send the bytes, then restart.
     Restart(&'a [u8]),
 }
 
-/// Operation of the model store.
+/// Operation of the store.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ModelUpdate {
+pub enum Update {
     /// Number and content of a part, see [`Request::ModelPart`].
     Part(u8, [u8; PART]),
     /// End of the transfer, see [`Request::ModelEnd`].
@@ -94,7 +106,6 @@ pub struct Server {
     session: Session,
     spring: Spring,
     about: About,
-    stored: ModelId,
     /// Request whose command is being executed.
     pending: Option<Request>,
     reports: Reports,
@@ -104,7 +115,7 @@ impl Server {
     /// A server before its first frame; `spring` defines the range of the targets.
     pub const fn new(spring: Spring, about: About) -> Self {
         let session = Session::new(about.silence_limit_ticks, about.seed);
-        Self { session, spring, about, stored: about.stored, pending: None, reports: Reports::NEW }
+        Self { session, spring, about, pending: None, reports: Reports::NEW }
     }
 
     /// Processes a received byte.
@@ -112,8 +123,15 @@ impl Server {
         if let Action::Apply(request) = self.session.on_byte(byte, view.sample.tick)? {
             let reply = match request {
                 Request::Hello | Request::Status => Reply::Status(self.status(view)),
-                Request::Model => Reply::Model(Models { active: self.about.model, stored: self.stored }),
-                Request::ModelPart { .. } | Request::ModelEnd { .. } | Request::Restart
+                Request::Model => Reply::Model(self.about.model),
+                Request::Settings => Reply::Settings(self.about.settings),
+                Request::Capture(capture) => return Some(Step::Capture(capture)),
+                Request::ReadSettings { built_in, number } => return Some(Step::ReadSettings { built_in, number }),
+                Request::ModelPart { .. }
+                | Request::ModelEnd { .. }
+                | Request::SettingsPart { .. }
+                | Request::SettingsEnd { .. }
+                | Request::Restart
                     if view.state != supervisor::State::Disarmed =>
                 {
                     Reply::Refused(match Fault::of(view.state) {
@@ -122,10 +140,16 @@ impl Server {
                     })
                 }
                 Request::ModelPart { number, bytes } => {
-                    return Some(Step::UpdateModel(ModelUpdate::Part(number, bytes)));
+                    return Some(Step::Update(Block::Model, Update::Part(number, bytes)));
                 }
                 Request::ModelEnd { length, checksum } => {
-                    return Some(Step::UpdateModel(ModelUpdate::End { length, checksum }));
+                    return Some(Step::Update(Block::Model, Update::End { length, checksum }));
+                }
+                Request::SettingsPart { number, bytes } => {
+                    return Some(Step::Update(Block::Settings, Update::Part(number, bytes)));
+                }
+                Request::SettingsEnd { length, checksum } => {
+                    return Some(Step::Update(Block::Settings, Update::End { length, checksum }));
                 }
                 Request::Heard { number } => {
                     self.reports.hear(number);
@@ -168,16 +192,31 @@ impl Server {
         self.session.answer(&refused.map_or(done(view), Reply::Refused))
     }
 
-    /// The reply to the request of the last [`Step::UpdateModel`]; `result` contains the model if a new one was stored.
-    pub fn model_updated(&mut self, result: Result<Option<ModelId>, Reason>, view: &View) -> &[u8] {
+    /// The reply to the request of the last [`Step::Update`]; `result` contains the identity of what was stored, if it is
+    /// complete.
+    pub fn updated(&mut self, block: Block, result: Result<Option<BlockId>, Reason>, view: &View) -> &[u8] {
         let reply = match result {
             Err(reason) => Reply::Refused(reason),
             Ok(stored) => {
-                self.stored = stored.unwrap_or(self.stored);
+                let about = match block {
+                    Block::Model => &mut self.about.model,
+                    Block::Settings => &mut self.about.settings,
+                };
+                about.stored = stored.unwrap_or(about.stored);
                 done(view)
             }
         };
         self.session.answer(&reply)
+    }
+
+    /// The reply to the request of the last [`Step::ReadSettings`].
+    pub fn settings_part(&mut self, part: Part) -> &[u8] {
+        self.session.answer(&Reply::SettingsPart(part))
+    }
+
+    /// The reply to the request of the last [`Step::Capture`].
+    pub fn captured(&mut self, reply: &Reply) -> &[u8] {
+        self.session.answer(reply)
     }
 
     /// The report of faults to send ahead of everything else, if one is due: immediately after a new fault, then ten times per

@@ -1,6 +1,7 @@
 //! Tests of the replies, and of the commands for the control tick.
 
 use super::*;
+use crate::capture::Captured;
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::frame::Frame;
 use crate::nonce::Nonce;
@@ -17,7 +18,7 @@ const FAULTED: View = view(supervisor::State::Faulted(Cause::Monitor), State::Fa
 /// A second fault that stands once the first one is acknowledged.
 const SECOND: View = view(supervisor::State::Faulted(Cause::Watchdog), State::Faulted);
 /// A stored model that failed its validation.
-const REJECTED: ModelId = ModelId { number: 3, format: 1, length: 9, checksum: 7 };
+const REJECTED: BlockId = BlockId { number: 3, format: 1, length: 9, checksum: 7 };
 const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
 
 const fn view(state: supervisor::State, shown: State) -> View {
@@ -45,7 +46,13 @@ fn stamped(bytes: &[u8]) -> (Nonce, Reply) {
 
 fn server() -> Server {
     let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
-    let about = About { silence_limit_ticks: 500, rate_hz: 1000, stored: REJECTED, seed: 7, ..About::default() };
+    let about = About {
+        silence_limit_ticks: 500,
+        rate_hz: 1000,
+        model: Blocks { stored: REJECTED, ..Blocks::default() },
+        seed: 7,
+        ..About::default()
+    };
     Server::new(spring, about)
 }
 
@@ -73,7 +80,12 @@ fn exchange(request: Request, before: &View, after: &View) -> (Option<Command>, 
                 answer = Some(reply(server.command_done(after)));
             }
             Some(Step::Send(bytes) | Step::Restart(bytes)) => answer = Some(reply(bytes)),
-            Some(Step::UpdateModel(_)) => answer = Some(reply(server.model_updated(Ok(None), after))),
+            Some(Step::Capture(_)) => answer = Some(reply(server.captured(&Reply::Captured(Captured::default())))),
+            Some(Step::Update(block, _)) => answer = Some(reply(server.updated(block, Ok(None), after))),
+            Some(Step::ReadSettings { built_in, number }) => {
+                let payload: &[u8] = if built_in { b"built in" } else { &[b'r'; 40] };
+                answer = Some(reply(server.settings_part(Part::of(number, payload))));
+            }
             None => {}
         }
     }
@@ -146,11 +158,13 @@ fn requests_without_a_command_are_answered_without_a_tick() {
 }
 
 #[test]
-fn models_are_accepted_only_while_disarmed() {
+fn models_and_settings_are_accepted_only_while_disarmed() {
     let monitor = Fault::from(Cause::Monitor);
     for request in [
         Request::ModelPart { number: 0, bytes: [1; PART] },
         Request::ModelEnd { length: 9, checksum: 7 },
+        Request::SettingsPart { number: 0, bytes: [1; PART] },
+        Request::SettingsEnd { length: 9, checksum: 7 },
         Request::Restart,
     ] {
         let answer = |view| exchange(request, &view, &view).1;
@@ -158,8 +172,44 @@ fn models_are_accepted_only_while_disarmed() {
         assert_eq!(answer(ARMED), Reply::Refused(Reason::Armed), "{request:?}");
         assert_eq!(answer(FAULTED), Reply::Refused(Reason::Faulted(monitor)), "{request:?}");
     }
-    let models = Models { active: ModelId::default(), stored: REJECTED };
+    let models = Blocks { active: BlockId::default(), stored: REJECTED };
     assert_eq!(exchange(Request::Model, &ARMED, &ARMED).1, Reply::Model(models));
+}
+
+#[test]
+fn the_running_and_the_built_in_settings_can_be_read_in_any_state() {
+    let padded = |text: &[u8]| -> [u8; PART] { core::array::from_fn(|at| text.get(at).copied().unwrap_or(0)) };
+    for view in [ARMED, DISARMED, FAULTED] {
+        let read = |built_in, number| exchange(Request::ReadSettings { built_in, number }, &view, &view).1;
+        let part = |number, length, bytes| Reply::SettingsPart(Part { number, length, bytes });
+        assert_eq!(read(false, 0), part(0, 40, [b'r'; PART]));
+        assert_eq!(read(false, 1), part(1, 40, padded(b"rrrrrrrr")));
+        assert_eq!(read(false, 2), part(2, 40, [0; PART]), "behind the end");
+        assert_eq!(read(false, 255), part(255, 40, [0; PART]), "behind the end");
+        assert_eq!(read(true, 0), part(0, 8, padded(b"built in")));
+    }
+}
+
+#[test]
+fn a_capture_is_started_and_read_in_any_state() {
+    for view in [ARMED, DISARMED, FAULTED] {
+        for capture in [Capture::Start { rows: 9 }, Capture::State, Capture::Read { first: 3 }] {
+            let (command, reply) = exchange(Request::Capture(capture), &view, &view);
+            assert_eq!((command, reply), (None, Reply::Captured(Captured::default())));
+        }
+    }
+}
+
+#[test]
+fn what_was_stored_is_reported_for_its_own_block() {
+    let mut server = server();
+    let stored = BlockId { number: 4, ..REJECTED };
+    server.updated(Block::Settings, Ok(Some(stored)), &DISARMED);
+    assert_eq!(server.about.settings, Blocks { stored, ..Blocks::default() });
+    assert_eq!(server.about.model.stored, REJECTED);
+    server.updated(Block::Settings, Err(Reason::NotStored), &DISARMED);
+    server.updated(Block::Model, Ok(None), &DISARMED);
+    assert_eq!((server.about.settings.stored, server.about.model.stored), (stored, REJECTED));
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! Strategies that generate every kind of message.
 
+use link::capture::{Capture, Captured, ROWS, Rows};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    Controller, Desired, Fault, FaultReport, Field, Mismatch, ModelId, Models, Reason, Reply, Request, Sensor, State,
-    Status, Telemetry, WireVolts,
+    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Mismatch, Part, Reason, Reply, Request, Sensor,
+    State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
@@ -38,6 +39,13 @@ pub(crate) fn request() -> impl Strategy<Value = Request> {
         any::<(u16, u32)>().prop_map(|(length, checksum)| Request::ModelEnd { length, checksum }),
         Just(Request::Restart),
         any::<u32>().prop_map(|number| Request::Heard { number }),
+        Just(Request::Settings),
+        any::<(u8, [u8; 32])>().prop_map(|(number, bytes)| Request::SettingsPart { number, bytes }),
+        any::<(u16, u32)>().prop_map(|(length, checksum)| Request::SettingsEnd { length, checksum }),
+        any::<(bool, u8)>().prop_map(|(built_in, number)| Request::ReadSettings { built_in, number }),
+        any::<u32>().prop_map(|rows| Request::Capture(Capture::Start { rows })),
+        Just(Request::Capture(Capture::State)),
+        any::<u32>().prop_map(|first| Request::Capture(Capture::Read { first })),
     ]
 }
 
@@ -60,7 +68,7 @@ fn reason() -> impl Strategy<Value = Reason> {
         Just(Reason::HostSilent),
         Just(Reason::Armed),
         any::<u8>().prop_map(Reason::PartMissing),
-        Just(Reason::ModelDamaged),
+        Just(Reason::Damaged),
         (any::<u8>(), number(), number()).prop_map(|(field, lowest, highest)| Reason::BadModel {
             field: Field(field),
             lowest,
@@ -71,6 +79,13 @@ fn reason() -> impl Strategy<Value = Reason> {
         any::<u8>().prop_map(|code| Reason::CausePresent(Fault(code))),
         Just(Reason::OtherSession),
         Just(Reason::Reference),
+        (any::<u8>(), number(), number()).prop_map(|(field, lowest, highest)| Reason::BadSettings {
+            field: Field(field),
+            lowest,
+            highest
+        }),
+        any::<u8>().prop_map(|field| Reason::NotBuiltIn(Field(field))),
+        any::<u32>().prop_map(|most| Reason::TooManyRows { most }),
     ]
 }
 
@@ -127,8 +142,8 @@ fn status() -> impl Strategy<Value = Status> {
     )
 }
 
-fn model() -> impl Strategy<Value = ModelId> {
-    any::<(u32, u8, u16, u32)>().prop_map(|(number, format, length, checksum)| ModelId {
+fn model() -> impl Strategy<Value = BlockId> {
+    any::<(u32, u8, u16, u32)>().prop_map(|(number, format, length, checksum)| BlockId {
         number,
         format,
         length,
@@ -142,10 +157,18 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
         reason().prop_map(Reply::Refused),
         status().prop_map(Reply::Status),
         telemetry().prop_map(Reply::Telemetry),
-        (model(), model()).prop_map(|(active, stored)| Reply::Model(Models { active, stored })),
+        (model(), model()).prop_map(|(active, stored)| Reply::Model(Blocks { active, stored })),
         any::<(u32, u64, u8, u16, u8)>().prop_map(|(number, tick, fault, standing, mismatch)| {
             let (fault, mismatch) = (Fault(fault), Mismatch(mismatch));
             Reply::Fault(FaultReport { number, tick, fault, standing, mismatch })
         }),
+        any::<[u32; 3]>().prop_map(|[most, wanted, captured]| Reply::Captured(Captured { most, wanted, captured })),
+        any::<(u32, u8, [[u8; 8]; ROWS])>().prop_map(|(first, count, rows)| Reply::Rows(Rows { first, count, rows })),
+        (model(), model()).prop_map(|(active, stored)| Reply::Settings(Blocks { active, stored })),
+        any::<(u8, u16, [u8; 32])>().prop_map(|(number, length, bytes)| Reply::SettingsPart(Part {
+            number,
+            length,
+            bytes
+        })),
     ]
 }

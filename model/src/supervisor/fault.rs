@@ -83,7 +83,7 @@ impl Fault {
             Self::Interlock => "close the safety circuit",
             Self::Watchdog => "read the log; restart the chip if a task still does not check in",
             Self::Monitor => "remove what the monitors name, and wait until the spring is discharged",
-            Self::Config => "send another model, or flash an image with valid settings",
+            Self::Config => "send another model or other settings, or flash an image with valid ones",
             Self::Supply => "check the supply, and let the spring settle",
             Self::SelfTest => "read the log, which names the part; restart the chip, and replace one that repeats it",
         }

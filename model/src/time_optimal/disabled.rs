@@ -23,6 +23,18 @@ pub struct TimeOptimal<I> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct State;
 
+impl Approach {
+    /// Returns `None`: without the feature `time-optimal` there is no time-optimal pre-compensator.
+    pub const fn new(_time_constant_s: f64) -> Option<Self> {
+        None
+    }
+
+    /// Returns the time constant of the last part of the way, in s; without the feature `time-optimal` it is never called.
+    pub const fn time_constant_s(&self) -> f64 {
+        match *self {}
+    }
+}
+
 impl Validate for Approach {
     fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
         match *self {}

@@ -13,7 +13,7 @@ pub(crate) fn line_and_column(name: &str, text: &str, at: usize) -> String {
 
 /// Byte index of the `value` of a field `table.key`: of the element with that value in a list, else of the field's
 /// value; of its table if the field is missing.
-pub(super) fn of_field(text: &str, field: &str, value: f64) -> usize {
+pub(crate) fn of_field(text: &str, field: &str, value: f64) -> usize {
     let Ok(root) = DeTable::parse(text) else { return 0 };
     let mut start = 0;
     let mut table = root.get_ref();

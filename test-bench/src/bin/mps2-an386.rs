@@ -11,10 +11,12 @@ use embassy_sync::signal::Signal;
 use firmware::board::Board;
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
-use firmware::settings::FLASHED;
+use firmware::settings::built_in;
+use firmware::start::{self, Loaded};
 use firmware::store::Store;
-use firmware::{crash_record, guards, log, tasks};
-use link::{Controller, Server};
+use firmware::tasks::{self, Timing};
+use firmware::{crash_record, guards, log};
+use link::Server;
 use model::supervisor::Fault;
 use test_bench::mps2::flash::Flash;
 use test_bench::mps2::instructions::{Counter, Instructions};
@@ -70,17 +72,18 @@ fn main() -> ! {
         (None, Some(script)) => Mode::Play(script),
         (None, None) => semihosting::exit(EXIT_NO_SCRIPT),
     };
-    let settings = match &mode {
-        Mode::Play(script) => script.settings(),
-        Mode::Link => &FLASHED,
+    let mut store = Store::new(Flash::init());
+    let loaded = match &mode {
+        // A script has its own settings, whatever is stored.
+        Mode::Play(script) => Loaded::fixed(built_in(*script.settings())),
+        Mode::Link => start::load(&store),
     };
-    let controller = Controller::of(&settings.compensation);
-    log::boot(cause.name, cause.fault.map_or(0, Fault::code), controller);
+    board.start_watchdog(loaded.settings.watchdogs.reset_ms);
+    log::boot(cause.name, cause.fault.map_or(0, Fault::code), &loaded.settings);
     if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
-    let mut store = Store::new(Flash::init());
-    let (control, server) = match host::open(settings, &store, &cause, semihosting::seed()) {
+    let (control, server) = match host::open(&loaded, &store, &cause, semihosting::seed()) {
         Ok(Some(both)) => both,
         Ok(None) => semihosting::exit(1),
         Err(error) => {
@@ -109,6 +112,7 @@ fn main() -> ! {
         // SAFETY: the interrupts are not enabled yet.
         unsafe { core.NVIC.set_priority(interrupt, priority) };
     }
+    let timing = Timing::of(&loaded.settings);
     let low = LOW.start(Interrupt::Low);
     let high = HIGH.start(Interrupt::High);
     if let Ok(housekeeping) = housekeeping() {
@@ -116,20 +120,20 @@ fn main() -> ! {
     }
     match mode {
         Mode::Play(script) => {
-            if let Ok(control) = play(board, control, script) {
+            if let Ok(control) = play(board, control, script, timing) {
                 high.spawn(control);
             }
         }
         Mode::Link => {
             INTERLOCK_CLOSED.store(true, Ordering::Relaxed);
-            if let (Ok(talk), Ok(control)) = (talk(server), obey(board, control)) {
+            if let (Ok(talk), Ok(control)) = (talk(server), obey(board, control, timing)) {
                 low.spawn(talk);
                 high.spawn(control);
             }
             // Without sleeping: while the processor sleeps, the emulator's clock can follow the real one and skip ticks; while it
             // runs, the instructions alone determine the time.
             loop {
-                host::serve_model_store(&mut store);
+                host::serve_store(&mut store, &loaded.settings);
             }
         }
     }
@@ -139,17 +143,17 @@ fn main() -> ! {
 }
 
 #[embassy_executor::task]
-async fn play(mut board: Mps2, control: &'static mut Control, script: Script) {
+async fn play(mut board: Mps2, control: &'static mut Control, script: Script, timing: Timing) {
     let mut player = Player::new(script);
     let mut counter = Counter::begin();
-    let (ticks, missed) = tasks::control(&mut board, control, &mut player, &mut counter).await;
+    let (ticks, missed) = tasks::control(&mut board, control, &mut player, &mut counter, timing).await;
     DONE.signal(Done { ticks, missed, digest: player.digest(), instructions: counter.instructions() });
 }
 
 #[embassy_executor::task]
-async fn obey(mut board: Mps2, control: &'static mut Control) {
+async fn obey(mut board: Mps2, control: &'static mut Control, timing: Timing) {
     let mut host = Host::new(control);
-    tasks::control(&mut board, control, &mut host, &mut Untimed).await;
+    tasks::control(&mut board, control, &mut host, &mut Untimed, timing).await;
 }
 
 #[embassy_executor::task]

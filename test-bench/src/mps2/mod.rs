@@ -10,7 +10,7 @@
 //! | [`uart`] | Line to the host. |
 //! | [`watchdog`] | The CMSDK watchdog: interrupt, then reset. |
 //! | [`instructions`] | SysTick as a counter of instructions. |
-//! | [`flash`] | Two pages for the model store, saved in a file. |
+//! | [`flash`] | Four pages for the store, saved in a file. |
 //! | [`semihosting`] | Calls to the emulator: command line, files, exit. |
 
 #![allow(unsafe_code)]
@@ -46,8 +46,14 @@ impl Mps2 {
     pub fn init() -> Self {
         switch_amplifier_off();
         time::init();
-        watchdog::init();
         Self { dac: dac::Dac::default() }
+    }
+}
+
+impl Mps2 {
+    /// Starts the hardware watchdog: it interrupts after `reset_ms` without feeding, and resets after twice that time.
+    pub fn start_watchdog(&mut self, reset_ms: u32) {
+        watchdog::start(reset_ms);
     }
 }
 

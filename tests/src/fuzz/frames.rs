@@ -1,6 +1,6 @@
-//! Frames on the serial link, and models of the spring in them.
+//! Frames on the serial link, and models of the spring and settings in them.
 
-use link::{Action, Frame, Message, Packet, Receiver, Reply, Request, Session, Unreadable, WireModel};
+use link::{Action, Frame, Message, Packet, Receiver, Reply, Request, Session, Unreadable, WireModel, WireSettings};
 
 /// Bytes on the line: what is read is the message that was sent, and a session survives everything.
 pub(super) fn wire(bytes: &[u8]) {
@@ -27,6 +27,16 @@ pub(super) fn wire(bytes: &[u8]) {
     {
         let again = WireModel::read(&payload).expect("a payload is read");
         assert_eq!(format!("{again:?}"), format!("{model:?}"), "the model changes on the wire");
+    }
+    // The payload of settings.
+    if let Some(settings) = WireSettings::read(bytes)
+        && let Some(payload) = settings.payload()
+    {
+        let again = WireSettings::read(&payload).expect("a payload is read");
+        assert_eq!(format!("{again:?}"), format!("{settings:?}"), "the settings change on the wire");
+        // Whatever they hold, a check ends without a panic.
+        let checked = settings.over(&model::device::Settings::PAPER).map(|settings| settings.check().is_ok());
+        assert!(checked.is_ok(), "a host has every controller");
     }
 }
 

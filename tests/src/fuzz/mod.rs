@@ -8,6 +8,7 @@ mod frames;
 mod logs;
 mod plants;
 mod recordings;
+mod settings;
 mod tables;
 
 /// A check of all properties of one format for some bytes.
@@ -22,6 +23,7 @@ pub const TARGETS: &[(&str, Check)] = &[
     ("elf", logs::elf),
     ("recording", recordings::recording),
     ("wire", frames::wire),
+    ("settings", settings::settings),
 ];
 
 /// Runs the check of a format by its name.

@@ -12,8 +12,7 @@ use sequential_storage::map::{MapConfig, MapStorage};
 
 use super::*;
 
-const KEY: u8 = 1;
-const RANGE: Range<u32> = 0..2 * PAGE as u32;
+const RANGE: Range<u32> = 0..(PAGES * PAGE) as u32;
 
 /// The simulated flash as the other crate expects it.
 impl ErrorType for Flash {
@@ -26,8 +25,6 @@ impl NorFlashError for FlashError {
     }
 }
 
-const SIDES: [Side; 2] = [Side::A, Side::B];
-
 impl ReadNorFlash for Flash {
     const READ_SIZE: usize = 1;
 
@@ -38,7 +35,7 @@ impl ReadNorFlash for Flash {
     }
 
     fn capacity(&self) -> usize {
-        2 * PAGE
+        PAGES * PAGE
     }
 }
 
@@ -47,13 +44,13 @@ impl NorFlash for Flash {
     const ERASE_SIZE: usize = PAGE;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        SIDES[from as usize / PAGE..to as usize / PAGE].iter().try_for_each(|side| Pages::erase(self, *side))?;
+        Page::ALL[from as usize / PAGE..to as usize / PAGE].iter().try_for_each(|page| Pages::erase(self, *page))?;
         Ok(())
     }
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         for (at, word) in (offset as usize..).step_by(WORD).zip(bytes.as_chunks().0) {
-            self.program(SIDES[at / PAGE], at % PAGE, *word)?;
+            self.program(Page::ALL[at / PAGE], at % PAGE, *word)?;
         }
         Ok(())
     }
@@ -71,54 +68,68 @@ fn other(flash: Flash) -> MapStorage<u8, Flash, impl sequential_storage::cache::
     MapStorage::new(flash, const { MapConfig::new(RANGE) }, Cache::new_uncached())
 }
 
-fn other_store(flash: &Flash, payload: &[u8]) -> (Flash, bool) {
+fn other_store(flash: &Flash, block: Block, payload: &[u8]) -> (Flash, bool) {
     let mut map = other(flash.clone());
-    let stored = now(map.store_item(&mut [0; 1024], &KEY, &payload)).is_ok();
+    let stored = now(map.store_item(&mut [0; 1024], &(block as u8), &payload)).is_ok();
     (map.destroy().0, stored)
 }
 
-fn other_newest(flash: &Flash) -> Option<Vec<u8>> {
+fn other_newest(flash: &Flash, block: Block) -> Option<Vec<u8>> {
     let mut buffer = vec![0; 1024];
-    let found = now(other(flash.clone()).fetch_item::<&[u8]>(&mut buffer, &KEY)).expect("a readable map");
+    let found = now(other(flash.clone()).fetch_item::<&[u8]>(&mut buffer, &(block as u8))).expect("a readable map");
     found.map(<[u8]>::to_vec)
 }
 
 #[test]
 #[cfg_attr(miri, ignore = "slow under Miri")]
 fn both_stores_keep_the_old_or_the_new_payload_and_agree_after_each_store() {
+    const STORES: u8 = 20;
+    const STEPS: usize = 80;
     let mut random = 1u32;
     let (mut ours, mut theirs) = (Flash::BLANK, Flash::BLANK);
-    let mut last: Option<Vec<u8>> = None;
+    // The last payload of each block.
+    let mut last: [Option<Vec<u8>>; 2] = [None, None];
     let (mut cuts, mut kept, mut advanced) = (0, [0; 2], [0; 2]);
-    for number in 1..=20u8 {
+    for number in 1..=STORES {
         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let (block, untouched) = if random >> 31 == 0 { (Model, Settings) } else { (Settings, Model) };
         let length = 1 + (random >> 8) as usize % MOST_BYTES;
         let new: Vec<u8> = (0..length).map(|i| (i as u8).wrapping_mul(number)).collect();
-        for (cut, torn) in (1..80).flat_map(|cut| [Torn::Nothing, Torn::All].map(|torn| (cut, torn))) {
+        for (cut, torn) in (1..STEPS).flat_map(|cut| [Torn::Nothing, Torn::All].map(|torn| (cut, torn))) {
             let until = |flash: &Flash| Flash { steps: Some(cut), torn, ..flash.clone() };
-            let (our_cut, stored) = store(&until(&ours), &new, Ok(()));
-            let (their_cut, their_stored) = other_store(&until(&theirs), &new);
+            let (our_cut, stored) = store_block(&until(&ours), block, &new, Ok(()));
+            let (their_cut, their_stored) = other_store(&until(&theirs), block, &new);
             for (which, flash, complete) in [(0, our_cut, stored.is_ok()), (1, their_cut, their_stored)] {
                 let flash = Flash { steps: None, ..flash };
-                let found = if which == 0 { newest(&flash) } else { other_newest(&flash) };
-                assert!(found == last || found.as_ref() == Some(&new), "store {number}, step {cut}, {torn:?}, {which}");
-                assert!(!complete || found.as_ref() == Some(&new), "a completed store is there");
-                kept[which] += u32::from(found == last);
-                advanced[which] += u32::from(found != last);
-                // The next attempt succeeds in both.
-                let again = if which == 0 {
-                    newest(&store(&flash, &new, Ok(())).0)
-                } else {
-                    other_newest(&other_store(&flash, &new).0)
+                let read = |flash: &Flash, block| match which {
+                    0 => newest_block(flash, block),
+                    _ => other_newest(flash, block),
                 };
-                assert_eq!(again.as_ref(), Some(&new), "store {number}, step {cut}, {torn:?}, {which}");
+                let (found, old) = (read(&flash, block), &last[block as usize]);
+                let message = std::format!("store {number}, step {cut}, {torn:?}, {which}");
+                assert!(found == *old || found.as_ref() == Some(&new), "{message}");
+                assert!(!complete || found.as_ref() == Some(&new), "a completed store is there");
+                assert_eq!(read(&flash, untouched), last[untouched as usize], "{message}: the other block");
+                kept[which] += u32::from(found == *old);
+                advanced[which] += u32::from(found != *old);
+                // The next attempt succeeds in both.
+                let again = match which {
+                    0 => store_block(&flash, block, &new, Ok(())).0,
+                    _ => other_store(&flash, block, &new).0,
+                };
+                assert_eq!(read(&again, block).as_ref(), Some(&new), "{message}");
             }
             cuts += 1;
         }
-        ours = store(&ours, &new, Ok(())).0;
-        theirs = other_store(&theirs, &new).0;
-        assert_eq!((newest(&ours).as_ref(), other_newest(&theirs).as_ref()), (Some(&new), Some(&new)));
-        last = Some(new);
+        ours = store_block(&ours, block, &new, Ok(())).0;
+        theirs = other_store(&theirs, block, &new).0;
+        last[block as usize] = Some(new);
+        for block in [Model, Settings] {
+            let stored = &last[block as usize];
+            assert_eq!((&newest_block(&ours, block), &other_newest(&theirs, block)), (stored, stored));
+        }
     }
-    assert!(cuts == 20 * 79 * 2 && kept.into_iter().chain(advanced).all(|count| count > 100), "{kept:?} {advanced:?}");
+    assert!(last.iter().all(Option::is_some), "both blocks were stored");
+    let all = usize::from(STORES) * (STEPS - 1) * 2;
+    assert!(cuts == all && kept.into_iter().chain(advanced).all(|count| count > 100), "{kept:?} {advanced:?}");
 }

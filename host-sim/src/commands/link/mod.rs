@@ -1,8 +1,10 @@
 //! `vsj link`: the MCU over its serial link.
 
+mod capture;
 mod model;
 pub(super) mod record;
 pub(super) mod session;
+mod settings;
 mod watch;
 
 use anyhow::{Context, Result};
@@ -13,7 +15,7 @@ use link::{Desired, Fault, Request};
 use session::{Session, seconds};
 use simulation::bad_input;
 
-/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, model
+/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, capture, model, settings
 #[derive(Args, Debug)]
 #[command(
     arg_required_else_help = false,
@@ -24,7 +26,9 @@ Examples:
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
   vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
+  vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
+  vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate
 
 The MCU ramps the voltage down when the host is silent for longer than its limit (see `status`): a target is kept only while \
 a command stays connected: --keep, watch or record. A request is repeated every 0.1 s until it is answered, for --timeout \
@@ -73,8 +77,12 @@ enum Command {
     Watch(watch::Arguments),
     /// Record time, voltage and stiffness as CSV for `vsj diagnose`
     Record(record::Arguments),
+    /// Record every tick of a few seconds in the MCU's RAM, then send it as CSV for `vsj diagnose`
+    Capture(capture::Arguments),
     /// Show the MCU's model of the spring; with a plant file, send it to be checked and stored, and restart
     Model(model::Arguments),
+    /// Show the MCU's settings; with a settings file, send it to be checked and stored, and restart
+    Settings(settings::Arguments),
 }
 
 #[derive(Args, Debug)]
@@ -125,12 +133,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if let Command::Record(arguments) = &arguments.command {
         arguments.check()?;
     }
+    if let Command::Capture(arguments) = &arguments.command {
+        arguments.check()?;
+    }
     if let Command::Watch(arguments) = &arguments.command {
         arguments.check()?;
     }
 
     let model = match &arguments.command {
         Command::Model(arguments) => arguments.read()?,
+        _ => None,
+    };
+    let source = match &arguments.command {
+        Command::Settings(arguments) => arguments.read()?,
         _ => None,
     };
 
@@ -169,7 +184,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         }
         Command::Watch(arguments) => watch::run(&mut session, arguments),
         Command::Record(record) => record::run(&mut session, record, arguments.baud),
+        Command::Capture(arguments) => capture::run(&mut session, arguments),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
+        Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
     }
 }
 

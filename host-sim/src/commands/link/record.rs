@@ -14,7 +14,7 @@ use serde_json::json;
 use simulation::bad_input;
 use simulation::bad_input::number;
 use simulation::record::{MEASURED, Record};
-use simulation::schedule::{Between, Schedule};
+use simulation::schedule::{Between, Reader, Schedule};
 
 use super::session::{Session, seconds, stop_on_interrupt, stopped};
 use crate::commands::choice::{BETWEEN, one_of};
@@ -91,12 +91,8 @@ pub(crate) fn rows_hz(rate_hz: f64) -> Result<f64> {
 
 pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Result<()> {
     let schedule = arguments.schedule()?;
-    if schedule.is_some() && !arguments.arm && session.status.sample.state != link::State::Armed {
-        bail!("{}: not armed ({}); expected --arm with --input", session.client.name(), session.status.sample.state);
-    }
     if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {
-        // Checked before anything is armed or written.
-        schedule.check_range(name, session.status.lowest.to_f64(), session.status.highest.to_f64())?;
+        check_schedule(session, schedule, name, arguments.arm)?;
     }
     let length = schedule.as_ref().map(|schedule| Duration::from_secs_f64(schedule.end_s() - schedule.start_s()));
     let whole = arguments.time()?.or(length);
@@ -113,21 +109,62 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     let (summary, file) = (recording.summary(), arguments.file.display());
     done.with_context(|| format!("{file} contains {} rows", summary.rows))?;
     stopped?;
-    if summary.stiffness == "estimate" {
-        remark("no sensor: the column estimate is the controller's own, not a measurement; it cannot be diagnosed");
-    }
-    if summary.missed_turns > 0 {
-        remark(&format!(
-            "{file}: samples are missing at {} of {} turns of the voltage: its extreme values there are not in the record",
-            summary.missed_turns, summary.turns
-        ));
-    }
+    summary.remarks(&file.to_string()).iter().for_each(|text| remark(text));
     if session.json {
         let mut report = serde_json::to_value(summary)?;
         report["file"] = json!(arguments.file);
         print(&format!("{report}\n"))
     } else {
         print(&format!("wrote {file}: {} rows, {} s, {} lost\n", summary.rows, summary.seconds, summary.lost))
+    }
+}
+
+/// Checks the schedule called `name` before anything is armed or written.
+pub(super) fn check_schedule(session: &Session, schedule: &Schedule, name: &str, arm: bool) -> Result<()> {
+    if !arm && session.status.sample.state != link::State::Armed {
+        bail!("{}: not armed ({}); expected --arm with --input", session.client.name(), session.status.sample.state);
+    }
+    schedule.check_range(name, session.status.lowest.to_f64(), session.status.highest.to_f64())
+}
+
+/// Commands a schedule and keeps the host heard.
+pub(super) struct Drive<'a> {
+    /// Time at which the schedule starts.
+    start: Instant,
+    /// First time of the schedule, in s, and its voltage.
+    reader: Option<(f64, Reader<'a>)>,
+    heartbeat: Duration,
+    /// The last commanded voltage.
+    commanded: Option<f64>,
+    /// When the MCU last heard from this program.
+    heard: Instant,
+}
+
+impl<'a> Drive<'a> {
+    /// Starts now.
+    pub(super) fn new(session: &Session, schedule: Option<&'a Schedule>) -> Self {
+        let start = Instant::now();
+        let reader = schedule.map(|schedule| (schedule.start_s(), schedule.reader()));
+        Self { start, reader, heartbeat: heartbeat(&session.status), commanded: None, heard: start }
+    }
+
+    /// Commands the voltage of this moment if it has changed, or sends a heartbeat if one is due.
+    pub(super) fn step(&mut self, session: &mut Session) -> Result<()> {
+        if let Some((from, reader)) = &mut self.reader {
+            let volts = reader.at(*from + self.start.elapsed().as_secs_f64());
+            if self.commanded != Some(volts) {
+                session.order(Request::Set(Desired::ScaledVolts(volts)))?;
+                (self.commanded, self.heard) = (Some(volts), Instant::now());
+            }
+        }
+        if self.heard.elapsed() >= self.heartbeat {
+            let (state, _) = session.order(Request::Heartbeat)?;
+            if self.reader.is_some() {
+                session.still_armed(state)?;
+            }
+            self.heard = Instant::now();
+        }
+        Ok(())
     }
 }
 
@@ -144,30 +181,15 @@ fn follow(
     };
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos} of {len} s, {msg}")?);
     let whole = whole.unwrap_or(Duration::MAX);
-    let mut reader = schedule.map(|schedule| (schedule.start_s(), schedule.reader()));
-    let (start, heartbeat) = (Instant::now(), heartbeat(&session.status));
-    let (mut commanded, mut heard) = (None, start);
+    let mut drive = Drive::new(session, schedule);
+    let start = drive.start;
     while start.elapsed() < whole && !stopped() {
-        let elapsed = start.elapsed();
-        if let Some((from, reader)) = &mut reader {
-            let volts = reader.at(*from + elapsed.as_secs_f64());
-            if commanded != Some(volts) {
-                session.order(Request::Set(Desired::ScaledVolts(volts)))?;
-                (commanded, heard) = (Some(volts), Instant::now());
-            }
-        }
-        if heard.elapsed() >= heartbeat {
-            let (state, _) = session.order(Request::Heartbeat)?;
-            if reader.is_some() {
-                session.still_armed(state)?;
-            }
-            heard = Instant::now();
-        }
+        drive.step(session)?;
         let wait = Duration::from_millis(5).min(whole.saturating_sub(start.elapsed()));
         for sample in session.client.samples(wait).with_context(|| name.clone())? {
             recording.add(&sample)?;
         }
-        bar.set_position(elapsed.as_secs());
+        bar.set_position(start.elapsed().as_secs());
         bar.set_message(format!("{} rows", recording.summary().rows));
     }
     bar.finish_and_clear();

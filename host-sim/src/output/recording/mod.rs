@@ -60,6 +60,55 @@ pub struct Summary {
     pub missed_turns: u64,
     /// `measured` if the MCU has a sensor, otherwise the controller's `estimate`.
     pub stiffness: &'static str,
+    /// Where samples are missing, the first [`MOST_GAPS`] of such places.
+    pub gaps: Vec<Gap>,
+}
+
+/// Missing samples between two that arrived.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Gap {
+    /// Time of the last sample before them, in s.
+    pub after_s: f64,
+    /// Number of samples that are missing.
+    pub samples: u64,
+}
+
+/// Largest number of gaps that are listed.
+pub const MOST_GAPS: usize = 1000;
+/// Largest number of gaps in a remark.
+const SHOWN_GAPS: usize = 5;
+
+impl Summary {
+    /// What a user has to know of the recording in `file` before it is diagnosed.
+    pub fn remarks(&self, file: &str) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.stiffness == "estimate" {
+            let text =
+                "no sensor: the column estimate is the controller's own, not a measurement; it cannot be diagnosed";
+            remarks.push(text.to_owned());
+        }
+        if self.lost > 0 {
+            let shown: Vec<String> = self
+                .gaps
+                .iter()
+                .take(SHOWN_GAPS)
+                .map(|gap| format!("{} after {} s", gap.samples, gap.after_s))
+                .collect();
+            let listed: u64 = self.gaps.iter().take(SHOWN_GAPS).map(|gap| gap.samples).sum();
+            let rest = match self.lost - listed {
+                0 => String::new(),
+                rest => format!(", {rest} later"),
+            };
+            remarks.push(format!("{file}: {} samples are missing: {}{rest}", self.lost, shown.join(", ")));
+        }
+        if self.missed_turns > 0 {
+            remarks.push(format!(
+                "{file}: samples are missing at {} of {} turns of the voltage: its extreme values there are not in the record",
+                self.missed_turns, self.turns
+            ));
+        }
+        remarks
+    }
 }
 
 impl Recording {
@@ -120,6 +169,10 @@ impl Recording {
             // Up to half a period is jitter, not a loss.
             let lost = ((sample.tick - last.tick + self.sample_ticks / 2) / self.sample_ticks).saturating_sub(1);
             self.summary.lost += lost;
+            if lost > 0 && self.summary.gaps.len() < MOST_GAPS {
+                let after_s = self.time_s(last.tick - first);
+                self.summary.gaps.push(Gap { after_s, samples: lost });
+            }
             if let Some(Turn { has_gap }) = self.turns.next(last.applied, sample.applied, lost > 0) {
                 self.summary.turns += 1;
                 self.summary.missed_turns += u64::from(has_gap);
@@ -140,14 +193,17 @@ impl Recording {
         let stiffness = if self.measured { sample.measured } else { Some(sample.estimate) };
         self.summary.without_reading += u64::from(stiffness.is_none());
         let stiffness = stiffness.map_or("-".into(), |stiffness| format!("{:.6}", stiffness.to_f64()));
-        let time_s = (sample.tick - first) as f64 / self.rate_hz;
-        // Nine decimals hide floating-point errors of decimal times.
-        let time = (time_s * 1e9).round() / 1e9;
+        let time = self.time_s(sample.tick - first);
         self.put(&format!("{time},{:.6},{stiffness}\n", sample.applied.to_f64()))?;
         self.last_row = sample.tick;
         self.summary.rows += 1;
         self.summary.seconds = time;
         Ok(())
+    }
+
+    /// Time of a number of ticks, in s, to nine decimals, which hide floating-point errors of decimal times.
+    fn time_s(&self, ticks: u64) -> f64 {
+        (ticks as f64 / self.rate_hz * 1e9).round() / 1e9
     }
 
     /// Totals so far.
@@ -208,6 +264,8 @@ mod tests {
         assert_eq!((read.rows[4].voltage_v, read.rows[4].measured), (100.0, None));
         let Summary { rows, lost, without_reading, .. } = recording.summary();
         assert_eq!((*rows, *lost, *without_reading), (5, 3, 1));
+        assert_eq!(recording.summary().gaps, [Gap { after_s: 0.01, samples: 3 }]);
+        assert_eq!(recording.summary().remarks("r.csv"), ["r.csv: 3 samples are missing: 3 after 0.01 s"]);
     }
 
     #[test]

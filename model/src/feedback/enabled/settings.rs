@@ -66,6 +66,19 @@ impl Feedback {
         fade_s: 2.0,
     };
 
+    /// Returns the settings with these values, in the order of the fields, to be validated. `None` where the crate is built
+    /// without the feature `feedback`.
+    pub const fn from_values(values: [f64; 8]) -> Option<Self> {
+        let [noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s] = values;
+        Some(Self { noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s })
+    }
+
+    /// Returns the settings in the order of their fields.
+    pub const fn values(&self) -> [f64; 8] {
+        let Self { noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s } = *self;
+        [noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s]
+    }
+
     /// Returns the fraction of an innovation that one reading adds to the correction, below 1/2: the Kalman gain,
     /// reduced as far as [`fastest_s`](Self::fastest_s) demands.
     pub fn gain(&self) -> f64 {

@@ -40,6 +40,17 @@ pub struct Approach {
 impl Approach {
     /// The fastest approach: the target is reached within one tick where the amplifier's range allows it.
     pub const DEAD_BEAT: Self = Self { time_constant_s: 0.0 };
+
+    /// Returns an approach with a time constant in s, to be validated. `None` where the crate is built without the feature
+    /// `time-optimal`.
+    pub const fn new(time_constant_s: f64) -> Option<Self> {
+        Some(Self { time_constant_s })
+    }
+
+    /// Returns the time constant of the last part of the way, in s.
+    pub const fn time_constant_s(&self) -> f64 {
+        self.time_constant_s
+    }
 }
 
 impl Validate for Approach {

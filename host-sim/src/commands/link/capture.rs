@@ -1,0 +1,156 @@
+//! `vsj link PORT capture`: every tick of a few seconds, from the MCU's RAM.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use host_sim::link::Failure;
+use host_sim::output::recording::{Every, Recording};
+use host_sim::output::terminal::{print, remark};
+use link::capture::Row;
+use link::{Reason, Request, Telemetry};
+use model::{DacCode, SampleTime, Validate, amplifier, device};
+use serde_json::json;
+use simulation::bad_input;
+use simulation::schedule::{Between, Schedule};
+
+use super::record::{self, Drive};
+use super::session::{Session, seconds, stop_on_interrupt, stopped};
+use crate::commands::choice::{BETWEEN, one_of};
+
+/// Longest accepted capture, in s: more than any MCU has RAM for.
+const LONGEST_S: f64 = 1e6;
+/// Time between two questions of how far the capture is.
+const POLL: Duration = Duration::from_millis(50);
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    /// The file to write
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+    /// Length of the capture; default: that of --input
+    #[arg(long, value_name = "S", required_unless_present = "input", allow_negative_numbers = true)]
+    seconds: Option<f64>,
+    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v
+    #[arg(long, value_name = "stair|step|FILE.csv")]
+    input: Option<String>,
+    /// Interpolation of the voltage between two rows of an input file
+    #[arg(long, default_value = "hold", value_parser = one_of(BETWEEN))]
+    between: Between,
+    /// Arm the MCU first; it is disarmed before the rows are sent
+    #[arg(long)]
+    arm: bool,
+    /// Overwrite an existing file
+    #[arg(long)]
+    force: bool,
+}
+
+impl Arguments {
+    pub(super) fn check(&self) -> Result<()> {
+        self.schedule()?;
+        self.seconds.map(|time| seconds("--seconds", time, LONGEST_S)).transpose().map(drop)
+    }
+
+    fn schedule(&self) -> Result<Option<Schedule>> {
+        self.input.as_deref().map(|input| record::schedule(input, self.between)).transpose()
+    }
+}
+
+pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
+    let schedule = arguments.schedule()?;
+    if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {
+        record::check_schedule(session, schedule, name, arguments.arm)?;
+    }
+    let name = session.client.name().to_owned();
+    let length_s = arguments.seconds.or(schedule.as_ref().map(|it| it.end_s() - it.start_s())).unwrap_or_default();
+    let rate_hz = session.status.rate_hz;
+    let rows = (length_s * f64::from(rate_hz)).round().clamp(1.0, f64::from(u32::MAX)) as u32;
+    let volts = volts_of(session)?;
+    stop_on_interrupt();
+    let room = session.client.capture_state().with_context(|| name.clone())?.most;
+    if rows > room {
+        let (row_rate, most_s) = (f64::from(rate_hz), f64::from(room) / f64::from(rate_hz));
+        bad_input!("{length_s} s at {row_rate} Hz are {rows} rows: {}, {most_s} s", Reason::TooManyRows { most: room });
+    }
+    let every = Every { sample_ticks: 1, row_ticks: 1 };
+    let mut recording = Recording::new(&arguments.out, arguments.force, &session.status, every)?;
+    if arguments.arm {
+        session.order(Request::Arm)?;
+    }
+    session.client.capture(rows).with_context(|| name.clone())?;
+    let followed = follow(session, schedule.as_ref(), Duration::from_secs_f64(length_s), rows);
+    // Sending the rows takes longer than the capture, and must not hold a voltage meanwhile.
+    if arguments.arm || schedule.is_some() {
+        session.order(Request::Disarm)?;
+    }
+    let captured = followed?;
+    let mut tick = 0;
+    let mut first = 0;
+    while first < captured {
+        let rows = session.client.rows(first).with_context(|| name.clone())?;
+        if rows.is_empty() {
+            bail!("{name}: the MCU has no row {first} of {captured}; has it restarted?");
+        }
+        for row in &rows {
+            tick += 1 + u64::from(row.missed);
+            recording.add(&telemetry(tick, row, &volts))?;
+        }
+        first += rows.len() as u32;
+    }
+    let (summary, file) = (recording.summary(), arguments.out.display());
+    summary.remarks(&file.to_string()).iter().for_each(|text| remark(text));
+    if session.json {
+        let mut report = serde_json::to_value(summary)?;
+        (report["file"], report["wanted"], report["room"]) = (json!(arguments.out), json!(rows), json!(room));
+        print(&format!("{report}\n"))
+    } else {
+        let (rows, seconds, lost) = (summary.rows, summary.seconds, summary.lost);
+        print(&format!("wrote {file}: {rows} rows, {seconds} s, {lost} missing; room for {room} rows\n"))
+    }
+}
+
+/// Commands the schedule until all rows are captured; returns their number, fewer after Ctrl-C.
+fn follow(session: &mut Session, schedule: Option<&Schedule>, length: Duration, rows: u32) -> Result<u32> {
+    let mut drive = Drive::new(session, schedule);
+    let start = Instant::now();
+    let mut asked = start;
+    loop {
+        drive.step(session)?;
+        if start.elapsed() >= length || asked.elapsed() >= POLL || stopped() {
+            asked = Instant::now();
+            let state = session.client.capture_state().with_context(|| session.client.name().to_owned())?;
+            if state.wanted != rows {
+                bail!("{}: the capture was replaced or lost: {state:?}", session.client.name());
+            }
+            if state.captured >= rows || stopped() {
+                return Ok(state.captured);
+            }
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// The amplifier stage that the MCU runs: the voltage of a code.
+fn volts_of(session: &mut Session) -> Result<amplifier::Config> {
+    let name = session.client.name().to_owned();
+    let running = session.client.read_settings(false).with_context(|| name.clone())?;
+    let settings = running.over(&device::Settings::PAPER);
+    let amplifier = settings.map_err(|field| Failure::Refused(Reason::NotBuiltIn(field)))?.control.amplifier;
+    let sample_time = SampleTime::from_rate(f64::from(running.rate_hz))?;
+    Ok(amplifier.validate(sample_time).with_context(|| name)?.quantize())
+}
+
+/// The row as the telemetry of that tick.
+fn telemetry(tick: u64, row: &Row, volts: &amplifier::Config) -> Telemetry {
+    Telemetry {
+        tick,
+        state: row.state,
+        applied: volts.volts(DacCode(row.code)).into(),
+        estimate: row.stiffness,
+        measured: row.measured.then_some(row.stiffness),
+        code: row.code,
+        limits: row.limits,
+        ..Telemetry::default()
+    }
+}

@@ -1,0 +1,71 @@
+//! `vsj link PORT settings`: the settings that the MCU runs, or new ones for it.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use host_sim::link::Failure;
+use host_sim::output::terminal::{json, print};
+use link::{Blocks, Reason};
+use serde::Serialize;
+use simulation::bad_input;
+use simulation::settings_file::{SettingsFile, Source};
+
+use super::session::Session;
+
+#[derive(Args, Debug)]
+pub(super) struct Arguments {
+    /// A settings file, see docs/settings.toml, at most 1 MiB; what it does not name stays as built into the image
+    #[arg(value_name = "FILE.toml")]
+    file: Option<PathBuf>,
+    /// Show the running settings, as a file; also without any argument
+    #[arg(long, conflicts_with_all = ["file", "default"])]
+    show: bool,
+    /// Send the settings that are built into the image
+    #[arg(long, conflicts_with = "file")]
+    default: bool,
+}
+
+/// The answer with `--json`.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    blocks: Blocks,
+    settings: SettingsFile,
+}
+
+impl Arguments {
+    /// Reads the file, before anything is sent.
+    pub(super) fn read(&self) -> Result<Option<Source>> {
+        match &self.file {
+            Some(path) => Source::open(path).map(Some),
+            None if self.default => Source::parse("--default", "schema = 1").map(Some),
+            None => Ok(None),
+        }
+    }
+}
+
+pub(super) fn run(session: &mut Session, arguments: &Arguments, source: Option<&Source>) -> Result<()> {
+    let name = session.client.name().to_owned();
+    let blocks = match source {
+        None => session.client.settings(),
+        Some(source) => {
+            let built_in = session.client.read_settings(true).with_context(|| name.clone())?;
+            session.client.install_settings(&source.over(&built_in)?)
+        }
+    };
+    let blocks = match blocks {
+        Err(Failure::Refused(reason @ (Reason::BadSettings { .. } | Reason::NotBuiltIn(_)))) => {
+            let file = arguments.file.as_ref().map_or_else(|| "--default".into(), |file| file.display().to_string());
+            bad_input!("{file}: {reason}")
+        }
+        blocks => blocks.with_context(|| name.clone())?,
+    };
+    let running = session.client.read_settings(false).with_context(|| name)?;
+    let settings = SettingsFile::from(&running);
+    print(&if session.json {
+        json(&Report { blocks, settings })?
+    } else {
+        format!("# runs    {}\n# stored  {}\n{}", blocks.active, blocks.stored, settings.to_toml()?)
+    })
+}

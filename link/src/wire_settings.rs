@@ -1,0 +1,257 @@
+//! The settings of an MCU in the format in which they are sent and stored.
+//!
+//! The numbers have the same bits as those of the settings' file. Decoding does not validate them; that is done by
+//! [`model::device::Settings::check`] on both sides.
+
+use heapless::Vec;
+use model::device::{self, Watchdogs};
+use model::{Amplifier, Approach, Compensation, Feedback, Gains, Settings, supervisor};
+use serde::{Deserialize, Serialize};
+
+use crate::block::PART;
+use crate::field::Field;
+use crate::reply::Controller;
+
+/// Version of the payload's format.
+pub const FORMAT: u8 = 1;
+/// Largest number of parts of a payload.
+pub const MOST_PARTS: u8 = 7;
+/// Length of the longest payload, in bytes.
+pub const MOST_BYTES: usize = PART * MOST_PARTS as usize;
+
+/// A payload of settings.
+pub type Payload = Vec<u8, MOST_BYTES, u16>;
+
+/// What can be changed without compiling the MCU's program, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WireSettings {
+    /// Rate of the control tick, in Hz.
+    pub rate_hz: u32,
+    /// Pre-compensator, of those that the image contains.
+    pub controller: Controller,
+    /// Proportional gain of the paper's controller, in V/V.
+    pub proportional: f64,
+    /// Integral gain of the paper's controller, in 1/s.
+    pub integral_per_s: f64,
+    /// Time constant of the fast controller's approach, in s.
+    pub approach_s: f64,
+    /// Voltage of the amplifier at the highest code, in V.
+    pub full_scale_v: f64,
+    /// Lowest voltage, in V.
+    pub min_v: f64,
+    /// Highest voltage, in V.
+    pub max_v: f64,
+    /// Fastest change of the voltage, in V/s; `None` if it is not limited.
+    pub slew_v_per_s: Option<f64>,
+    /// Stiffness sensor that corrects the estimate, as [`Feedback::values`]; `None` without one.
+    pub sensor: Option<[f64; 8]>,
+    /// Longest silence of the host, in s.
+    pub host_timeout_s: f64,
+    /// Slope of the ramp after that, in V/s.
+    pub ramp_v_per_s: f64,
+    /// Number of missed ticks that are tolerated together.
+    pub missed_ticks_allowed: u32,
+    /// Time after which a missed tick is forgotten, in s.
+    pub forget_missed_s: f64,
+    /// Largest difference between the voltage monitor and the output, in V.
+    pub monitor_tolerance_v: f64,
+    /// Largest magnitude of the current monitor, in A.
+    pub max_current_a: f64,
+    /// Time for which a monitor may disagree while the output is enabled, in s.
+    pub monitor_time_s: f64,
+    /// Time for which a monitor may disagree while the output is disabled, in s.
+    pub discharge_time_s: f64,
+    /// Times of the three watchdogs, in ms: hang guard, task watchdog, hardware watchdog.
+    pub watchdogs_ms: [u32; 3],
+}
+
+impl WireSettings {
+    /// The part of `settings` that can be changed. What the chosen controller does not use has its default value.
+    pub fn new(settings: &device::Settings) -> Self {
+        let device::Settings { control, supervision, watchdogs } = settings;
+        let Settings { compensation, amplifier, feedback, .. } = control;
+        let (gains, approach_s) = match compensation {
+            Compensation::None => (Gains::PAPER, 0.0),
+            Compensation::ProportionalIntegral(gains) => (*gains, 0.0),
+            Compensation::TimeOptimal(approach) => (Gains::PAPER, approach.time_constant_s()),
+        };
+        Self {
+            rate_hz: settings.rate_hz(),
+            controller: Controller::of(compensation),
+            proportional: gains.proportional,
+            integral_per_s: gains.integral_per_s,
+            approach_s,
+            full_scale_v: amplifier.full_scale_v,
+            min_v: amplifier.min_v,
+            max_v: amplifier.max_v,
+            slew_v_per_s: amplifier.slew_v_per_s,
+            sensor: feedback.as_ref().map(Feedback::values),
+            host_timeout_s: supervision.host_timeout_s,
+            ramp_v_per_s: supervision.ramp_v_per_s,
+            missed_ticks_allowed: supervision.missed_ticks_allowed,
+            forget_missed_s: supervision.forget_missed_s,
+            monitor_tolerance_v: supervision.monitor_tolerance_v,
+            max_current_a: supervision.max_current_a,
+            monitor_time_s: supervision.monitor_time_s,
+            discharge_time_s: supervision.discharge_time_s,
+            watchdogs_ms: [watchdogs.hang_ms, watchdogs.stall_ms, watchdogs.reset_ms],
+        }
+    }
+
+    /// `fixed`, which has the board's own properties, with these settings.
+    ///
+    /// # Errors
+    /// The field that needs a program with other features.
+    pub fn over(&self, fixed: &device::Settings) -> Result<device::Settings, Field> {
+        let compensation = match self.controller {
+            Controller::None => Compensation::None,
+            Controller::Paper => Compensation::ProportionalIntegral(Gains {
+                proportional: self.proportional,
+                integral_per_s: self.integral_per_s,
+            }),
+            Controller::Fast => {
+                Compensation::TimeOptimal(Approach::new(self.approach_s).ok_or(Field::named("controller"))?)
+            }
+        };
+        let feedback = match self.sensor {
+            None => None,
+            Some(values) => Some(Feedback::from_values(values).ok_or(Field::named("sensor"))?),
+        };
+        let [hang_ms, stall_ms, reset_ms] = self.watchdogs_ms;
+        Ok(device::Settings {
+            control: Settings {
+                rate_hz: f64::from(self.rate_hz),
+                compensation,
+                amplifier: Amplifier {
+                    full_scale_v: self.full_scale_v,
+                    min_v: self.min_v,
+                    max_v: self.max_v,
+                    slew_v_per_s: self.slew_v_per_s,
+                    ..fixed.control.amplifier
+                },
+                feedback,
+                ..fixed.control
+            },
+            supervision: supervisor::Settings {
+                host_timeout_s: self.host_timeout_s,
+                ramp_v_per_s: self.ramp_v_per_s,
+                missed_ticks_allowed: self.missed_ticks_allowed,
+                forget_missed_s: self.forget_missed_s,
+                monitor_tolerance_v: self.monitor_tolerance_v,
+                max_current_a: self.max_current_a,
+                monitor_time_s: self.monitor_time_s,
+                discharge_time_s: self.discharge_time_s,
+                ..fixed.supervision
+            },
+            watchdogs: Watchdogs { hang_ms, stall_ms, reset_ms },
+        })
+    }
+
+    /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the longest.
+    #[inline(never)]
+    pub fn payload(&self) -> Option<Payload> {
+        let mut bytes = Payload::new();
+        bytes.resize_default(MOST_BYTES).ok()?;
+        let (format, message) = bytes.split_first_mut()?;
+        *format = FORMAT;
+        let length = 1 + postcard::to_slice(self, message).ok()?.len();
+        bytes.truncate(length);
+        Some(bytes)
+    }
+
+    /// Deserialises a payload. `None` for another format and for bytes that are not exactly one set of settings.
+    #[inline(never)]
+    pub fn read(payload: &[u8]) -> Option<Self> {
+        match payload.split_first() {
+            Some((&FORMAT, message)) => match postcard::take_from_bytes(message) {
+                Ok((settings, [])) => Some(settings),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BUILT_IN: device::Settings = device::Settings::PAPER;
+
+    fn longest() -> WireSettings {
+        let most = u32::MAX;
+        WireSettings {
+            rate_hz: most,
+            missed_ticks_allowed: most,
+            watchdogs_ms: [most; 3],
+            slew_v_per_s: Some(1.5),
+            sensor: Some([2.5; 8]),
+            ..WireSettings::new(&BUILT_IN)
+        }
+    }
+
+    #[test]
+    fn the_longest_settings_fit_and_survive_a_round_trip() {
+        let payload = longest().payload().unwrap();
+        assert_eq!((payload.len(), WireSettings::read(&payload)), (205, Some(longest())));
+        assert!(payload.len() <= MOST_BYTES);
+    }
+
+    #[test]
+    fn bytes_that_are_not_one_set_of_settings_are_rejected() {
+        let payload = longest().payload().unwrap();
+        for end in 0..payload.len() {
+            assert_eq!(WireSettings::read(&payload[..end]), None, "{end} bytes");
+        }
+        let mut bytes = payload.clone();
+        bytes.push(0).unwrap();
+        assert_eq!(WireSettings::read(&bytes), None, "one byte too many");
+        for format in (0..=u8::MAX).filter(|format| *format != FORMAT) {
+            bytes = payload.clone();
+            bytes[0] = format;
+            assert_eq!(WireSettings::read(&bytes), None, "format {format}");
+        }
+    }
+
+    #[test]
+    fn settings_that_were_sent_are_those_that_were_meant() {
+        assert_eq!(WireSettings::new(&BUILT_IN).over(&BUILT_IN), Ok(BUILT_IN));
+        let gains = Gains { proportional: 3.0, integral_per_s: 0.5 };
+        let amplifier = Amplifier { min_v: 5.0, max_v: 400.0, slew_v_per_s: Some(2e3), ..Amplifier::up_to(450.0) };
+        let control = Settings {
+            rate_hz: 500.0,
+            compensation: Compensation::ProportionalIntegral(gains),
+            amplifier,
+            ..BUILT_IN.control
+        };
+        let supervision = supervisor::Settings {
+            host_timeout_s: 0.25,
+            ramp_v_per_s: 100.0,
+            missed_ticks_allowed: 3,
+            forget_missed_s: 2.0,
+            monitor_tolerance_v: 20.0,
+            max_current_a: 1e-3,
+            monitor_time_s: 0.1,
+            discharge_time_s: 3.0,
+            ..BUILT_IN.supervision
+        };
+        let watchdogs = Watchdogs { hang_ms: 20, stall_ms: 60, reset_ms: 200 };
+        let meant = device::Settings { control, supervision, watchdogs };
+        let payload = WireSettings::new(&meant).payload().unwrap();
+        assert_eq!(WireSettings::read(&payload).unwrap().over(&BUILT_IN), Ok(meant));
+        let none = Settings { compensation: Compensation::None, ..control };
+        let meant = device::Settings { control: none, ..meant };
+        assert_eq!(WireSettings::new(&meant).over(&BUILT_IN), Ok(meant));
+    }
+
+    /// What the settings leave out is the board's.
+    #[test]
+    fn the_converter_the_supply_and_the_spring_stay_those_of_the_board() {
+        let amplifier = Amplifier { dac_bits: 10, ..Amplifier::PAPER };
+        let supervision = supervisor::Settings { lowest_supply_v: 2.0, ..BUILT_IN.supervision };
+        let plant = model::Plant { share: 0.2, ..model::Plant::PAPER };
+        let board =
+            device::Settings { control: Settings { amplifier, plant, ..BUILT_IN.control }, supervision, ..BUILT_IN };
+        assert_eq!(WireSettings::new(&BUILT_IN).over(&board), Ok(board));
+    }
+}
