@@ -1,7 +1,7 @@
 //! Hand-over between the host's task and the control tick: at most one command in one direction, the view of the last tick in
 //! the other.
 //!
-//! The tick empties the mailbox [`RATE_HZ`](crate::RATE_HZ) times per second, independently of the host's task.
+//! Each tick empties the mailbox, independently of the host's task.
 
 use link::{Command, Fault, View};
 use model::supervisor::State;

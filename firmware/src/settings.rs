@@ -29,10 +29,10 @@ pub const SETTINGS: Settings = paper(AMPLIFIER);
 #[cfg(feature = "fast")]
 pub const FAST: Settings = fast(AMPLIFIER);
 
-/// Settings of a run that the host commands: those of the flashed image.
+/// Settings of a run that the host commands, unless others are stored.
 #[cfg(not(feature = "fast"))]
 pub const FLASHED: Settings = with_sensor(SETTINGS);
-/// Settings of a run that the host commands: those of the flashed image.
+/// Settings of a run that the host commands, unless others are stored.
 #[cfg(feature = "fast")]
 pub const FLASHED: Settings = with_sensor(FAST);
 /// Correction by the stiffness sensor; it has no effect on a board without one.
@@ -41,10 +41,10 @@ const SENSOR: Option<Feedback> = None;
 /// Correction by the stiffness sensor; it has no effect on a board without one.
 #[cfg(feature = "feedback")]
 const SENSOR: Option<Feedback> = Some(Feedback::TYPICAL);
-/// Settings of the supervisor in every run.
+/// Settings of the supervisor, unless others are stored.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 
-/// Times of the watchdogs in every run.
+/// Times of the watchdogs, unless others are stored.
 pub const WATCHDOGS: Watchdogs = Watchdogs::DEFAULT;
 /// All settings of the flashed image.
 pub const BUILT_IN: device::Settings = built_in(FLASHED);

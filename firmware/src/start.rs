@@ -1,7 +1,7 @@
 //! Settings, model and fault of the last run at the start, and the controller that is built from them.
 //!
-//! Stored settings run from the start on, or not at all: those that are damaged, of another format, out of range or beyond what
-//! the image contains are a `config` fault, and the built-in ones run.
+//! Stored settings run from the start on, or not at all: those of another format, out of range or beyond what the image
+//! contains are a `config` fault, and the built-in ones run. A damaged page counts as never written.
 
 use link::{Block, BlockId, Blocks, Reason, WireModel, WireSettings};
 use model::supervisor::Fault;
@@ -269,7 +269,7 @@ mod tests {
             (&WireSettings { max_v: f64::NAN, ..wire }.payload().unwrap(), "max_v"),
             (&WireSettings { rate_hz: 0, ..wire }.payload().unwrap(), "rate_hz"),
             (&WireSettings { rate_hz: u32::MAX, ..wire }.payload().unwrap(), "rate_hz"),
-            (&WireSettings { watchdogs_ms: [0; 3], ..wire }.payload().unwrap(), "reset_ms"),
+            (&WireSettings { watchdogs_ms: [0; 3], ..wire }.payload().unwrap(), "hang_ms"),
             (&WireSettings { missed_ticks_allowed: u32::MAX, ..wire }.payload().unwrap(), "missed_ticks_allowed"),
         ] {
             let store = store(&[(Block::Settings, payload)]);
@@ -303,7 +303,8 @@ mod tests {
     #[test]
     fn model_and_settings_are_checked_with_each_other() {
         let model = model(0.5).payload().unwrap();
-        let wire = built_in_settings();
+        // Whatever controller the image has built in.
+        let wire = WireSettings { controller: Controller::Paper, integral_per_s: 1.35, ..built_in_settings() };
         let strong = WireSettings { proportional: 90.0, ..wire }.payload().unwrap();
         assert_eq!(check_settings(&store(&[]), &strong), Ok(()), "with the built-in model");
         let short = WireModel { time_constants_s: [0.01].into_iter().collect(), ..WireModel::default() };

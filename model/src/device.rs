@@ -19,9 +19,13 @@ use crate::units::SampleTime;
 const RATES_HZ: (u32, u32) = (100, 2000);
 /// Clock of the tick's timer, in Hz: a period is a whole number of its cycles.
 const TIMER_HZ: u32 = 1_000_000;
-/// Shortest time in which the task watchdog can complete a round, in ms: tasks check in every 10 ms, or after waiting for
-/// the line for up to 20 ms.
-const SHORTEST_STALL_MS: u32 = 30;
+/// Longest round of the task watchdog, in ms: tasks check in every 10 ms, or after waiting for the line for up to 20 ms, or for a page of
+/// flash to be erased, 25 ms.
+const LONGEST_ROUND_MS: u32 = 45;
+/// Largest tolerance of the voltage monitor, as a part of the amplifier's full scale.
+const MOST_TOLERANCE: f64 = 0.1;
+/// Largest tolerated current, in A, below the end of the monitor's range of 5 mA: beyond, none would be seen.
+const MOST_CURRENT_A: f64 = 4e-3;
 /// Longest time without feeding after which a chip may be reset, in ms.
 const LONGEST_RESET_MS: u32 = 2000;
 
@@ -40,14 +44,14 @@ pub struct Settings {
 /// Times after which the three watchdogs act, in ms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Watchdogs {
-    /// Time without a tick after which the hang guard performs the emergency stop, in ms: two ticks more than the missed
-    /// ones that the supervisor tolerates, so that a late control task still reports its overrun itself, to less than
-    /// `reset_ms`.
+    /// Time without a tick after which the hang guard performs the emergency stop, in ms: more than two ticks beyond the missed
+    /// ones that the supervisor tolerates, so that a late control task still reports its overrun itself, to 1000 ms.
     pub hang_ms: u32,
-    /// Time without a complete round of the task watchdog after which the output is disabled, 30 ms to less than
-    /// `reset_ms`.
+    /// Time without a complete round of the task watchdog after which the output is disabled, in ms: the longest round of 45 ms and
+    /// two ticks, to 1000 ms.
     pub stall_ms: u32,
-    /// Time without feeding after which the hardware watchdog resets the chip, in ms, up to 2000.
+    /// Time without feeding after which the hardware watchdog resets the chip, in ms: 10 % more than the others need, since its
+    /// clock is a few percent off, to 2000 ms.
     pub reset_ms: u32,
 }
 
@@ -78,18 +82,25 @@ impl Settings {
         check_rate(control.rate_hz)?;
         control.validate()?;
         supervision.validate(SampleTime::from_rate(control.rate_hz)?)?;
-        let tolerated = supervision.missed_ticks_allowed + 2;
-        let hang_ms_from = (1000 * tolerated).div_ceil(self.rate_hz());
-        let reset_ms_from = SHORTEST_STALL_MS.max(hang_ms_from) + 1;
-        let before_reset = reset_ms.saturating_sub(1);
-        for (field, value, lowest, highest) in [
-            ("reset_ms", *reset_ms, reset_ms_from, LONGEST_RESET_MS),
-            ("hang_ms", *hang_ms, hang_ms_from, before_reset),
-            ("stall_ms", *stall_ms, SHORTEST_STALL_MS, before_reset),
-        ] {
+        // A monitor with a wider tolerance could agree with anything.
+        let most_v = MOST_TOLERANCE * control.amplifier.full_scale_v;
+        OutOfRange::check("monitor_tolerance_v", supervision.monitor_tolerance_v, 1.0..=most_v, "V")?;
+        OutOfRange::check("max_current_a", supervision.max_current_a, 1e-6..=MOST_CURRENT_A, "A")?;
+        let ticks_ms = |ticks: u32| (1000 * ticks).div_ceil(self.rate_hz());
+        // The guard counts whole ms, the first of which may be short.
+        let hang_ms_from = ticks_ms(supervision.missed_ticks_allowed + 2) + 1;
+        let stall_ms_from = LONGEST_ROUND_MS + ticks_ms(2);
+        let longest = LONGEST_RESET_MS / 2;
+        for (field, value, lowest, highest) in
+            [("hang_ms", *hang_ms, hang_ms_from, longest), ("stall_ms", *stall_ms, stall_ms_from, longest)]
+        {
             OutOfRange::check(field, f64::from(value), f64::from(lowest)..=f64::from(highest), "ms")?;
         }
-        Ok(())
+        // The last feeding may be a whole round before a hang.
+        let others_ms = (*stall_ms).max(hang_ms + LONGEST_ROUND_MS) + ticks_ms(2);
+        let reset_ms_from = others_ms + others_ms.div_ceil(10);
+        let allowed = f64::from(reset_ms_from)..=f64::from(LONGEST_RESET_MS);
+        OutOfRange::check("reset_ms", f64::from(*reset_ms), allowed, "ms")
     }
 }
 
@@ -116,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_rate_is_allowed_if_its_period_is_a_whole_number_of_microseconds() {
-        let slow = Watchdogs { hang_ms: 90, ..GOOD.watchdogs };
+        let slow = Watchdogs { hang_ms: 90, stall_ms: 80, reset_ms: 200 };
         for rate_hz in [100.0, 125.0, 500.0, 1000.0, 1250.0, 2000.0] {
             assert_eq!(at(rate_hz, slow).check(), Ok(()), "{rate_hz}");
         }
@@ -139,19 +150,20 @@ mod tests {
         let watchdogs = |hang_ms, stall_ms, reset_ms| Watchdogs { hang_ms, stall_ms, reset_ms };
         for (rate_hz, watchdogs, expected) in [
             (1000.0, GOOD.watchdogs, Ok(())),
-            (1000.0, watchdogs(7, 30, 31), Ok(())),
-            (1000.0, watchdogs(6, 50, 100), Err(("hang_ms", 7.0, 99.0))),
-            (1000.0, watchdogs(100, 50, 100), Err(("hang_ms", 7.0, 99.0))),
-            (1000.0, watchdogs(12, 29, 100), Err(("stall_ms", 30.0, 99.0))),
-            (1000.0, watchdogs(12, 100, 100), Err(("stall_ms", 30.0, 99.0))),
-            (1000.0, watchdogs(12, 50, 30), Err(("reset_ms", 31.0, 2000.0))),
-            (1000.0, watchdogs(12, 50, 0), Err(("reset_ms", 31.0, 2000.0))),
-            (1000.0, watchdogs(12, 50, 2001), Err(("reset_ms", 31.0, 2000.0))),
-            (100.0, GOOD.watchdogs, Err(("hang_ms", 70.0, 99.0))),
-            (100.0, watchdogs(70, 50, 71), Ok(())),
-            (100.0, watchdogs(70, 50, 70), Err(("reset_ms", 71.0, 2000.0))),
-            (2000.0, watchdogs(4, 50, 100), Ok(())),
-            (2000.0, watchdogs(3, 50, 100), Err(("hang_ms", 4.0, 99.0))),
+            (1000.0, watchdogs(8, 47, 61), Ok(())),
+            (1000.0, watchdogs(7, 50, 100), Err(("hang_ms", 8.0, 1000.0))),
+            (1000.0, watchdogs(1001, 50, 2000), Err(("hang_ms", 8.0, 1000.0))),
+            (1000.0, watchdogs(12, 46, 100), Err(("stall_ms", 47.0, 1000.0))),
+            (1000.0, watchdogs(12, 1001, 2000), Err(("stall_ms", 47.0, 1000.0))),
+            (1000.0, watchdogs(12, 100, 100), Err(("reset_ms", 113.0, 2000.0))),
+            (1000.0, watchdogs(100, 50, 100), Err(("reset_ms", 162.0, 2000.0))),
+            (1000.0, watchdogs(12, 50, 0), Err(("reset_ms", 65.0, 2000.0))),
+            (1000.0, watchdogs(12, 50, 2001), Err(("reset_ms", 65.0, 2000.0))),
+            (100.0, GOOD.watchdogs, Err(("hang_ms", 71.0, 1000.0))),
+            (100.0, watchdogs(71, 50, 200), Err(("stall_ms", 65.0, 1000.0))),
+            (100.0, watchdogs(71, 65, 150), Ok(())),
+            (2000.0, watchdogs(5, 50, 100), Ok(())),
+            (2000.0, watchdogs(4, 50, 100), Err(("hang_ms", 5.0, 1000.0))),
         ] {
             let found = at(rate_hz, watchdogs).check().map_err(|error| (error.field, error.lowest, error.highest));
             assert_eq!(found, expected, "{rate_hz} Hz, {watchdogs:?}");
@@ -165,5 +177,19 @@ mod tests {
         assert_eq!(Settings { control, ..GOOD }.check().unwrap_err().field, "full_scale_v");
         let supervision = supervisor::Settings { ramp_v_per_s: 0.0, ..GOOD.supervision };
         assert_eq!(Settings { supervision, ..GOOD }.check().unwrap_err().field, "ramp_v_per_s");
+    }
+
+    #[test]
+    fn monitors_that_would_agree_with_anything_are_rejected() {
+        let with = |monitor_tolerance_v, max_current_a| Settings {
+            supervision: supervisor::Settings { monitor_tolerance_v, max_current_a, ..GOOD.supervision },
+            ..GOOD
+        };
+        assert_eq!(with(70.0, 4e-3).check(), Ok(()));
+        assert_eq!(with(70.1, 2e-3).check().unwrap_err().field, "monitor_tolerance_v");
+        assert_eq!(with(35.0, 5e-3).check().unwrap_err().field, "max_current_a");
+        // A lower full scale asks for a narrower tolerance than the default.
+        let control = controller::Settings { amplifier: crate::Amplifier::up_to(300.0), ..GOOD.control };
+        assert_eq!(Settings { control, ..GOOD }.check().unwrap_err().field, "monitor_tolerance_v");
     }
 }

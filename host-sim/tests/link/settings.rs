@@ -74,7 +74,7 @@ fn settings_that_cannot_run_change_nothing_and_the_error_says_why() {
         (
             "order.toml",
             "schema = 1\n[watchdogs]\nreset_ms = 40\n",
-            "stall_ms = 50 is not allowed: expected 30 to 39 ms",
+            "reset_ms = 40 is not allowed: expected 65 to 2000 ms",
         ),
     ] {
         let text = bad(2, port, &["settings", &file(&folder, name, text)]);

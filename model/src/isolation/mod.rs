@@ -24,7 +24,7 @@
 //! output. It stays until [`State::acknowledge`].
 //!
 //! A cause is named if it leaves no more than noise and the error of its linear signature can leave, and every other cause leaves
-//! much more. If another one does not, both are named as ambiguous; if no cause leaves so little, the verdict is unknown. Two
+//! much more. If another one does not, both are named as ambiguous; if no cause leaves so little, the verdict is unknown. Three
 //! decisions in a row have to agree.
 //!
 //! The reference in double precision is `simulation::isolation`.

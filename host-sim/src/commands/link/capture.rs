@@ -74,29 +74,37 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         bad_input!("{length_s} s at {row_rate} Hz are {rows} rows: {}, {most_s} s", Reason::TooManyRows { most: room });
     }
     let every = Every { sample_ticks: 1, row_ticks: 1 };
+    // Created before anything is armed: what was measured must find its file.
     let mut recording = Recording::new(&arguments.out, arguments.force, &session.status, every)?;
     if arguments.arm {
         session.order(Request::Arm)?;
     }
-    session.client.capture(rows).with_context(|| name.clone())?;
-    let followed = follow(session, schedule.as_ref(), Duration::from_secs_f64(length_s), rows);
+    let begun = session.client.capture(rows).with_context(|| name.clone());
+    let followed = begun.and_then(|_| follow(session, schedule.as_ref(), Duration::from_secs_f64(length_s), rows));
     // Sending the rows takes longer than the capture, and must not hold a voltage meanwhile.
-    if arguments.arm || schedule.is_some() {
-        session.order(Request::Disarm)?;
-    }
+    let ends = arguments.arm || schedule.is_some();
+    let disarmed = if ends { session.order(Request::Disarm).map(drop) } else { Ok(()) };
     let captured = followed?;
-    let mut tick = 0;
-    let mut first = 0;
-    while first < captured {
+    disarmed?;
+    let mut all = Vec::new();
+    while (all.len() as u32) < captured {
+        let first = all.len() as u32;
         let rows = session.client.rows(first).with_context(|| name.clone())?;
         if rows.is_empty() {
             bail!("{name}: the MCU has no row {first} of {captured}; has it restarted?");
         }
-        for row in &rows {
-            tick += 1 + u64::from(row.missed);
-            recording.add(&telemetry(tick, row, &volts))?;
-        }
-        first += rows.len() as u32;
+        all.extend(rows);
+    }
+    // Not every tick of a sensor has a reading, the one before the capture perhaps neither.
+    let read = all.iter().find(|row| row.measured).map(|row| row.stiffness);
+    if session.status.sample.measured.is_none() && read.is_some() {
+        session.status.sample.measured = read;
+        recording = Recording::new(&arguments.out, true, &session.status, every)?;
+    }
+    let mut tick = 0;
+    for row in &all {
+        tick += 1 + u64::from(row.missed);
+        recording.add(&telemetry(tick, row, &volts))?;
     }
     let (summary, file) = (recording.summary(), arguments.out.display());
     summary.remarks(&file.to_string()).iter().for_each(|text| remark(text));

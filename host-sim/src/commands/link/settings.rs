@@ -15,7 +15,8 @@ use super::session::Session;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// A settings file, see docs/settings.toml, at most 1 MiB; what it does not name stays as built into the image
+    /// A settings file, see docs/settings.toml, at most 1 MiB; what it does not name is
+    /// sent as built into the image that runs
     #[arg(value_name = "FILE.toml")]
     file: Option<PathBuf>,
     /// Show the running settings, as a file; also without any argument
