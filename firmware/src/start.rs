@@ -9,7 +9,6 @@ use model::{Amplifier, OutOfRange, device};
 
 use crate::control::Control;
 use crate::reset_cause::Cause;
-use crate::settings::BUILT_IN;
 use crate::store::{Pages, Store};
 
 /// Settings of a run.
@@ -44,13 +43,13 @@ impl Loaded {
     }
 }
 
-/// The settings in the store if they are valid, otherwise those that are built in.
+/// The settings in the store if they are valid, otherwise `built_in`.
 #[inline(never)]
-pub fn load<P: Pages>(store: &Store<P>) -> Loaded {
-    let mut loaded = Loaded::fixed(BUILT_IN);
+pub fn load<P: Pages>(store: &Store<P>, built_in: &device::Settings) -> Loaded {
+    let mut loaded = Loaded::fixed(*built_in);
     if let Some((stored, payload)) = store.newest(Block::Settings) {
         loaded.blocks.stored = stored;
-        match read(payload) {
+        match read(payload, built_in) {
             Ok(settings) => (loaded.settings, loaded.blocks.active) = (settings, stored),
             Err(Reason::NotBuiltIn(field) | Reason::BadSettings { field, .. }) => loaded.rejected = Some(field.name()),
             Err(_) => loaded.rejected = Some("format"),
@@ -94,10 +93,10 @@ pub fn control<'a>(
 /// # Errors
 /// The [`Reason`] for rejecting the model.
 #[inline(never)]
-pub fn check_model<P: Pages>(store: &Store<P>, payload: &[u8]) -> Result<(), Reason> {
+pub fn check_model<P: Pages>(store: &Store<P>, payload: &[u8], built_in: &device::Settings) -> Result<(), Reason> {
     let model = WireModel::read(payload);
     let Some(model) = &model else { return Err(Reason::Damaged) };
-    Control::check(&load(store).settings.control, model).map_err(|error| Reason::of_model(&error))
+    Control::check(&load(store, built_in).settings.control, model).map_err(|error| Reason::of_model(&error))
 }
 
 /// Validates the settings in `payload`, also for the stored model.
@@ -105,19 +104,19 @@ pub fn check_model<P: Pages>(store: &Store<P>, payload: &[u8]) -> Result<(), Rea
 /// # Errors
 /// The [`Reason`] for rejecting the settings.
 #[inline(never)]
-pub fn check_settings<P: Pages>(store: &Store<P>, payload: &[u8]) -> Result<(), Reason> {
-    let settings = read(payload)?;
+pub fn check_settings<P: Pages>(store: &Store<P>, payload: &[u8], built_in: &device::Settings) -> Result<(), Reason> {
+    let settings = read(payload, built_in)?;
     let model = store.newest(Block::Model).and_then(|(_, payload)| WireModel::read(payload));
     let Some(model) = &model else { return Ok(()) };
     Control::check(&settings.control, model).map_err(|error| Reason::of_settings(&error))
 }
 
-/// Reads and validates settings.
+/// Reads and validates settings; what they leave out is that of `built_in`.
 #[inline(never)]
-fn read(payload: &[u8]) -> Result<device::Settings, Reason> {
+fn read(payload: &[u8], built_in: &device::Settings) -> Result<device::Settings, Reason> {
     let wire = WireSettings::read(payload);
     let Some(wire) = &wire else { return Err(Reason::Damaged) };
-    let settings = wire.over(&BUILT_IN).map_err(Reason::NotBuiltIn)?;
+    let settings = wire.over(built_in).map_err(Reason::NotBuiltIn)?;
     settings.check().map_err(|error| Reason::of_settings(&error))?;
     Ok(settings)
 }
@@ -138,6 +137,7 @@ fn build<'a>(settings: &device::Settings, place: &'a mut Option<Control>) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::BUILT_IN;
     use crate::settings::{SETTINGS, built_in};
     use crate::store::{FlashError, PAGE, PAGES, Page, WORD};
     use link::wire_model::FORMAT;
@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn a_model_is_checked_before_it_is_stored() {
         let payload = |share| model(share).payload().unwrap();
-        let check = |payload: &[u8]| check_model(&store(&[]), payload);
+        let check = |payload: &[u8]| check_model(&store(&[]), payload, &BUILT_IN);
         assert_eq!(check(&payload(0.1)), Ok(()));
         assert_eq!(check(b"noise"), Err(Reason::Damaged));
         assert!(matches!(check(&payload(2.0)), Err(Reason::BadModel { .. })));
@@ -234,7 +234,7 @@ mod tests {
         let mut newer = model(0.1).payload().unwrap();
         for version in (0..=u8::MAX).filter(|version| *version != FORMAT) {
             newer[0] = version;
-            assert_eq!(check_model(&store(&[]), &newer), Err(Reason::Damaged), "format {version}");
+            assert_eq!(check_model(&store(&[]), &newer, &BUILT_IN), Err(Reason::Damaged), "format {version}");
             let mut place = None;
             let stored = Some((BlockId::of(3, &newer), &newer[..]));
             let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
@@ -247,13 +247,13 @@ mod tests {
     #[test]
     fn stored_settings_run_and_the_board_keeps_its_own() {
         let wire = WireSettings { full_scale_v: 450.0, max_v: 400.0, rate_hz: 1250, ..built_in_settings() };
-        let loaded = load(&store(&[(Block::Settings, &wire.payload().unwrap())]));
+        let loaded = load(&store(&[(Block::Settings, &wire.payload().unwrap())]), &BUILT_IN);
         assert_eq!((loaded.rejected, loaded.blocks.active), (None, loaded.blocks.stored));
         assert_eq!((loaded.blocks.active.number, loaded.settings.rate_hz()), (1, 1250));
         let amplifier = Amplifier { full_scale_v: 450.0, max_v: 400.0, ..BUILT_IN.control.amplifier };
         let control = model::Settings { rate_hz: 1250.0, amplifier, ..BUILT_IN.control };
         assert_eq!(loaded.settings, device::Settings { control, ..BUILT_IN });
-        assert_eq!(load(&store(&[])).settings, BUILT_IN, "without stored ones the built-in settings run");
+        assert_eq!(load(&store(&[]), &BUILT_IN).settings, BUILT_IN, "without stored ones the built-in settings run");
     }
 
     #[test]
@@ -273,10 +273,10 @@ mod tests {
             (&WireSettings { missed_ticks_allowed: u32::MAX, ..wire }.payload().unwrap(), "missed_ticks_allowed"),
         ] {
             let store = store(&[(Block::Settings, payload)]);
-            let loaded = load(&store);
+            let loaded = load(&store, &BUILT_IN);
             assert_eq!((loaded.rejected, loaded.settings), (Some(rejected), BUILT_IN));
             assert_eq!((loaded.blocks.active, loaded.blocks.stored.number), (BlockId::default(), 1));
-            assert!(check_settings(&store, payload).is_err(), "{rejected}: it is not stored either");
+            assert!(check_settings(&store, payload, &BUILT_IN).is_err(), "{rejected}: it is not stored either");
             let mut place = None;
             let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
             let (control, _) = control(&loaded, None, &cause, &mut place).unwrap();
@@ -287,7 +287,7 @@ mod tests {
     /// The features of this build decide, as those of an image do.
     #[test]
     fn what_the_image_does_not_contain_is_refused_by_its_name() {
-        let check = |wire: WireSettings| check_settings(&store(&[]), &wire.payload().unwrap());
+        let check = |wire: WireSettings| check_settings(&store(&[]), &wire.payload().unwrap(), &BUILT_IN);
         let fast = WireSettings { controller: Controller::Fast, ..built_in_settings() };
         let sensor =
             WireSettings { sensor: Some([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]), ..built_in_settings() };
@@ -306,16 +306,16 @@ mod tests {
         // Whatever controller the image has built in.
         let wire = WireSettings { controller: Controller::Paper, integral_per_s: 1.35, ..built_in_settings() };
         let strong = WireSettings { proportional: 90.0, ..wire }.payload().unwrap();
-        assert_eq!(check_settings(&store(&[]), &strong), Ok(()), "with the built-in model");
+        assert_eq!(check_settings(&store(&[]), &strong, &BUILT_IN), Ok(()), "with the built-in model");
         let short = WireModel { time_constants_s: [0.01].into_iter().collect(), ..WireModel::default() };
         let short = short.payload().unwrap();
-        assert_eq!(check_settings(&store(&[(Block::Model, &model)]), &strong), Ok(()));
-        let refused = check_settings(&store(&[(Block::Model, &short)]), &strong);
+        assert_eq!(check_settings(&store(&[(Block::Model, &model)]), &strong, &BUILT_IN), Ok(()));
+        let refused = check_settings(&store(&[(Block::Model, &short)]), &strong, &BUILT_IN);
         assert!(
             matches!(refused, Err(Reason::BadSettings { field, .. }) if field == Field::named("proportional_gain"))
         );
-        let refused = check_model(&store(&[(Block::Settings, &strong)]), &short);
+        let refused = check_model(&store(&[(Block::Settings, &strong)]), &short, &BUILT_IN);
         assert!(matches!(refused, Err(Reason::BadModel { field, .. }) if field == Field::named("proportional_gain")));
-        assert_eq!(check_model(&store(&[]), &short), Ok(()));
+        assert_eq!(check_model(&store(&[]), &short, &BUILT_IN), Ok(()));
     }
 }

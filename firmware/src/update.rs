@@ -6,18 +6,25 @@ use model::device;
 use crate::start;
 use crate::store::{Pages, Store};
 
-/// Executes an update of `block`. Returns the identity of its new content if that is complete and valid.
+/// Executes an update of `block` on an MCU whose image has the settings `built_in`. Returns the identity of its new content if that is complete and valid.
 ///
 /// # Errors
 /// The [`Reason`] for rejecting it; the old content remains.
-pub fn execute<P: Pages>(store: &mut Store<P>, block: Block, update: Update) -> Result<Option<BlockId>, Reason> {
+pub fn execute<P: Pages>(
+    store: &mut Store<P>,
+    block: Block,
+    update: Update,
+    built_in: &device::Settings,
+) -> Result<Option<BlockId>, Reason> {
     match (block, update) {
         (_, Update::Part(number, bytes)) => store.part(block, number, &bytes).map(|()| None),
         (Block::Model, Update::End { length, checksum }) => {
-            store.end(block, length, checksum, start::check_model).map(Some)
+            let check = |store: &_, payload: &_| start::check_model(store, payload, built_in);
+            store.end(block, length, checksum, check).map(Some)
         }
         (Block::Settings, Update::End { length, checksum }) => {
-            store.end(block, length, checksum, start::check_settings).map(Some)
+            let check = |store: &_, payload: &_| start::check_settings(store, payload, built_in);
+            store.end(block, length, checksum, check).map(Some)
         }
     }
 }

@@ -13,6 +13,7 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, random, reset, switch_amplifier_off};
+use firmware::settings::BUILT_IN;
 use firmware::store::Store;
 use firmware::tasks::{self, Timing};
 use firmware::{crash_record, guards, log, start};
@@ -42,7 +43,7 @@ fn main() -> ! {
     let cause = crash_record::reset_cause(Some(reset()));
     let (mut board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
     let mut store = Store::new(flash);
-    let loaded = start::load(&store);
+    let loaded = start::load(&store, &BUILT_IN);
     board.start_watchdog(loaded.settings.watchdogs.reset_ms);
     log::boot(cause.name, cause.fault.map_or(0, Fault::code), &loaded.settings);
     if guards::start(clocks::CORE_HZ).is_none() {

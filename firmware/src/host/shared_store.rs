@@ -56,7 +56,9 @@ async fn done(work: Work) -> Done {
 pub fn serve_store<P: Pages>(store: &mut Store<P>, running: &device::Settings) {
     match PENDING.lock(Cell::take) {
         None => {}
-        Some(Work::Update(block, update)) => DONE.signal(Done::Updated(update::execute(store, block, update))),
+        Some(Work::Update(block, update)) => {
+            DONE.signal(Done::Updated(update::execute(store, block, update, &BUILT_IN)))
+        }
         Some(Work::Read(built_in, number)) => {
             DONE.signal(Done::Read(update::settings_part(if built_in { &BUILT_IN } else { running }, number)));
         }

@@ -16,7 +16,8 @@ use simulation::record::Record;
 /// Run the MCU's fault isolation over a record and print what it says, and when
 ///
 /// The model runs on the voltages of the record, the readings are the stiffness sensor's. An alarm comes first; a cause is named when
-/// it explains the residual and no other cause does. `ambiguous` names two, `unknown` none. How rightly: docs/isolation.md.
+/// it explains the residual and no other cause does. `ambiguous` names two, `unknown` none. Before the first row the spring is taken
+/// to be at rest at 0 V. How rightly: docs/isolation.md.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +37,7 @@ pub(crate) struct Arguments {
     /// Standard deviation of a reading, in V; default: from the readings
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     noise_v: Option<f64>,
-    /// Correlation time of the readings' noise, in s
+    /// Correlation time of the readings' noise, in s; needs --noise-v
     #[arg(long, default_value_t = 0.0, value_name = "S", allow_negative_numbers = true)]
     noise_correlation_s: f64,
     /// Highest voltage of the amplifier, in V
@@ -55,6 +56,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let record = Record::open(&arguments.data, &arguments.column)?;
     if record.rows.iter().all(|row| row.measured.is_none()) {
         bad_input!("{}: no column `{}`; expected readings", record.name, arguments.column);
+    }
+    if arguments.noise_correlation_s > 0.0 && arguments.noise_v.is_none() {
+        bad_input!("--noise-correlation-s: expected --noise-v beside it; only white noise is found from the readings");
     }
     let noise_v = match arguments.noise_v.or_else(|| noise_v(&record)) {
         Some(noise_v) => noise_v,

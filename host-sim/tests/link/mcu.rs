@@ -13,7 +13,6 @@ use std::time::{Duration, Instant};
 use firmware::capture::Recorder;
 use firmware::control::{Control, Sensors, Untimed};
 use firmware::reset_cause::Cause;
-use firmware::settings::BUILT_IN;
 use firmware::start::{self, Start};
 use firmware::store::{FlashError, PAGE, PAGES, Page, Pages, Store, WORD};
 use firmware::update;
@@ -111,6 +110,8 @@ fn next_seed() -> u32 {
     SEED.fetch_add(1 << 20, Ordering::Relaxed)
 }
 
+/// What the image has built in, whatever features this build has.
+const BUILT_IN: device::Settings = device::Settings::PAPER;
 /// Rows for which the MCU has room.
 pub(crate) const ROWS: usize = 2000;
 
@@ -260,7 +261,7 @@ struct Chip {
 impl Chip {
     fn new(setup: Setup, shared: Arc<Mutex<Shared>>) -> Self {
         let store = Store::new(shared.lock().unwrap().flash.clone());
-        let mut loaded = start::load(&store);
+        let mut loaded = start::load(&store, &BUILT_IN);
         assert_eq!(loaded.rejected, None);
         let settings = loaded.settings;
         loaded.settings.supervision.host_timeout_s = f64::from(setup.silence_ms) / 1000.0;
@@ -330,7 +331,7 @@ impl Chip {
             }
             Some(Step::Send(bytes)) => out.extend_from_slice(bytes),
             Some(Step::Update(block, update)) => {
-                let kept = update::execute(&mut self.store, block, update);
+                let kept = update::execute(&mut self.store, block, update, &BUILT_IN);
                 out.extend_from_slice(self.server.updated(block, kept, &self.view));
             }
             Some(Step::ReadSettings { built_in, number }) => {

@@ -83,6 +83,8 @@ pub(super) struct Decision {
     second: (i64, Option<Cause>),
     proposed: Verdict,
     agreed: u8,
+    /// Number of decisions in a row that say something else than the verdict.
+    against: u8,
     pub(super) verdict: Verdict,
     pub(super) size: Size,
     /// Number of decisions made.
@@ -119,6 +121,7 @@ impl Default for Decision {
             second: (0, None),
             proposed: Verdict::Quiet,
             agreed: 0,
+            against: 0,
             verdict: Verdict::Quiet,
             size: Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 },
             rounds: 0,
@@ -359,12 +362,14 @@ impl Decision {
 
     fn conclude(&mut self, config: &Config) {
         let (least, floor, total) = self.energies_now();
+        // What the cause leaves that would be named, which need not be the one that leaves least.
+        let left = self.first.1.map_or(least, |_| self.first.0);
         // sqrt(2 n) with 20 fraction bits.
         let sigma = i64::from(((2 * self.blocks) << 18).isqrt()) << 11;
         let tolerated = thresholds::NOISE_SIGMAS * sigma + (total >> thresholds::MODEL_ERROR_BITS);
         let says = if total < config.margin {
             Verdict::Alarm
-        } else if least - floor > tolerated {
+        } else if left - floor > tolerated {
             Verdict::Unknown
         } else {
             match (self.first.1, self.second.1) {
@@ -373,15 +378,18 @@ impl Decision {
                 (None, _) => Verdict::Unknown,
             }
         };
-        self.agreed = if says == self.proposed { self.agreed.saturating_add(1) } else { 1 };
+        self.agreed = if says.is_like(self.proposed) { self.agreed.saturating_add(1) } else { 1 };
+        self.against = if says.is_like(self.verdict) { 0 } else { self.against.saturating_add(1) };
         if self.agreed >= thresholds::AGREED {
             self.verdict = says;
+        } else if self.against >= thresholds::AGREED && matches!(self.verdict, Verdict::Named(_)) {
+            self.verdict = Verdict::Alarm;
         }
         self.proposed = says;
-        if let Some(cause) = self.first.1 {
+        if let Some(cause) = self.verdict.cause() {
             self.size = self.sizes.get(cause as usize).copied().unwrap_or_default();
         }
-        self.energies = (self.none, least);
+        self.energies = (self.none, left);
         self.rounds = self.rounds.wrapping_add(1);
         self.stage = Stage::Idle;
     }

@@ -25,7 +25,7 @@
 //!
 //! A cause is named if it leaves no more than noise and the error of its linear signature can leave, and every other cause leaves
 //! much more. If another one does not, both are named as ambiguous; if no cause leaves so little, the verdict is unknown. Three
-//! decisions in a row have to agree.
+//! decisions in a row have to agree; three in a row against a name withdraw it.
 //!
 //! The reference in double precision is `simulation::isolation`.
 
@@ -72,6 +72,22 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// Returns the cause that explains most; `None` unless named or ambiguous.
+    pub const fn cause(self) -> Option<Cause> {
+        match self {
+            Self::Named(cause) | Self::Ambiguous(cause, _) => Some(cause),
+            Self::Quiet | Self::Alarm | Self::Unknown => None,
+        }
+    }
+
+    /// Returns true if both say the same, whichever of two ambiguous causes leaves less.
+    fn is_like(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Ambiguous(a, b), Self::Ambiguous(c, d)) => (a, b) == (c, d) || (a, b) == (d, c),
+            _ => self == other,
+        }
+    }
+
     /// Returns a number for frames and logs: the state in the upper byte (quiet 0, alarm 1, unknown 2, named 3, ambiguous 4), then the
     /// numbers of the two causes, four bits each, as their places in [`Cause::ALL`].
     pub const fn code(self) -> u16 {
@@ -133,7 +149,9 @@ impl Validated<'_, Settings> {
         let lag = |tau_s: f64| Rate::new(crate::units::lag_fraction(block_s, tau_s).min(bank::FASTEST));
         let slow = bank::SLOW_TAUS.map(|times| lag(times * tau));
         let (sigma_v, correlation) = settings.block_noise(block_s);
-        let whitened_v = sigma_v * libm::sqrt(1.0 - correlation * correlation);
+        // Below, signatures of the size of the range would not fit.
+        let whitened_v =
+            (sigma_v * libm::sqrt(1.0 - correlation * correlation)).max(range * 1024.0 / f64::from(LARGEST));
         let bits = |value: f64, fraction: u32| steps(value, f64::from(1u32 << fraction)) as i32;
         Config {
             ticks,
@@ -342,6 +360,7 @@ impl State {
         self.alarmed = false;
         self.tests = Default::default();
         self.decision.reset();
+        self.mode = products::Mode { fresh: true, ..Default::default() };
         self.restart();
     }
 
@@ -370,7 +389,7 @@ impl State {
         (none as f64 / 1_048_576.0, least as f64 / 1_048_576.0)
     }
 
-    /// Returns the size of the best cause in units of [`Settings::unit`] and its standard deviation, at the last decision. Floating
+    /// Returns the size of the verdict's cause in units of [`Settings::unit`] and its standard deviation, at the last decision. Floating
     /// point: for the host.
     pub fn size(&self) -> (f64, f64) {
         let decision::Size { numerator, denominator, exponent, scale } = self.decision.size;

@@ -1,6 +1,6 @@
 //! The bank's settings, in SI units.
 
-use super::{Cause, bank};
+use super::{Cause, bank, thresholds};
 use crate::error::OutOfRange;
 use crate::estimator::Plant;
 use crate::units::SampleTime;
@@ -82,7 +82,7 @@ impl Validate for Settings {
         OutOfRange::check("interval_s", self.interval_s, sample_time.seconds()..=0.5 * block_s, "s")?;
         OutOfRange::check("noise_correlation_s", self.noise_correlation_s, 0.0..=10.0, "s")?;
         OutOfRange::check("range_v", self.range_v, 50.0..=1000.0, "V")?;
-        OutOfRange::check("alarm_nats", self.alarm_nats, 5.0..=40.0, "nats")?;
+        OutOfRange::check("alarm_nats", self.alarm_nats, thresholds::RESTART_NATS..=40.0, "nats")?;
         OutOfRange::check("margin_nats", self.margin_nats, 1.0..=100.0, "nats")
     }
 }

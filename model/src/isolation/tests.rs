@@ -109,3 +109,22 @@ fn numbers_of_verdicts_and_places_of_causes_agree() {
     assert_eq!(verdict.code(), 4 << 8 | (Cause::SeriesLag as u16) << 4 | Cause::Delay as u16);
     assert_eq!([Verdict::Quiet, Verdict::Alarm, Verdict::Unknown].map(Verdict::code), [0, 256, 512]);
 }
+
+#[test]
+fn two_ambiguous_causes_in_either_order_say_the_same() {
+    let (one, other) =
+        (Verdict::Ambiguous(Cause::Delay, Cause::SeriesLag), Verdict::Ambiguous(Cause::SeriesLag, Cause::Delay));
+    assert!(one.is_like(other) && one.is_like(one));
+    assert!(!one.is_like(Verdict::Ambiguous(Cause::Delay, Cause::Drift)) && !one.is_like(Verdict::Named(Cause::Delay)));
+}
+
+#[test]
+fn signatures_of_the_size_of_the_range_fit_however_small_the_noise_is() {
+    for (rate_hz, interval_s) in [(1000.0, 1e-3), (10_000.0, 1e-4)] {
+        let settings = Settings { noise_v: 0.05, interval_s, ..Settings::PAPER };
+        let config = settings.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize();
+        // In standard deviations with 10 fraction bits.
+        let whitened = (i64::from(config.range) * i64::from(config.whitening)) >> 31;
+        assert!(whitened <= i64::from(LARGEST), "{rate_hz} Hz: {whitened}");
+    }
+}

@@ -30,7 +30,8 @@ pub struct Bank {
     /// True after a sequential test has exceeded its threshold.
     alarmed: bool,
     proposed: Verdict,
-    agreed: u8,
+    agreed: u32,
+    against: u32,
     /// The last decision that enough rounds in a row agree on.
     pub verdict: Verdict,
     /// Size of the cause that leaves least, in the unit of [`Cause`], and its standard deviation.
@@ -110,6 +111,7 @@ impl Bank {
             alarmed: false,
             proposed: Verdict::Quiet,
             agreed: 0,
+            against: 0,
             verdict: Verdict::Quiet,
             size: (0.0, 0.0),
             none: 0.0,
@@ -364,7 +366,6 @@ impl Bank {
         }
         best.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (cause, least, _) = best[0];
-        self.least = least;
         self.rounds += 1;
         let total = (self.none - n).max(0.0);
         let tolerated =
@@ -374,21 +375,31 @@ impl Bank {
             (total / f64::from(1 << thresholds::RIVAL_ERROR_BITS)).max(thresholds::RIVAL_RATIO as f64 * (least - n));
         let bar = least.max(n) + 2.0 * self.settings.margin_nats + excess;
         let rivals: Vec<Cause> = best[1..].iter().filter(|rival| rival.1 < bar).map(|rival| rival.0).collect();
+        let among = self.among(cause, &rivals);
+        let named = best.iter().find(|known| Some(known.0) == among.cause());
+        self.least = named.map_or(least, |known| known.1);
         let says = if total < 2.0 * self.settings.margin_nats {
             Verdict::Alarm
-        } else if least - n > tolerated {
+        } else if named.is_none_or(|(_, left, _)| left - n > tolerated) {
             Verdict::Unknown
         } else {
-            self.among(cause, &rivals)
+            among
         };
-        if let Verdict::Named(cause) | Verdict::Ambiguous(cause, _) = says {
-            self.size = best.iter().find(|known| known.0 == cause).map_or((0.0, 0.0), |known| known.2);
-        }
-        self.agreed = if says == self.proposed { self.agreed.saturating_add(1) } else { 1 };
-        if self.agreed >= thresholds::AGREED {
+        let same = |one: Verdict, other: Verdict| match (one, other) {
+            (Verdict::Ambiguous(a, b), Verdict::Ambiguous(c, d)) => (a == c && b == d) || (a == d && b == c),
+            _ => one == other,
+        };
+        self.agreed = if same(says, self.proposed) { self.agreed + 1 } else { 1 };
+        self.against = if same(says, self.verdict) { 0 } else { self.against + 1 };
+        if self.agreed >= u32::from(thresholds::AGREED) {
             self.verdict = says;
+        } else if self.against >= u32::from(thresholds::AGREED) && matches!(self.verdict, Verdict::Named(_)) {
+            self.verdict = Verdict::Alarm;
         }
         self.proposed = says;
+        if let Some(cause) = self.verdict.cause() {
+            self.size = best.iter().find(|known| known.0 == cause).map_or((0.0, 0.0), |known| known.2);
+        }
     }
 
     /// The verdict when `cause` leaves least and `rivals` cannot be excluded.

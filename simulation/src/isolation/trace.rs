@@ -26,7 +26,7 @@ pub struct Event {
     pub since_s: Option<f64>,
     /// Size of the cause with its 95 % interval.
     pub size: Option<Size>,
-    /// Part of the residual's energy above the noise that the best cause explains, 0 to 1.
+    /// Part of the residual's energy, its noise included, that the cause explains, 0 to 1.
     pub explained: Option<f64>,
 }
 
@@ -72,7 +72,8 @@ fn unit(cause: Cause) -> &'static str {
     }
 }
 
-/// Standard deviation of the readings' noise, in V, from the median of the magnitudes of their second differences; `None` for fewer
+/// Standard deviation of the readings' noise, in V, if it is white, from the median of the magnitudes of their second
+/// differences; `None` for fewer
 /// than 10 readings.
 pub fn noise_v(record: &Record) -> Option<f64> {
     let readings: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
@@ -82,8 +83,8 @@ pub fn noise_v(record: &Record) -> Option<f64> {
     (bent.len() >= 8).then(|| 1.4826 * bent[bent.len() / 2] / 6f64.sqrt())
 }
 
-/// Runs the bank over a record. The rate is 1 kHz, or 100 Hz for rows further apart than half a block of 1 kHz, 64 ms; `settings.interval_s` is set to the
-/// mean distance of the rows.
+/// Runs the bank over a record of a spring that is at rest at 0 V at its first row. The rate is 1 kHz, or 100 Hz for rows further
+/// apart than half a block of 1 kHz, 64 ms; `settings.interval_s` is set to the mean distance of the rows.
 ///
 /// # Errors
 /// [`BadInput`] for settings that the bank rejects, voltages beyond +-2000 V, and rows more than 0.6 s apart.

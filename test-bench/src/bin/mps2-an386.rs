@@ -11,7 +11,7 @@ use embassy_sync::signal::Signal;
 use firmware::board::Board;
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
-use firmware::settings::built_in;
+use firmware::settings::{BUILT_IN, built_in};
 use firmware::start::{self, Loaded};
 use firmware::store::Store;
 use firmware::tasks::{self, Timing};
@@ -76,7 +76,7 @@ fn main() -> ! {
     let loaded = match &mode {
         // A script has its own settings, whatever is stored.
         Mode::Play(script) => Loaded::fixed(built_in(*script.settings())),
-        Mode::Link => start::load(&store),
+        Mode::Link => start::load(&store, &BUILT_IN),
     };
     board.start_watchdog(loaded.settings.watchdogs.reset_ms);
     log::boot(cause.name, cause.fault.map_or(0, Fault::code), &loaded.settings);
