@@ -410,7 +410,7 @@ mod tests {
             ),
             (
                 "schema = 1\n[watchdogs]\nhang_ms = 5",
-                "s.toml, line 3, column 11: hang_ms = 5 is not allowed: expected 7 to 99 ms",
+                "s.toml, line 3, column 11: hang_ms = 5 is not allowed: expected 8 to 1000 ms",
             ),
             (
                 "schema = 1\n[supervision]\nramp_v_per_s = nan",
