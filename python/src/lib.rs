@@ -5,7 +5,7 @@
 //! | module | what it is |
 //! | --- | --- |
 //! | [`error`] | the library's errors as exceptions |
-//! | [`table`] | columns in memory as the text of a data file, so that they are read as the command reads a file |
+//! | [`table`] | columns as Python hands them over |
 //! | [`records`] | the options of a record, and its rows |
 //! | [`interrupt`] | computations that Ctrl-C ends |
 //! | [`analysis`] | identification, diagnosis, plan |

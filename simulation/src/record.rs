@@ -1,6 +1,7 @@
 //! Records of an experiment as CSV: the columns `time_s`, `voltage_v` and optionally a measured one. Records with other
 //! columns and units are opened by [`Format`].
 
+pub mod columns;
 pub mod columns_file;
 pub mod gaps;
 mod measured;
@@ -8,7 +9,7 @@ mod names;
 mod times;
 
 pub use measured::{Format, MeasuredRecord, remarks_on};
-pub use names::ColumnNames;
+pub use names::{ColumnNames, with_unit};
 
 use std::path::Path;
 

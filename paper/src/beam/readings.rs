@@ -43,8 +43,8 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
     }
     if voltages.len() > MOST_VOLTAGES {
         bad_input!(
-            "{name}, line {}: {} columns of forces; expected at most {MOST_VOLTAGES}",
-            table.header_line(),
+            "{}: {} columns of forces; expected at most {MOST_VOLTAGES}",
+            table.header_place(),
             voltages.len()
         );
     }

@@ -26,7 +26,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// The file to write
+    /// The file to write: MCAP or Parquet if its name ends in .mcap or .parquet, otherwise CSV
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Length of the capture; default: that of --input
@@ -106,6 +106,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         tick += 1 + u64::from(row.missed);
         recording.add(&telemetry(tick, row, &volts))?;
     }
+    recording.finish()?;
     let (summary, file) = (recording.summary(), arguments.out.display());
     summary.remarks(&file.to_string()).iter().for_each(|text| remark(text));
     if session.json {

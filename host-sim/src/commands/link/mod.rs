@@ -26,6 +26,7 @@ Examples:
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
   vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
+  vsj link /dev/ttyACM0 record out.mcap                 for Foxglove, PlotJuggler
   vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
   vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate
@@ -75,7 +76,7 @@ enum Command {
     },
     /// Show the running loop, and keep the MCU from detecting a silent host
     Watch(watch::Arguments),
-    /// Record time, voltage and stiffness as CSV for `vsj diagnose`
+    /// Record time, voltage and stiffness as CSV, MCAP or Parquet for `vsj diagnose`
     Record(record::Arguments),
     /// Record every tick of a few seconds in the MCU's RAM, then send it as CSV for `vsj diagnose`
     Capture(capture::Arguments),
