@@ -104,12 +104,12 @@ fn texts_and_whole_numbers_can_be_times() {
     let rows = stamped.map(|stamp| vec![Cell::Text(stamp), Cell::Number(1.0), Cell::Number(2.0)]);
     let whole = [Column::whole("time_ns"), columns[1], columns[2]];
     let start = 1_767_225_600_123_456_789;
-    let counted = [0, 1_500_000_001].map(|ns| vec![Cell::Whole(start + ns), Cell::Number(1.0), Cell::Number(2.0)]);
+    let counted = [0, 1_500].map(|ns| vec![Cell::Whole(start + ns), Cell::Number(1.0), Cell::Number(2.0)]);
     for container in BOTH {
         let found = parsed(container, bytes(container, &columns, &rows), &Format::default());
         assert_eq!(found.record.rows[1].time_s, 1.5);
         let found = parsed(container, bytes(container, &whole, &counted), &Format::default());
-        assert_eq!(found.record.rows[1].time_s, 1.500000001);
+        assert_eq!(found.record.rows[1].time_s, 1.5e-6, "{:?}", found.remarks);
     }
 }
 
@@ -122,7 +122,8 @@ fn every_damaged_file_is_an_error_in_one_line_or_a_remark() {
             Ok(_) => (),
             Err(error) => {
                 let text = error.downcast_ref::<BadInput>().expect("bad input").0.clone();
-                assert!(!text.contains('\n') && text.contains("expected"), "{text:?}");
+                let says_what = text.contains("expected") || text.contains("is not a");
+                assert!(!text.contains('\n') && says_what, "{text:?}");
             }
         };
         for length in 0..whole.len() {
@@ -186,7 +187,7 @@ fn messages_of_others_have_fields_inside_objects_and_times_in_two_parts() {
     };
     let format = Format { columns, ..Format::default() };
     let found = parsed(Container::Mcap, file.clone(), &format);
-    assert_eq!((found.record.rows[1].time_s, found.record.rows[1].voltage_v), (1.000000001, 2500.0));
+    assert_eq!((found.record.rows[1].time_s, found.record.rows[1].voltage_v), (1_700_000_001.000_000_006, 2500.0));
     assert_eq!((found.record.rows[0].measured, found.record.rows[1].measured), (Some(0.25), None));
     let error = message(Container::Mcap, file, &Format::default());
     assert!(error.contains("--time") && error.contains("tip.x"), "{error}");
@@ -196,7 +197,7 @@ fn messages_of_others_have_fields_inside_objects_and_times_in_two_parts() {
 fn without_a_time_in_the_messages_they_have_the_time_of_logging() {
     let messages = [r#"{"voltage_v": 1, "stiffness": 2}"#, r#"{"voltage_v": 2, "stiffness": 3}"#];
     let found = parsed(Container::Mcap, foreign(&[("/a", "json", &messages)]), &Format::default());
-    assert_eq!(found.record.rows[1].time_s, 0.5);
+    assert_eq!(found.record.rows[1].time_s - found.record.rows[0].time_s, 0.5);
     let two = foreign(&[("/a", "json", &messages), ("/b", "json", &messages)]);
     let error = message(Container::Mcap, two.clone(), &Format::default());
     assert_eq!(error, "r: 2 topics have the columns; expected one of --topic /a, --topic /b");

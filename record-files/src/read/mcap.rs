@@ -6,14 +6,13 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use mcap::read::{MessageStream, Options};
-use mcap::{McapError, Message};
 use serde_json::{Map, Value};
 use simulation::bad_input;
 use simulation::csv_table::text::MOST_ROWS;
 use simulation::record::columns::{Column, too_many_rows};
 use simulation::record::{Format, with_unit};
 
+use super::messages::{Message, each_message};
 use super::{Cells, Columns};
 
 /// Column of the time at which a message was logged, in ns.
@@ -34,8 +33,8 @@ struct Topic {
 pub(crate) fn columns(name: &str, bytes: &[u8], format: &Format, topic: Option<&str>) -> Result<Columns> {
     let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
     let (mut others, mut count) = (Vec::new(), 0);
-    let cut_off = each_message(name, bytes, |message, number| {
-        count = number;
+    let cut_off = each_message(name, bytes, |message| {
+        count = message.number;
         let topic = message.channel.topic.as_str();
         if message.channel.message_encoding != "json" {
             let other = format!("{topic} ({})", message.channel.message_encoding);
@@ -43,7 +42,7 @@ pub(crate) fn columns(name: &str, bytes: &[u8], format: &Format, topic: Option<&
                 others.push(other);
             }
         } else if !topics.contains_key(topic) {
-            topics.insert(topic.to_owned(), Topic::of(name, message, number)?);
+            topics.insert(topic.to_owned(), Topic::of(name, message)?);
         }
         Ok(())
     })?;
@@ -59,11 +58,11 @@ pub(crate) fn columns(name: &str, bytes: &[u8], format: &Format, topic: Option<&
             cells.push((index, Cells::new()));
         }
     }
-    each_message(name, bytes, |message, number| {
+    each_message(name, bytes, |message| {
         if message.channel.topic != topic || message.channel.message_encoding != "json" {
             return Ok(());
         }
-        let object = object(name, message, number)?;
+        let object = object(name, message)?;
         for (index, cells) in &mut cells {
             match fields.get(*index) {
                 Some(path) => add(cells, at(&object, path)),
@@ -84,37 +83,6 @@ pub(crate) fn columns(name: &str, bytes: &[u8], format: &Format, topic: Option<&
 
 /// Largest number of topics that an error lists.
 const MOST_LISTED: usize = 6;
-
-/// Calls `each` with every message and its number, from 1; returns why the file ends early, if it does, as the file of a
-/// recording that was killed does.
-fn each_message(
-    name: &str,
-    bytes: &[u8],
-    mut each: impl FnMut(&Message<'_>, usize) -> Result<()>,
-) -> Result<Option<McapError>> {
-    let damaged = |error: &McapError, number: usize| {
-        let hint = match error {
-            McapError::UnsupportedCompression(_) => "chunks without compression (mcap compress --compression none)",
-            _ => "an MCAP file",
-        };
-        simulation::BadInput(format!("{name}, after message {number}: {error}; expected {hint}"))
-    };
-    let mut number = 0;
-    let stream = MessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into());
-    for message in stream.map_err(|error| damaged(&error, 0))? {
-        match message {
-            Ok(message) => {
-                number += 1;
-                each(&message, number)?;
-            }
-            Err(error @ (McapError::UnexpectedEof | McapError::UnexpectedEoc)) if number > 0 => {
-                return Ok(Some(error));
-            }
-            Err(error) => return Err(damaged(&error, number).into()),
-        }
-    }
-    Ok(None)
-}
 
 /// The topic of the record, the names of its columns, and the indices of time, voltage and reading among them.
 fn chosen(
@@ -162,8 +130,8 @@ fn chosen(
 
 impl Topic {
     /// The fields of a message and of its schema, and the units that the schema gives them.
-    fn of(name: &str, message: &Message<'_>, number: usize) -> Result<Self> {
-        let object = object(name, message, number)?;
+    fn of(name: &str, message: &Message<'_>) -> Result<Self> {
+        let object = object(name, message)?;
         let (mut fields, mut units) = (Vec::new(), BTreeMap::new());
         collect(&object, &mut Vec::new(), &mut fields);
         for path in &fields {
@@ -219,9 +187,9 @@ fn properties(schema: &Value, path: &mut Path, each: &mut impl FnMut(&Path, &Val
 }
 
 /// The object that a message is.
-fn object(name: &str, message: &Message<'_>, number: usize) -> Result<Map<String, Value>> {
-    let topic = &message.channel.topic;
-    match serde_json::from_slice(&message.data) {
+fn object(name: &str, message: &Message<'_>) -> Result<Map<String, Value>> {
+    let (topic, number) = (&message.channel.topic, message.number);
+    match serde_json::from_slice(message.data) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => bad_input!("{name}, message {number}, topic {topic}: no JSON object; expected one"),
         Err(error) => bad_input!("{name}, message {number}, topic {topic}: {error}; expected a JSON object"),

@@ -1,6 +1,9 @@
 //! The columns of a file. Those that the record needs are read, of the others only the names.
 
+mod caught;
 pub(crate) mod mcap;
+mod messages;
+mod pages;
 pub(crate) mod parquet;
 
 use simulation::record::columns::Column;

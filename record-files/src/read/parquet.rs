@@ -18,14 +18,21 @@ use simulation::record::columns::{Column, too_many_rows};
 use simulation::record::{Format, with_unit};
 use simulation::BadInput;
 
-use super::{Cells, Columns};
+use super::caught::caught;
+use super::{Cells, Columns, pages};
 
 /// Number of cells that are read at a time.
 const BATCH: usize = 1 << 12;
 
 pub(crate) fn columns(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
+    let damaged = || BadInput(format!("{name}: damaged; expected a Parquet file"));
+    caught(|| read(name, bytes, format)).ok_or_else(damaged)?
+}
+
+fn read(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
     let damaged = |error: ParquetError| BadInput(format!("{name}: {error}; expected a Parquet file"));
-    let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(damaged)?;
+    let bytes = Bytes::from(bytes);
+    let reader = SerializedFileReader::new(bytes.clone()).map_err(damaged)?;
     let metadata = reader.metadata().file_metadata();
     if metadata.num_rows() > MOST_ROWS as i64 {
         return Err(too_many_rows(name).into());
@@ -45,7 +52,7 @@ pub(crate) fn columns(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Col
     for (place, column) in names.into_iter().enumerate() {
         let cells = if needed.contains(&place) {
             let wrong = |what: String| BadInput(format!("{name}, column {column}: {what}"));
-            cells(&reader, flat[place]).map_err(wrong)?
+            cells(&reader, &bytes, flat[place]).map_err(wrong)?
         } else {
             Column::Unread
         };
@@ -124,15 +131,16 @@ fn stamp(value: i64, per_second: i64, is_utc: bool) -> String {
 }
 
 /// The cells of a column, or what is wrong with it.
-fn cells(file: &SerializedFileReader<Bytes>, index: usize) -> Result<Column, String> {
+fn cells(file: &SerializedFileReader<Bytes>, bytes: &[u8], index: usize) -> Result<Column, String> {
     let descriptor = file.metadata().file_metadata().schema_descr().column(index);
     let most = descriptor.max_def_level();
     let mut cells = Cells::new();
     let whole = || Whole::of(&descriptor).ok_or_else(|| unsupported(&descriptor));
     for group in 0..file.num_row_groups() {
+        check_pages(file, bytes, group, index)?;
         let reader = file.get_row_group(group).and_then(|group| group.get_column_reader(index));
         let to = &mut cells;
-        match reader.map_err(|error| error.to_string())? {
+        match reader.map_err(|error| unreadable(&error, to.len()))? {
             ColumnReader::BoolColumnReader(reader) => each(reader, most, to, |it, to| to.whole((*it).into())),
             ColumnReader::Int32ColumnReader(reader) => {
                 let whole = whole()?;
@@ -156,6 +164,15 @@ fn cells(file: &SerializedFileReader<Bytes>, index: usize) -> Result<Column, Str
     Ok(cells.0)
 }
 
+/// Checks the sizes of the pages of a column in a group of rows.
+fn check_pages(file: &SerializedFileReader<Bytes>, bytes: &[u8], group: usize, index: usize) -> Result<(), String> {
+    let column = file.metadata().row_group(group).column(index);
+    let start = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
+    let range = usize::try_from(start).ok().zip(usize::try_from(column.compressed_size()).ok());
+    let pages = range.and_then(|(start, length)| bytes.get(start..start.checked_add(length)?));
+    pages::check(pages.ok_or("outside of the file; expected a Parquet file")?)
+}
+
 fn is_decimal(column: &ColumnDescriptor) -> bool {
     column.converted_type() == ConvertedType::DECIMAL || matches!(column.logical_type_ref(), Some(LogicalType::Decimal(_)))
 }
@@ -167,6 +184,16 @@ fn unsupported(column: &ColumnDescriptor) -> String {
         (None, converted) => converted.to_string(),
     };
     format!("values of the type {kind}; expected numbers, time stamps or texts")
+}
+
+/// What is wrong with a column that cannot be read further than a row.
+fn unreadable(error: &ParquetError, row: usize) -> String {
+    let text = error.to_string();
+    // The name of a compression that is left out, which is another one.
+    match text.rsplit_once("Disabled feature at compile time: ") {
+        Some((_, compression)) => format!("compressed by {compression}; expected Snappy, the usual one, or none"),
+        None => format!("after row {row}: {text}; expected a Parquet file"),
+    }
 }
 
 /// Adds every value of a column to `cells`, and a missing cell for each null.
@@ -182,7 +209,7 @@ fn each<T: DataType>(
         levels.clear();
         let (records, ..) = reader
             .read_records(BATCH, Some(&mut levels), None, &mut values)
-            .map_err(|error| format!("after row {}: {error}; expected a Parquet file", cells.len()))?;
+            .map_err(|error| unreadable(&error, cells.len()))?;
         if records == 0 {
             return Ok(());
         }

@@ -89,7 +89,6 @@ impl<W: Write + Send> Writer<W> {
         if self.rows > 0 {
             self.write()?;
         }
-        self.inner.finish()?;
         Ok(self.inner.into_inner()?.flush()?)
     }
 }

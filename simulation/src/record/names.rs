@@ -249,7 +249,7 @@ pub fn with_unit(name: &str, unit: &str) -> String {
     let own = split_unit(name).1;
     let unit = unit.trim();
     let is_said = own.is_some() && own == Some(usual(unit).unwrap_or_else(|| unit.to_owned()));
-    let is_default = name == MEASURED && usual_volts(unit).as_deref() == Some("V");
+    let is_default = [MEASURED, ESTIMATE].contains(&name) && usual_volts(unit).as_deref() == Some("V");
     if unit.is_empty() || is_said || is_default { name.to_owned() } else { format!("{name} [{unit}]") }
 }
 
