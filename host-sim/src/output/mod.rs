@@ -7,6 +7,7 @@
 //! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`isolate`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`log_file`] | the decoded log as MCAP or Parquet |
 //! | [`recording`] | telemetry as CSV, MCAP or Parquet while it arrives |
+//! | [`udp`] | telemetry as datagrams for PlotJuggler |
 //! | [`figure`], [`plots`] | plots as SVG |
 //! | `chart`, `page` | the parts of all plots and of all report pages |
 
@@ -36,3 +37,4 @@ pub mod stair;
 mod step_response;
 pub mod terminal;
 pub mod tune;
+pub mod udp;

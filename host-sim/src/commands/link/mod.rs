@@ -26,6 +26,7 @@ Examples:
   vsj link /dev/ttyACM0 set 300 --arm --keep 60         arm, 300 V for a minute
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
   vsj link unix:/tmp/mcu.sock watch                     the emulator
+  vsj link /dev/ttyACM0 watch --udp                     live in PlotJuggler
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
   vsj link /dev/ttyACM0 record out.mcap                 for Foxglove, PlotJuggler
   vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
@@ -116,7 +117,7 @@ enum Unit {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let json = arguments.json;
     let timeout = seconds("--timeout", arguments.timeout, 3600.0)?;
-    let patience = Patience::of(timeout);
+    let (patience, baud) = (Patience::of(timeout), arguments.baud);
     // The arguments are checked before anything is sent.
     let fault = match &arguments.command {
         Command::Acknowledge { fault } => parse_fault(fault)?,
@@ -151,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         _ => None,
     };
 
-    let port = Port::open(&arguments.port, arguments.baud, timeout)?;
+    let port = Port::open(&arguments.port, baud, timeout)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
     let mut session = Session { client, status, json };
     match &arguments.command {
@@ -184,8 +185,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             }
             session.show(done)
         }
-        Command::Watch(arguments) => watch::run(&mut session, arguments),
-        Command::Record(record) => record::run(&mut session, record, arguments.baud),
+        Command::Watch(arguments) => watch::run(&mut session, arguments, baud),
+        Command::Record(record) => record::run(&mut session, record, baud),
         Command::Capture(arguments) => capture::run(&mut session, arguments),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
         Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
