@@ -8,6 +8,7 @@
 //! | [`table`] | columns as Python hands them over |
 //! | [`records`] | the options of a record, and its rows |
 //! | [`interrupt`] | computations that Ctrl-C ends |
+//! | [`link`] | a running MCU over its serial link |
 //! | [`analysis`] | identification, diagnosis, plan |
 //! | [`controller`] | the controller's tick, and the spring alone |
 
@@ -15,6 +16,7 @@ mod analysis;
 mod controller;
 mod error;
 mod interrupt;
+mod link;
 mod records;
 mod table;
 
@@ -26,5 +28,7 @@ mod _vsj {
     #[pymodule_export]
     use crate::controller::{Controller, predict, simulate};
     #[pymodule_export]
-    use crate::error::BadInput;
+    use crate::error::{BadInput, LinkError};
+    #[pymodule_export]
+    use crate::link::Port;
 }

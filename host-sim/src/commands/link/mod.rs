@@ -10,7 +10,7 @@ mod watch;
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
-use host_sim::link::{Client, Patience, Port};
+use host_sim::link::{Client, Patience, Port, fault as parse_fault};
 use host_sim::output::terminal::remark;
 use link::{Desired, Fault, Request};
 use session::{Session, seconds};
@@ -190,19 +190,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Capture(arguments) => capture::run(&mut session, arguments),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
         Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
-    }
-}
-
-fn parse_fault(text: &str) -> Result<Fault> {
-    let known = (1..=u8::MAX).map(Fault).filter(|fault| fault.name() != "unknown");
-    if let Some(fault) = known.clone().find(|fault| fault.name() == text) {
-        return Ok(fault);
-    }
-    match text.parse() {
-        Ok(code) if code > 0 => Ok(Fault(code)),
-        _ => {
-            let names: Vec<_> = known.map(Fault::name).collect();
-            bad_input!("{text} is not a fault; expected {} or a number of 1 to 255", names.join(", "))
-        }
     }
 }
