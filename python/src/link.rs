@@ -184,6 +184,9 @@ impl Port {
                 }
                 rate => bad_input!("rate_hz {rate}: expected 0.02 to 10000"),
             };
+            // Samples of an earlier stream may have come after its end.
+            let name = it.name();
+            it.client.samples(Duration::ZERO).with_context(|| name)?.for_each(drop);
             it.order(Request::Stream { every_ticks })?;
             Ok(ticks_hz)
         })

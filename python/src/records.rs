@@ -58,7 +58,7 @@ impl Options {
     pub(crate) fn open(self, records: &[Owned]) -> Result<Records> {
         let (format, input) = self.format()?;
         let read = |(name, columns): &Owned| match columns {
-            None => record_files::open(Path::new(name), &format, None),
+            None => format.open(Path::new(name)),
             Some(columns) => {
                 let mut format = format.clone();
                 format.dialect.separator = Some(",".parse()?);
