@@ -522,9 +522,9 @@ public:
     /// Telemetry that arrives within `wait`.
     std::vector<Sample> samples(Clock::duration wait) {
         const auto until = Clock::now() + wait;
-        for (;;) {
+        for (;; std::this_thread::yield()) {
             const Lock lock(mutex_);
-            // In short turns, between which the heartbeat has its own.
+            // In short turns, between which other threads have theirs.
             const auto turn = std::min(until, Clock::now() + std::chrono::milliseconds(5));
             while (next_answer(turn)) {
             }

@@ -32,7 +32,8 @@ def test_the_link_arms_sets_watches_and_disarms(board):
         time.sleep(1.2 * link.status()["silence_limit_s"])
         samples = list(link.watch(rate_hz=50, seconds=0.5))
         assert {sample.state for sample in samples} == {"armed"}
-        assert {after.tick - before.tick for before, after in zip(samples, samples[1:])} == {20}
+        # Up to half a period is jitter, not a loss.
+        assert all(10 < after.tick - before.tick < 30 for before, after in zip(samples, samples[1:]))
         assert samples[-1].target_v == 300.0 and samples[-1].applied_v > 300
     with vsj.Link(board, timeout=5) as link:
         assert link.status()["sample"]["state"] == "disarmed"
@@ -49,7 +50,7 @@ def test_a_schedule_is_recorded_from_its_first_row_on(board):
             pass
         frame = link.record(schedule=[(0, 200), (0.2, 0), (0.4, 0)])
         assert list(frame.columns) == ["time_s", "voltage_v", "estimate"]
-        assert frame.time_s[0] == 0 and frame.time_s.diff().max() == pytest.approx(0.01)
+        assert frame.time_s[0] == 0 and frame.time_s.diff().max() < 0.015
         assert frame.voltage_v.max() > 200 and frame.voltage_v.iloc[-1] < 200
         with pytest.raises(vsj.BadInput, match="the controller's own estimate"):
             vsj.identify(frame)
