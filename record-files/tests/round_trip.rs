@@ -80,7 +80,10 @@ fn errors_name_row_and_column() {
             "{error}"
         );
         let error = message(container, bytes(container, &many, &rows), &Format::default());
-        assert!(error.starts_with("r: no column `voltage_v`; expected a header with time_s, voltage_v, stiff"), "{error}");
+        assert!(
+            error.starts_with("r: no column `voltage_v`; expected a header with time_s, voltage_v, stiff"),
+            "{error}"
+        );
         let error = message(container, bytes(container, &RECORD, &rows[..1]), &Format::default());
         assert_eq!(error, "r: 1 row(s) of data; expected at least 2");
         assert!(message(container, bytes(container, &RECORD, &[]), &Format::default()).contains("expected"));

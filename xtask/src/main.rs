@@ -263,7 +263,9 @@ fn arguments() -> Vec<OsString> {
 
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
-    use Command::{Bench, Boot, Check, Clients, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof};
+    use Command::{
+        Bench, Boot, Check, Clients, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof,
+    };
     use Command::{Manual, Prove, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
         Setup => setup::run(),

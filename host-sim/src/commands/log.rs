@@ -63,7 +63,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
 fn log_file(path: &Path) -> Result<LogFile> {
     match Container::of(path) {
         Some(container) => LogFile::create(path, container),
-        None => bad_input!("{}: expected a name that ends in .mcap or .parquet; CSV is printed by --csv", path.display()),
+        None => {
+            bad_input!("{}: expected a name that ends in .mcap or .parquet; CSV is printed by --csv", path.display())
+        }
     }
 }
 
@@ -87,12 +89,7 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
     }
 }
 
-fn decode(
-    mut source: Box<dyn Read>,
-    formats: Formats,
-    arguments: &Arguments,
-    mut file: Option<LogFile>,
-) -> Result<()> {
+fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments, mut file: Option<LogFile>) -> Result<()> {
     let encoding = formats.encoding();
     let mut decoder = Decoder::new(formats);
     let mut summary = Summary::default();

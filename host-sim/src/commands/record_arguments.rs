@@ -6,9 +6,9 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::output::terminal::remark;
 use identify::Input;
+use record_files::open;
 use simulation::bad_input::BadInput;
 use simulation::csv_table::dialect::{Decimal, Dialect, Separator};
-use record_files::open;
 use simulation::record::{ColumnNames, Format, MeasuredRecord, columns_file, remarks_on};
 
 use super::choice::{INPUT, one_of};

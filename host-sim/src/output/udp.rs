@@ -41,8 +41,7 @@ impl Datagrams {
             Ok(None) => bad_input!("--udp {address}: no address; {expected}"),
             Err(error) => bad_input!("--udp {address}: {error}; {expected}"),
         };
-        let any: IpAddr =
-            if to.is_ipv4() { Ipv4Addr::UNSPECIFIED.into() } else { Ipv6Addr::UNSPECIFIED.into() };
+        let any: IpAddr = if to.is_ipv4() { Ipv4Addr::UNSPECIFIED.into() } else { Ipv6Addr::UNSPECIFIED.into() };
         let socket = UdpSocket::bind((any, 0)).and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
         match socket {
             Ok(socket) => Ok(Self { socket, to, rate_hz, first: None, sent: 0, not_sent: 0 }),
@@ -89,7 +88,8 @@ mod tests {
         let receiver = UdpSocket::bind("127.0.0.1:0").unwrap();
         receiver.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
         let mut datagrams = Datagrams::to(&receiver.local_addr().unwrap().to_string(), 1000).unwrap();
-        let sample = |tick| Telemetry { tick, state: State::Armed, applied: WireVolts(3 << 19), ..Telemetry::default() };
+        let sample =
+            |tick| Telemetry { tick, state: State::Armed, applied: WireVolts(3 << 19), ..Telemetry::default() };
         let mut received = |tick| -> Value {
             datagrams.send(&sample(tick));
             let mut bytes = [0; 2048];
@@ -113,7 +113,10 @@ mod tests {
     fn an_address_without_port_is_refused() {
         for address in ["127.0.0.1", "127.0.0.1:x", ":::"] {
             let error = Datagrams::to(address, 1000).err().unwrap().to_string();
-            assert!(error.starts_with(&format!("--udp {address}: ")) && error.contains("expected HOST:PORT"), "{error}");
+            assert!(
+                error.starts_with(&format!("--udp {address}: ")) && error.contains("expected HOST:PORT"),
+                "{error}"
+            );
         }
     }
 }

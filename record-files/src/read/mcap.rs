@@ -120,7 +120,9 @@ fn chosen(
     match (fitting.len(), first_error) {
         (1, _) => Ok(fitting.remove(0)),
         (0, Some(error)) => Err(error),
-        (0, None) => bad_input!("{name}: no topic with JSON messages, {found}; expected one with the columns of a record"),
+        (0, None) => {
+            bad_input!("{name}: no topic with JSON messages, {found}; expected one with the columns of a record")
+        }
         _ => {
             let names: Vec<String> = fitting.iter().map(|(topic, ..)| format!("--topic {topic}")).collect();
             bad_input!("{name}: {} topics have the columns; expected one of {}", fitting.len(), names.join(", "))

@@ -73,8 +73,7 @@ impl<F: FnMut(&Message<'_>) -> Result<()>> Messages<'_, F> {
                     return Err(self.damaged(&unknown).into());
                 };
                 self.count += 1;
-                let message =
-                    Message { number: self.count, channel: &channel, log_time: header.log_time, data: &data };
+                let message = Message { number: self.count, channel: &channel, log_time: header.log_time, data: &data };
                 (self.each)(&message)?;
             }
             _ => (),

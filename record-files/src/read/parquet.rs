@@ -13,10 +13,10 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 use serde_json::{Map, Value};
+use simulation::BadInput;
 use simulation::csv_table::text::MOST_ROWS;
 use simulation::record::columns::{Column, too_many_rows};
 use simulation::record::{Format, with_unit};
-use simulation::BadInput;
 
 use super::caught::caught;
 use super::{Cells, Columns, pages};
@@ -174,7 +174,8 @@ fn check_pages(file: &SerializedFileReader<Bytes>, bytes: &[u8], group: usize, i
 }
 
 fn is_decimal(column: &ColumnDescriptor) -> bool {
-    column.converted_type() == ConvertedType::DECIMAL || matches!(column.logical_type_ref(), Some(LogicalType::Decimal(_)))
+    column.converted_type() == ConvertedType::DECIMAL
+        || matches!(column.logical_type_ref(), Some(LogicalType::Decimal(_)))
 }
 
 fn unsupported(column: &ColumnDescriptor) -> String {

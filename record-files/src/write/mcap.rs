@@ -50,12 +50,8 @@ impl<W: Write> Writer<W> {
         };
         let fields = self.columns.iter().zip(cells).map(|(column, cell)| (column.name.to_owned(), value(cell)));
         let message = Value::Object(fields.collect()).to_string();
-        let header = MessageHeader {
-            channel_id: self.channel,
-            sequence: self.rows,
-            log_time: time_ns,
-            publish_time: time_ns,
-        };
+        let header =
+            MessageHeader { channel_id: self.channel, sequence: self.rows, log_time: time_ns, publish_time: time_ns };
         self.inner.write_to_known_channel(&header, message.as_bytes())?;
         self.rows = self.rows.wrapping_add(1);
         Ok(())

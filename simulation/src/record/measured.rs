@@ -11,9 +11,9 @@ use super::times::{Clock, Time};
 use super::{MOST_READING, MOST_V, Record, Row};
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
-use crate::csv_table::{Numbering, Table};
 use crate::csv_table::dialect::{Decimal, Dialect, Separator};
 use crate::csv_table::text::Source;
+use crate::csv_table::{Numbering, Table};
 use crate::units::{Unit, Units, usual_volts};
 
 /// How to read a file with a measured record; everything that is not said is found in the file.

@@ -90,6 +90,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let read = all.iter().find(|row| row.measured).map(|row| row.stiffness);
     if session.status.sample.measured.is_none() && read.is_some() {
         session.status.sample.measured = read;
+        recording.finish()?;
         recording = Recording::new(&arguments.out, true, &session.status, every)?;
     }
     let mut tick = 0;

@@ -31,7 +31,7 @@ pub(super) enum Sink {
         path: PathBuf,
         writer: Option<Writer<File>>,
         /// Time of day of the first row, in ns since 1970.
-        start_ns: u64,
+        start_ns: Option<u64>,
         /// Time of the last chunk, in s of the recording.
         chunk_s: f64,
     },
@@ -45,8 +45,7 @@ impl Sink {
     /// Creates the file that the extension of `path` asks for, with the column `reading` and `source` as a remark on its origin. An
     /// existing one is kept unless `replace`, since a measurement cannot be repeated.
     pub(super) fn create(path: &Path, replace: bool, reading: &'static str, source: &str) -> Result<Self> {
-        let columns =
-            [Column::number("time_s", "s"), Column::number("voltage_v", "V"), Column::number(reading, "V")];
+        let columns = [Column::number("time_s", "s"), Column::number("voltage_v", "V"), Column::number(reading, "V")];
         let sheet = Sheet { name: "record", source, columns: &columns };
         let path = path.to_owned();
         let unwritable = || format!("{} cannot be written", path.display());
@@ -59,8 +58,7 @@ impl Sink {
             Some(container @ Container::Mcap) => {
                 let mut writer = Writer::new(container, &sheet, create(&path, replace)?).with_context(unwritable)?;
                 writer.flush().with_context(unwritable)?;
-                let start_ns = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
-                Ok(Self::Mcap { path, writer: Some(writer), start_ns, chunk_s: 0.0 })
+                Ok(Self::Mcap { path, writer: Some(writer), start_ns: None, chunk_s: 0.0 })
             }
             Some(container @ Container::Parquet) => {
                 let (file, out) = WholeFile::create(&path, replace)?;
@@ -80,8 +78,10 @@ impl Sink {
             }
             Self::Mcap { writer, start_ns, chunk_s, path } => {
                 let Some(writer) = writer else { return Ok(()) };
+                let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
+                let start_ns = *start_ns.get_or_insert_with(now);
                 let mut add = || -> Result<()> {
-                    writer.row(*start_ns + (time_s * 1e9).round() as u64, &cells)?;
+                    writer.row(start_ns + (time_s * 1e9).round() as u64, &cells)?;
                     if time_s - *chunk_s >= CHUNK_S {
                         *chunk_s = time_s;
                         writer.flush()?;
