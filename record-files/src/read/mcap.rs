@@ -1,6 +1,6 @@
 //! An MCAP file: the JSON messages of one topic, a row each.
 //!
-//! A field is a column; one inside an object is `outer.inner`, an object of `sec` and `nsec` is a time in ns, and arrays are left
+//! A field is a column; one inside an object is `outer.inner`, an object of `sec` and `nsec` is a time in s, and arrays are left
 //! out. The time at which a message was logged is the column `log_time`, which is taken where the messages have no other time.
 
 use std::collections::BTreeMap;
@@ -15,10 +15,10 @@ use simulation::record::{Format, with_unit};
 use super::messages::{Message, each_message};
 use super::{Cells, Columns};
 
-/// Column of the time at which a message was logged, in ns.
-const LOG_TIME: &str = "log_time [ns]";
+/// Column of the time at which a message was logged, in s.
+const LOG_TIME: &str = "log_time [s]";
 /// The same column under the name of a time, for messages without one.
-const TIME: &str = "time [ns]";
+const TIME: &str = "time [s]";
 
 /// The field of an object that is a column: the keys that lead to it.
 type Path = Vec<String>;
@@ -66,7 +66,7 @@ pub(crate) fn columns(name: &str, bytes: &[u8], format: &Format, topic: Option<&
         for (index, cells) in &mut cells {
             match fields.get(*index) {
                 Some(path) => add(cells, at(&object, path)),
-                None => cells.whole(message.log_time.into()),
+                None => cells.text(seconds(message.log_time.into())),
             }
             if cells.len() > MOST_ROWS {
                 return Err(too_many_rows(name).into());
@@ -138,7 +138,7 @@ impl Topic {
         collect(&object, &mut Vec::new(), &mut fields);
         for path in &fields {
             if let Some(Value::Object(_)) = at(&object, path) {
-                units.insert(path.join("."), "ns".to_owned());
+                units.insert(path.join("."), "s".to_owned());
             }
         }
         let schema = message.channel.schema.as_ref().filter(|schema| schema.encoding == "jsonschema");
@@ -222,6 +222,12 @@ fn nanoseconds(object: &Map<String, Value>) -> Option<i128> {
     Some(part("sec")? * 1_000_000_000 + part("nsec")?)
 }
 
+/// A time in ns as seconds with all its digits, which a double does not have.
+fn seconds(nanoseconds: i128) -> String {
+    let (sign, size) = (if nanoseconds < 0 { "-" } else { "" }, nanoseconds.unsigned_abs());
+    format!("{sign}{}.{:09}", size / 1_000_000_000, size % 1_000_000_000)
+}
+
 /// The value at a path.
 fn at<'a>(object: &'a Map<String, Value>, path: &Path) -> Option<&'a Value> {
     let (last, outer) = path.split_last()?;
@@ -238,7 +244,7 @@ fn add(cells: &mut Cells, value: Option<&Value>) {
             (None, number) => cells.number(number.unwrap_or(f64::NAN)),
         },
         Some(Value::Object(object)) => match nanoseconds(object) {
-            Some(time) => cells.whole(time),
+            Some(time) => cells.text(seconds(time)),
             None => cells.missing(),
         },
     }
