@@ -137,7 +137,7 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments, mu
     }
     printer.end(encoding, summary)?;
     if let Some(path) = &arguments.out {
-        print(&wrote(&[path.clone()]))?;
+        print(&wrote(std::slice::from_ref(path)))?;
     }
     let name = name(&arguments.file);
     match broken {

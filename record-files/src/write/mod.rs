@@ -81,9 +81,9 @@ pub struct Sheet<'a> {
 /// Writes a table. What has been added is in the file after [`Writer::flush`], and the file is whole after [`Writer::finish`].
 pub enum Writer<W: Write + Send> {
     /// As an MCAP file.
-    Mcap(mcap::Writer<W>),
+    Mcap(Box<mcap::Writer<W>>),
     /// As a Parquet file.
-    Parquet(parquet::Writer<W>),
+    Parquet(Box<parquet::Writer<W>>),
 }
 
 impl<W: Write + Send> Writer<W> {
@@ -93,8 +93,8 @@ impl<W: Write + Send> Writer<W> {
     /// If `out` cannot be written.
     pub fn new(container: Container, sheet: &Sheet<'_>, out: W) -> Result<Self> {
         Ok(match container {
-            Container::Mcap => Self::Mcap(mcap::Writer::new(sheet, out)?),
-            Container::Parquet => Self::Parquet(parquet::Writer::new(sheet, out)?),
+            Container::Mcap => Self::Mcap(Box::new(mcap::Writer::new(sheet, out)?)),
+            Container::Parquet => Self::Parquet(Box::new(parquet::Writer::new(sheet, out)?)),
         })
     }
 
