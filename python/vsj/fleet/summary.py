@@ -1,0 +1,264 @@
+"""Causes and drifts of each spring, from the table of results.
+
+Rows come in, ordered by spring and time; one spring is in memory at a time. A :class:`Summary` goes out, whose size depends on the
+number of springs, not on that of records.
+"""
+
+import dataclasses
+import datetime
+import itertools
+from collections import Counter
+from typing import Dict, List, Optional
+
+import numpy as np
+
+from . import work
+from .chart import Chart, chart
+
+_CHARTS = 24
+"""Most charts that are kept."""
+_PROBLEMS = 100
+"""Most records without a diagnosis that are named."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Moment:
+    """A record, and when it was measured if that is known."""
+
+    record: str
+    time: Optional[datetime.datetime]
+
+    def __str__(self):
+        if self.time is None:
+            return self.record
+        return self.time.strftime("%Y-%m-%d" if self.time.time() == datetime.time() else "%Y-%m-%d %H:%M")
+
+
+@dataclasses.dataclass(frozen=True)
+class Presence:
+    """A cause in a spring."""
+
+    cause: str
+    since: Moment
+    """The first record of the part in which the cause is more frequent than before: the most likely single change of its frequency
+    (Hinkley, Hinkley, Biometrika 57, 1970)."""
+    last: Moment
+    """The last record that has it."""
+    found: int
+    """Records with the cause from ``since`` on."""
+    of: int
+    """Records that were judged from ``since`` on."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Drift:
+    """A parameter of a spring that changed."""
+
+    spring: str
+    parameter: str
+    unit: str
+    after_record: Moment
+    """The change came after this record,"""
+    by_record: Moment
+    """and by this one."""
+    until: Moment
+    """The last record at which the chart is outside its limits."""
+    stands: bool
+    """True if that is the spring's last record."""
+    before: float
+    after: float
+    scatter: float
+    """Standard deviation before the change."""
+
+    @property
+    def strength(self):
+        """Size of the change in standard deviations."""
+        return abs(self.after - self.before) / self.scatter if self.scatter > 0 else np.inf
+
+
+@dataclasses.dataclass(frozen=True)
+class Series:
+    """A drift with its chart, for a figure."""
+
+    drift: Drift
+    moments: List[Moment]
+    values: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    chart: Chart
+
+
+@dataclasses.dataclass(frozen=True)
+class Spring:
+    """What there is to say about a spring."""
+
+    name: str
+    records: int
+    first: Moment
+    last: Moment
+    verdict: Optional[str]
+    """The last record's; ``None`` if that has no diagnosis."""
+    causes: List[Presence]
+    drifts: List[Drift]
+
+    @property
+    def strength(self):
+        """Springs with more to say come first."""
+        return (
+            len(self.causes) + len([it for it in self.drifts if it.stands]),
+            max((it.strength for it in self.drifts), default=0.0),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """What there is to say about a fleet."""
+
+    springs: List[Spring]
+    status: Dict[str, int]
+    """Records by status."""
+    verdicts: Dict[str, int]
+    """Records by verdict."""
+    causes: List["FleetCause"]
+    series: List[Series]
+    """The strongest drifts."""
+    problems: List["Problem"]
+    """The first records without a diagnosis."""
+    charts: int
+    compared: int
+    """Charts, and values that were compared in them."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FleetCause:
+    """A cause in a fleet."""
+
+    cause: str
+    springs: int
+    records: int
+    first: Moment
+    last: Moment
+
+
+@dataclasses.dataclass(frozen=True)
+class Problem:
+    """A record without a diagnosis."""
+
+    record: str
+    status: str
+    error: str
+
+
+def summary(rows):
+    """The summary of rows that are ordered by spring and time."""
+    springs, status, verdicts, series, problems = [], Counter(), Counter(), [], []
+    causes, charts, compared = {}, 0, 0
+    for name, group in itertools.groupby(rows, lambda row: row["spring"]):
+        group = list(group)
+        for row in group:
+            status[row["status"]] += 1
+            if row["verdict"]:
+                verdicts[row["verdict"]] += 1
+            if row["error"] and len(problems) < _PROBLEMS:
+                problems.append(Problem(row["record"], row["status"], row["error"]))
+        present = _causes(group)
+        drifting, tried, values = _drifts(name, group)
+        charts, compared = charts + tried, compared + values
+        series = sorted(series + drifting, key=lambda it: (not it.drift.stands, -it.drift.strength))[:_CHARTS]
+        moments = [_moment(row) for row in group]
+        springs.append(
+            Spring(name, len(group), moments[0], moments[-1], group[-1]["verdict"], present, [it.drift for it in drifting])
+        )
+        for it in present:
+            causes.setdefault(it.cause, []).append(it)
+    return Summary(
+        sorted(springs, key=lambda it: it.strength, reverse=True),
+        dict(status),
+        dict(verdicts),
+        sorted((_fleet_cause(cause, where) for cause, where in causes.items()), key=lambda it: (-it.springs, -it.records)),
+        series,
+        problems,
+        charts,
+        compared,
+    )
+
+
+def _moment(row):
+    return Moment(row["record"], row["time"])
+
+
+def _causes(group):
+    """The causes of a spring, the most frequent first."""
+    judged = [row for row in group if row["status"] == work.DIAGNOSED and row["verdict"] != "insufficient"]
+    names = [{finding["cause"] for finding in row["findings"]} for row in judged]
+    found = []
+    for cause in set().union(*names):
+        present = np.array([cause in it for it in names])
+        since = _since(present)
+        last = int(np.flatnonzero(present)[-1])
+        there = present[since:]
+        found.append(Presence(cause, _moment(judged[since]), _moment(judged[last]), int(there.sum()), len(there)))
+    return sorted(found, key=lambda it: (-it.found / it.of, -it.found, it.cause))
+
+
+def _since(present):
+    """The index from which something is more frequent than before, of largest likelihood; 0 if it is nowhere."""
+    count, total = len(present), int(present.sum())
+    before = np.concatenate([[0], np.cumsum(present)[:-1]])
+    length = np.arange(count)
+
+    def likelihood(hits, trials):
+        rate = np.divide(hits, trials, out=np.zeros(count), where=trials > 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.nan_to_num(hits * np.log(rate)) + np.nan_to_num((trials - hits) * np.log1p(-rate)), rate
+
+    (left, rate_before), (right, rate_after) = likelihood(before, length), likelihood(total - before, count - length)
+    return int(np.argmax(np.where((rate_after > rate_before) | (length == 0), left + right, -np.inf)))
+
+
+def _drifts(name, group):
+    """The drifts of a spring, the number of charts, and that of compared values."""
+    series = {}
+    for row in group:
+        if row["status"] != work.DIAGNOSED:
+            continue
+        named = [(it["name"], it) for it in row["identified"] or []]
+        named += [(f"{finding['cause']} {it['name']}", it) for finding in row["findings"] for it in finding["parameters"]]
+        for parameter, it in named:
+            if it["value"] is not None and np.isfinite(it["value"]):
+                series.setdefault((parameter, it["unit"]), []).append((_moment(row), it["value"], it["low"], it["high"]))
+    drifting, charts, compared = [], 0, 0
+    for (parameter, unit), points in series.items():
+        moments, values, low, high = zip(*points)
+        found = chart(values)
+        if found is None:
+            continue
+        charts, compared = charts + 1, compared + found.compared
+        change = found.change
+        if change is None:
+            continue
+        drift = Drift(
+            name,
+            parameter,
+            unit,
+            moments[change.first - 1],
+            moments[change.first],
+            moments[change.last],
+            change.stands,
+            change.before,
+            change.after,
+            float(np.std(values[: change.first], ddof=1)),
+        )
+        arrays = [np.array(it, dtype=float) for it in (values, low, high)]
+        drifting.append(Series(drift, list(moments), *arrays, found))
+    return drifting, charts, compared
+
+
+def _fleet_cause(cause, where):
+    first = min((it.since for it in where), key=_order)
+    last = max((it.last for it in where), key=_order)
+    return FleetCause(cause, len(where), sum(it.found for it in where), first, last)
+
+
+def _order(moment):
+    return (moment.time is not None, moment.time or datetime.datetime.min, moment.record)
