@@ -19,6 +19,8 @@ _CHARTS = 24
 """Most charts that are kept."""
 _PROBLEMS = 100
 """Most records without a diagnosis that are named."""
+_IMPRECISE = 5.0
+"""A value whose interval is wider than so many times the median of its series says nothing about a change."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +88,8 @@ class Series:
     low: np.ndarray
     high: np.ndarray
     chart: Chart
+    imprecise: int
+    """Values that are left out because their intervals are much wider than the others'."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -229,7 +233,12 @@ def _drifts(name, group):
                 series.setdefault((parameter, it["unit"]), []).append((_moment(row), it["value"], it["low"], it["high"]))
     drifting, charts, compared = [], 0, 0
     for (parameter, unit), points in series.items():
-        moments, values, low, high = zip(*points)
+        moments = [moment for moment, *_ in points]
+        values, low, high = np.array([numbers for _, *numbers in points], dtype=float).T
+        width = high - low
+        # A parameter may have no interval.
+        precise = np.isnan(width) | (width <= _IMPRECISE * np.nanmedian(width) if np.any(~np.isnan(width)) else False)
+        moments, values, low, high = list(itertools.compress(moments, precise)), values[precise], low[precise], high[precise]
         found = chart(values)
         if found is None:
             continue
@@ -244,13 +253,12 @@ def _drifts(name, group):
             moments[change.first - 1],
             moments[change.first],
             moments[change.last],
-            change.stands,
+            change.last == len(values) - 1,
             change.before,
             change.after,
-            float(np.std(values[: change.first], ddof=1)),
+            float(np.std(values[: change.first], ddof=min(1, change.first - 1))),
         )
-        arrays = [np.array(it, dtype=float) for it in (values, low, high)]
-        drifting.append(Series(drift, list(moments), *arrays, found))
+        drifting.append(Series(drift, moments, values, low, high, found, int(np.sum(~precise))))
     return drifting, charts, compared
 
 
