@@ -7,7 +7,8 @@ try:
 except ImportError as error:
     if error.name is None or error.name.startswith("vsj"):
         raise
-    sys.exit(f"vsj.fleet: the package {error.name} is missing; expected: pip install './python[fleet]'")
+    print(f"vsj.fleet: the package {error.name} is missing; expected: pip install './python[fleet]'", file=sys.stderr)
+    sys.exit(2)
 
 # Workers of a cluster on this machine import this module again.
 if __name__ == "__main__":

@@ -113,7 +113,8 @@ def chart(values):
             singles.append(index)
         z[index] = smooth = (1 - WEIGHT) * smooth + WEIGHT * min(max(q, -WIDTH), WIDTH)
         limit[index] = WIDTH * math.sqrt(WEIGHT / (2 - WEIGHT) * (1 - (1 - WEIGHT) ** (2 * compared)))
-        if abs(smooth) <= limit[index]:
+        # The first comparison reaches the limit at most, but for rounding.
+        if abs(smooth) <= limit[index] * (1 + 1e-9):
             process.learn(process.at(math.copysign(min(abs(q), _SINGLE), q), scale))
         elif change and change[1] == index - 1:
             change = (change[0], index)

@@ -9,6 +9,8 @@ from distributed.comm import parse_address
 from .. import BadInput
 
 LOCAL, SLURM = "local", "slurm"
+# A terminal sends Ctrl-C to all processes; this program ends the workers.
+_WITHOUT_CTRL_C = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 
 
 @contextmanager
@@ -48,7 +50,9 @@ def connected(scheduler, workers, wait_s):
 def _cluster(scheduler, workers):
     if scheduler == LOCAL:
         # One thread in each process: a diagnosis uses one processor.
-        with LocalCluster(workers, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL") as cluster:
+        with LocalCluster(
+            workers, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL", preload=[_WITHOUT_CTRL_C]
+        ) as cluster:
             yield cluster
     elif scheduler == SLURM:
         try:

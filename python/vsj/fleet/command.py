@@ -85,7 +85,7 @@ def _diagnose(wanted):
 
 
 def _progress(outcome, count):
-    return f"{outcome.new + outcome.before} of {count} records are finished; the same command goes on"
+    return f"at least {outcome.new + outcome.before} of {count} records are finished; the same command goes on"
 
 
 def _settings(wanted, table, folder):

@@ -6,8 +6,8 @@ the scheduler and this program, by running empty tasks. What is computed, for R 
     CPU time           R s                       s: mean CPU time of a record
     limit of the cores R s / C
     limit of one task  (R / B) o                 o: time of an empty task, one after the other in the scheduler
-    limit of the store (R / B) 4 / 3500 s        a part is one PUT, COPY and DELETE, and a GET at the end;
-                       R / 5500 s                a record is one GET
+    limit of the store 3 (R / B) / 3500 s        a part is one PUT, COPY and DELETE,
+                       (R + 2 R / B) / 5500 s    and two GETs at the end; a record is one GET
     time               the largest of these, and B s for the last batch
     cores that help    B s / o                   with more the scheduler is the bottleneck
 
@@ -82,7 +82,7 @@ def measured(out):
 
 def task_s():
     """The time of an empty task, in s: 2000 of them, at most 100 in progress, one process on this machine."""
-    with LocalCluster(1, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL") as cluster, Client(cluster) as client:
+    with LocalCluster(1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster, Client(cluster) as client:
         client.submit(_nothing, -1, pure=False).result()
         start = time.perf_counter()
         completed = as_completed([client.submit(_nothing, it, pure=False) for it in range(100)])
@@ -103,7 +103,7 @@ def estimate(it, count, cores, price, batch):
     limits = {
         "cores": cpu_s / cores,
         "scheduler": tasks * it.task_s,
-        "object store": max(4 * tasks / PUTS_PER_S, count / GETS_PER_S),
+        "object store": max(3 * tasks / PUTS_PER_S, (count + 2 * tasks) / GETS_PER_S),
     }
     bottleneck = max(limits, key=limits.get)
     time_s = limits[bottleneck] + batch * it.seconds
