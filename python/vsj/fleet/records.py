@@ -1,7 +1,7 @@
 """The records of a fleet: which there are, and spring, time and plant of each.
 
 In comes the address of a folder or of a manifest, a local path or a URL that fsspec knows. Out comes a table with one row for each
-record, in the order spring, time, record. It is all that is held in memory of every record: about 100 bytes each.
+record, in the order spring, time, record.
 """
 
 import datetime
