@@ -4,6 +4,7 @@ import datetime
 import json
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -426,3 +427,20 @@ def test_the_cost_of_a_larger_fleet_is_what_the_page_of_formulas_says():
 def test_the_schema_of_the_table_is_in_the_manual():
     manual = (ROOT / "docs/fleet.md").read_text()
     assert [name for name in store.SCHEMA.names if f"`{name}`" not in manual] == []
+
+
+def test_the_commands_of_the_manual_run(copied, tmp_path, monkeypatch, capsys):
+    page = (ROOT / "docs/fleet.md").read_text()
+    lines = [line for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL) for line in block.splitlines()]
+    commands = [shlex.split(line)[3:] for line in lines if line.startswith("python -m vsj.fleet ")]
+    examples = [shlex.split(line)[3:] for line in fleet._EXAMPLES.splitlines() if line.startswith("  python -m vsj.fleet ")]
+    assert len(commands) == 5 and len(examples) == 5
+    for words in commands + examples:
+        fleet._parser().parse_args(words)
+    (tmp_path / "data").mkdir()
+    copied.rename(tmp_path / "data/springs")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cost, "_TASKS", 200)
+    for words, printed in ((commands[0], "wrote out/fleet/fleet.html"), (commands[-1], "1000000 records in batches of 16")):
+        assert fleet.main(words) == 0
+        assert printed in capsys.readouterr().out

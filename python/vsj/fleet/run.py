@@ -8,6 +8,7 @@ from concurrent.futures import CancelledError
 
 import numpy as np
 from distributed import KilledWorker, as_completed
+from distributed.comm import CommClosedError
 
 from . import store, work
 
@@ -92,33 +93,32 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress)
     completed = as_completed()
 
     def fill():
-        try:
-            ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-        except OSError as error:
-            raise SchedulerLost("the scheduler is lost") from error
+        ahead = _AHEAD * max(1, sum(client.nthreads().values()))
         while len(in_progress) < ahead and (following := next(batches, None)):
             completed.add(submit(*following))
 
-    fill()
-    for future in completed:
-        start, rows = in_progress.pop(future)
-        if future.status in ("cancelled", "lost"):
-            raise SchedulerLost("the scheduler is lost")
-        try:
-            done = future.result()
-        except CancelledError as error:
-            raise SchedulerLost("the scheduler is lost") from error
-        except KilledWorker:
-            if len(rows) > 1:
-                for index, row in enumerate(rows):
-                    completed.add(submit(start + index, [row]))
-                continue
-            row = work.failed(rows[0], f"{rows[0]['record']}: every worker that diagnosed it died")
-            store.write_part(out, [row])
-            done = [(None, work.FAILED, True)]
-        outcome.add(start, done)
-        on_progress(outcome)
+    try:
         fill()
+        for future in completed:
+            start, rows = in_progress.pop(future)
+            try:
+                done = future.result()
+            except KilledWorker:
+                if len(rows) > 1:
+                    for index, row in enumerate(rows):
+                        completed.add(submit(start + index, [row]))
+                    continue
+                row = work.failed(rows[0], f"{rows[0]['record']}: every worker that diagnosed it died")
+                store.write_part(out, [row])
+                done = [(None, work.FAILED, True)]
+            outcome.add(start, done)
+            on_progress(outcome)
+            fill()
+    except Exception as error:
+        # Its end shows in the future that is waited for, or in the next request.
+        if client.status != "running" or isinstance(error, (CancelledError, CommClosedError)):
+            raise SchedulerLost("the scheduler is lost") from error
+        raise
     return outcome
 
 
