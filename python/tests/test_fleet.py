@@ -219,9 +219,13 @@ def test_an_error_is_in_its_row_with_the_text_of_the_command(copied, tmp_path, e
         assert rows["gone.csv"]["status"] == "failed" and "gone.csv: FileNotFoundError" in rows["gone.csv"]["error"]
     # What was refused is finished, what failed is tried again.
     assert "2 finished before, 1 now; 2 with an error" in printed.out
+    # A manifest that says more of a finished record is followed.
+    manifest.write_text(manifest.read_text().replace("s1,2026-03-04", "s9,2026-03-05"))
     shutil.copy(copied / good, gone)
     assert fleet.main([str(manifest), "--out", str(out), "--scheduler", engine]) == 1
-    assert rows_of(out)["gone.csv"]["status"] == "diagnosed"
+    rows = rows_of(out)
+    assert rows["gone.csv"]["status"] == "diagnosed"
+    assert (rows[str(good)]["spring"], rows[str(good)]["time"].day) == ("s9", 5)
 
 
 def test_parquet_records_and_a_parquet_manifest_have_the_same_answers(copied, tmp_path, engine):
@@ -289,6 +293,7 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
     for it in (folder / "a", empty):
         it.mkdir(parents=True)
     (folder / "a/b.csv").write_text("no")
+    (tmp_path / "bad.toml").write_text("[relaxation]\nshare = 7\n")
     listed = {"names.csv": "name\nx\n", "dates.csv": "record,time\nx.csv,yesterday\n", "twice.csv": "record\nx.csv\nx.csv\n", "gap.csv": "record,spring\n,s\n"}
     for name, text in listed.items():
         (tmp_path / name).write_text(text)
@@ -300,6 +305,7 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
         ([tmp_path / "twice.csv"], "x.csv is listed twice"),
         ([tmp_path / "gap.csv"], "row 1, column record: empty"),
         ([folder, "--plant", "no.toml"], "--plant no.toml: cannot be read"),
+        ([folder, "--plant", tmp_path / "bad.toml"], "bad.toml"),
         ([folder, "--columns", "no.toml"], "--columns no.toml: cannot be read"),
         ([folder, "--scheduler", "10.0.0.5"], "expected local, slurm, or an address"),
         ([folder, "--batch", "0"], "expected a number, 1 to 100000"),

@@ -29,7 +29,7 @@ def connected(scheduler, workers, wait_s):
     Raises BadInput for an address that is none, ConnectionError if no scheduler or no worker answers in time.
     """
     # A lost scheduler is reported, not waited for: the next run goes on.
-    with dask.config.set({"distributed.comm.timeouts.connect": f"{min(wait_s, 30)}s", "distributed.admin.log-format": "%(message)s"}):
+    with dask.config.set({"distributed.comm.timeouts.connect": f"{min(wait_s, 30)}s"}):
         with _cluster(scheduler, workers) as cluster:
             try:
                 client = Client(cluster or scheduler, timeout=wait_s)

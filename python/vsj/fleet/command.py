@@ -4,9 +4,10 @@ import argparse
 import json
 import sys
 
+import numpy as np
 from tqdm import tqdm
 
-from .. import BadInput, __version__
+from .. import BadInput, __version__, _vsj
 from . import cluster, cost, page, records, run, store
 from .settings import NAMED_PLANTS, Settings
 from .summary import summary
@@ -65,11 +66,7 @@ def _diagnose(wanted):
         return _said(f"interrupted; {_progress(outcome, count)}", 130)
     except run.SchedulerLost as error:
         return _said(f"--scheduler {wanted.scheduler}: {error}; {_progress(outcome, count)}", 1)
-    names = table["record"]
-    store.write_table(
-        wanted.out,
-        ([(names[index].as_py(), outcome.key(index)) for index in range(start, min(start + 1000, count))] for start in range(0, count, 1000)),
-    )
+    store.write_table(wanted.out, table, outcome.key)
     found = summary(store.rows(wanted.out))
     store.write_text(wanted.out, page.NAME, page.page(found, wanted.records, settings))
     errors = outcome.refused + int(outcome.failed.sum())
@@ -97,6 +94,10 @@ def _settings(wanted, table, folder):
         if name is not None and name not in plants:
             where = name if "://" in name or name.startswith("/") else f"{folder}/{name}"
             plants[name] = None if name in NAMED_PLANTS else _text(where, f"{wanted.records}, column plant")
+    for name, text in plants.items():
+        if text is not None:
+            # Refused here, not in the row of every record.
+            _vsj.predict((name, text), np.array([0.0, 1.0]), np.zeros(2), "hold")
     return Settings(options | {"columns": None}, wanted.effort, columns), plants
 
 

@@ -48,6 +48,7 @@ def page(found, records, settings):
         springs=_springs(springs),
         springs_left_out=len(found.springs) - len(springs),
         drifts=_drifts(found.springs),
+        drifts_in_all=sum(len(it.drifts) for it in found.springs),
         figures=[figure.drawn(it) for it in found.series],
         false_alarms=found.compared / COMPARED_PER_FALSE_ALARM,
         problems=Table([("record", "cause"), ("status", ""), ("error", "")], [[it.record, it.status, it.error] for it in found.problems]),

@@ -40,12 +40,6 @@ def filesystem(url):
         raise BadInput(f"{url}: {error}") from error
 
 
-def is_manifest(url):
-    """True for the address of a manifest: an existing file."""
-    fs, path = filesystem(url)
-    return fs.isfile(path)
-
-
 def listed(url):
     """The records in a folder or a manifest, and the address of the folder that their names are relative to.
 

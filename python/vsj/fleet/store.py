@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 
 import pyarrow as pa
-from pyarrow import compute, parquet
+from pyarrow import parquet
 
 from .records import filesystem
 
@@ -87,32 +87,30 @@ def finished(out):
     return pa.concat_tables(tables).unify_dictionaries()
 
 
-def write_table(out, keys):
-    """Write the table of all results, in the order of ``keys``: one row for each ``(record, key)``.
+def write_table(out, records, key_of):
+    """Write the table of all results: for each record of the table ``records``, in its order, the row with its key.
 
-    ``keys`` is an iterable of lists of pairs. Memory: the parts' names, keys and rows of one list.
+    ``key_of`` gives the key of the record with an index. Spring, time and plant are those of ``records``, which may have changed since.
+    Memory: names, keys and places of all rows, and a thousand rows.
     """
     there = finished(out)
-    place = dict(
-        zip(
-            zip(there["record"].to_pylist(), there["key"].to_pylist()),
-            zip(there["part"].to_pylist(), there["row"].to_pylist()),
-        )
-    )
+    names = zip(there["record"].to_pylist(), there["key"].to_pylist())
+    place = dict(zip(names, zip(there["part"].to_pylist(), there["row"].to_pylist())))
     fs, _ = filesystem(out)
     with _replacing(out, TABLE) as file, parquet.ParquetWriter(file, SCHEMA) as writer:
-        for pairs in keys:
-            wanted = [place[pair] for pair in pairs]
-            parts = {}
+        for start in range(0, len(records), _ROWS_AT_ONCE):
+            some = records.slice(start, _ROWS_AT_ONCE)
+            wanted = [place[name, key_of(index)] for index, name in enumerate(some["record"].to_pylist(), start)]
+            tables, offsets, length = [], {}, 0
             for part in dict.fromkeys(part for part, _ in wanted):
                 with fs.open(part, "rb") as source:
-                    parts[part] = len(parts), parquet.read_table(source, schema=SCHEMA)
-            offsets, start = [], 0
-            for _, table in parts.values():
-                offsets.append(start)
-                start += len(table)
-            rows = [offsets[parts[part][0]] + row for part, row in wanted]
-            writer.write_table(pa.concat_tables([table for _, table in parts.values()]).take(rows))
+                    tables.append(parquet.read_table(source, schema=SCHEMA))
+                offsets[part] = length
+                length += len(tables[-1])
+            table = pa.concat_tables(tables).take([offsets[part] + row for part, row in wanted])
+            for column in ("spring", "time", "plant"):
+                table = table.set_column(SCHEMA.get_field_index(column), SCHEMA.field(column), some[column])
+            writer.write_table(table)
 
 
 def rows(out):
