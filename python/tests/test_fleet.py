@@ -17,7 +17,6 @@ import numpy as np
 import pandas
 import psutil
 import pytest
-from pyarrow import parquet
 
 import vsj
 from conftest import ROOT

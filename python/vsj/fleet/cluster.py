@@ -1,5 +1,6 @@
 """The engine that distributes the work: Dask on this machine, on SLURM, or at the address of a scheduler."""
 
+import logging
 from contextlib import contextmanager
 
 import dask
@@ -28,6 +29,9 @@ def connected(scheduler, workers, wait_s):
 
     Raises BadInput for an address that is none, ConnectionError if no scheduler or no worker answers in time.
     """
+    # What goes wrong is said once, by this package.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     # A lost scheduler is reported, not waited for: the next run goes on.
     with dask.config.set({"distributed.comm.timeouts.connect": f"{min(wait_s, 30)}s"}):
         with _cluster(scheduler, workers) as cluster:
