@@ -49,7 +49,7 @@ def main(arguments=None):
 def _diagnose(wanted):
     folder, table = records.listed(wanted.records)
     settings, plants = _settings(wanted, table, folder)
-    table = _with_plants(table, wanted.plant)
+    table, out = _with_plants(table, wanted.plant), records.absolute(wanted.out)
     outcome, count = run.Outcome(len(table)), len(table)
     try:
         with tqdm(total=count, unit="record", disable=None, desc="diagnosed", smoothing=0.05) as bar:
@@ -61,14 +61,14 @@ def _diagnose(wanted):
                 bar.set_postfix(refused=now.refused, failed=int(now.failed.sum()), refresh=False)
 
             with cluster.connected(wanted.scheduler, wanted.workers, wanted.wait) as client:
-                outcome = run.run(client, table, settings, plants, folder, wanted.out, wanted.batch, show)
+                outcome = run.run(client, table, settings, plants, folder, out, wanted.batch, show)
     except KeyboardInterrupt:
         return _said(f"interrupted; {_progress(outcome, count)}", 130)
     except run.SchedulerLost as error:
         return _said(f"--scheduler {wanted.scheduler}: {error}; {_progress(outcome, count)}", 1)
-    store.write_table(wanted.out, table, outcome.key)
-    found = summary(store.rows(wanted.out))
-    store.write_text(wanted.out, page.NAME, page.page(found, wanted.records, settings))
+    store.write_table(out, table, outcome.key)
+    found = summary(store.rows(out))
+    store.write_text(out, page.NAME, page.page(found, wanted.records, settings))
     errors = outcome.refused + int(outcome.failed.sum())
     if wanted.json:
         print(json.dumps(_json(found, outcome)))

@@ -40,6 +40,12 @@ def filesystem(url):
         raise BadInput(f"{url}: {error}") from error
 
 
+def absolute(url):
+    """A URL that means the same in every folder and on every machine that has the file."""
+    fs, path = filesystem(url)
+    return fs.unstrip_protocol(path)
+
+
 def listed(url):
     """The records in a folder or a manifest, and the address of the folder that their names are relative to.
 
