@@ -13,8 +13,9 @@ In comes a folder or an object store with records, or a manifest that lists them
 | ``cluster`` | the engine: this machine, SLURM, or a scheduler by its address |
 | ``run`` | the loop that keeps a bounded number of batches in progress |
 | ``chart`` | the control chart of a parameter |
+| ``report`` | what a summary says, as data classes |
 | ``summary`` | causes and drifts of each spring, from the table |
-| ``page`` | the summary as one HTML page |
+| ``page``, ``figure`` | the summary as one HTML page with its charts |
 | ``cost`` | time, price and bottleneck of a larger fleet, computed from a smaller one |
 | ``command`` | the command line |
 """
