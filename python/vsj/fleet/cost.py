@@ -8,11 +8,12 @@ the scheduler and this program, by running empty tasks. What is computed, for R 
     limit of one task  (R / B) o                 o: time of an empty task, one after the other in the scheduler
     limit of the store 3 (R / B) / 3500 s        a part is one PUT, COPY and DELETE,
                        (R + 2 R / B) / 5500 s    and two GETs at the end; a record is one GET
-    time               the largest of these, and B s for the last batch
+    the end            2 (R / B) 0.1 s / 32      the parts are read twice, 32 at a time
+    time               the largest limit, B s for the last batch, and the end
     cores that help    B s / o                   with more the scheduler is the bottleneck
 
-3500 and 5500 are the requests of each kind in a second that Amazon S3 guarantees for one prefix (its user guide, "Best practices design
-patterns: optimizing Amazon S3 performance"); a local disk has other limits.
+3500 and 5500 are the requests of each kind in a second that Amazon S3 guarantees for one prefix, 0.1 s is the lower end of the latency that
+it names for small objects (its user guide, "Best practices design patterns: optimizing Amazon S3 performance"); a local disk is faster.
 """
 
 import dataclasses
@@ -27,6 +28,8 @@ from .records import filesystem
 
 PUTS_PER_S, GETS_PER_S = 3500, 5500
 """Requests in a second that an object store guarantees for one prefix."""
+GET_S = 0.1
+"""Latency of a request, in s."""
 _CLIENT_BYTES = 900
 """Memory of this program for each record: name, spring, time, key, place of its row (measured with 300 000)."""
 _TASKS = 2000
@@ -57,6 +60,8 @@ class Estimate:
     limits: dict
     """Time that each limit alone would take."""
     bottleneck: str
+    end_s: float
+    """Time to gather the parts."""
     time_s: float
     cost: float
     useful_cores: int
@@ -106,7 +111,8 @@ def estimate(it, count, cores, price, batch):
         "object store": max(3 * tasks / PUTS_PER_S, (count + 2 * tasks) / GETS_PER_S),
     }
     bottleneck = max(limits, key=limits.get)
-    time_s = limits[bottleneck] + batch * it.seconds
+    end_s = 2 * tasks * GET_S / store.READERS
+    time_s = limits[bottleneck] + batch * it.seconds + end_s
     useful = max(1, int(batch * it.seconds / it.task_s))
     return Estimate(
         count,
@@ -116,6 +122,7 @@ def estimate(it, count, cores, price, batch):
         cpu_s,
         limits,
         bottleneck,
+        end_s,
         time_s,
         time_s / 3600 * cores * price,
         useful,
@@ -142,6 +149,7 @@ def text(it, of):
         ("CPU time", _hours(of.cpu_s)),
         *((f"limit of the {name}", _hours(seconds)) for name, seconds in of.limits.items()),
         ("bottleneck", of.bottleneck),
+        ("gathering the parts", _hours(of.end_s)),
         ("time", _hours(of.time_s)),
         (f"price at {of.price:g} for a core and hour", f"{of.cost:.2f}"),
         ("cores that the scheduler keeps busy", f"{of.useful_cores}"),

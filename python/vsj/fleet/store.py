@@ -6,6 +6,7 @@ dead, writes the same rows again; every reader takes one row for each record and
 """
 
 import hashlib
+import itertools
 import os
 import posixpath
 import uuid
@@ -49,7 +50,8 @@ SCHEMA = pa.schema(
 TABLE = "diagnoses.parquet"
 _PARTS = "parts"
 _ROWS_AT_ONCE = 1000
-_READERS = 8
+READERS = 32
+"""Parts that are read at a time: on an object store most of the time is waiting."""
 
 
 def write_part(out, rows):
@@ -80,7 +82,7 @@ def finished(out):
         columns = [pa.array([part] * len(table)).dictionary_encode(), pa.array(range(len(table)), pa.int32())]
         return table.append_column("part", columns[0]).append_column("row", columns[1])
 
-    with ThreadPoolExecutor(_READERS) as pool:
+    with ThreadPoolExecutor(READERS) as pool:
         tables = list(pool.map(names, parts))
     if not tables:
         return pa.table({name: [] for name in ("record", "key", "status", "part", "row")})
@@ -97,16 +99,18 @@ def write_table(out, records, key_of):
     names = zip(there["record"].to_pylist(), there["key"].to_pylist())
     place = dict(zip(names, zip(there["part"].to_pylist(), there["row"].to_pylist())))
     fs, _ = filesystem(out)
-    with _replacing(out, TABLE) as file, parquet.ParquetWriter(file, SCHEMA) as writer:
+
+    def read(part):
+        with fs.open(part, "rb") as source:
+            return parquet.read_table(source, schema=SCHEMA)
+
+    with ThreadPoolExecutor(READERS) as pool, _replacing(out, TABLE) as file, parquet.ParquetWriter(file, SCHEMA) as writer:
         for start in range(0, len(records), _ROWS_AT_ONCE):
             some = records.slice(start, _ROWS_AT_ONCE)
             wanted = [place[name, key_of(index)] for index, name in enumerate(some["record"].to_pylist(), start)]
-            tables, offsets, length = [], {}, 0
-            for part in dict.fromkeys(part for part, _ in wanted):
-                with fs.open(part, "rb") as source:
-                    tables.append(parquet.read_table(source, schema=SCHEMA))
-                offsets[part] = length
-                length += len(tables[-1])
+            parts = list(dict.fromkeys(part for part, _ in wanted))
+            tables = list(pool.map(read, parts))
+            offsets = dict(zip(parts, itertools.accumulate(map(len, tables), initial=0)))
             table = pa.concat_tables(tables).take([offsets[part] + row for part, row in wanted])
             for column in ("spring", "time", "plant"):
                 table = table.set_column(SCHEMA.get_field_index(column), SCHEMA.field(column), some[column])
