@@ -27,4 +27,8 @@ mod _vsj {
     use crate::controller::{Controller, predict, simulate};
     #[pymodule_export]
     use crate::error::BadInput;
+
+    /// The style sheet of the command's report pages.
+    #[pymodule_export]
+    const PAGE_STYLE: &str = include_str!("../../host-sim/src/output/page/page.css");
 }
