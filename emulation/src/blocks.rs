@@ -25,7 +25,7 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
 }
 
 fn count(opt: Opt) -> Result<Table> {
-    let run = emulator::count("blocks", "mps2-an386,fast", opt)?;
+    let run = emulator::count("blocks", "mps2-an386,robust", opt)?;
     let mut counted = vec![[(0, 0); CONTROLLERS.len()]; SPRINGS.len()];
     for (row, (name, plant)) in SPRINGS.iter().enumerate() {
         for (column, (controller, compensation)) in CONTROLLERS.iter().enumerate() {

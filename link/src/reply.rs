@@ -137,6 +137,8 @@ pub enum Controller {
     Paper,
     /// The time-optimal controller.
     Fast,
+    /// The controller for a spring that is known to within errors.
+    Robust,
 }
 
 impl Controller {
@@ -146,6 +148,7 @@ impl Controller {
             Compensation::None => Self::None,
             Compensation::ProportionalIntegral(_) => Self::Paper,
             Compensation::TimeOptimal(_) => Self::Fast,
+            Compensation::Robust(_) => Self::Robust,
         }
     }
 
@@ -155,6 +158,7 @@ impl Controller {
             Self::None => "none",
             Self::Paper => "paper",
             Self::Fast => "fast",
+            Self::Robust => "robust",
         }
     }
 }

@@ -71,7 +71,7 @@ impl WireSettings {
         let device::Settings { control, supervision, watchdogs } = settings;
         let Settings { compensation, amplifier, feedback, .. } = control;
         let (gains, approach_s) = match compensation {
-            Compensation::None => (Gains::PAPER, 0.0),
+            Compensation::None | Compensation::Robust(_) => (Gains::PAPER, 0.0),
             Compensation::ProportionalIntegral(gains) => (*gains, 0.0),
             Compensation::TimeOptimal(approach) => (Gains::PAPER, approach.time_constant_s()),
         };
@@ -112,6 +112,8 @@ impl WireSettings {
             Controller::Fast => {
                 Compensation::TimeOptimal(Approach::new(self.approach_s).ok_or(Field::named("controller"))?)
             }
+            // Its margin is not among these settings.
+            Controller::Robust => return Err(Field::named("controller")),
         };
         let feedback = match self.sensor {
             None => None,

@@ -3,7 +3,7 @@
 use link::{Controller, Fault, Field, Sensor, State};
 use model::amplifier::Limits;
 use model::supervisor::{self, Command, Inputs, Settings, Supervisor};
-use model::{Approach, Compensation, DacCode, Gains, Output, SampleTime, Volts};
+use model::{Approach, Compensation, DacCode, Gains, Margin, Output, SampleTime, Volts};
 
 #[test]
 fn a_fault_has_the_name_and_the_remedy_of_the_supervisor() {
@@ -67,6 +67,7 @@ fn controllers_are_called_as_on_the_command_line() {
         (Compensation::None, "none"),
         (Compensation::ProportionalIntegral(gains), "paper"),
         (Compensation::TimeOptimal(Approach { time_constant_s: 0.1 }), "fast"),
+        (Compensation::Robust(Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: 0.02 }), "robust"),
     ] {
         assert_eq!(Controller::of(&compensation).name(), name);
     }

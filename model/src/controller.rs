@@ -18,8 +18,9 @@
 use crate::amplifier::{self, Amplifier, Limits};
 use crate::error::OutOfRange;
 use crate::estimator::{self, Estimator, Model, Plant};
-use crate::feedback::{self, Feedback, Reading, Sensor};
+use crate::feedback::{self, Feedback, Observed, Reading, Sensor};
 use crate::pre_compensator::{self, Gains, ProportionalIntegral};
+use crate::robust::{self, Aim, Margin, Robust};
 use crate::time_optimal::{self, Approach, TimeOptimal};
 use crate::units::{DacCode, SampleTime, ScaledStiffness, Volts};
 use crate::validated::{Validate, Validated};
@@ -65,6 +66,8 @@ pub enum Compensation {
     ProportionalIntegral(Gains),
     /// The time-optimal pre-compensator, as fast as the amplifier allows ([`crate::time_optimal`]).
     TimeOptimal(Approach),
+    /// The robust pre-compensator, as fast as a spring allows that is known to within errors ([`crate::robust`]).
+    Robust(Margin),
 }
 
 impl Settings {
@@ -96,6 +99,11 @@ impl<P: Model> Settings<P> {
                 self.plant.check_inverse()?;
                 approach.check(sample_time)?;
             }
+            Compensation::Robust(margin) => {
+                self.plant.check_inverse()?;
+                margin.check(sample_time)?;
+                self.plant.check_differing(margin.factors(), sample_time)?;
+            }
         }
         self.feedback.check(sample_time)?;
         Ok(Validated::new(self, sample_time))
@@ -109,16 +117,21 @@ impl<P: Model> Validated<'_, Settings<P>> {
         let plant = self.part(&settings.plant);
         let estimator = P::quantize(plant);
         let step_gain = settings.plant.largest_step_gain(sample_time);
+        let step_v = settings.amplifier.slew_per_tick_v(sample_time);
+        let resolution_v = settings.amplifier.volts_per_code();
         let pre_compensator = match &settings.compensation {
             Compensation::None => PreCompensator::None,
             Compensation::ProportionalIntegral(gains) => {
                 PreCompensator::ProportionalIntegral(self.part(gains).quantize(&step_gain))
             }
             Compensation::TimeOptimal(approach) => {
-                let inverse = P::inverse(plant, &estimator, settings.amplifier.volts_per_code());
-                let step_v = settings.amplifier.slew_per_tick_v(sample_time);
+                let inverse = P::inverse(plant, &estimator, resolution_v);
                 let slew = step_v.map(|step_v| (settings.plant.smallest_step_gain(sample_time), step_v));
                 PreCompensator::TimeOptimal(self.part(approach).quantize(inverse, &step_gain, slew))
+            }
+            Compensation::Robust(margin) => {
+                let quick = P::differing(plant, margin.factors(), resolution_v);
+                PreCompensator::Robust(self.part(margin).quantize(quick, step_v))
             }
         };
         Config {
@@ -133,17 +146,18 @@ impl<P: Model> Validated<'_, Settings<P>> {
 /// The quantized pre-compensator. A tag of its own is read faster than one hidden in 64 bits of a variant.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum PreCompensator<I> {
+enum PreCompensator<E: Estimator> {
     None,
     ProportionalIntegral(ProportionalIntegral),
-    TimeOptimal(TimeOptimal<I>),
+    TimeOptimal(TimeOptimal<E::Inverse>),
+    Robust(Robust<E>),
 }
 
 /// A validated configuration, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config<E: Estimator = estimator::Config> {
     estimator: E,
-    pre_compensator: PreCompensator<E::Inverse>,
+    pre_compensator: PreCompensator<E>,
     amplifier: amplifier::Config,
     feedback: Option<feedback::Config>,
 }
@@ -154,6 +168,7 @@ pub struct State<S = estimator::State> {
     estimator: S,
     pre_compensator: pre_compensator::State,
     time_optimal: time_optimal::State,
+    robust: robust::State<S>,
     amplifier: amplifier::State,
     feedback: feedback::State,
 }
@@ -204,11 +219,11 @@ impl<E: Estimator> Config<E> {
     #[inline(always)]
     pub fn tick(&self, state: &mut State<E::State>, input: Input) -> Output {
         let (target, moved) = self.amplifier.clamp_target(input.target);
-        let pursued = match &self.feedback {
-            None => target,
+        let (pursued, observed) = match &self.feedback {
+            None => (target, None),
             Some(feedback) => {
-                let corrected = feedback.update(&mut state.feedback, target, input.measured);
-                self.amplifier.clamp_target(corrected).0
+                let (corrected, observed) = feedback.update(&mut state.feedback, target, input.measured);
+                (self.amplifier.clamp_target(corrected).0, Some((feedback, observed)))
             }
         };
         let wanted = match &self.pre_compensator {
@@ -217,11 +232,14 @@ impl<E: Estimator> Config<E> {
                 it.voltage(&state.pre_compensator, pursued, self.estimator.operating_point(&state.estimator))
             }
             PreCompensator::TimeOptimal(it) => self.time_optimal(it, state, pursued),
+            PreCompensator::Robust(it) => self.robust(it, state, target, pursued, observed),
         };
         let drive = self.amplifier.drive(&mut state.amplifier, wanted);
         let model = self.estimator.run(&mut state.estimator, drive.applied);
-        if let PreCompensator::ProportionalIntegral(it) = &self.pre_compensator {
-            it.track(&mut state.pre_compensator, drive.voltage);
+        match &self.pre_compensator {
+            PreCompensator::ProportionalIntegral(it) => it.track(&mut state.pre_compensator, drive.voltage),
+            PreCompensator::Robust(it) => it.run(&mut state.robust, drive.applied),
+            PreCompensator::None | PreCompensator::TimeOptimal(_) => (),
         }
         let (stiffness, sensor) = self.estimate(&mut state.feedback, model);
         let limits = drive.limits.with(Limits::TARGET, moved);
@@ -238,6 +256,9 @@ impl<E: Estimator> Config<E> {
             feedback.update(&mut state.feedback, zero, measured);
         }
         let model = self.estimator.run(&mut state.estimator, zero);
+        if let PreCompensator::Robust(it) = &self.pre_compensator {
+            it.run(&mut state.robust, zero);
+        }
         let (stiffness, sensor) = self.estimate(&mut state.feedback, model);
         Output { target: zero, voltage: zero, code, applied: zero, stiffness, limits: Limits::NONE, sensor }
     }
@@ -266,6 +287,26 @@ impl<E: Estimator> Config<E> {
         )
     }
 
+    /// Returns the voltage that the robust law asks for. Not inlined, for the same reason.
+    #[inline(never)]
+    fn robust(
+        &self,
+        it: &Robust<E>,
+        state: &mut State<E::State>,
+        target: Volts,
+        pursued: Volts,
+        observed: Option<(&feedback::Config, Observed)>,
+    ) -> Volts {
+        let aim = self.aim(state, target, pursued);
+        it.voltage(&mut state.robust, aim, observed)
+    }
+
+    fn aim(&self, state: &State<E::State>, target: Volts, pursued: Volts) -> Aim {
+        let applied = self.amplifier.applied(&state.amplifier);
+        let model = self.estimator.predict(&state.estimator, applied).now;
+        Aim { target, pursued, model, driven: state.amplifier.voltage(), applied }
+    }
+
     /// Makes this configuration take over a running `state` without moving the voltage: for the same `target`, the next
     /// voltage is the last one.
     ///
@@ -274,8 +315,8 @@ impl<E: Estimator> Config<E> {
     /// pre-compensator the next voltage is the target.
     pub fn bumpless_transfer(&self, state: &mut State<E::State>, target: Volts) {
         state.feedback.transfer_to(self.feedback.as_ref());
-        let (target, _) = self.amplifier.clamp_target(target);
-        let (target, _) = self.amplifier.clamp_target(state.feedback.corrected(target));
+        let (desired, _) = self.amplifier.clamp_target(target);
+        let (target, _) = self.amplifier.clamp_target(state.feedback.corrected(desired));
         match &self.pre_compensator {
             PreCompensator::None => (),
             PreCompensator::ProportionalIntegral(it) => {
@@ -285,6 +326,10 @@ impl<E: Estimator> Config<E> {
             PreCompensator::TimeOptimal(it) => {
                 let applied = self.amplifier.applied(&state.amplifier);
                 it.preset_offset(&mut state.time_optimal, target, &self.estimator, &state.estimator, applied);
+            }
+            PreCompensator::Robust(it) => {
+                let aim = self.aim(state, desired, target);
+                it.transfer(&mut state.robust, aim, &state.estimator, state.feedback.is_trusted());
             }
         }
     }

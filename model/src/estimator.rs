@@ -58,6 +58,15 @@ pub trait Model: Validate + Copy {
         Ok(())
     }
 
+    /// Checks this spring with its time constants and its share multiplied by `factors`, at a constant settled value.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the field that would be outside its allowed range.
+    fn check_differing(&self, factors: (f64, f64), sample_time: SampleTime) -> Result<(), OutOfRange>;
+
+    /// Quantizes this spring with its time constants and its share multiplied by `factors`, with its inverse.
+    fn differing(plant: Validated<'_, Self>, factors: (f64, f64), resolution_v: f64) -> Invertible<Self::Config>;
+
     /// Quantizes the inverse of this spring, which has become `config`; `resolution_v` is the voltage of one DAC code.
     /// The inverse of a spring that [`Model::check_inverse`] rejects saturates: it is safe to run, and of no use.
     fn inverse(
@@ -65,6 +74,28 @@ pub trait Model: Validate + Copy {
         config: &Self::Config,
         resolution_v: f64,
     ) -> <Self::Config as Estimator>::Inverse;
+}
+
+/// A quantized spring with what a pre-compensator needs to invert it.
+#[derive(Clone, Copy, Debug)]
+pub struct Invertible<E: Estimator> {
+    pub(crate) estimator: E,
+    pub(crate) inverse: E::Inverse,
+    pub(crate) largest: StepGain,
+    pub(crate) smallest: StepGain,
+}
+
+impl<E: Estimator> Invertible<E> {
+    /// Quantizes a spring with its inverse; `resolution_v` is the voltage of one DAC code.
+    pub(crate) fn new<P: Model<Config = E>>(plant: Validated<'_, P>, resolution_v: f64) -> Self {
+        let (settings, sample_time, estimator) = (plant.settings(), plant.sample_time(), P::quantize(plant));
+        Self {
+            estimator,
+            inverse: P::inverse(plant, &estimator, resolution_v),
+            largest: settings.largest_step_gain(sample_time),
+            smallest: settings.smallest_step_gain(sample_time),
+        }
+    }
 }
 
 impl<P: Model> Validated<'_, P> {
@@ -168,6 +199,11 @@ impl Plant {
     pub const fn proportional_integral(proportional: f64, integral_per_s: f64) -> Self {
         Self { share: proportional / (1.0 + proportional), time_constant_s: (1.0 + proportional) / integral_per_s }
     }
+
+    /// Returns the plant with its time constant and its share multiplied by these factors.
+    fn times(&self, (time_constant, share): (f64, f64)) -> Self {
+        Self { share: share * self.share, time_constant_s: time_constant * self.time_constant_s }
+    }
 }
 
 /// The plain spring for one sample time, quantized for the tick.
@@ -216,6 +252,14 @@ impl Model for Plant {
     fn largest_step_gain(&self, sample_time: SampleTime) -> StepGain {
         let relaxation = sample_time.lag_fraction(self.time_constant_s);
         StepGain { feedthrough: self.share, in_one_tick: (1.0 - self.share) * relaxation, relaxation }
+    }
+
+    fn check_differing(&self, factors: (f64, f64), sample_time: SampleTime) -> Result<(), OutOfRange> {
+        self.times(factors).check(sample_time)
+    }
+
+    fn differing(plant: Validated<'_, Self>, factors: (f64, f64), resolution_v: f64) -> Invertible<Config> {
+        Invertible::new(Validated::new(&plant.settings().times(factors), plant.sample_time()), resolution_v)
     }
 
     fn inverse(plant: Validated<'_, Self>, _: &Config, _: f64) -> WideGain {

@@ -32,6 +32,7 @@
 //! | [`extended`] | a spring with hysteresis, a static law, leakage and several relaxations |
 //! | [`pre_compensator`] | the proportional-integral pre-compensator |
 //! | [`time_optimal`] | the pre-compensator that is as fast as the amplifier allows |
+//! | [`robust`] | the pre-compensator that is as fast as a spring allows that is known to within errors |
 //! | [`feedback`] | correction of the estimate by a stiffness sensor, and detection of the sensor's faults |
 //! | [`isolation`] | which fault explains that sensor and model differ |
 //! | [`amplifier`] | slew, range, rounding to a DAC code |
@@ -72,6 +73,7 @@ pub mod extended;
 pub mod feedback;
 pub mod isolation;
 pub mod pre_compensator;
+pub mod robust;
 pub mod stiffness;
 pub mod supervisor;
 pub mod time_optimal;
@@ -85,6 +87,7 @@ pub use estimator::Plant;
 pub use extended::ExtendedPlant;
 pub use feedback::{Feedback, Reading, SENSOR_NAMES, Sensor};
 pub use pre_compensator::Gains;
+pub use robust::Margin;
 pub use stiffness::Spring;
 pub use time_optimal::Approach;
 pub use units::{DacCode, SampleTime, ScaledStiffness, Volts};

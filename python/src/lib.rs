@@ -31,4 +31,8 @@ mod _vsj {
     use crate::error::{BadInput, LinkError};
     #[pymodule_export]
     use crate::link::Port;
+
+    /// The style sheet of the command's report pages.
+    #[pymodule_export]
+    const PAGE_STYLE: &str = include_str!("../../host-sim/src/output/page/page.css");
 }

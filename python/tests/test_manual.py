@@ -21,6 +21,7 @@ def test_the_examples_of_the_manual_run(monkeypatch, capsys):
 def test_stubs_have_the_names_of_the_compiled_part():
     stub = ast.parse((ROOT / "python/vsj/_vsj.pyi").read_text())
     declared = {node.name for node in stub.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    declared |= {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
     assert declared == {name for name in vars(_vsj) if not name.startswith("__")}
 
 

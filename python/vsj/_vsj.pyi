@@ -10,6 +10,8 @@ _Columns = List[Tuple[str, Union[_Floats, List[str]]]]
 _Records = List[Tuple[str, Optional[_Columns]]]
 _Plant = Union[str, Tuple[str, str]]
 
+PAGE_STYLE: str
+
 class BadInput(ValueError):
     """Invalid input, as one line that names what was given and what was expected."""
 

@@ -1,6 +1,7 @@
 """An estimator with the interface of scikit-learn's, which it does not need."""
 
 import inspect
+import sys
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,8 +31,6 @@ class Spring:
     ----------
     fitted_ : Identified or Diagnosis
         The linear spring, or with ``extend`` the diagnosis, after :meth:`fit`.
-    plant : str
-        Text of the plant file of the fitted spring.
     """
 
     _estimator_type = "regressor"
@@ -43,20 +42,21 @@ class Spring:
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> "Spring":
         """Fit the spring to readings; returns ``self``."""
+        if y is None:
+            raise _vsj.BadInput("Spring requires y to be passed, but the target y is None; expected an array of shape (n,)")
         time, voltage = _columns(X)
         record = (time, voltage, vector(y))
         if self.extend is None:
             self.fitted_ = identify(record, input=self.input)
         else:
             self.fitted_ = diagnose(record, plant=self.extend, effort=self.effort, input=self.input)
-        self.plant = self.fitted_.plant
         self.n_features_in_ = 2
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the readings, an array of shape ``(n,)`` in the unit of those that were fitted."""
-        if not hasattr(self, "plant"):
-            raise AttributeError("this Spring is not fitted; call fit first")
+        if not self.__sklearn_is_fitted__():
+            raise _not_fitted()("this Spring is not fitted; call fit first")
         time, voltage = _columns(X)
         return _vsj.predict(("Spring", self.plant), time, voltage, self.input)
 
@@ -80,12 +80,36 @@ class Spring:
             setattr(self, name, value)
         return self
 
+    @property
+    def plant(self) -> str:
+        """Text of the plant file of the fitted spring."""
+        return self.fitted_.plant
+
+    def __sklearn_is_fitted__(self):
+        return hasattr(self, "fitted_")
+
+    def __sklearn_tags__(self):
+        # scikit-learn asks for it, so it is there.
+        from sklearn.utils import InputTags, RegressorTags, Tags, TargetTags
+
+        return Tags("regressor", TargetTags(required=True), regressor_tags=RegressorTags(), input_tags=InputTags())
+
     def __repr__(self):
         return f"Spring({', '.join(f'{name}={value!r}' for name, value in self.get_params().items())})"
 
 
+def _not_fitted():
+    """The exception of scikit-learn where that is loaded; it is an AttributeError too."""
+    return getattr(sys.modules.get("sklearn.exceptions"), "NotFittedError", AttributeError)
+
+
 def _columns(X):
-    array = np.asarray(X, dtype=np.float64)
+    if hasattr(X, "toarray"):
+        raise _vsj.BadInput("X: sparse data is not supported; expected a dense array, such as X.toarray()")
+    array = np.asarray(X)
+    if np.iscomplexobj(array):
+        raise _vsj.BadInput("X: Complex data not supported; expected real numbers")
+    array = array.astype(np.float64)
     if array.ndim != 2 or array.shape[1] != 2:
         raise _vsj.BadInput(f"X: shape {array.shape}; expected (n, 2) with time in s and voltage in V")
     return np.ascontiguousarray(array[:, 0]), np.ascontiguousarray(array[:, 1])

@@ -1,7 +1,7 @@
 //! All controllers on the same steps, compared with the lower bound for any controller.
 
 use anyhow::Result;
-use model::{Amplifier, Approach, Compensation, ExtendedPlant, Feedback, Gains, Settings};
+use model::{Amplifier, Approach, Compensation, ExtendedPlant, Feedback, Gains, Margin, Settings};
 use serde::Serialize;
 
 use crate::bad_input::BadInput;
@@ -53,17 +53,21 @@ pub struct Step {
     pub paper: Response,
     /// With the time-optimal controller.
     pub fast: Response,
+    /// With the robust controller, if it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robust: Option<Response>,
 }
 
 impl Step {
     /// The responses with the names of their controllers.
-    pub fn each(&self) -> [(&'static str, &Response); 3] {
-        [("none", &self.none), ("paper", &self.paper), ("fast", &self.fast)]
+    pub fn each(&self) -> impl Iterator<Item = (&'static str, &Response)> {
+        let always = [("none", &self.none), ("paper", &self.paper), ("fast", &self.fast)];
+        always.into_iter().chain(self.robust.as_ref().map(|robust| ("robust", robust)))
     }
 }
 
 /// Runs the stair of ideal steps behind each of the amplifiers, on the controllers' model of the spring or on an actual spring. There
-/// each step is measured from the stiffness at its start.
+/// each step is measured from the stiffness at its start. With a margin, the robust controller is among them.
 ///
 /// # Errors
 /// [`BadInput`] for settings that the controller rejects, and for a spring that cannot be.
@@ -72,6 +76,7 @@ pub fn compare(
     rate_hz: f64,
     amplifiers: &[Amplifier],
     actual: Option<&Actual>,
+    margin: Option<Margin>,
 ) -> Result<Comparison> {
     let differing = actual.map(|actual| DifferingSpring::new(file, &actual.spring_error));
     differing.iter().try_for_each(DifferingSpring::check)?;
@@ -89,8 +94,8 @@ pub fn compare(
         // As in `vsj stair`: where the range ends below the limit, only the sampled reference accepts targets at its
         // end.
         let steps = match settings.plant.plain().filter(|_| settings.amplifier.max_v == amplifier.max_v) {
-            Some(plant) => steps(with_plant(&settings, plant), on)?,
-            None => steps(settings, on)?,
+            Some(plant) => steps(with_plant(&settings, plant), on, margin)?,
+            None => steps(settings, on, margin)?,
         };
         Ok(AtLimit { limit_v: settings.amplifier.max_v, steps })
     });
@@ -102,7 +107,7 @@ pub fn compare(
 /// A spring that differs from the model, and the noise of its sensor in V, if it has one.
 type On<'a> = (&'a DifferingSpring, Option<f64>);
 
-fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>) -> Result<Vec<Step>> {
+fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>, margin: Option<Margin>) -> Result<Vec<Step>> {
     let of = |compensation| {
         let settings = Settings { compensation, ..settings };
         let experiment =
@@ -123,8 +128,13 @@ fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>) -> Result<Vec<S
     };
     let (paper, none) = of(Compensation::ProportionalIntegral(Gains::PAPER))?;
     let (fast, _) = of(Compensation::TimeOptimal(Approach::DEAD_BEAT))?;
+    let mut robust = match margin {
+        Some(margin) => of(Compensation::Robust(margin))?.0,
+        None => Vec::new(),
+    }
+    .into_iter();
     let together = none.into_iter().zip(paper).zip(fast);
-    Ok(together.map(|((none, paper), fast)| Step { none, paper, fast }).collect())
+    Ok(together.map(|((none, paper), fast)| Step { none, paper, fast, robust: robust.next() }).collect())
 }
 
 /// Responses of the controller of an experiment on a spring that differs from its model.

@@ -4,14 +4,14 @@
 //! time-optimal pre-compensator, which is defined in ticks, have the loop at the controller's rate, [`crate::sampled`].
 
 use model::estimator::Model;
-use model::{Compensation, ExtendedPlant, Plant, Settings};
+use model::{Compensation, ExtendedPlant, Margin, Plant, Settings};
 
 use serde::Serialize;
 
 use crate::bound::{shortest_time, shortest_times_from_state};
 use crate::reference::{Loop, Moment};
 use crate::run::{Run, Sample};
-use crate::sampled::{Controller, SampledLoop, Spring};
+use crate::sampled::{Controller, Robust, SampledLoop, Spring};
 use crate::schedule::{Change, Schedule};
 
 /// Initial state of the spring for the lower bound on a step's time.
@@ -55,7 +55,7 @@ impl HasReference for Plant {
 
     fn reference_at_ticks(settings: &Settings, schedule: &Schedule, targets: &[f64]) -> Vec<f64> {
         match settings.compensation {
-            Compensation::TimeOptimal(_) => sampled_at_ticks(settings, targets),
+            Compensation::TimeOptimal(_) | Compensation::Robust(_) => sampled_at_ticks(settings, targets),
             _ => exact_at_ticks(continuous(settings), schedule, settings.rate_hz, targets),
         }
     }
@@ -68,7 +68,7 @@ impl HasReference for Plant {
         times_s: &[f64],
     ) -> Vec<f64> {
         match settings.compensation {
-            Compensation::TimeOptimal(_) => at_last_ticks(run, samples, times_s),
+            Compensation::TimeOptimal(_) | Compensation::Robust(_) => at_last_ticks(run, samples, times_s),
             _ => reference_at(continuous(settings), schedule, times_s.iter().copied()),
         }
     }
@@ -155,16 +155,22 @@ fn slew<P>(settings: &Settings<P>) -> f64 {
 
 impl<P: Copy + Into<Spring>> From<&Settings<P>> for SampledLoop {
     fn from(settings: &Settings<P>) -> Self {
+        let spring: Spring = settings.plant.into();
         Self {
             sample_s: 1.0 / settings.rate_hz,
-            spring: settings.plant.into(),
             controller: match settings.compensation {
                 Compensation::None => Controller::None,
                 Compensation::ProportionalIntegral(gains) => {
                     Controller::ProportionalIntegral(gains.proportional, gains.integral_per_s)
                 }
                 Compensation::TimeOptimal(approach) => Controller::TimeOptimal(approach.time_constant_s),
+                Compensation::Robust(Margin { time_constant, share, gain, overshoot }) => Controller::Robust(Robust {
+                    quick: spring.clone().times(1.0 - time_constant, 1.0 + share),
+                    gain,
+                    overshoot,
+                }),
             },
+            spring,
             range_v: (settings.amplifier.min_v, settings.amplifier.max_v),
             slew_v_per_s: slew(settings),
         }

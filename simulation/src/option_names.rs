@@ -25,6 +25,8 @@ pub const SETTINGS: &[(&str, &str)] = &[
     ("proportional_gain", "--kp"),
     ("integral_gain_per_s", "--ki"),
     ("approach_s", "--approach-s"),
+    ("margin.overshoot", "--overshoot-percent"),
+    ("margin.", "--known"),
     ("share", "--plant"),
     ("time_constant_s", "--plant"),
     ("relaxation.", "--plant"),

@@ -7,6 +7,7 @@
 //!   linearised around the last voltage with the steepest slope that it has anywhere.
 //! - Time-optimal: the voltage that brings the spring to its target at the end of the tick, found by simulating copies of
 //!   the spring over that tick.
+//! - Robust: the same for the quickest spring that is possible, towards a target that is moved by a part of its lead over the spring.
 
 pub mod spring;
 
@@ -28,7 +29,7 @@ pub struct SampledLoop {
 }
 
 /// A controller and its parameters.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Controller {
     /// The target is the voltage.
     None,
@@ -36,6 +37,19 @@ pub enum Controller {
     ProportionalIntegral(f64, f64),
     /// Time-optimal, with the time constant of its approach in s.
     TimeOptimal(f64),
+    /// Robust, without a sensor.
+    Robust(Robust),
+}
+
+/// The robust controller's parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robust {
+    /// The quickest spring that is possible, but for its gain.
+    pub quick: Spring,
+    /// Largest relative error of the gain.
+    pub gain: f64,
+    /// Overshoot that is allowed, as a part of the step.
+    pub overshoot: f64,
 }
 
 /// State of spring, controller and amplifier, in V.
@@ -44,21 +58,35 @@ pub struct State {
     spring: spring::State,
     integral: f64,
     voltage: f64,
+    /// The robust controller's spring, its last target, and the step to it.
+    quick: spring::State,
+    target: f64,
+    step: f64,
 }
 
 impl SampledLoop {
     /// The state at rest at 0 V.
     pub fn at_rest(&self) -> State {
-        State { spring: self.spring.at_rest(), integral: 0.0, voltage: 0.0 }
+        let quick = match &self.controller {
+            Controller::Robust(robust) => robust.quick.at_rest(),
+            _ => self.spring.at_rest(),
+        };
+        State { spring: self.spring.at_rest(), integral: 0.0, voltage: 0.0, quick, target: 0.0, step: 0.0 }
     }
 
     /// First half of a tick: returns the limited voltage before rounding, in V, for a target in V.
     pub fn drive(&self, state: &mut State, target: f64) -> f64 {
         let (lowest, highest) = self.range_v;
         let target = target.clamp(lowest, highest);
-        let wanted = match self.controller {
+        let wanted = match &self.controller {
             Controller::None => target,
-            Controller::TimeOptimal(approach_s) => self.voltage_to_reach(&state.spring, target, approach_s),
+            Controller::TimeOptimal(approach_s) => {
+                self.voltage_to_reach((&self.spring, &state.spring), target, *approach_s)
+            }
+            Controller::Robust(robust) => {
+                let moved = target + self.excess(robust, state, target);
+                self.voltage_to_reach((&robust.quick, &state.quick), moved, 0.0)
+            }
             Controller::ProportionalIntegral(proportional, _) => {
                 // u = Kp (target - y) + z with y = y0 + s (u - u0)
                 let (before, steepest) = (state.spring.voltage(), self.spring.steepest_slope());
@@ -69,7 +97,7 @@ impl SampledLoop {
         let step = self.slew_v_per_s * self.sample_s;
         let slewed = wanted.clamp(state.voltage - step, state.voltage + step);
         state.voltage = slewed.clamp(lowest, highest);
-        if let Controller::ProportionalIntegral(proportional, integral_per_s) = self.controller {
+        if let Controller::ProportionalIntegral(proportional, integral_per_s) = &self.controller {
             let error = (wanted - state.integral) / proportional;
             let tracking_per_s = integral_per_s / proportional;
             state.integral += self.sample_s * (integral_per_s * error + tracking_per_s * (state.voltage - wanted));
@@ -77,18 +105,31 @@ impl SampledLoop {
         state.voltage
     }
 
+    /// How far above the target the quick spring is held: as far as the band of -3 % to the overshoot around it is used on both sides.
+    fn excess(&self, robust: &Robust, state: &mut State, target: f64) -> f64 {
+        let Robust { quick, gain, overshoot } = robust;
+        let stiffness = self.spring.stiffness(&state.spring);
+        if target != state.target {
+            (state.target, state.step) = (target, target - stiffness);
+        }
+        let most = f64::max(0.0, (1.0 + overshoot) / (1.0 + gain) - 1.0) * state.step;
+        let lead = quick.stiffness(&state.quick) - stiffness;
+        (2.0 * overshoot / (overshoot + 0.03) * lead).clamp(most.min(0.0), most.max(0.0))
+    }
+
     /// The voltage within the range that covers the approach's part of the distance to the target in the coming tick,
     /// found by regula falsi (Illinois), since the stiffness increases with the voltage.
-    fn voltage_to_reach(&self, spring: &spring::State, target: f64, approach_s: f64) -> f64 {
-        let now = self.spring.stiffness(spring);
+    fn voltage_to_reach(&self, (spring, state): (&Spring, &spring::State), target: f64, approach_s: f64) -> f64 {
+        let now = spring.stiffness(state);
         let part = if approach_s > 0.0 { -(-self.sample_s / approach_s).exp_m1() } else { 1.0 };
         let ahead = |volts: f64| {
-            let mut tried = spring.clone();
-            self.spring.apply(&mut tried, volts);
-            self.spring.hold(&mut tried, self.sample_s);
-            self.spring.stiffness(&tried)
+            let mut tried = state.clone();
+            spring.apply(&mut tried, volts);
+            spring.hold(&mut tried, self.sample_s);
+            spring.stiffness(&tried)
         };
-        let aim = self.limited_by_slew(now, ahead(spring.voltage()), target, now + part * (target - now));
+        let reversal = spring.reversal(self.sample_s);
+        let aim = self.limited_by_slew(reversal, now, ahead(state.voltage()), target, now + part * (target - now));
         let missed = |volts: f64| ahead(volts) - aim;
         let (mut low, mut high) = self.range_v;
         let (mut at_low, mut at_high) = (missed(low), missed(high));
@@ -122,10 +163,10 @@ impl SampledLoop {
     /// Limits the `aim` for the end of the tick so that the slew limit leaves time to stop at the target; the stiffness
     /// is `now`, and `then` at the end of the tick under constant voltage. While the voltage turns back at the slew
     /// limit, every tick reduces the drift by the same amount and by the part that relaxes.
-    fn limited_by_slew(&self, now: f64, then: f64, target: f64, aim: f64) -> f64 {
+    fn limited_by_slew(&self, reversal: spring::Reversal, now: f64, then: f64, target: f64, aim: f64) -> f64 {
         let step = self.slew_v_per_s * self.sample_s;
         let (sign, drift) = ((then - now).signum(), (then - now).abs());
-        let spring::Reversal { within_a_tick, in_each_later, relaxed } = self.spring.reversal(self.sample_s);
+        let spring::Reversal { within_a_tick, in_each_later, relaxed } = reversal;
         let beyond = drift - within_a_tick * step;
         if beyond <= 0.0 || step.is_infinite() {
             return aim;
@@ -142,6 +183,10 @@ impl SampledLoop {
         self.spring.apply(&mut state.spring, applied);
         let stiffness = self.spring.stiffness(&state.spring);
         self.spring.hold(&mut state.spring, self.sample_s);
+        if let Controller::Robust(robust) = &self.controller {
+            robust.quick.apply(&mut state.quick, applied);
+            robust.quick.hold(&mut state.quick, self.sample_s);
+        }
         stiffness
     }
 }

@@ -63,6 +63,8 @@ pub enum Name {
     Paper,
     /// The time-optimal one.
     Fast,
+    /// For a spring that is known to within errors.
+    Robust,
 }
 
 /// A table of a settings file: optional keys with a documentation for each.
@@ -177,6 +179,7 @@ impl From<&WireSettings> for SettingsFile {
                 Controller::None => Name::None,
                 Controller::Paper => Name::Paper,
                 Controller::Fast => Name::Fast,
+                Controller::Robust => Name::Robust,
             }),
             gains: Gains { proportional: Some(wire.proportional), integral_per_s: Some(wire.integral_per_s) },
             approach: Approach { tau_s: Some(wire.approach_s) },
@@ -235,6 +238,7 @@ impl SettingsFile {
                 Some(Name::None) => Controller::None,
                 Some(Name::Paper) => Controller::Paper,
                 Some(Name::Fast) => Controller::Fast,
+                Some(Name::Robust) => Controller::Robust,
             },
             proportional: gains.proportional.unwrap_or(built_in.proportional),
             integral_per_s: gains.integral_per_s.unwrap_or(built_in.integral_per_s),

@@ -5,7 +5,7 @@ use firmware::control::{Stopwatch, whole_tick};
 use model::estimator::{Estimator, Model};
 use model::extended::{Law, Leakage, Memory, Relaxation};
 use model::units::Signal;
-use model::{Approach, Compensation, ExtendedPlant, Gains, Input, OutOfRange, Plant, Settings, State, Volts};
+use model::{Approach, Compensation, ExtendedPlant, Gains, Input, Margin, OutOfRange, Plant, Settings, State, Volts};
 
 use crate::digest::Digest;
 
@@ -13,10 +13,11 @@ use crate::digest::Digest;
 pub const TICKS: u32 = 10_000;
 
 /// The controllers with their names.
-pub const CONTROLLERS: [(&str, Compensation); 3] = [
+pub const CONTROLLERS: [(&str, Compensation); 4] = [
     ("none", Compensation::None),
     ("paper", Compensation::ProportionalIntegral(Gains::PAPER)),
     ("fast", Compensation::TimeOptimal(Approach { time_constant_s: 0.0 })),
+    ("robust", Compensation::Robust(Margin { time_constant: 0.05, share: 0.05, gain: 0.01, overshoot: 0.02 })),
 ];
 
 /// The springs with their names. The first is the plain spring, which has a tick of its own. The others use the extended tick,

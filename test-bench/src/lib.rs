@@ -5,7 +5,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | `blocks` | Runs of the tick with each kind of spring and each controller, for counting instructions (feature `fast`). |
+//! | `blocks` | Runs of the tick with each kind of spring and each controller, for counting instructions (feature `robust`). |
 //! | [`digest`] | Checksum of a whole run. |
 //! | [`isolation`] | A run of the isolation bank beside the controller, for counting instructions. |
 //! | [`script`] | Commands and injected faults of every run. |
@@ -20,7 +20,7 @@
 #[cfg(test)]
 extern crate std;
 
-#[cfg(feature = "fast")]
+#[cfg(feature = "robust")]
 pub mod blocks;
 pub mod digest;
 pub mod isolation;

@@ -150,3 +150,25 @@ fn an_oracle_scores_100_percent_and_a_wrong_diagnosis_0() {
     let found = sensitivity::measure(Cause::Drift, 0.2, 1, 4, &oracle, &ProgressBar::hidden());
     assert_eq!((found.ratio, found.records), (Some(1.0), 4));
 }
+
+#[test]
+fn exported_records_are_files_with_their_true_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let export = |parts: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_campaign"));
+        command.args(parts).args(["--records", "1", "--export"]).arg(folder.path()).output().unwrap()
+    };
+    assert!(!export(&["singles", "plan"]).status.success());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written if a part cannot be");
+    assert!(export(&["singles", "nulls"]).status.success());
+    for job in part::singles(1, 1).iter().chain(&part::nulls(1, 1)) {
+        let file = |ending| folder.path().join(&job.group).join(format!("seed-{}.{ending}", job.seed));
+        let record = simulation::record::Record::parse(
+            "record",
+            &std::fs::read_to_string(file("csv")).unwrap(),
+            simulation::record::MEASURED,
+        );
+        assert_eq!(record.unwrap().rows, job.recipe.draw(job.seed).record().rows);
+        assert!(file("json").exists());
+    }
+}

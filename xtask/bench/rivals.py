@@ -1,7 +1,7 @@
 """Times the report's closed loop in Python, for `cargo xtask bench`.
 
 Prints one JSON object, ns per sample of each implementation. Ends with an error if the stiffness of two of them
-differs by more than TOLERANCE_V.
+differs by more than TOLERANCE_V, or that of a loop with limits and DAC codes by more than TICK_TOLERANCE_V.
 
 Spring       w' = (u - w) / 5.5             y = u/11 + 10 w/11
 Controller   z' = 1.35 (r - y)              u = 4 (r - y) + z
@@ -16,11 +16,16 @@ import time
 
 import numba
 import numpy as np
+import vsj
 from scipy import signal
 
 RATE_HZ = 1000
+LIMIT_V = 700.0
+DAC_STEPS = 4095
 SAMPLES = 70_001
 TOLERANCE_V = 1e-6
+# Of loops that write DAC codes: steps of 0.17 V, and a voltage that is held between the samples.
+TICK_TOLERANCE_V = 1.0
 
 SHARE = 1 / 11
 TAU_S = 5.5
@@ -77,6 +82,33 @@ def loop(r, phi, now, later, cy, dy, y_out, u_out):
         w, z = a * w + b * z + (now_w * r[k] + later_w * ahead), c * w + d * z + (now_z * r[k] + later_z * ahead)
 
 
+def numpy_loop(r, phi, now, later, c, d, y_out):
+    """The same loop in Python, with the states in NumPy arrays."""
+    x = np.zeros(2)
+    for k in range(len(r)):
+        y_out[k] = c @ x + d * r[k]
+        x = phi @ x + now * r[k] + later * r[min(k + 1, len(r) - 1)]
+
+
+@numba.njit
+def tick(r, kept, y_out, code_out):
+    """The loop with what the tick has besides: the amplifier's limits, DAC codes that the spring sees, no windup."""
+    w = 0.0
+    z = 0.0
+    y = 0.0
+    for k in range(len(r)):
+        # The equation in the head of this file with the stiffness that follows from the voltage of the same instant.
+        wanted = (KP * (r[k] - (1 - SHARE) * w) + z) / (1 + KP * SHARE)
+        code = round(min(max(wanted, 0.0), LIMIT_V) / LIMIT_V * DAC_STEPS)
+        applied = code * (LIMIT_V / DAC_STEPS)
+        y = SHARE * applied + (1 - SHARE) * w
+        w = applied + kept * (w - applied)
+        if 0.0 <= wanted <= LIMIT_V:
+            z += KI_PER_S * (r[k] - y) / RATE_HZ
+        y_out[k] = y
+        code_out[k] = code
+
+
 def median_ns(call, repeats):
     """Median time of a call in ns per sample."""
     times = []
@@ -101,25 +133,38 @@ def main():
     phi, now, later = between_samples(a, b)
     cy, dy = c[0].copy(), d[0, 0]
     y, u = np.empty(SAMPLES), np.empty(SAMPLES)
+    stepped, held, codes = np.empty(SAMPLES), np.empty(SAMPLES), np.empty(SAMPLES, np.uint16)
+    kept = np.exp(-1 / (TAU_S * RATE_HZ))
+    controller = vsj.Controller("paper", "paper", limit_v=LIMIT_V, rate_hz=RATE_HZ, kp=KP, ki=KI_PER_S)
 
     rivals = {  # name: (call, repeats in one group)
         "lsim": (lambda: signal.lsim(stiffness, r, t), 3),
         "lfilter": (lambda: signal.lfilter(numerator, denominator, r), 101),
         "numba": (lambda: loop(r, phi, now, later, cy, dy, y, u), 101),
+        "numpy": (lambda: numpy_loop(r, phi, now, later, cy, dy, stepped), 1),
+        "numba_tick": (lambda: tick(r, kept, held, codes), 101),
+        "controller": (lambda: controller.run(r), 101),
     }
 
     # The first calls compile and are compared, but not timed.
-    rivals["numba"][0]()
+    for name in ("numba", "numpy", "numba_tick"):
+        rivals[name][0]()
     both = signal.lsim(signal.StateSpace(a, b, c, d), r, t)[1]
     apart = {
         "lfilter": np.abs(rivals["lfilter"][0]() - both[:, 0]).max(),
         "numba": np.abs(y - both[:, 0]).max(),
         "numba's voltage": np.abs(u - both[:, 1]).max(),
+        "numpy": np.abs(stepped - both[:, 0]).max(),
     }
-    for name, volts in apart.items():
-        print(f"{name} is within {volts:.1e} V of lsim", file=sys.stderr)
-        if not volts <= TOLERANCE_V:
-            sys.exit(f"rivals.py: {name} does not compute the same loop: {volts} V from lsim, allowed {TOLERANCE_V}")
+    apart_ticks = {
+        "numba with limits and DAC": np.abs(held - both[:, 0]).max(),
+        "vsj.Controller": np.abs(controller.run(r).stiffness_v - both[:, 0]).max(),
+    }
+    for each, tolerance_v in ((apart, TOLERANCE_V), (apart_ticks, TICK_TOLERANCE_V)):
+        for name, volts in each.items():
+            print(f"{name} is within {volts:.1e} V of lsim", file=sys.stderr)
+            if not volts <= tolerance_v:
+                sys.exit(f"rivals.py: {name} does not compute the same loop: {volts} V from lsim, allowed {tolerance_v}")
 
     # In turns, and the best group of each: disturbances of the machine must not count against one of them.
     groups = {name: [] for name in rivals}

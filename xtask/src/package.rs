@@ -17,12 +17,17 @@ pub(crate) fn run() -> Result<()> {
     let target = shell::target_directory()?;
     let python = python::environment(&target, "python", REQUIREMENTS)?;
     shell::run(shell::cargo().args(["build", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
-    // In the same folder, so that what both depend on is built once.
-    let install = ["-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps", "--force-reinstall", FOLDER];
-    let path = with_first(python.parent().context("an interpreter is in a folder")?)?;
-    shell::run(shell::command(&python).args(install).env("CARGO_TARGET_DIR", &target).env("PATH", path))?;
+    install(&python, &target)?;
     let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
     shell::run(shell::command(&python).args(tests).env("VSJ", target.join("release/vsj")))
+}
+
+/// Installs the package in the virtual environment of an interpreter, which has maturin.
+pub(crate) fn install(python: &Path, target: &Path) -> Result<()> {
+    // In the same folder, so that what the package and the command depend on is built once.
+    let install = ["-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps", "--force-reinstall", FOLDER];
+    let path = with_first(python.parent().context("an interpreter is in a folder")?)?;
+    shell::run(shell::command(python).args(install).env("CARGO_TARGET_DIR", target).env("PATH", path))
 }
 
 /// The search path with a folder in front.

@@ -23,7 +23,8 @@ pub fn environment(target: &Path, command: &str, requirements: &str) -> Result<P
     eprintln!("{command}: installing {requirements} into {}", venv.display());
     shell::run(shell::command("python3").args(["-m", "venv", "--clear"]).arg(&venv))
         .context("python3 with its module venv is needed (Debian, Ubuntu: apt-get install python3-venv)")?;
-    shell::run(shell::command(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&path))?;
+    // Most modules are never imported: each is compiled when it is.
+    shell::run(shell::command(&python).args(["-m", "pip", "install", "--quiet", "--no-compile", "-r"]).arg(&path))?;
     // Written last: its presence shows that the installation succeeded.
     fs::write(&installed, wanted).with_context(|| format!("cannot write {}", installed.display()))?;
     Ok(python)

@@ -113,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     }
     let (option, mut spring_error) = match &arguments.identified {
         Some(path) => ("--identified", of_identification(path)?),
-        None => ("--spring-error", together(&arguments.spring_error)?),
+        None => ("--spring-error", together("--spring-error", &arguments.spring_error)?),
     };
     for parameter in Parameter::ALL {
         let error = *spring_error.of(parameter);

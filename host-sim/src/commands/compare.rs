@@ -10,7 +10,7 @@ use simulation::comparison::{Actual, compare};
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file;
 
-use super::spring_error::{ErrorOf, together};
+use super::spring_error::{ErrorOf, Known, together};
 
 /// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller
 #[derive(Args, Debug)]
@@ -20,7 +20,8 @@ Examples:
   vsj compare --limit-v 850 --slew-v-per-s 500
   vsj compare --plant spring.toml --json  on another spring
   vsj compare --spring-error tau=10       time constant 10 % above the model's
-  vsj compare --spring-error gain=-5 --sensor-noise 0.2  with a stiffness sensor")]
+  vsj compare --spring-error gain=-5 --sensor-noise 0.2  with a stiffness sensor
+  vsj compare --spring-error tau=3 --known tau=5 --known share=5  and a controller that allows for it")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
@@ -40,6 +41,8 @@ pub(crate) struct Arguments {
     /// A stiffness sensor is read in each tick, with white noise of this standard deviation in percent of 500 V, 0.001 to 10
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     sensor_noise: Option<f64>,
+    #[command(flatten)]
+    known: Known,
     /// One JSON object on stdout
     #[arg(long)]
     json: bool,
@@ -55,7 +58,7 @@ const NOISE_PERCENT: (f64, f64) = (0.001, 10.0);
 impl Arguments {
     /// The spring and its sensor, where they differ from the model.
     fn actual(&self) -> Result<Option<Actual>> {
-        let spring_error = together(&self.spring_error)?;
+        let spring_error = together("--spring-error", &self.spring_error)?;
         let sensor_noise_v = self.sensor_noise.map(|percent| percent / 100.0 * FULL_SCALE_V);
         if let Some(percent) = self.sensor_noise.filter(|of| !(NOISE_PERCENT.0..=NOISE_PERCENT.1).contains(of)) {
             bad_input!("--sensor-noise {percent}: expected {} to {}", NOISE_PERCENT.0, NOISE_PERCENT.1);
@@ -74,7 +77,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
     let actual = arguments.actual()?;
-    let comparison =
-        compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref()).map_err(|error| named(error, SETTINGS))?;
+    let margin = arguments.known.margin()?;
+    let comparison = compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref(), margin)
+        .map_err(|error| named(error, SETTINGS))?;
     print(&if arguments.json { json(&comparison)? } else { text(&comparison) })
 }

@@ -3,6 +3,8 @@
 use std::str::FromStr;
 
 use anyhow::Result;
+use clap::Args;
+use model::Margin;
 use simulation::bad_input;
 use simulation::bad_input::{BadInput, excerpt};
 use simulation::spring_error::{Parameter, SpringError};
@@ -40,13 +42,33 @@ impl FromStr for ErrorOf {
 ///
 /// # Errors
 /// [`BadInput`] for a parameter that is there twice.
-pub(super) fn together(errors: &[ErrorOf]) -> Result<SpringError> {
+pub(super) fn together(option: &str, errors: &[ErrorOf]) -> Result<SpringError> {
     let mut together = SpringError::default();
     for (index, ErrorOf { parameter, error }) in errors.iter().enumerate() {
         if errors[..index].iter().any(|earlier| earlier.parameter == *parameter) {
-            bad_input!("--spring-error: {} twice; expected each parameter once", parameter.name());
+            bad_input!("{option}: {} twice; expected each parameter once", parameter.name());
         }
         *together.of(*parameter) = *error;
     }
     Ok(together)
+}
+
+/// How well the robust controller knows the spring.
+#[derive(Args, Debug)]
+pub(super) struct Known {
+    /// The robust controller knows `tau`, `gain` or `share` to within this, both ways, 0 to 25 %; repeatable
+    #[arg(long, value_name = "KEY=PERCENT", allow_hyphen_values = true)]
+    known: Vec<ErrorOf>,
+    /// Overshoot that the robust controller may cause, in percent of the step, 0 to 20
+    #[arg(long, default_value_t = 2.0, value_name = "PERCENT", allow_negative_numbers = true)]
+    overshoot_percent: f64,
+}
+
+impl Known {
+    /// The robust controller's margin; `None` without `--known`.
+    pub(super) fn margin(&self) -> Result<Option<Margin>> {
+        let SpringError { share, time_constant, gain } = together("--known", &self.known)?;
+        let overshoot = self.overshoot_percent / 100.0;
+        Ok((!self.known.is_empty()).then_some(Margin { time_constant, share, gain, overshoot }))
+    }
 }

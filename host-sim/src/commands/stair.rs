@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::choice::{BETWEEN, one_of};
+use super::spring_error::Known;
 use anyhow::Result;
 use clap::{Args, Parser, ValueEnum};
 use host_sim::output::file::write_whole;
@@ -31,6 +32,7 @@ Examples:
   vsj stair --controller none --input step  no controller, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7  another amplifier, other gains
   vsj stair --controller fast --input step  as fast as the amplifier allows
+  vsj stair --controller robust --known tau=5 --known share=5  no overshoot beyond 2 % on any of these springs
   vsj stair --plant spring.toml             another spring: hysteresis, creep
   vsj stair --input schedule.csv --json     columns time_s,voltage_v")]
 pub(crate) struct Arguments {
@@ -72,6 +74,8 @@ pub(crate) struct Arguments {
     /// Time constant of the fast controller's approach to the target, in s, 0 to 1; default: 0
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     approach_s: Option<f64>,
+    #[command(flatten)]
+    known: Known,
     /// Ticks per second, 100 to 10 000
     #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
@@ -94,6 +98,8 @@ enum Controller {
     Paper,
     /// Time-optimal: the end of the range until the target can be held, then the holding voltage
     Fast,
+    /// As fast as every spring allows that is possible within the errors of --known
+    Robust,
 }
 
 /// Makes the arguments without a command line equal to the defaults of the options.
@@ -110,13 +116,18 @@ impl Arguments {
     }
 
     /// The experiment on a plant file's spring.
-    fn request<'a>(&self, plant: &'a PlantFile, target: Target<'a>) -> Request<'a> {
-        Request {
+    fn request<'a>(&self, plant: &'a PlantFile, target: Target<'a>) -> Result<Request<'a>> {
+        let margin = self.known.margin()?;
+        if margin.is_some() != (self.controller == Controller::Robust) {
+            bad_input!("--known belongs to the robust controller: expected --controller robust --known KEY=PERCENT");
+        }
+        Ok(Request {
             plant,
             paper: self.plant == "paper",
             target,
-            compensation: match self.controller {
-                Controller::Fast => {
+            compensation: match (self.controller, margin) {
+                (_, Some(margin)) => Compensation::Robust(margin),
+                (Controller::Fast, _) => {
                     Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s.unwrap_or(0.0) })
                 }
                 _ => Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki }),
@@ -129,7 +140,7 @@ impl Arguments {
                 ..Amplifier::up_to(self.limit_v)
             },
             rate_hz: self.rate_hz,
-        }
+        })
     }
 
     /// Rejects options that would be ignored.
@@ -175,7 +186,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         None => Target::Step,
     };
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
-    let request = arguments.request(&file, target);
+    let request = arguments.request(&file, target)?;
     request.check().map_err(|error| named(error, SETTINGS))?;
     let answer = request.run(|done, all| {
         bar.set_length(all as u64);

@@ -108,7 +108,7 @@ fn telemetry() -> impl Strategy<Value = Telemetry> {
 }
 
 fn controller() -> impl Strategy<Value = Controller> {
-    prop_oneof![Just(Controller::None), Just(Controller::Paper), Just(Controller::Fast)]
+    prop_oneof![Just(Controller::None), Just(Controller::Paper), Just(Controller::Fast), Just(Controller::Robust)]
 }
 
 fn status() -> impl Strategy<Value = Status> {

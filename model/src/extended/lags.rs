@@ -70,6 +70,26 @@ impl Relaxation<'_> {
         self.time_constants_s.iter().enumerate().map(move |(lag, &tau)| (tau, weight(lag)))
     }
 
+    /// Calls `then` with the relaxation whose time constants and share are multiplied by these factors. The weights of the lags change
+    /// so that the settled value does not.
+    pub(super) fn times<T>(&self, (time_constant, share): (f64, f64), then: impl FnOnce(&Relaxation) -> T) -> T {
+        let later: f64 = self.lags().map(|(_, weight)| weight).sum();
+        let differs = share * self.share;
+        let left = if later == 0.0 { 1.0 } else { (later + self.share - differs) / later };
+        let (mut time_constants_s, mut weights) = ([0.0; MAX_LAGS], [0.0; MAX_LAGS]);
+        let places = time_constants_s.iter_mut().zip(&mut weights);
+        for ((tau, weight), (of_tau, of_weight)) in places.zip(self.lags()) {
+            (*tau, *weight) = (time_constant * of_tau, left * of_weight);
+        }
+        let count = self.time_constants_s.len().min(MAX_LAGS);
+        then(&Relaxation {
+            share: differs,
+            time_constants_s: time_constants_s.get(..count).unwrap_or_default(),
+            weights: weights.get(..count).unwrap_or_default(),
+            time_constant_high_s: self.time_constant_high_s.map(|tau| time_constant * tau),
+        })
+    }
+
     /// Returns the first time constant if it depends on the voltage.
     pub(super) fn varying(&self) -> Option<TimeConstant> {
         let (&low_s, high_s) = (self.time_constants_s.first()?, self.time_constant_high_s?);

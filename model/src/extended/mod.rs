@@ -36,9 +36,9 @@ pub use memory::Memory;
 pub use plant::ExtendedPlant;
 
 use crate::error::OutOfRange;
-use crate::estimator::{Estimator, Model, OperatingPoint, Prediction, StepGain};
+use crate::estimator::{Estimator, Invertible, Model, OperatingPoint, Prediction, StepGain};
 use crate::units::{SampleTime, ScaledStiffness, Signal, Volts};
-use crate::validated::Validated;
+use crate::validated::{Validate, Validated};
 
 /// Lowest stiffness of an operating point, so that the pre-compensator's error fits in a signal.
 const LOWEST: Signal = Signal::const_from_int(-1000);
@@ -100,6 +100,18 @@ impl Model for ExtendedPlant<'_> {
 
     fn check_inverse(&self) -> Result<(), OutOfRange> {
         inverse::check(self)
+    }
+
+    fn check_differing(&self, factors: (f64, f64), sample_time: SampleTime) -> Result<(), OutOfRange> {
+        self.relaxation.times(factors, |relaxation| relaxation.check(sample_time))
+    }
+
+    fn differing(plant: Validated<'_, Self>, factors: (f64, f64), resolution_v: f64) -> Invertible<Config> {
+        let spring = plant.settings();
+        spring.relaxation.times(factors, |&relaxation| {
+            let differing = ExtendedPlant { relaxation, ..*spring };
+            Invertible::new(Validated::new(&differing, plant.sample_time()), resolution_v)
+        })
     }
 
     fn inverse(plant: Validated<'_, Self>, config: &Config, resolution_v: f64) -> Inverse {

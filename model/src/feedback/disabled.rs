@@ -1,6 +1,9 @@
 //! Stand-ins without values, built without the feature `feedback`.
 
+use super::Observed;
 use crate::error::OutOfRange;
+#[cfg(feature = "robust")]
+use crate::units::{Accumulator, Signal};
 use crate::units::{SampleTime, ScaledStiffness, Volts};
 use crate::validated::{Validate, Validated};
 
@@ -68,7 +71,12 @@ impl Sensor {
 }
 
 impl Config {
-    pub(crate) fn update(&self, _: &mut State, _: Volts, _: Option<Reading>) -> Volts {
+    pub(crate) fn update(&self, _: &mut State, _: Volts, _: Option<Reading>) -> (Volts, Observed) {
+        match *self {}
+    }
+
+    #[cfg(feature = "robust")]
+    pub(crate) fn follow(&self, _: Observed, _: &mut Accumulator, _: Signal) {
         match *self {}
     }
 
@@ -82,6 +90,10 @@ impl State {
 
     pub(crate) fn corrected(&self, target: Volts) -> Volts {
         target
+    }
+
+    pub(crate) fn is_trusted(&self) -> bool {
+        false
     }
 
     /// Returns 0 V: without the feature `feedback` nothing is corrected.

@@ -66,6 +66,17 @@ mod enabled;
 /// Names of what can be said of a stiffness sensor, in the order of their numbers in frames: 0 stands for no sensor.
 pub const SENSOR_NAMES: [&str; 7] = ["none", "trusted", "absent", "stale", "stuck", "jumping", "out-of-range"];
 
+/// What became of a tick's reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Observed {
+    /// The sensor is trusted, and its reading was used.
+    Reading,
+    /// The sensor is trusted, and there was none to use.
+    Nothing,
+    /// The sensor is not trusted.
+    Untrusted,
+}
+
 #[cfg(not(feature = "feedback"))]
 pub use disabled::{Config, Feedback, Reading, Sensor, State};
 #[cfg(feature = "feedback")]

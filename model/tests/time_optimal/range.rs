@@ -10,10 +10,17 @@ use super::{FAST, tick};
 
 prop_compose! {
     /// Pre-compensators up to the ends of their allowed ranges.
-    fn compensation()(kind in 0..3u8, approach in 0.0..=1.0f64, gain in -3.0..2.0f64, integral in -4.0..2.0f64) -> Compensation {
+    fn compensation()(kind in 0..4u8, approach in 0.0..=1.0f64, gain in -3.0..2.0f64, integral in -4.0..2.0f64) -> Compensation {
         match kind {
             0 => FAST,
             1 => Compensation::TimeOptimal(Approach { time_constant_s: approach }),
+            #[cfg(feature = "robust")]
+            2 => Compensation::Robust(model::Margin {
+                time_constant: 0.25 * approach,
+                share: 0.25 * (1.0 - approach),
+                gain: 0.05 * (gain + 3.0),
+                overshoot: 0.2 * approach,
+            }),
             _ => Compensation::ProportionalIntegral(Gains {
                 proportional: 10f64.powf(gain),
                 integral_per_s: 10f64.powf(integral),

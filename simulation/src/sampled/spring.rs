@@ -85,6 +85,17 @@ impl From<model::Plant> for Spring {
 }
 
 impl Spring {
+    /// The spring with its time constants and its share multiplied by these factors, at the same settled value.
+    #[must_use]
+    pub fn times(mut self, time_constant: f64, share: f64) -> Self {
+        let (before, later) = (self.share, self.lags.iter().map(|(_, weight)| weight).sum::<f64>());
+        self.share *= share;
+        let left = if later == 0.0 { 1.0 } else { (later + before - self.share) / later };
+        self.lags.iter_mut().for_each(|(tau, weight)| (*tau, *weight) = (time_constant * *tau, left * *weight));
+        self.high_s = self.high_s.map(|tau| time_constant * tau);
+        self
+    }
+
     /// The state at rest at 0 V.
     pub fn at_rest(&self) -> State {
         State { voltage: 0.0, plays: vec![0.0; self.plays.len()], leaked: 0.0, lags: vec![0.0; self.lags.len()] }

@@ -39,6 +39,7 @@ Examples:
   cargo campaign                             singles, nulls, pairs, triples, small
   cargo campaign singles nulls --records 50  50 records of each cause and 50 nulls
   cargo campaign --first-seed 2 --docs docs/identification
+  cargo campaign singles --export out/singles    its records as files, for `python -m vsj.fleet`
   cargo campaign --write out/hidden --cause hysteresis --seed 3
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
   cargo campaign rivals                      comparison with PySINDy and SysIdentPy
@@ -72,6 +73,10 @@ struct Cli {
     /// Write the tables to this folder, one Markdown file per part
     #[arg(long, value_name = "DIR")]
     docs: Option<PathBuf>,
+    /// Do not diagnose; write the records of singles, forms, nulls, pairs, triples, long, stress and speed to DIR/ROW/seed-N.csv,
+    /// where ROW is that of the part's table, and their true values to seed-N.json
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["json", "docs", "write"])]
+    export: Option<PathBuf>,
     /// Do not diagnose; write one record as CSV and its true values as JSON
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
@@ -306,6 +311,9 @@ fn run(cli: &Cli) -> Result<bool> {
     if let Some(folder) = &cli.write {
         return write(folder, &cli.record).map(|()| true);
     }
+    if let Some(folder) = &cli.export {
+        return cli.export(folder).map(|()| true);
+    }
     let mut done: Vec<Done> = Vec::new();
     for &part in &cli.parts {
         let result = cli.part(part)?;
@@ -334,12 +342,11 @@ impl Cli {
     fn part(&self, part: Part) -> Result<Done> {
         let first = self.first_seed;
         match part {
-            Part::Singles => self.jobs(part, &part::singles(first, self.count(20)), criteria::singles),
-            Part::Forms => self.jobs(part, &part::forms(first, self.count(20)), |_| Vec::new()),
-            Part::Nulls => self.jobs(part, &part::nulls(first, self.count(500)), criteria::nulls),
-            Part::Pairs => self.jobs(part, &part::pairs(first, self.count(3)), criteria::pairs),
-            Part::Triples => self.jobs(part, &part::triples(first, self.count(100)), criteria::triples),
-            Part::Long => self.jobs(part, &part::long(first, self.count(1)), criteria::pairs),
+            Part::Singles => self.jobs(part, criteria::singles),
+            Part::Nulls => self.jobs(part, criteria::nulls),
+            Part::Pairs | Part::Long => self.jobs(part, criteria::pairs),
+            Part::Triples => self.jobs(part, criteria::triples),
+            Part::Forms | Part::Stress | Part::Speed => self.jobs(part, |_| Vec::new()),
             Part::Shared => self.answers(part, &["causes", "size"], &shared::cases(first, self.count(3))),
             Part::Steps => self.answers(part, &["causes", "experiment"], &steps::cases(first, self.count(3))),
             Part::Plants => {
@@ -358,8 +365,6 @@ impl Cli {
                 Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(sets), figure })
             }
             Part::Unforeseen => self.answers(part, &["law"], &unforeseen::cases(first, self.count(3))),
-            Part::Stress => self.jobs(part, &part::stress(first, self.count(5)), |_| Vec::new()),
-            Part::Speed => self.jobs(part, &part::speed(first, self.count(1)), |_| Vec::new()),
             Part::Small => self.sensitivities(part, &[0.2]),
             Part::Noise => self.sensitivities(part, &[0.1, 0.2, 0.5, 1.0]),
             Part::OutOfModel => {
@@ -436,7 +441,36 @@ impl Cli {
         }
     }
 
-    fn jobs(&self, part: Part, jobs: &[Job], criteria: fn(&[Outcome]) -> Vec<Criterion>) -> Result<Done> {
+    /// The records of a part that draws every one from a recipe.
+    fn recipes(&self, part: Part) -> Result<Vec<Job>> {
+        let first = self.first_seed;
+        Ok(match part {
+            Part::Singles => part::singles(first, self.count(20)),
+            Part::Forms => part::forms(first, self.count(20)),
+            Part::Nulls => part::nulls(first, self.count(500)),
+            Part::Pairs => part::pairs(first, self.count(3)),
+            Part::Triples => part::triples(first, self.count(100)),
+            Part::Long => part::long(first, self.count(1)),
+            Part::Stress => part::stress(first, self.count(5)),
+            Part::Speed => part::speed(first, self.count(1)),
+            _ => bail!("{}: expected singles, forms, nulls, pairs, triples, long, stress or speed", part.name()),
+        })
+    }
+
+    /// Writes the records of the parts as files, with their true values.
+    fn export(&self, folder: &Path) -> Result<()> {
+        let parts = self.parts.iter().map(|&part| Ok((part, self.recipes(part)?))).collect::<Result<Vec<_>>>()?;
+        for (part, jobs) in parts {
+            for Job { group, recipe, seed } in &jobs {
+                recipe.draw(*seed).write(&folder.join(group), &format!("seed-{seed}"))?;
+            }
+            println!("wrote {} records of {} to {}", jobs.len(), part.name(), folder.display());
+        }
+        Ok(())
+    }
+
+    fn jobs(&self, part: Part, criteria: fn(&[Outcome]) -> Vec<Criterion>) -> Result<Done> {
+        let jobs = &self.recipes(part)?;
         let bar = bar(&format!("{part:?}"), jobs.len())?;
         let outcomes = part::run(jobs, &diagnose, &bar);
         bar.finish_and_clear();

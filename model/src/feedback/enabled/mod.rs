@@ -13,6 +13,7 @@ mod settings;
 pub use fault_detection::{Fault, Sensor};
 pub use settings::{Feedback, HISTORY, Reading};
 
+use super::Observed;
 use crate::coefficient::{Rate, upper};
 use crate::units::{Accumulator, ScaledStiffness, Signal, Volts};
 use crate::validated::Validated;
@@ -57,9 +58,9 @@ impl Validated<'_, Feedback> {
 impl Config {
     /// First half of a tick, before its voltage: updates the correction with the latest reading, or lets it decay while
     /// the sensor is not trusted. Returns the stiffness to which the model has to be brought for the spring to reach
-    /// `target`.
+    /// `target`, and what became of the reading.
     #[inline]
-    pub(crate) fn update(&self, state: &mut State, target: Volts, reading: Option<Reading>) -> Volts {
+    pub(crate) fn update(&self, state: &mut State, target: Volts, reading: Option<Reading>) -> (Volts, Observed) {
         self.oscillation.track_target(&mut state.oscillation, target.0);
         let correction = upper(state.correction);
         let sample = reading.map(|reading| {
@@ -67,19 +68,32 @@ impl Config {
             fault_detection::Sample { reading, model, mismatch: reading.stiffness.0.saturating_sub(model) }
         });
         let accepted = self.detection.evaluate(&mut state.detection, sample);
-        let step = match (state.detection.sensor(), accepted) {
+        let (step, observed) = match (state.detection.sensor(), accepted) {
             (Sensor::Trusted, Some(mismatch)) => {
                 self.oscillation.detect(&mut state.oscillation, mismatch, self.detection.noise());
                 let (innovation, model) = (mismatch.saturating_sub(correction), state.model_at(0));
                 let recent = state.detection.model_envelope();
                 let clipped = self.influence.clip(&mut state.influence, innovation, model, recent);
-                state.oscillation.reduce(self.gain.step(clipped))
+                (state.oscillation.reduce(self.gain.step(clipped)), Observed::Reading)
             }
-            (Sensor::Trusted, None) => Accumulator::ZERO,
-            _ => self.fade.step(Signal::ZERO.saturating_sub(correction)),
+            (Sensor::Trusted, None) => (Accumulator::ZERO, Observed::Nothing),
+            _ => (self.fade.step(Signal::ZERO.saturating_sub(correction)), Observed::Untrusted),
         };
         state.correction = state.correction.saturating_add(step);
-        state.corrected(target)
+        (state.corrected(target), observed)
+    }
+
+    /// Lets `seen` follow a signal as the correction follows the mismatch: by the gain at a reading, and back to 0 V while the sensor
+    /// is not trusted.
+    #[inline]
+    pub(crate) fn follow(&self, observed: Observed, seen: &mut Accumulator, signal: Signal) {
+        let distance = |to: Signal| to.saturating_sub(upper(*seen));
+        let step = match observed {
+            Observed::Reading => self.gain.step(distance(signal)),
+            Observed::Nothing => Accumulator::ZERO,
+            Observed::Untrusted => self.fade.step(distance(Signal::ZERO)),
+        };
+        *seen = seen.saturating_add(step);
     }
 
     /// Second half of a tick, after its voltage was applied: records the model's stiffness. Returns the corrected
@@ -109,6 +123,11 @@ impl State {
     #[inline]
     pub(crate) fn corrected(&self, target: Volts) -> Volts {
         Volts(target.0.saturating_sub(upper(self.correction)))
+    }
+
+    /// Returns whether the sensor is trusted.
+    pub(crate) fn is_trusted(&self) -> bool {
+        self.detection.sensor() == Sensor::Trusted
     }
 
     /// Returns the correction `d` that is added to the model's stiffness, in V.

@@ -1,0 +1,181 @@
+//! The law with its settings and state, built with the feature `robust`.
+
+use super::Aim;
+use crate::coefficient::{Weight, saturated, sum, upper, widened};
+use crate::error::OutOfRange;
+use crate::estimator::{Estimator, Invertible};
+use crate::feedback::{self, Observed};
+use crate::time_optimal::{self, Approach, TimeOptimal};
+use crate::units::{Accumulator, SampleTime, Signal, Volts};
+use crate::validated::{Validate, Validated};
+
+/// Part of a step that may be missing when it counts as done: 97 % are reached.
+const MISSING: f64 = 0.03;
+/// Largest relative error of a parameter.
+const LARGEST_ERROR: f64 = 0.25;
+
+/// How well the spring is known, and what it may overshoot; all without a unit.
+///
+/// ```
+/// use model::{Compensation, Input, Margin, OutOfRange, Settings, State, Volts};
+///
+/// fn main() -> Result<(), OutOfRange> {
+///     // The share of 1/11 may be 10 % larger: a step of 100 V begins with less than the 1000 V that the model's share allows.
+///     let margin = Margin { time_constant: 0.05, share: 0.1, gain: 0.0, overshoot: 0.02 };
+///     let amplifier = model::Amplifier::up_to(1000.0);
+///     let settings = Settings { compensation: Compensation::Robust(margin), amplifier, ..Settings::PAPER };
+///     let config = settings.validate()?.quantize();
+///     let input = Input { target: Volts::new(90.0)?, ..Input::default() };
+///     assert_eq!(config.tick(&mut State::default(), input).applied.to_f64().round(), 899.0);
+///     Ok(())
+/// }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margin {
+    /// Largest relative error of all time constants, both ways, 0 to 0.25.
+    pub time_constant: f64,
+    /// Largest relative error of the instantaneous share, both ways, 0 to 0.25.
+    pub share: f64,
+    /// Largest relative error of the gain, both ways, 0 to 0.25.
+    pub gain: f64,
+    /// Overshoot that is allowed on any spring within the errors, as a part of the step, 0 to 0.2.
+    pub overshoot: f64,
+}
+
+impl Margin {
+    /// Returns the factors of the quick spring's time constants and share.
+    pub(crate) fn factors(&self) -> (f64, f64) {
+        (1.0 - self.time_constant, 1.0 + self.share)
+    }
+}
+
+impl Validate for Margin {
+    fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
+        OutOfRange::check("margin.time_constant", self.time_constant, 0.0..=LARGEST_ERROR, "of the model's")?;
+        OutOfRange::check("margin.share", self.share, 0.0..=LARGEST_ERROR, "of the model's")?;
+        OutOfRange::check("margin.gain", self.gain, 0.0..=LARGEST_ERROR, "of the model's")?;
+        OutOfRange::check("margin.overshoot", self.overshoot, 0.0..=0.2, "of a step")
+    }
+}
+
+/// The pre-compensator for one spring and sample time, quantized for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Robust<E: Estimator> {
+    quick: E,
+    law: TimeOptimal<E::Inverse>,
+    /// Error of the gain, and the reciprocal of 1 more.
+    gain: Weight,
+    of_gain: Weight,
+    /// Part of the unseen lead by which the target is moved.
+    part: Weight,
+    /// Overshoot that the quick spring may have where the sensor removes an error of the gain, and where it cannot.
+    overshoot: Weight,
+    overshoot_blind: Weight,
+}
+
+/// The quick spring and what the sensor has shown; the default is a spring at rest at 0 V.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State<S> {
+    quick: S,
+    law: time_optimal::State,
+    target: Signal,
+    /// Change of stiffness that the present target asked for when it came.
+    step: Signal,
+    base: Signal,
+    seen: Accumulator,
+    /// Whether the sensor was trusted in the last tick.
+    trusted: bool,
+}
+
+impl Validated<'_, Margin> {
+    /// Quantizes the law for the quick spring. `step_v` is the amplifier's largest change in a tick, in V, if the slew is limited.
+    pub(crate) fn quantize<E: Estimator>(self, quick: Invertible<E>, step_v: Option<f64>) -> Robust<E> {
+        let Margin { gain, overshoot, .. } = *self.settings();
+        let Invertible { estimator, inverse, largest, smallest } = quick;
+        let slew = step_v.map(|step_v| (smallest, step_v));
+        Robust {
+            quick: estimator,
+            law: self.part(&Approach::DEAD_BEAT).quantize(inverse, &largest, slew),
+            gain: Weight::new(gain),
+            of_gain: Weight::new(1.0 / (1.0 + gain)),
+            part: Weight::new(2.0 * overshoot / (overshoot + MISSING)),
+            overshoot: Weight::new(overshoot),
+            overshoot_blind: Weight::new(((1.0 + overshoot) / (1.0 + gain) - 1.0).max(0.0)),
+        }
+    }
+}
+
+impl<E: Estimator> Robust<E> {
+    /// Returns the voltage that this law asks for, before the amplifier's limits. `feedback` is the correction and what it did with
+    /// the reading of this tick.
+    #[inline(always)]
+    pub(crate) fn voltage(
+        &self,
+        state: &mut State<E::State>,
+        aim: Aim,
+        feedback: Option<(&feedback::Config, Observed)>,
+    ) -> Volts {
+        let blind = feedback.is_none_or(|(_, observed)| observed == Observed::Untrusted);
+        let quick = self.quick.predict(&state.quick, aim.applied).now;
+        let changed = aim.target.0 != state.target;
+        if changed {
+            (state.target, state.step) = (aim.target.0, aim.pursued.0.saturating_sub(aim.model));
+        }
+        if changed || state.trusted == blind {
+            // What remains unseen is the same.
+            state.seen = state.seen.saturating_sub(widened(self.by_gain(state, quick)));
+            (state.base, state.trusted) = (quick, !blind);
+        }
+        let lead = self.lead(state, quick, aim.model);
+        if let Some((feedback, observed)) = feedback {
+            feedback.follow(observed, &mut state.seen, lead);
+        }
+        let overshoot = if blind { self.overshoot_blind } else { self.overshoot };
+        let (seen, most) = (upper(state.seen), saturated(overshoot.times(state.step)));
+        let unseen = saturated(self.part.times(lead.saturating_sub(seen)));
+        let excess = unseen.max(most.min(Signal::ZERO)).min(most.max(Signal::ZERO));
+        let wanted = aim.pursued.0.saturating_add(seen).saturating_add(excess);
+        let wanted = self.without_gain(state, wanted);
+        self.law.voltage(&mut state.law, Volts(wanted), &self.quick, &state.quick, aim.driven, aim.applied)
+    }
+
+    /// Holds `applied` across the quick spring for one sample time.
+    #[inline(always)]
+    pub(crate) fn run(&self, state: &mut State<E::State>, applied: Volts) {
+        self.quick.run(&mut state.quick, applied);
+    }
+
+    /// Takes over from the model at `model` so that the law asks for the last voltage again: no lead is unseen. `trusted`: there is a
+    /// sensor that is.
+    pub(crate) fn transfer(&self, state: &mut State<E::State>, aim: Aim, model: &E::State, trusted: bool) {
+        state.quick = *model;
+        let quick = self.quick.predict(&state.quick, aim.applied).now;
+        (state.target, state.step, state.base, state.trusted) = (aim.target.0, Signal::ZERO, quick, trusted);
+        let lead = if trusted { self.lead(state, quick, aim.model) } else { Signal::ZERO };
+        state.seen = widened(lead);
+        let wanted = self.without_gain(state, aim.pursued.0.saturating_add(lead));
+        self.law.preset_offset(&mut state.law, Volts(wanted), &self.quick, &state.quick, aim.applied);
+    }
+
+    /// How much farther than the model's stiffness `model` the quick spring may be whose stiffness is `quick` but for its gain.
+    #[inline(always)]
+    fn lead(&self, state: &State<E::State>, quick: Signal, model: Signal) -> Signal {
+        quick.saturating_sub(model).saturating_add(self.by_gain(state, quick))
+    }
+
+    /// The part of the lead that is due to the gain; none where no sensor would show it.
+    #[inline(always)]
+    fn by_gain(&self, state: &State<E::State>, quick: Signal) -> Signal {
+        if state.trusted { saturated(self.gain.times(quick.saturating_sub(state.base))) } else { Signal::ZERO }
+    }
+
+    /// Stiffness of the quick spring without its gain at which it has `wanted` with it.
+    #[inline(always)]
+    fn without_gain(&self, state: &State<E::State>, wanted: Signal) -> Signal {
+        if !state.trusted {
+            return wanted;
+        }
+        let base = state.base;
+        saturated(sum(base).saturating_add(self.of_gain.times(wanted.saturating_sub(base))))
+    }
+}

@@ -1,0 +1,453 @@
+"""The fleet: every record has one row, whatever dies on the way, and the page says what is in the rows."""
+
+import datetime
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import distributed
+import numpy as np
+import pandas
+import psutil
+import pytest
+
+import vsj
+from conftest import ROOT
+from vsj import _vsj
+from vsj.fleet import command as fleet
+from vsj.fleet import cost, page, records, run, store, summary, work
+from vsj.fleet.chart import COMPARED_PER_FALSE_ALARM, chart
+from vsj.fleet.settings import Settings
+
+SPRINGS, RECORDS, ROWS = 3, 12, 120
+STEP = 7
+
+
+def csv_of(random, gain):
+    """A record of the report's spring with another gain."""
+    time_s = 0.2 * np.arange(ROWS)
+    voltage_v = np.repeat(100.0 * random.integers(0, 6, ROWS // 10), 10)
+    stiffness = gain * _vsj.predict("paper", time_s, voltage_v, "hold") + random.normal(size=ROWS)
+    return pandas.DataFrame({"time_s": time_s, "voltage_v": voltage_v, "stiffness": stiffness})
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """Records of three springs; the gain of the second steps by 8 % between two records that are 100 days apart."""
+    folder, random = tmp_path_factory.mktemp("fleet") / "springs", np.random.default_rng(5)
+    for spring in range(SPRINGS):
+        (folder / f"s{spring}").mkdir(parents=True)
+        for index in range(RECORDS):
+            date = datetime.date(2026, 1, 1) + datetime.timedelta(days=7 * index + (100 if index >= STEP else 0))
+            gain = 1 + 0.002 * random.normal() + (0.08 if spring == 1 and index >= STEP else 0)
+            csv_of(random, gain).to_csv(folder / f"s{spring}" / f"{date}.csv", index=False)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def engine():
+    """The address of a scheduler with one worker in this process."""
+    with distributed.LocalCluster(1, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.fixture
+def copied(folder, tmp_path):
+    """Four records of two springs that a test may change."""
+    for path in sorted(folder.glob("s[01]/*"))[:: RECORDS // 2]:
+        target = tmp_path / "few" / path.relative_to(folder)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, target)
+    return tmp_path / "few"
+
+
+def rows_of(out):
+    """The rows of the table by record; fails if a record has two."""
+    rows = list(store.rows(out))
+    by_record = {row["record"]: row for row in rows}
+    assert len(by_record) == len(rows)
+    return by_record
+
+
+def parts(out):
+    return list((out / "parts").glob("*.parquet"))
+
+
+def until(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.01)
+
+
+def program(*arguments):
+    """The command as a program of its own, in a group of processes of its own."""
+    words = [sys.executable, "-m", "vsj.fleet", *map(str, arguments)]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def test_ctrl_c_and_a_killed_worker_cost_no_record_and_double_none(folder, tmp_path):
+    arguments = (folder, "--out", tmp_path, "--workers", 2, "--batch", 1, "--json")
+    first = program(*arguments)
+    until(lambda: len(parts(tmp_path)) >= 3)
+    os.killpg(first.pid, signal.SIGINT)
+    out, error = first.communicate(timeout=60)
+    assert first.returncode == 130 and not out, error
+    [line] = error.strip().splitlines()
+    assert re.fullmatch(r"vsj\.fleet: interrupted; at least \d+ of 36 records are finished; the same command goes on", line)
+    before = len(parts(tmp_path))
+    assert 3 <= before < SPRINGS * RECORDS and not (tmp_path / store.TABLE).exists()
+
+    second = program(*arguments)
+    until(lambda: len(parts(tmp_path)) >= before + 3)
+    workers = [it for it in psutil.Process(second.pid).children(recursive=True) if "spawn_main" in " ".join(it.cmdline())]
+    assert len(workers) == 2
+    workers[0].kill()
+    out, error = second.communicate(timeout=120)
+    assert second.returncode == 0, error
+    answer = json.loads(out)
+    assert answer["finished_before"] == before and answer["finished_now"] == SPRINGS * RECORDS - before
+    rows = rows_of(tmp_path)
+    assert len(rows) == SPRINGS * RECORDS and {row["status"] for row in rows.values()} == {"diagnosed"}
+    [(spring, drift)] = [
+        (it["spring"], drift) for it in answer["springs"] for drift in it["drifts"] if drift["parameter"] == "gain"
+    ]
+    assert spring == "s1" and drift["value_after"] == pytest.approx(1.08, abs=0.01)
+    # The step is in the gap.
+    assert drift["after"]["time"].startswith("2026-02-12") and drift["by"]["time"].startswith("2026-05-30")
+
+
+def test_after_a_killed_scheduler_the_next_run_goes_on(folder, tmp_path, engine, capsys):
+    file, out = tmp_path / "scheduler.json", tmp_path / "out"
+    start = lambda *words: subprocess.Popen([sys.executable, "-m", *words, "--scheduler-file", file], stderr=subprocess.DEVNULL)
+    scheduler = start("distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard")
+    worker = start("distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", "--death-timeout", "5")
+    try:
+        until(file.exists)
+        address = json.loads(file.read_text())["address"]
+
+        def kill():
+            until(lambda: len(parts(out)) >= 3)
+            scheduler.kill()
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        code = fleet.main([str(folder), "--out", str(out), "--scheduler", address, "--batch", "2"])
+        killer.join()
+        assert code == 1
+        line = capsys.readouterr().err.strip().splitlines()[-1]
+        assert re.fullmatch(rf"vsj\.fleet: --scheduler {address}: .* lost; at least \d+ of 36 records are finished; .*", line), line
+    finally:
+        scheduler.kill()
+        worker.kill()
+        worker.wait()
+    there = len(store.finished(out))
+    assert 6 <= there < SPRINGS * RECORDS
+    # Not even the size of the batches has to be the same.
+    assert fleet.main([str(folder), "--out", str(out), "--scheduler", engine, "--batch", "5", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["finished_before"], answer["finished_now"]) == (there, SPRINGS * RECORDS - there)
+    assert len(rows_of(out)) == SPRINGS * RECORDS
+
+
+def test_a_row_is_the_diagnosis_of_its_record(copied, tmp_path, engine):
+    out = tmp_path / "out"
+    assert fleet.main([str(copied), "--out", str(out), "--scheduler", engine, "--effort", "quick"]) == 0
+    for record, row in rows_of(out).items():
+        expected, linear = vsj.diagnose(copied / record, effort="quick"), vsj.identify(copied / record).nominal
+        assert (row["verdict"], row["rows"], row["gain"]) == (expected.verdict, ROWS, expected.extended.gain)
+        assert (row["spring"], row["time"].date().isoformat()) == tuple(record.removesuffix(".csv").split("/"))
+        named = {it["name"]: it for it in row["identified"]}
+        assert named["gain"]["value"] == linear.gain.value and named["tau_s"]["unit"] == "s"
+        assert [it["cause"] for it in row["findings"]] == [it.cause for it in expected.findings]
+        for found, finding in zip(row["findings"], expected.findings):
+            assert found["probability"] == finding.probability
+            for it in found["parameters"]:
+                other = finding.parameters[it["name"]]
+                assert (it["value"], it["low"], it["high"], it["unit"]) == (other.value, other.low, other.high, other.unit)
+    frame = store.read(out)
+    assert set(frame["cause"].dropna()) == {it["cause"] for row in rows_of(out).values() for it in row["findings"]}
+    assert len(frame) >= 4
+
+
+def test_only_what_has_changed_is_diagnosed_again(copied, tmp_path, engine, capsys):
+    out = tmp_path / "out"
+
+    def counts(*more):
+        assert fleet.main([str(copied), "--out", str(out), "--scheduler", engine, "--json", *more]) == 0
+        answer = json.loads(capsys.readouterr().out)
+        return answer["finished_before"], answer["finished_now"]
+
+    assert counts() == (0, 4)
+    before = rows_of(out)
+    os.utime(copied / sorted(before)[0])
+    # A part that was written twice, by a worker that was taken for dead.
+    shutil.copy(parts(out)[0], out / "parts" / "again.parquet")
+    (out / "parts" / ".x.parquet.1.partial").write_bytes(b"half")
+    assert counts("--batch", "1") == (4, 0)
+    assert rows_of(out) == before
+    changed = copied / sorted(before)[0]
+    changed.write_text(changed.read_text() + "30.0,0.0,0.0\n")
+    assert counts() == (3, 1)
+    assert rows_of(out)[sorted(before)[0]]["rows"] == ROWS + 1
+    assert counts("--effort", "quick") == (0, 4)
+    assert counts() == (4, 0)
+
+
+def test_an_error_is_in_its_row_with_the_text_of_the_command(copied, tmp_path, engine, capsys, command):
+    out, bad, gone = tmp_path / "out", copied / "s0/2026-09-01.csv", copied / "gone.csv"
+    bad.write_text("time_s,voltage_v,stiffness\n0,0,0\n1,oops,0\n")
+    manifest = copied / "list.csv"
+    good = sorted(copied.glob("s1/*.csv"))[0].relative_to(copied)
+    manifest.write_text(f"record,spring,time,plant\n{good},s1,2026-03-04,identify\ns0/{bad.name},s0,,\ngone.csv,s0,,\n")
+    for _ in range(2):
+        assert fleet.main([str(manifest), "--out", str(out), "--scheduler", engine]) == 1
+        printed = capsys.readouterr()
+        assert "2 of 3 records have no diagnosis" in printed.err
+        rows = rows_of(out)
+        assert rows[str(good)]["plant"] == "identify" and rows[str(good)]["time"].day == 4
+        assert rows[f"s0/{bad.name}"]["status"] == "refused"
+        assert rows[f"s0/{bad.name}"]["error"] == command.error("diagnose", bad)
+        assert rows["gone.csv"]["status"] == "failed" and "gone.csv: FileNotFoundError" in rows["gone.csv"]["error"]
+    # What was refused is finished, what failed is tried again.
+    assert "2 finished before, 1 now; 2 with an error" in printed.out
+    # A manifest that says more of a finished record is followed.
+    manifest.write_text(manifest.read_text().replace("s1,2026-03-04", "s9,2026-03-05"))
+    shutil.copy(copied / good, gone)
+    assert fleet.main([str(manifest), "--out", str(out), "--scheduler", engine]) == 1
+    rows = rows_of(out)
+    assert rows["gone.csv"]["status"] == "diagnosed"
+    assert (rows[str(good)]["spring"], rows[str(good)]["time"].day) == ("s9", 5)
+
+
+def test_parquet_records_and_a_parquet_manifest_have_the_same_answers(copied, tmp_path, engine):
+    out, other = tmp_path / "out", tmp_path / "parquet"
+    names = sorted(path.relative_to(copied) for path in copied.glob("*/*.csv"))
+    for name in names:
+        (other / name).parent.mkdir(parents=True, exist_ok=True)
+        frame = pandas.read_csv(copied / name).rename(columns={"time_s": "t_ms", "stiffness": "x"})
+        frame.assign(t_ms=1e3 * frame["t_ms"]).to_parquet((other / name).with_suffix(".parquet"))
+    moments = pandas.to_datetime([name.stem for name in names])
+    listed = pandas.DataFrame({"record": [str(it.with_suffix(".parquet")) for it in names], "time": moments, "spring": 7})
+    listed.to_parquet(other / "list.parquet")
+    options = ["--scheduler", engine, "--time", "t_ms:ms", "--column", "x"]
+    assert fleet.main([str(other / "list.parquet"), "--out", str(out), *options]) == 0
+    for name, row in rows_of(out).items():
+        expected = vsj.diagnose((copied / name).with_suffix(".csv"))
+        assert row["verdict"] == expected.verdict and row["spring"] == "7"
+        assert row["rmse"] == pytest.approx(expected.baseline.rmse, rel=1e-9)
+
+
+def test_records_and_results_may_be_in_an_object_store(copied, engine):
+    import fsspec
+
+    fs = fsspec.filesystem("memory")
+    fs.put(str(copied), "/lab/springs", recursive=True)
+    assert fleet.main(["memory://lab/springs", "--out", "memory://lab/fleet", "--scheduler", engine]) == 0
+    assert len(rows_of("memory://lab/fleet")) == 4
+    assert fs.cat_file("/lab/fleet/fleet.html").startswith(b"<!DOCTYPE html>")
+    assert not [it for it in fs.find("/lab/fleet") if it.endswith(".partial")]
+
+
+def test_a_record_that_ends_its_workers_has_a_row_and_the_others_too(copied, tmp_path, monkeypatch):
+    out, _ = str(tmp_path / "out"), (tmp_path / "out").mkdir()
+    address, table = records.listed(copied)
+    table = fleet._with_plants(table, "paper")
+    fatal, diagnose = table["record"][1].as_py(), work.diagnose
+
+    def deadly(batch, *rest):
+        if fatal in [it["record"] for it in batch]:
+            os._exit(1)
+        return diagnose(batch, *rest)
+
+    monkeypatch.setattr(work, "diagnose", deadly)
+    with distributed.LocalCluster(1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
+        cluster.scheduler.allowed_failures = 0
+        with distributed.Client(cluster) as client:
+            outcome = run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, out, 2, lambda _: None)
+    assert outcome.new == 4 and list(outcome.failed) == [False, True, False, False]
+    there = store.finished(out).to_pandas().set_index("record")
+    assert there.loc[fatal, "status"] == "failed" and len(there) == 4
+
+
+def no_options():
+    return dict.fromkeys(("time", "voltage", "reading", "column", "columns", "separator", "decimal", "input")) | {"sort": False}
+
+
+def test_a_worker_with_another_version_is_refused(tmp_path):
+    settings = Settings(no_options(), "quick", version="0.0.0")
+    with pytest.raises(RuntimeError, match="expected 0.0.0"):
+        work.diagnose([], {}, settings, str(tmp_path), str(tmp_path))
+
+
+def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
+    folder, empty = tmp_path / "springs", tmp_path / "empty"
+    for it in (folder / "a", empty):
+        it.mkdir(parents=True)
+    (folder / "a/b.csv").write_text("no")
+    (tmp_path / "bad.toml").write_text("[relaxation]\nshare = 7\n")
+    listed = {"names.csv": "name\nx\n", "dates.csv": "record,time\nx.csv,yesterday\n", "twice.csv": "record\nx.csv\nx.csv\n", "gap.csv": "record,spring\n,s\n"}
+    for name, text in listed.items():
+        (tmp_path / name).write_text(text)
+    for words, part in (
+        ([tmp_path / "none"], "not found; expected a folder"),
+        ([empty], "no record; expected files"),
+        ([tmp_path / "names.csv"], "columns name; expected record"),
+        ([tmp_path / "dates.csv"], "row 1, column time: yesterday; expected a date"),
+        ([tmp_path / "twice.csv"], "x.csv is listed twice"),
+        ([tmp_path / "gap.csv"], "row 1, column record: empty"),
+        ([folder, "--plant", "no.toml"], "--plant no.toml: cannot be read"),
+        ([folder, "--plant", tmp_path / "bad.toml"], "bad.toml"),
+        ([folder, "--columns", "no.toml"], "--columns no.toml: cannot be read"),
+        ([folder, "--scheduler", "10.0.0.5"], "expected local, slurm, or an address"),
+        ([folder, "--batch", "0"], "expected a number, 1 to 100000"),
+        ([folder, "--effort", "much"], "quick"),
+        ([], "RECORDS: expected"),
+        (["--cost", "10", "--out", empty], "no diagnoses.parquet"),
+        (["nowhere://x"], "nowhere"),
+    ):
+        try:
+            code = fleet.main([*map(str, words), *([] if "--out" in words else ["--out", str(tmp_path / "out")])])
+        except SystemExit as end:
+            code = end.code
+        [line] = capsys.readouterr().err.strip().splitlines()
+        assert code == 2 and line.startswith("vsj.fleet: ") and part in line, (words, line)
+    assert fleet.main([str(folder), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1", "--wait", "1"]) == 1
+    assert "no scheduler answers within 1 s" in capsys.readouterr().err
+
+
+def test_without_its_packages_the_command_says_what_to_install():
+    program = "import sys, runpy; sys.modules['distributed'] = None; runpy.run_module('vsj.fleet', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 2 and done.stderr == "vsj.fleet: the package distributed is missing; expected: pip install './python[fleet]'\n"
+
+
+@pytest.mark.parametrize(
+    "text, expected",
+    [
+        ("2026-03-01", "2026-03-01T00:00:00+00:00"),
+        ("20260301", "2026-03-01T00:00:00+00:00"),
+        ("2026-03-01_second", "2026-03-01T00:00:00+00:00"),
+        ("2026-03-01T12-30-05", "2026-03-01T12:30:05+00:00"),
+        ("2026-03-01 12:30:05.25+02:00", "2026-03-01T10:30:05.250000+00:00"),
+        ("20260301T1230Z", "2026-03-01T12:30:00+00:00"),
+        ("2026-13-01", None),
+        ("run 7", None),
+        ("202603011", None),
+    ],
+)
+def test_the_time_of_a_record_is_the_date_that_its_name_begins_with(text, expected):
+    found = records.time_of(text)
+    assert (found and found.isoformat()) == expected
+
+
+def test_a_name_with_several_folders_is_a_spring(tmp_path):
+    for name in ("rig/a/1.csv", "rig/a/2.csv", "alone.csv", "note.txt"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    _, table = records.listed(tmp_path)
+    assert list(zip(table["spring"].to_pylist(), table["record"].to_pylist())) == [
+        ("alone", "alone.csv"),
+        ("rig/a", "rig/a/1.csv"),
+        ("rig/a", "rig/a/2.csv"),
+    ]
+
+
+def test_an_unchanged_parameter_signals_as_rarely_as_stated():
+    random, compared, signals = np.random.default_rng(1), 0, 0
+    for _ in range(500):
+        found = chart(random.normal(10, 3, 60))
+        outside = np.abs(found.z) > found.limit
+        compared, signals = compared + found.compared, signals + np.sum(outside[1:] & ~outside[:-1]) + outside[0]
+    assert 0.7 < compared / signals / COMPARED_PER_FALSE_ALARM < 1.5
+
+
+def test_a_change_is_found_with_its_time_and_its_size():
+    random = np.random.default_rng(2)
+    for step, place in ((4.0, 20), (-4.0, 20), (6.0, 9)):
+        values = 50 + random.normal(size=40)
+        values[place:] += step
+        change = chart(values).change
+        assert abs(change.first - place) <= 1 and change.last == 39 and change.after - change.before == pytest.approx(step, abs=1)
+    slow = chart(50 + random.normal(size=60) + 0.15 * np.arange(60)).change
+    assert slow.last == 59 and slow.after > slow.before + 3
+
+
+def test_single_and_few_and_equal_values_are_no_change():
+    values = np.random.default_rng(3).normal(size=30)
+    values[12] = 1e6
+    found = chart(values)
+    assert found.singles == [12] and found.change is None
+    assert chart([1.0, 2.0]) is None and chart([]) is None and chart(np.full(50, 0.1)) is None
+    assert chart([1.0, 1.1, 5000.0]).change is None
+
+
+def test_a_cause_is_there_since_it_is_more_frequent():
+    since = lambda text: summary._since(np.array([it == "x" for it in text]))
+    assert [since(it) for it in ("xxxx", "...x", "...xxx", "x.....xxxx.xx", "..x", "x...")] == [0, 3, 3, 6, 2, 0]
+
+
+def row(spring, time, gain, **more):
+    identified = [{"name": "gain", "value": gain, "low": gain - 0.001, "high": gain + 0.001, "unit": "<V>"}]
+    made = dict(spring=spring, record=f"{spring}/{time:03}.csv", time=None, status="diagnosed", verdict="consistent", error=None)
+    return made | dict(findings=[], identified=identified) | more
+
+
+def test_the_page_needs_nothing_else_and_escapes_what_it_is_given():
+    random = np.random.default_rng(4)
+    gains = 1 + 0.001 * random.normal(size=30) + 0.02 * (np.arange(30) >= 15)
+    rows = [row("<b>&", index, gain) for index, gain in enumerate(gains)]
+    rows[5]["findings"] = [{"cause": "hysteresis", "probability": 0.9, "parameters": []}]
+    # An interval that says nothing, and an error text.
+    rows[20]["identified"] = [{"name": "gain", "value": 7.0, "low": -90.0, "high": 90.0, "unit": "<V>"}]
+    rows.append(row("<b>&", 30, 1.0, status="refused", verdict=None, error="<script>", findings=None, identified=None))
+    found = summary.summary(rows)
+    [series] = found.series
+    assert series.imprecise == 1 and series.drift.by_record.record.endswith("015.csv") and series.drift.strength > 5
+    html = page.page(found, "springs", Settings({}, "quick"))
+    for part in ("prefers-color-scheme: dark", "max-width: 640px", 'data-name="spring"', "&lt;b&gt;&amp;", "&lt;script&gt;", "hysteresis since"):
+        assert part in html, part
+    assert "<script" not in html and "<b>" not in html and not re.search(r'(src|href)=|url\(|@import', html)
+    assert html.count("<svg") == 1 and "nan" not in re.findall("<svg.*?</svg>", html, re.DOTALL)[0]
+
+
+def test_the_cost_of_a_larger_fleet_is_what_the_page_of_formulas_says():
+    small = cost.Measured(records=100, seconds=0.5, record_bytes=1e5, row_bytes=400, task_s=1e-3)
+    of = cost.estimate(small, 1_000_000, cores=100, price=0.04, batch=16)
+    assert of.cpu_s == 500_000 and of.limits["cores"] == 5000 and of.limits["scheduler"] == pytest.approx(62.5)
+    assert of.bottleneck == "cores" and of.useful_cores == 8000
+    # 62 500 parts, read twice by 32 readers of 0.1 s each.
+    assert of.end_s == 390.625 and of.time_s == 5000 + 8 + 390.625
+    assert of.cost == pytest.approx(of.time_s / 3600 * 100 * 0.04)
+    assert cost.estimate(small, 1_000_000, cores=20_000, price=0.04, batch=16).bottleneck == "object store"
+    assert cost.estimate(small, 1_000_000, cores=2000, price=0.04, batch=1).bottleneck == "scheduler"
+    assert "bottleneck                              cores" in cost.text(small, of)
+
+
+def test_the_schema_of_the_table_is_in_the_manual():
+    manual = (ROOT / "docs/fleet.md").read_text()
+    assert [name for name in store.SCHEMA.names if f"`{name}`" not in manual] == []
+
+
+def test_the_commands_of_the_manual_run(copied, tmp_path, monkeypatch, capsys):
+    page = (ROOT / "docs/fleet.md").read_text()
+    lines = [line for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL) for line in block.splitlines()]
+    commands = [shlex.split(line)[3:] for line in lines if line.startswith("python -m vsj.fleet ")]
+    examples = [shlex.split(line)[3:] for line in fleet._EXAMPLES.splitlines() if line.startswith("  python -m vsj.fleet ")]
+    assert len(commands) == 5 and len(examples) == 5
+    for words in commands + examples:
+        fleet._parser().parse_args(words)
+    (tmp_path / "data").mkdir()
+    copied.rename(tmp_path / "data/springs")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cost, "_TASKS", 200)
+    for words, printed in ((commands[0], "wrote out/fleet/fleet.html"), (commands[-1], "1000000 records in batches of 64")):
+        assert fleet.main(words) == 0
+        assert printed in capsys.readouterr().out

@@ -1,0 +1,131 @@
+"""The loop that has records diagnosed: a bounded number of batches in progress, none done twice, none lost.
+
+A batch whose worker dies is given to another by Dask, three times. Then its records are tried one by one, and one that ends its worker
+again has a row that says so. If the scheduler is lost, the run ends; the next one goes on with what is not finished.
+"""
+
+from concurrent.futures import CancelledError
+
+import numpy as np
+from distributed import KilledWorker, as_completed
+from distributed.comm import CommClosedError
+
+from . import store, work
+
+_AHEAD = 3
+"""Batches in progress for each thread of a worker: one that is computed, and two that wait there."""
+
+
+class SchedulerLost(ConnectionError):
+    """The scheduler has gone, and with it the work in progress."""
+
+
+class Outcome:
+    """Key and status of the result of each record, in the order of the records."""
+
+    def __init__(self, count):
+        self.keys = np.full(count, b"", "S32")
+        self.failed = np.zeros(count, bool)
+        self.refused = 0
+        self.before = 0
+        """Records that were finished before this run."""
+        self.new = 0
+        """Records that were diagnosed, refused or failed in this run."""
+
+    def add(self, start, done):
+        """Take in what a worker answers for the batch that begins at record ``start``."""
+        for index, (key, status, is_new) in enumerate(done, start):
+            self.keys[index] = (key or "").encode()
+            self.failed[index] = status == work.FAILED
+            self.refused += status == work.REFUSED
+            self.new += is_new
+            self.before += not is_new
+
+    def key(self, index):
+        """The key of a record's row, ``None`` for a failed one."""
+        return self.keys[index].decode() or None
+
+
+def run(client, records, settings, plants, folder, out, batch_size, on_progress):
+    """Diagnose what is not finished.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    records : pyarrow.Table
+        From :func:`records.listed`.
+    settings : Settings
+    plants : dict
+        Text of each plant by its name in ``records``, ``None`` for a name that the library knows.
+    folder, out : str
+        Addresses of records and results.
+    batch_size : int
+        Records in one task and one part.
+    on_progress : callable
+        Called with the :class:`Outcome` after each batch.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    SchedulerLost
+        What is finished stays so.
+    """
+    finished = _finished(out)
+    outcome = Outcome(len(records))
+
+    def batch(start, size):
+        rows = records.slice(start, size).to_pylist()
+        for row in rows:
+            row["finished"] = finished.get(row["record"], {})
+        return start, rows
+
+    def submit(start, rows):
+        wanted = {row["plant"]: plants[row["plant"]] for row in rows}
+        future = client.submit(work.diagnose, rows, wanted, settings, folder, out, pure=False)
+        in_progress[future] = (start, rows)
+        return future
+
+    in_progress = {}
+    batches = (batch(start, batch_size) for start in range(0, len(records), batch_size))
+    completed = as_completed()
+
+    def fill():
+        ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+        while len(in_progress) < ahead and (following := next(batches, None)):
+            completed.add(submit(*following))
+
+    try:
+        fill()
+        for future in completed:
+            start, rows = in_progress.pop(future)
+            try:
+                done = future.result()
+            except KilledWorker:
+                if len(rows) > 1:
+                    for index, row in enumerate(rows):
+                        completed.add(submit(start + index, [row]))
+                    continue
+                row = work.failed(rows[0], f"{rows[0]['record']}: every worker that diagnosed it died")
+                store.write_part(out, [row])
+                done = [(None, work.FAILED, True)]
+            outcome.add(start, done)
+            on_progress(outcome)
+            fill()
+    except Exception as error:
+        # Its end shows in the future that is waited for, or in the next request.
+        if client.status != "running" or isinstance(error, (CancelledError, CommClosedError)):
+            raise SchedulerLost("the scheduler is lost") from error
+        raise
+    return outcome
+
+
+def _finished(out):
+    """Keys and status of each record's results that another run need not repeat."""
+    there, finished = store.finished(out), {}
+    for record, key, status in zip(*(there[name].to_pylist() for name in ("record", "key", "status"))):
+        if status != work.FAILED:
+            finished.setdefault(record, {})[key] = status
+    return finished
