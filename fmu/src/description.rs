@@ -205,7 +205,7 @@ fn structure(variables: &[Variable], version: Version) -> String {
     };
     match version {
         Version::Two => {
-            let unknowns = list("  Unknown", |index| format!("index=\"{}\"", index + 1));
+            let unknowns = list("Unknown", |index| format!("index=\"{}\"", index + 1));
             format!(
                 "  <ModelStructure>\n    <Outputs>\n{unknowns}    </Outputs>\n    <InitialUnknowns>\n{unknowns}    \
                  </InitialUnknowns>\n  </ModelStructure>\n"

@@ -273,6 +273,8 @@ fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> i
     let list = |table: &'static str, key: &'static str, count: usize, number: fn(usize) -> Number| {
         (0..count).map(move |index| (format!("{table}.{key}[{}]", index + 1), number(index)))
     };
+    // The first point of a law is the origin.
+    let is_free = |number: &Number| !matches!(number, Number::LawVoltage(0) | Number::LawStiffness(0));
     let one = |name: &str, number| std::iter::once((name.to_owned(), number));
     let (lags, weights) = (plant.relaxation.tau_s.len(), plant.relaxation.weights.len());
     let plays = plant.memory.as_ref().map_or(0, |memory| memory.thresholds_v.len());
@@ -292,6 +294,7 @@ fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> i
         .chain(one("reading.gain", Number::ReadingGain))
         .chain(one("reading.zero", Number::ReadingZero));
     let all: Vec<Variable> = all
+        .filter(|(_, number)| is_free(number))
         .filter_map(|(name, number)| {
             let start = *number.place(&mut plant)?;
             let (unit, range, description) = about(number, share);
