@@ -29,7 +29,8 @@
 extern "C" {
 #endif
 
-/* What a function returns. With every status but VSJ_OK its outputs are as they were, but for `error`. */
+/* What a function returns. With every status but VSJ_OK its outputs are as they were; a configuration that vsj_configure has
+ * refused is not configured. */
 typedef int32_t vsj_status;
 enum {
     VSJ_OK = 0,
