@@ -30,6 +30,7 @@ const EMULATION: &[(&str, &[&str])] = &[
     ("boot", &["boot"]),
     ("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
     ("story", &["story", "--check"]),
+    ("c library", &["capi"]),
 ];
 
 #[rustfmt::skip]

@@ -1,7 +1,6 @@
 //! Files of `vsj export c`.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Result;
