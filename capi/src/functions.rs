@@ -1,4 +1,4 @@
-//! The functions that C calls. A null pointer is an error, never a fault.
+//! The functions that C calls. A null pointer is an error, never a fault; every structure that is passed may have any bits.
 
 use core::ffi::c_char;
 use core::mem::MaybeUninit;
@@ -46,6 +46,13 @@ pub type ConfigSlot = Slot<AnyConfig>;
 /// `vsj_state`.
 pub type StateSlot = Slot<AnyState>;
 
+impl<T> Default for Slot<T> {
+    /// Memory without a value.
+    fn default() -> Self {
+        Self { mark: 0, value: MaybeUninit::uninit() }
+    }
+}
+
 impl<T> Slot<T> {
     fn put(&mut self, mark: u32, value: T) {
         self.value.write(value);
@@ -65,7 +72,7 @@ impl<T> Slot<T> {
 
 /// `vsj_error`: the setting that was refused. The texts end with 0.
 #[repr(C)]
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Refused {
     /// Name of the setting.
     pub field: [c_char; 32],
@@ -116,8 +123,8 @@ macro_rules! expect {
 
 exported! {
     /// Puts the report's settings into `settings`.
-    fn vsj_paper(settings: Option<&mut MaybeUninit<All>>) -> Status {
-        expect!(settings, NULL).write(All::paper());
+    fn vsj_paper(settings: Option<&mut All>) -> Status {
+        *expect!(settings, NULL) = All::paper();
         OK
     }
 
@@ -125,7 +132,7 @@ exported! {
     fn vsj_configure(
         config: Option<&mut ConfigSlot>,
         settings: Option<&All>,
-        error: Option<&mut MaybeUninit<Refused>>,
+        error: Option<&mut Refused>,
     ) -> Status {
         let (config, settings) = (expect!(config, NULL), expect!(settings, NULL));
         match AnyConfig::new(settings) {
@@ -136,7 +143,7 @@ exported! {
             Err(refused) => {
                 config.mark = 0;
                 if let Some(error) = error {
-                    error.write(refused.into());
+                    *error = refused.into();
                 }
                 OUT_OF_RANGE
             }
@@ -156,14 +163,14 @@ exported! {
         config: Option<&ConfigSlot>,
         state: Option<&mut StateSlot>,
         input: Option<&TickInput>,
-        output: Option<&mut MaybeUninit<TickOutput>>,
+        output: Option<&mut TickOutput>,
     ) -> Status {
         let (config, state) = (expect!(config, NULL), expect!(state, NULL));
         let (input, place) = (expect!(input, NULL), expect!(output, NULL));
         let config = expect!(config.read(CONFIGURED), NOT_CONFIGURED);
         let state = expect!(state.get(STARTED), NOT_STARTED);
         let output = expect!(config.tick(state, input.input()), NOT_STARTED);
-        place.write(output.into());
+        *place = output.into();
         OK
     }
 
@@ -172,14 +179,14 @@ exported! {
         config: Option<&ConfigSlot>,
         state: Option<&mut StateSlot>,
         input: Option<&TickInput>,
-        output: Option<&mut MaybeUninit<TickOutput>>,
+        output: Option<&mut TickOutput>,
     ) -> Status {
         let (config, state) = (expect!(config, NULL), expect!(state, NULL));
         let (input, place) = (expect!(input, NULL), expect!(output, NULL));
         let config = expect!(config.read(CONFIGURED), NOT_CONFIGURED);
         let state = expect!(state.get(STARTED), NOT_STARTED);
         let output = expect!(config.off(state, input.measured()), NOT_STARTED);
-        place.write(output.into());
+        *place = output.into();
         OK
     }
 
@@ -195,23 +202,22 @@ exported! {
     /// Puts the lowest and the highest voltage that is put out into `lowest` and `highest`.
     fn vsj_range(
         config: Option<&ConfigSlot>,
-        lowest: Option<&mut MaybeUninit<i32>>,
-        highest: Option<&mut MaybeUninit<i32>>,
+        lowest: Option<&mut i32>,
+        highest: Option<&mut i32>,
     ) -> Status {
         let config = expect!(expect!(config, NULL).read(CONFIGURED), NOT_CONFIGURED);
         let (lowest, highest) = (expect!(lowest, NULL), expect!(highest, NULL));
         let range = config.range();
-        lowest.write(range.0.0.to_bits());
-        highest.write(range.1.0.to_bits());
+        (*lowest, *highest) = (range.0.0.to_bits(), range.1.0.to_bits());
         OK
     }
 
     /// Rounds a voltage in V to steps of 2^-20 V.
-    fn vsj_from_volts(volts: f64, steps: Option<&mut MaybeUninit<i32>>) -> Status {
+    fn vsj_from_volts(volts: f64, steps: Option<&mut i32>) -> Status {
         let steps = expect!(steps, NULL);
         match Volts::new(volts) {
             Ok(volts) => {
-                steps.write(volts.0.to_bits());
+                *steps = volts.0.to_bits();
                 OK
             }
             Err(_) => OUT_OF_RANGE,
@@ -231,15 +237,15 @@ pub type Text = [c_char; 200];
 #[cfg(not(target_os = "none"))]
 exported! {
     /// Puts the error of `settings` into `line` as the command prints it; an empty line if there is none.
-    fn vsj_explain(settings: Option<&All>, line: Option<&mut MaybeUninit<Text>>) -> Status {
+    fn vsj_explain(settings: Option<&All>, line: Option<&mut Text>) -> Status {
         let (settings, line) = (expect!(settings, NULL), expect!(line, NULL));
         match AnyConfig::new(settings) {
             Ok(_) => {
-                line.write([0; 200]);
+                *line = [0; 200];
                 OK
             }
             Err(error) => {
-                line.write(text(&std::format!("{error}")));
+                *line = text(&std::format!("{error}"));
                 OUT_OF_RANGE
             }
         }

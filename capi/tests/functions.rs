@@ -1,45 +1,35 @@
 //! The functions of C, called from Rust: the same outputs as the tick's, and a status for every misuse.
 
-use std::mem::MaybeUninit;
-
 use model::{Amplifier, Feedback, Input, Reading, ScaledStiffness, Settings, State, Volts};
 use vsj_tick::functions::{
-    ConfigSlot, NOT_CONFIGURED, NOT_STARTED, NULL, OK, OUT_OF_RANGE, StateSlot, Text, vsj_configure, vsj_explain,
-    vsj_from_volts, vsj_off, vsj_paper, vsj_range, vsj_start, vsj_tick, vsj_to_volts, vsj_transfer,
+    ConfigSlot, NOT_CONFIGURED, NOT_STARTED, NULL, OK, OUT_OF_RANGE, Refused, StateSlot, Text, vsj_configure,
+    vsj_explain, vsj_from_volts, vsj_off, vsj_paper, vsj_range, vsj_start, vsj_tick, vsj_to_volts, vsj_transfer,
 };
 use vsj_tick::settings::{All, Sensor};
 use vsj_tick::tick::{TickInput, TickOutput};
 
-/// Memory as a C program has it before a value is put into it.
-fn memory<T>() -> Box<T> {
-    // SAFETY: integers and memory for a value may be zero.
-    unsafe { Box::new(MaybeUninit::zeroed().assume_init()) }
-}
-
-fn configured(settings: &All) -> Box<ConfigSlot> {
-    let mut config = memory();
+fn configured(settings: &All) -> ConfigSlot {
+    let mut config = ConfigSlot::default();
     assert_eq!(vsj_configure(Some(&mut config), Some(settings), None), OK);
     config
 }
 
-fn started(config: &ConfigSlot) -> Box<StateSlot> {
-    let mut state = memory();
+fn started(config: &ConfigSlot) -> StateSlot {
+    let mut state = StateSlot::default();
     assert_eq!(vsj_start(Some(config), Some(&mut state)), OK);
     state
 }
 
 fn tick(config: &ConfigSlot, state: &mut StateSlot, input: TickInput) -> TickOutput {
-    let mut output = MaybeUninit::new(TickOutput::default());
+    let mut output = TickOutput::default();
     assert_eq!(vsj_tick(Some(config), Some(state), Some(&input), Some(&mut output)), OK);
-    // SAFETY: it has been initialised.
-    unsafe { output.assume_init() }
+    output
 }
 
 fn steps(volts: f64) -> i32 {
-    let mut steps = MaybeUninit::new(0);
+    let mut steps = 0;
     assert_eq!(vsj_from_volts(volts, Some(&mut steps)), OK);
-    // SAFETY: it has been initialised.
-    unsafe { steps.assume_init() }
+    steps
 }
 
 #[test]
@@ -75,10 +65,9 @@ fn ticks_with_a_sensor_off_and_after_a_transfer_are_those_of_the_model() {
         let measured = (number % 2 != 0).then_some(measured);
         let target = Volts::new(target).unwrap();
         let (got, expected) = if (1000..1100).contains(&number) {
-            let mut output = MaybeUninit::new(TickOutput::default());
+            let mut output = TickOutput::default();
             assert_eq!(vsj_off(Some(&config), Some(&mut state), Some(&input), Some(&mut output)), OK);
-            // SAFETY: it has been initialised.
-            (unsafe { output.assume_init() }, rust.rest(&mut expected, measured))
+            (output, rust.rest(&mut expected, measured))
         } else {
             if number == 1100 {
                 assert_eq!(vsj_transfer(Some(&config), Some(&mut state), input.target), OK);
@@ -90,11 +79,9 @@ fn ticks_with_a_sensor_off_and_after_a_transfer_are_those_of_the_model() {
         assert_eq!(got, TickOutput::from(expected), "tick {number}");
     }
     assert_eq!(limits & !1, 2 | 4 | 8, "slew, lower end and target have acted");
-    let (mut lowest, mut highest) = (MaybeUninit::new(0), MaybeUninit::new(0));
+    let (mut lowest, mut highest) = (0, 0);
     assert_eq!(vsj_range(Some(&config), Some(&mut lowest), Some(&mut highest)), OK);
-    // SAFETY: they have been initialised.
-    let range = unsafe { [lowest.assume_init(), highest.assume_init()] };
-    assert_eq!(range.map(|steps| vsj_to_volts(steps)), [rust.range().0.to_f64(), rust.range().1.to_f64()]);
+    assert_eq!([vsj_to_volts(lowest), vsj_to_volts(highest)], [rust.range().0.to_f64(), rust.range().1.to_f64()]);
 }
 
 #[test]
@@ -105,8 +92,8 @@ fn every_misuse_has_a_status() {
     (extended.spring.direct, extended.spring.lags) = (0.9, 1);
     let mut of_other = started(&configured(&extended));
     let (mut state, input) = (started(&config), TickInput::default());
-    let mut output = MaybeUninit::new(TickOutput::default());
-    let (empty, mut fresh) = (memory::<ConfigSlot>(), memory::<StateSlot>());
+    let mut output = TickOutput::default();
+    let (empty, mut fresh) = (ConfigSlot::default(), StateSlot::default());
     let out = &mut output;
     assert_eq!(vsj_tick(None, Some(&mut state), Some(&input), Some(out)), NULL);
     assert_eq!(vsj_tick(Some(&config), None, Some(&input), Some(out)), NULL);
@@ -122,17 +109,16 @@ fn every_misuse_has_a_status() {
     assert_eq!(vsj_paper(None), NULL);
     assert_eq!(vsj_configure(None, Some(&paper), None), NULL);
     for volts in [f64::NAN, 2001.0] {
-        assert_eq!(vsj_from_volts(volts, Some(&mut MaybeUninit::new(0))), OUT_OF_RANGE);
+        assert_eq!(vsj_from_volts(volts, Some(&mut 0)), OUT_OF_RANGE);
     }
 }
 
 #[test]
 fn a_refused_setting_is_named_and_a_refused_configuration_is_none() {
-    let (mut config, mut error) = (configured(&All::paper()), MaybeUninit::uninit());
+    let (mut config, (letters, unit)) = (configured(&All::paper()), ([0; 32], [0; 64]));
+    let mut error = Refused { field: letters, value: 0.0, lowest: 0.0, highest: 0.0, unit };
     let bad = All { full_scale_v: 20_000.0, ..All::paper() };
     assert_eq!(vsj_configure(Some(&mut config), Some(&bad), Some(&mut error)), OUT_OF_RANGE);
-    // SAFETY: a refused setting fills it.
-    let error = unsafe { error.assume_init() };
     let text = |letters: &[std::ffi::c_char]| -> String {
         letters.iter().take_while(|letter| **letter != 0).map(|letter| *letter as u8 as char).collect()
     };
@@ -141,10 +127,8 @@ fn a_refused_setting_is_named_and_a_refused_configuration_is_none() {
         ("full_scale_v", 2e4, 50.0, 1e3)
     );
     assert_eq!(text(&error.unit), "V");
-    assert_eq!(vsj_start(Some(&config), Some(&mut memory())), NOT_CONFIGURED);
-    let mut line: MaybeUninit<Text> = MaybeUninit::uninit();
+    assert_eq!(vsj_start(Some(&config), Some(&mut StateSlot::default())), NOT_CONFIGURED);
+    let mut line: Text = [0; 200];
     assert_eq!(vsj_explain(Some(&bad), Some(&mut line)), OUT_OF_RANGE);
-    // SAFETY: it has been filled.
-    let line = text(&unsafe { line.assume_init() });
-    assert_eq!(line, "full_scale_v = 20000 is not allowed: expected 50 to 1000 V");
+    assert_eq!(text(&line), "full_scale_v = 20000 is not allowed: expected 50 to 1000 V");
 }

@@ -13,16 +13,16 @@ const FUNCTIONS: &str = include_str!("../src/functions.rs");
 
 /// Types of Rust and of C.
 const TYPES: &[(&str, &str)] = &[
-    ("Option<&mut MaybeUninit<All>>", "vsj_settings *"),
+    ("Option<&mut All>", "vsj_settings *"),
     ("Option<&All>", "const vsj_settings *"),
     ("Option<&mut ConfigSlot>", "vsj_config *"),
     ("Option<&ConfigSlot>", "const vsj_config *"),
     ("Option<&mut StateSlot>", "vsj_state *"),
-    ("Option<&mut MaybeUninit<Refused>>", "vsj_error *"),
+    ("Option<&mut Refused>", "vsj_error *"),
     ("Option<&TickInput>", "const vsj_input *"),
-    ("Option<&mut MaybeUninit<TickOutput>>", "vsj_output *"),
-    ("Option<&mut MaybeUninit<i32>>", "int32_t *"),
-    ("Option<&mut MaybeUninit<Text>>", "vsj_text *"),
+    ("Option<&mut TickOutput>", "vsj_output *"),
+    ("Option<&mut i32>", "int32_t *"),
+    ("Option<&mut Text>", "vsj_text *"),
     ("i32", "int32_t "),
     ("f64", "double "),
     ("Status", "vsj_status "),

@@ -131,7 +131,9 @@ impl Instance {
         let rate_hz = machine.rate_hz();
         let (now, end) = ((from_s - *start_s) * rate_hz, (from_s + step_s - *start_s) * rate_hz);
         let time_s = |ticks: u64| *start_s + ticks as f64 / rate_hz;
-        if !((now - *ticks as f64).abs() <= TOLERANCE) {
+        // NaN is near nothing.
+        let is_near = |time: f64, tick: f64| (time - tick).abs() <= TOLERANCE;
+        if !is_near(now, *ticks as f64) {
             bad_input!(
                 "a step begins at {} s: expected {} s, where the last one has ended",
                 number(from_s),
@@ -139,7 +141,7 @@ impl Instance {
             );
         }
         let last = end.round();
-        if !((end - last).abs() <= TOLERANCE && last > *ticks as f64) {
+        if !is_near(end, last) || last <= *ticks as f64 {
             bad_input!(
                 "a step of {} s is {} ticks: expected a whole number of ticks of {} s",
                 number(step_s),

@@ -6,7 +6,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`unit`] | a kind of unit, its spring and its settings, and their files in `resources` |
+//! | [`mod@unit`] | a kind of unit, its spring and its settings, and their files in `resources` |
 //! | [`variables`] | the variables of a unit: names, units, ranges, start values |
 //! | [`description`] | `modelDescription.xml` for both versions |
 //! | `machine` | values of the variables in, ticks, values out |
