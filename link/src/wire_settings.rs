@@ -8,7 +8,7 @@ use model::device::{self, Watchdogs};
 use model::{Amplifier, Approach, Compensation, Feedback, Gains, Settings, supervisor};
 use serde::{Deserialize, Serialize};
 
-use crate::block::PART;
+use crate::block::{self, PART};
 use crate::field::Field;
 use crate::reply::Controller;
 
@@ -150,25 +150,13 @@ impl WireSettings {
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the longest.
     #[inline(never)]
     pub fn payload(&self) -> Option<Payload> {
-        let mut bytes = Payload::new();
-        bytes.resize_default(MOST_BYTES).ok()?;
-        let (format, message) = bytes.split_first_mut()?;
-        *format = FORMAT;
-        let length = 1 + postcard::to_slice(self, message).ok()?.len();
-        bytes.truncate(length);
-        Some(bytes)
+        block::write(FORMAT, self)
     }
 
     /// Deserialises a payload. `None` for another format and for bytes that are not exactly one set of settings.
     #[inline(never)]
     pub fn read(payload: &[u8]) -> Option<Self> {
-        match payload.split_first() {
-            Some((&FORMAT, message)) => match postcard::take_from_bytes(message) {
-                Ok((settings, [])) => Some(settings),
-                _ => None,
-            },
-            _ => None,
-        }
+        block::read(FORMAT, payload)
     }
 }
 
