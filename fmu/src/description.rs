@@ -241,3 +241,42 @@ fn fnv_1a(bytes: &[u8]) -> u128 {
         (digest ^ u128::from(byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use simulation::control_loop::Options;
+    use simulation::plant_file;
+
+    #[test]
+    fn the_token_follows_version_kind_settings_and_spring() {
+        let paper = || plant_file::load("paper").expect("the report's spring");
+        let unit = Unit { kind: Kind::Both, plant: paper(), options: Options::PAPER };
+        let mut slower = paper();
+        slower.relaxation.tau_s[0] = 5.6;
+        let others = [
+            Unit { kind: Kind::Spring, ..unit.clone() },
+            Unit { options: Options { kp: 3.0, ..Options::PAPER }, ..unit.clone() },
+            Unit { plant: slower, ..unit.clone() },
+        ];
+        let tokens = |unit: &Unit| Version::ALL.map(|version| unit.token(version));
+        assert_eq!(tokens(&unit), tokens(&unit.clone()));
+        let mut all: Vec<String> = others.iter().chain([&unit]).flat_map(tokens).collect();
+        all.sort();
+        all.dedup();
+        assert_eq!(all.len(), 8);
+        assert!(unit.description(Version::Three).contains(&unit.token(Version::Three)));
+    }
+
+    /// Test vectors published by the authors of FNV.
+    #[test]
+    fn the_digest_is_fnv_1a_with_128_bits() {
+        assert_eq!(fnv_1a(b""), 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+        assert_eq!(fnv_1a(b"a"), 0xd228_cb69_6f1a_8caf_7891_2b70_4e4a_8964);
+    }
+
+    #[test]
+    fn texts_of_a_plant_file_do_not_end_an_attribute() {
+        assert_eq!(escaped("a\"<&>\n\u{b5}"), "a&quot;&lt;&amp;&gt; \u{b5}");
+    }
+}

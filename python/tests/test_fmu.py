@@ -266,10 +266,12 @@ def test_the_same_export_is_the_same_bytes_and_bad_input_is_named(command, expor
     assert (tmp_path / unit["file"]).read_bytes() == (export("paper") / unit["file"]).read_bytes()
     with zipfile.ZipFile(tmp_path / unit["file"]) as archive:
         assert "resources/plant.toml" in archive.namelist()
+    built = Path(command.path).parent / "deps/libvsj_fmu.so"
     no_library = tmp_path / "library.so"
     no_library.write_bytes(b"\x7fELF")
     for words, expected in (
         (["--library", no_library], "library.so: expected the shared library of the package fmu, for x86_64 or aarch64 "),
+        (["--library", built, "--library", built], ": a second one for "),
         (["--plant", "no.toml"], "no.toml: cannot be read: "),
         (["--kp", 0], "--kp: proportional_gain = 0 is not allowed: "),
         (["--approach-s", 0.1], "--approach-s applies to the fast controller only: "),

@@ -1,15 +1,17 @@
 //! The options of a controlled loop, which `vsj stair` and `vsj export` share.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use model::Gains;
-use simulation::control_loop::{self, Options};
+use simulation::control_loop::{Controller, Options};
+
+use super::choice::{CONTROLLER, one_of};
 
 /// Spring, controller and amplifier.
 #[derive(Args, Debug)]
 pub(crate) struct LoopArguments {
     /// Controller
-    #[arg(long, value_enum, default_value_t = Controller::Paper)]
-    pub(crate) controller: Controller,
+    #[arg(long, value_parser = one_of(CONTROLLER), default_value = "paper")]
+    controller: Controller,
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded limit and slew apply where they are stricter than
     /// the options
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
@@ -40,26 +42,10 @@ pub(crate) struct LoopArguments {
     rate_hz: f64,
 }
 
-/// `--controller`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Controller {
-    /// No controller: the target is the voltage
-    None,
-    /// The report's proportional-integral pre-compensator
-    Paper,
-    /// Time-optimal: the end of the range until the target can be held, then the holding voltage
-    Fast,
-}
-
 impl LoopArguments {
     /// The settings of the loop.
     pub(crate) fn options(&self) -> Options {
-        let Self { limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, .. } = *self;
-        let controller = match self.controller {
-            Controller::None => control_loop::Controller::None,
-            Controller::Paper => control_loop::Controller::Paper,
-            Controller::Fast => control_loop::Controller::Fast,
-        };
+        let Self { controller, limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, .. } = *self;
         Options { controller, limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, feedback: None }
     }
 }

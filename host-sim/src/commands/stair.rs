@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::choice::{BETWEEN, one_of};
-use super::loop_arguments::{Controller, LoopArguments};
+use super::loop_arguments::LoopArguments;
 use anyhow::Result;
 use clap::{Args, Parser};
 use host_sim::output::files::{Files, write_csv};
@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use paper::stair::request::{Answer, Request, Target};
 use simulation::bad_input;
 use simulation::bad_input::number;
-use simulation::control_loop::{self, Options};
+use simulation::control_loop::{Controller, Options};
 use simulation::experiment::paper_spring;
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
@@ -73,7 +73,7 @@ impl Arguments {
         let options = self.control.options();
         // The loop without a controller is run beside one with the report's.
         let compared = match options.controller {
-            control_loop::Controller::None => control_loop::Controller::Paper,
+            Controller::None => Controller::Paper,
             controller => controller,
         };
         Request {
@@ -81,7 +81,7 @@ impl Arguments {
             paper: self.control.plant == "paper",
             target,
             compensation: Options { controller: compared, ..options }.compensation(),
-            controlled: options.controller != control_loop::Controller::None,
+            controlled: options.controller != Controller::None,
             amplifier: options.amplifier(),
             rate_hz: options.rate_hz,
         }
@@ -137,7 +137,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     })?;
     bar.finish_and_clear();
     let paths = match &arguments.out {
-        Some(folder) => write(folder, &answer, arguments.control.controller != Controller::None, stride)?,
+        Some(folder) => write(folder, &answer, arguments.control.options().controller != Controller::None, stride)?,
         None => Vec::new(),
     };
     print(&if arguments.json { json(&answer.report)? } else { stair::text(&answer.report) + &wrote(&paths) })

@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use host_sim::output::export::fmu::{Units, text, write};
 use host_sim::output::export::library::{Library, find};
 use host_sim::output::files::Files;
 use host_sim::output::terminal::{json, print, remark, wrote};
+use simulation::bad_input;
 use simulation::plant_file;
 use vsj_fmu::{Kind, Unit, Version};
 
+use super::super::choice::{FMI, UNIT, one_of};
 use super::super::loop_arguments::LoopArguments;
 
 /// Name of the library beside `vsj`, without its ending.
@@ -34,11 +36,11 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     control: LoopArguments,
     /// Parts in the unit, repeatable; default: a unit of each
-    #[arg(long, value_enum)]
-    unit: Vec<Parts>,
+    #[arg(long, value_parser = one_of(UNIT))]
+    unit: Vec<Kind>,
     /// Version of FMI, repeatable; default: both
-    #[arg(long, value_enum, value_name = "2|3")]
-    fmi: Vec<Fmi>,
+    #[arg(long, value_parser = one_of(FMI), value_name = "2|3")]
+    fmi: Vec<Version>,
     /// The library for the units, repeatable for several platforms; default: the one beside `vsj`
     #[arg(long, value_name = "FILE")]
     library: Vec<PathBuf>,
@@ -48,26 +50,6 @@ pub(crate) struct Arguments {
     /// One JSON object on stdout
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Parts {
-    /// The spring alone: voltage in, stiffness out
-    Spring,
-    /// The controller: target in, voltage out
-    Controller,
-    /// Both: target in, stiffness out
-    Both,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Fmi {
-    /// FMI 2.0
-    #[value(name = "2")]
-    Two,
-    /// FMI 3.0
-    #[value(name = "3")]
-    Three,
 }
 
 /// Runs the command.
@@ -80,30 +62,36 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let unit = Unit { kind: Kind::Both, plant, options: arguments.control.options() };
     unit.options.check()?;
     unit.check()?;
-    let libraries = if arguments.library.is_empty() {
-        vec![find(LIBRARY, "cargo build --release -p fmu")?]
-    } else {
-        arguments.library.iter().map(|path| Library::read(path)).collect::<Result<_>>()?
+    let libraries = libraries(&arguments.library)?;
+    let all = Kind::ALL.into_iter().flat_map(|kind| Version::ALL.map(|version| (kind, version)));
+    let is_wanted = |(kind, version): &(Kind, Version)| {
+        (arguments.unit.is_empty() || arguments.unit.contains(kind))
+            && (arguments.fmi.is_empty() || arguments.fmi.contains(version))
     };
-    let kinds = Kind::ALL.into_iter().filter(|kind| {
-        let is_this = |parts: &Parts| match parts {
-            Parts::Spring => *kind == Kind::Spring,
-            Parts::Controller => *kind == Kind::Controller,
-            Parts::Both => *kind == Kind::Both,
-        };
-        arguments.unit.is_empty() || arguments.unit.iter().any(is_this)
-    });
-    let versions: Vec<Version> = Version::ALL
-        .into_iter()
-        .filter(|version| {
-            let is_this = |fmi: &Fmi| (*fmi == Fmi::Two) == (*version == Version::Two);
-            arguments.fmi.is_empty() || arguments.fmi.iter().any(is_this)
-        })
-        .collect();
-    let wanted = kinds.flat_map(|kind| versions.iter().map(move |version| (kind, *version)));
-    let units = Units { unit: &unit, plant_text: &plant_text, libraries: &libraries, wanted: wanted.collect() };
+    let units =
+        Units { unit: &unit, plant_text: &plant_text, libraries: &libraries, wanted: all.filter(is_wanted).collect() };
     let mut files = Files::new(&arguments.out)?;
     let answer = write(&units, &mut files, not_simulated)?;
     let paths = files.finish()?;
     print(&if arguments.json { json(&answer)? } else { text(&answer) + &wrote(&paths) })
+}
+
+/// The libraries in `files`, one for each platform; without a file the one beside this program.
+fn libraries(files: &[PathBuf]) -> Result<Vec<Library>> {
+    if files.is_empty() {
+        return Ok(vec![find(LIBRARY, "cargo build --release -p fmu")?]);
+    }
+    let mut libraries: Vec<Library> = Vec::new();
+    for file in files {
+        let library = Library::read(file)?;
+        if libraries.iter().any(|other| other.platform == library.platform) {
+            bad_input!(
+                "--library {}: a second one for {}; expected one a platform",
+                file.display(),
+                library.platform.name
+            );
+        }
+        libraries.push(library);
+    }
+    Ok(libraries)
 }

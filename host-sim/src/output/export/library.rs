@@ -32,8 +32,11 @@ pub struct Platform {
     pub ending: &'static str,
 }
 
+/// Whether a file is for a platform.
+type IsFor = fn(&[u8]) -> bool;
+
 /// Platforms for which a unit can have a library, and how each of their files begins.
-const PLATFORMS: [(Platform, fn(&[u8]) -> bool); 6] = [
+const PLATFORMS: [(Platform, IsFor); 6] = [
     (Platform { name: "x86_64-linux", in_fmi_2: "linux64", ending: ".so" }, |bytes| elf(bytes) == Some(0x3e)),
     (Platform { name: "aarch64-linux", in_fmi_2: "aarch64-linux", ending: ".so" }, |bytes| elf(bytes) == Some(0xb7)),
     (Platform { name: "x86_64-windows", in_fmi_2: "win64", ending: ".dll" }, |bytes| pe(bytes) == Some(0x8664)),
