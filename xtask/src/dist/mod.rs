@@ -88,13 +88,11 @@ fn commands(program: &Path, folder: &Path) -> Result<()> {
 fn libraries(target: &Path, program: &Path, host: &str, folder: &Path) -> Result<()> {
     let file = format!("{}vsj_fmu{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     // Built with `vsj`, which depends on it.
-    copy(&target.join("dist/deps").join(&file), &folder.join(&file))?;
+    files::copy(&target.join("dist/deps").join(&file), &folder.join(&file))?;
     let c = folder.join("c");
     shell::output(shell::command(program).args(["export", "c", "--out"]).arg(&c))?;
     for (name, library) in [(host, build::c_library(false)?), (shell::MCU, build::c_library(true)?)] {
-        let place = c.join("lib").join(name);
-        make(&place)?;
-        copy(&library, &place.join(library.file_name().context("a library has a name")?))?;
+        files::copy(&library, &c.join("lib").join(name).join(library.file_name().context("a library has a name")?))?;
     }
     Ok(())
 }
