@@ -33,6 +33,7 @@ const BESIDE: &[Step] = &[
     Step::emulation("boot", &["boot"]),
     Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
     Step::emulation("story", &["story", "--check"]),
+    Step::emulation("c library", &["capi"]),
 ];
 
 #[rustfmt::skip]

@@ -5,6 +5,7 @@
 //! | [`terminal`], [`screen`] | stdout and stderr; a status that is refreshed in place |
 //! | [`files`] | the files of one run: all of them or none |
 //! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`isolate`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
+//! | [`export`] | spring and controller for other programs |
 //! | [`recording`] | telemetry as CSV while it arrives |
 //! | [`figure`], [`plots`] | plots as SVG |
 //! | `chart`, `page` | the parts of all plots and of all report pages |
@@ -17,6 +18,7 @@ mod colours;
 pub mod compare;
 pub mod diagnosis;
 pub mod dynamics;
+pub mod export;
 pub mod figure;
 pub mod files;
 pub mod identify;
