@@ -7,12 +7,14 @@
 //! - [`qemu`] runs an image under QEMU and compares the run with the same code on the host: [`emulate`], [`rivals`],
 //!   [`blocks`], [`isolation`], [`drill`], [`talk`], [`clients`], [`story`].
 //! - [`boot`] runs the image that is flashed on models of the chip's registers.
+//! - [`capi`] builds the C library's example and compares its run on this machine and under QEMU with the same in Rust.
 //! - [`soak`] runs random ticks of the control on the host and checks every invariant in each.
 //! - [`proof`] is what all of `cargo xtask test` asks of the emulated board.
 
 mod binary;
 mod blocks;
 mod boot;
+mod capi;
 mod clients;
 mod drill;
 mod emulate;
@@ -119,6 +121,12 @@ Examples:
   cargo xtask boot --controller fast                   the image of the time-optimal controller
   cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V")]
     Boot(Variant),
+    /// Build the C library's example, run it here and under QEMU
+    ///
+    /// As a user does: settings by `vsj export c`, the libraries by cargo, the example by CMake, for this machine and for a
+    /// Cortex-M4. Exits with 1 unless every DAC code and every estimate is Rust's, bit for bit, and the program for the Cortex-M4
+    /// contains no panic and no allocator. Installs CMake and GCC for ARM with apt-get unless they are there. A part of `test`.
+    Capi,
     /// Run random ticks on the host and check every invariant in each
     ///
     /// Random settings, commands, readings, missed ticks, silences, interlock openings and faults. In each tick: range,
@@ -141,6 +149,7 @@ fn main() -> ExitCode {
         Command::Story(args) => story::run(&args),
         Command::Size(args) => size::run(&args),
         Command::Boot(variant) => boot::run(variant),
+        Command::Capi => capi::run(),
         Command::Soak(args) => soak::run(&args),
     };
     match result {

@@ -5,19 +5,13 @@ use identify::effects::model::Model;
 use identify::fit::simulator::Simulator;
 use identify::plant::base::Base;
 use identify::record::data::Data;
-use model::estimator::Estimator;
-use model::extended;
-use model::{
-    Amplifier, Approach, Compensation, Config, Feedback, Gains, Input, OutOfRange, Output, Reading, ScaledStiffness,
-    Settings, State, Volts,
-};
+use model::{Feedback, Input, OutOfRange, Output, Reading, ScaledStiffness, Volts};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use simulation::bad_input;
 use simulation::bad_input::BadInput;
-use simulation::experiment::with_plant;
+use simulation::control_loop::{self, ControlLoop, Options};
 use simulation::open_loop;
-use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{Record, Row};
 
@@ -54,23 +48,12 @@ pub(crate) struct Sensor {
     fade_s: f64,
 }
 
-/// The error of the settings, with the option of the command that sets the field.
-fn refused(error: OutOfRange) -> anyhow::Error {
-    named(BadInput(error.to_string()).into(), SETTINGS)
-}
-
 /// Loads a spring that the tick simulates.
 fn load(plant: Plant) -> Result<PlantFile> {
     match plant {
         Plant::Named(name) => plant_file::load(&name),
         Plant::Text((name, text)) => plant_file::parse(&name, &text),
     }
-}
-
-/// The two kinds of springs. A plain one runs in the plain tick, as in `vsj stair`.
-enum Loop {
-    Plain(Box<(Config, State)>),
-    Extended(Box<(Config<extended::Config>, State<extended::State>)>),
 }
 
 /// What the ticks put out, one value per tick.
@@ -82,21 +65,9 @@ struct Samples {
     limits: Vec<u8>,
 }
 
-impl Loop {
-    fn new(plant: Plant, options: LoopOptions) -> Result<(Self, Vec<String>)> {
-        if options.approach_s.is_some() && options.controller != "fast" {
-            bad_input!("--approach-s applies to the fast controller only: expected --controller fast");
-        }
-        let compensation = match options.controller.as_str() {
-            "none" => Compensation::None,
-            "paper" => {
-                Compensation::ProportionalIntegral(Gains { proportional: options.kp, integral_per_s: options.ki })
-            }
-            "fast" => Compensation::TimeOptimal(Approach { time_constant_s: options.approach_s.unwrap_or(0.0) }),
-            other => bad_input!("--controller {other}: expected none, paper or fast"),
-        };
-        let file = load(plant)?;
-        let feedback = options.feedback.map(|it| Feedback {
+impl LoopOptions {
+    fn options(self) -> Result<Options> {
+        let feedback = self.feedback.map(|it| Feedback {
             noise_v: it.noise_v,
             model_uncertainty: it.model_uncertainty,
             fastest_s: it.fastest_s,
@@ -106,64 +77,30 @@ impl Loop {
             highest_v: it.highest_v,
             fade_s: it.fade_s,
         });
-        let settings = Settings {
-            rate_hz: options.rate_hz,
-            plant: file.extended(),
-            compensation,
-            amplifier: file.behind(Amplifier {
-                min_v: options.min_v,
-                slew_v_per_s: options.slew_v_per_s,
-                dac_bits: options.dac_bits,
-                ..Amplifier::up_to(options.limit_v)
-            }),
+        Ok(Options {
+            controller: control_loop::Controller::by_name(&self.controller)?,
+            limit_v: self.limit_v,
+            min_v: self.min_v,
+            slew_v_per_s: self.slew_v_per_s,
+            dac_bits: self.dac_bits,
+            kp: self.kp,
+            ki: self.ki,
+            approach_s: self.approach_s,
+            rate_hz: self.rate_hz,
             feedback,
-        };
-        let plain = settings.plant.plain().filter(|_| settings.amplifier.max_v == options.limit_v);
-        let this = match plain {
-            Some(plant) => {
-                let settings = with_plant(&settings, plant);
-                Self::Plain(Box::new((settings.validate().map_err(refused)?.quantize(), State::default())))
-            }
-            None => Self::Extended(Box::new((settings.validate().map_err(refused)?.quantize(), State::default()))),
-        };
-        Ok((this, file.left_out()))
-    }
-
-    fn run(&mut self, targets: &[f64], readings: Option<&[f64]>) -> Result<Samples> {
-        match self {
-            Self::Plain(it) => run(&it.0, &mut it.1, targets, readings),
-            Self::Extended(it) => run(&it.0, &mut it.1, targets, readings),
-        }
+        })
     }
 }
 
 /// Runs one tick per target in V; a reading in V that is NaN is none. Checks all before the first tick.
-fn run<E: Estimator>(
-    config: &Config<E>,
-    state: &mut State<E::State>,
-    targets: &[f64],
-    readings: Option<&[f64]>,
-) -> Result<Samples> {
+fn run(control: &mut ControlLoop, targets: &[f64], readings: Option<&[f64]>) -> Result<Samples> {
     let at = |name: &str, tick: usize, error: OutOfRange| BadInput(format!("{name}[{tick}]: {error}"));
     if let Some(readings) = readings
         && readings.len() != targets.len()
     {
         bad_input!("readings: {} values; expected {}, one per target", readings.len(), targets.len());
     }
-    for (tick, &target) in targets.iter().enumerate() {
-        Volts::new(target).map_err(|error| at("targets", tick, error))?;
-    }
-    for (tick, &reading) in readings.unwrap_or_default().iter().enumerate() {
-        if !reading.is_nan() {
-            Volts::new(reading).map_err(|error| at("readings", tick, error))?;
-        }
-    }
-    let mut samples = Samples {
-        code: Vec::with_capacity(targets.len()),
-        applied_v: Vec::with_capacity(targets.len()),
-        stiffness: Vec::with_capacity(targets.len()),
-        limits: Vec::with_capacity(targets.len()),
-    };
+    let mut inputs = Vec::with_capacity(targets.len());
     for (tick, &target) in targets.iter().enumerate() {
         let target = Volts::new(target).map_err(|error| at("targets", tick, error))?;
         let measured = match readings.map(|readings| readings[tick]) {
@@ -173,19 +110,27 @@ fn run<E: Estimator>(
             }
             _ => None,
         };
-        let Output { code, applied, stiffness, limits, .. } = config.tick(state, Input { target, measured });
+        inputs.push(Input { target, measured });
+    }
+    let mut samples = Samples {
+        code: Vec::with_capacity(targets.len()),
+        applied_v: Vec::with_capacity(targets.len()),
+        stiffness: Vec::with_capacity(targets.len()),
+        limits: Vec::with_capacity(targets.len()),
+    };
+    control.run(inputs.into_iter(), |Output { code, applied, stiffness, limits, .. }| {
         samples.code.push(code.0);
         samples.applied_v.push(applied.to_f64());
         samples.stiffness.push(stiffness.to_f64());
         samples.limits.push(limits.bits());
-    }
+    });
     Ok(samples)
 }
 
 /// The controller: configuration and state of the tick.
 #[pyclass(module = "vsj._vsj")]
 pub(crate) struct Controller {
-    inner: Loop,
+    inner: ControlLoop,
     has_sensor: bool,
     #[pyo3(get)]
     not_simulated: Vec<String>,
@@ -200,25 +145,25 @@ impl Controller {
     #[new]
     fn new(plant: Plant, options: LoopOptions) -> PyResult<Self> {
         let has_sensor = options.feedback.is_some();
-        let (inner, not_simulated) = Loop::new(plant, options).map_err(exception)?;
+        let load = || {
+            let options = options.options()?;
+            options.check()?;
+            let file = load(plant)?;
+            Ok((ControlLoop::new(&file, &options)?, file.left_out()))
+        };
+        let (inner, not_simulated) = load().map_err(exception)?;
         Ok(Self { inner, has_sensor, not_simulated })
     }
 
     /// Forgets everything: the spring is at rest at 0 V.
     fn reset(&mut self) {
-        match &mut self.inner {
-            Loop::Plain(it) => it.1 = State::default(),
-            Loop::Extended(it) => it.1 = State::default(),
-        }
+        self.inner.reset();
     }
 
     /// The lowest and the highest voltage that is put out, in V.
     #[getter]
     fn range_v(&self) -> (f64, f64) {
-        let (low, high) = match &self.inner {
-            Loop::Plain(it) => it.0.range(),
-            Loop::Extended(it) => it.0.range(),
-        };
+        let (low, high) = self.inner.range();
         (low.to_f64(), high.to_f64())
     }
 
@@ -238,7 +183,7 @@ impl Controller {
         let targets = targets.as_array().to_vec();
         let readings = readings.map(|readings| readings.as_array().to_vec());
         let inner = &mut self.inner;
-        let samples = py.detach(|| inner.run(&targets, readings.as_deref())).map_err(exception)?;
+        let samples = py.detach(|| run(inner, &targets, readings.as_deref())).map_err(exception)?;
         Ok((
             samples.code.into_pyarray(py),
             samples.applied_v.into_pyarray(py),

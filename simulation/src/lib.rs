@@ -13,6 +13,7 @@
 //! | [`sampled`] | the loop at the controller's own rate, in double precision |
 //! | [`run`], [`has_reference`], [`experiment`] | fixed point and reference over a schedule |
 //! | [`open_loop`] | the fixed-point spring alone over a record |
+//! | [`control_loop`] | controller and spring of a plant file, one tick at a time |
 //! | [`isolation`] | the bank of fault signatures over a record, and its reference |
 //! | [`response`], [`bound`] | t50, t90, t97, overshoot of each step, and the shortest possible t97 |
 //! | [`spring_error`] | the tick on a spring that differs from its model, with a sensor or without |
@@ -23,6 +24,7 @@ pub mod bad_input;
 pub mod bound;
 pub mod bounded_file;
 pub mod comparison;
+pub mod control_loop;
 pub mod csv_table;
 pub mod experiment;
 pub mod has_reference;

@@ -425,7 +425,25 @@ fn load_checked(plant: &str, check: Check) -> Result<PlantFile> {
     if plant == "paper" {
         return Ok(Plant::PAPER.into());
     }
-    parse_checked(plant, &read_text(Path::new(plant), MOST_MIB, "`paper` or a plant file")?, check)
+    parse_checked(plant, &text_of(plant)?, check)
+}
+
+fn text_of(plant: &str) -> Result<String> {
+    read_text(Path::new(plant), MOST_MIB, "`paper` or a plant file")
+}
+
+/// Loads like [`load`], with the text of the file as it is; that of the report's spring is made.
+///
+/// # Errors
+/// The errors of [`load`].
+pub fn load_with_text(plant: &str) -> Result<(PlantFile, String)> {
+    if plant == "paper" {
+        let file = load(plant)?;
+        let text = file.to_toml()?;
+        return Ok((file, text));
+    }
+    let text = text_of(plant)?;
+    Ok((parse(plant, &text)?, text))
 }
 
 /// Loads like [`load`], but accepts the plain spring only.

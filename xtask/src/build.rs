@@ -74,6 +74,22 @@ pub fn vsj() -> Result<PathBuf> {
     Ok(shell::target_directory()?.join("release/vsj"))
 }
 
+/// Builds the C library for this machine, or for the MCU as its images are built. Returns its path.
+pub fn c_library(for_mcu: bool) -> Result<PathBuf> {
+    let mut command = shell::cargo();
+    // Alone, so that it is optimised as a whole.
+    command.args(["rustc", "--quiet", "-p", "capi", "--lib", "--crate-type", "staticlib"]);
+    let folder = if for_mcu {
+        command.args(["--profile", Opt::S.profile(), "--target", shell::MCU]);
+        format!("{}/{}", shell::MCU, Opt::S.profile())
+    } else {
+        command.arg("--release");
+        "release".to_owned()
+    };
+    shell::run(&mut command)?;
+    Ok(shell::target_directory()?.join(folder).join("libvsj_tick.a"))
+}
+
 /// Builds the default image of a board, with the paper's controller and the amplifier of 700 V. Returns the path of its
 /// ELF file.
 pub fn image(board: Board, opt: Opt) -> Result<PathBuf> {

@@ -117,6 +117,8 @@ Examples:
     Boot(Forwarded),
     /// Run random ticks on the host and check every invariant in each
     Soak(Forwarded),
+    /// Build the C library's example, run it here and under QEMU
+    Capi(Forwarded),
     /// Compare the host's speed with Python's
     ///
     /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Marks a time of Rust's above
@@ -187,7 +189,8 @@ Examples:
     Counts(counts::Args),
     /// Pack a release: vsj, images, documents, licences, checksums
     ///
-    /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the images of
+    /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the libraries for
+    /// FMI and C, the images of
     /// both boards for each controller and amplifier with their bills of materials, the manual, the page for a browser, the changes of
     /// this version, the licences of all dependencies, SHA256SUMS.
     #[command(
@@ -264,7 +267,7 @@ fn arguments() -> Vec<OsString> {
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
     use Command::{
-        Bench, Boot, Check, Clients, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof,
+        Bench, Boot, Capi, Check, Clients, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof,
     };
     use Command::{Manual, Prove, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
@@ -286,7 +289,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Sanitize(args) => sanitize::run(&args),
         Deny { require_advisories } => deny::run(require_advisories),
         Reproducible(variant) => reproducible::run(variant),
-        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Clients(_) | Story(_) | Size(_) | Boot(_) | Soak(_) => {
+        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Clients(_) | Story(_) | Size(_) | Boot(_) | Capi(_) | Soak(_) => {
             emulation::replace(args).map(|never: Infallible| match never {})
         }
     }

@@ -14,6 +14,8 @@ use super::thumb::Code;
 
 /// Beginning and end of the demangled name of the function that must not panic.
 const TICK: (&str, &str) = ("firmware::control::Control", "tick");
+/// The tick of the C library.
+const C_TICK: &str = "vsj_tick";
 
 /// Runs all checks. Returns the number of functions that the tick consists of, its callees included.
 pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
@@ -24,9 +26,25 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
     // Otherwise a change of names would make every check pass.
     ensure!(functions.iter().any(|f| is_panic(&f.name)), "the image has no panic at all: have names changed?");
     ensure!(functions.iter().any(|f| is_float(&f.name)), "the image has no float at all: have names changed?");
+    walk(bytes, &functions, &ticks(&functions)?)
+}
+
+/// Runs the checks of a program around the C library, which contains no panic at all. Returns the number of functions that its
+/// tick consists of.
+pub(crate) fn run_c(bytes: &[u8]) -> Result<usize> {
+    let functions = elf::functions(bytes)?;
+    if let Some(found) = functions.iter().find(|f| is_panic(&f.name) || is_heap(&f.name)) {
+        bail!("`{}` is a panic's or an allocator's", found.name);
+    }
+    ensure!(functions.iter().any(|f| is_float(&f.name)), "the image has no float at all: have names changed?");
+    let tick = functions.iter().find(|f| f.name == C_TICK);
+    walk(bytes, &functions, &[tick.with_context(|| format!("no function `{C_TICK}` in the image"))?])
+}
+
+/// Checks all that can be reached from `ticks`; returns the number of functions.
+fn walk(bytes: &[u8], functions: &[Function], ticks: &[&Function]) -> Result<usize> {
     let code = Code::new(bytes)?;
     let by_address: BTreeMap<u32, &Function> = functions.iter().map(|f| (f.address, f)).collect();
-    let ticks = ticks(&functions)?;
 
     let mut seen = BTreeSet::new();
     let mut open: Vec<(&Function, String)> = ticks.iter().map(|f| (*f, f.name.clone())).collect();

@@ -6,7 +6,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use paper::dynamics::report::Model;
 use paper::dynamics::zener::Changes;
 use paper::joint::OuterEnd;
+use simulation::control_loop::Controller;
 use simulation::schedule::Between;
+use vsj_fmu::{Kind, Version};
 
 /// The values of an option: name on the command line, help text, value.
 pub(crate) type Choices<T> = &'static [(&'static str, &'static str, T)];
@@ -40,6 +42,27 @@ pub(crate) const BETWEEN: Choices<Between> = &[
     ("hold", "The earlier row's value holds until the next row", Between::Hold),
     ("linear", "Linear interpolation between the rows", Between::Linear),
 ];
+
+/// `--controller` of a controlled loop.
+pub(crate) const CONTROLLER: Choices<Controller> = &[
+    ("none", "No controller: the target is the voltage", Controller::None),
+    ("paper", "The report's proportional-integral pre-compensator", Controller::Paper),
+    (
+        "fast",
+        "Time-optimal: the end of the range until the target can be held, then the holding voltage",
+        Controller::Fast,
+    ),
+];
+
+/// `--unit` of `vsj export fmu`: the parts of a unit.
+pub(crate) const UNIT: Choices<Kind> = &[
+    ("spring", "The spring alone: voltage in, stiffness out", Kind::Spring),
+    ("controller", "The controller: target in, voltage out", Kind::Controller),
+    ("both", "Both: target in, stiffness out", Kind::Both),
+];
+
+/// `--fmi` of `vsj export fmu`: the version of the standard.
+pub(crate) const FMI: Choices<Version> = &[("2", "FMI 2.0", Version::Two), ("3", "FMI 3.0", Version::Three)];
 
 /// `--input` of `vsj diagnose`: the commanded voltage between two rows of a record.
 pub(crate) const INPUT: Choices<identify::Input> = &[

@@ -56,7 +56,7 @@ pub(super) fn together(option: &str, errors: &[ErrorOf]) -> Result<SpringError> 
 /// How well the robust controller knows the spring.
 #[derive(Args, Debug)]
 pub(super) struct Known {
-    /// The robust controller knows `tau`, `gain` or `share` to within this, both ways, 0 to 25 %; repeatable
+    /// The controller for a spring whose `tau`, `gain` or `share` is known to within this, both ways, 0 to 25 %; repeatable
     #[arg(long, value_name = "KEY=PERCENT", allow_hyphen_values = true)]
     known: Vec<ErrorOf>,
     /// Overshoot that the robust controller may cause, in percent of the step, 0 to 20

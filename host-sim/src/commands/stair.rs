@@ -3,19 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use super::choice::{BETWEEN, one_of};
+use super::loop_arguments::LoopArguments;
 use super::spring_error::Known;
 use anyhow::Result;
-use clap::{Args, Parser, ValueEnum};
+use clap::{Args, Parser};
 use host_sim::output::file::write_whole;
 use host_sim::output::files::{Files, write_csv, write_sheet};
 use host_sim::output::terminal::{json, print, remark, wrote};
 use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
-use model::{Amplifier, Approach, Compensation, Gains};
+use model::Compensation;
 use paper::stair::request::{Answer, Request, Target};
 use record_files::Container;
 use simulation::bad_input;
 use simulation::bad_input::number;
+use simulation::control_loop::{Controller, Options};
 use simulation::experiment::paper_spring;
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
@@ -32,17 +34,14 @@ Examples:
   vsj stair --controller none --input step  no controller, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7  another amplifier, other gains
   vsj stair --controller fast --input step  as fast as the amplifier allows
-  vsj stair --controller robust --known tau=5 --known share=5  no overshoot beyond 2 % on any of these springs
+  vsj stair --known tau=5 --known share=5   no overshoot beyond 2 % on any of these springs
   vsj stair --plant spring.toml             another spring: hysteresis, creep
   vsj stair --input schedule.csv --json     columns time_s,voltage_v")]
 pub(crate) struct Arguments {
-    /// Controller whose steps, CSV and voltage are shown
-    #[arg(long, value_enum, default_value_t = Controller::Paper)]
-    controller: Controller,
-    /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded limit and slew apply where they are stricter than
-    /// the options
-    #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
-    plant: String,
+    #[command(flatten)]
+    control: LoopArguments,
+    #[command(flatten)]
+    known: Known,
     /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns
     /// time_s,voltage_v
     #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
@@ -53,32 +52,6 @@ pub(crate) struct Arguments {
     /// Column of an input file with the measured stiffness; default: stiffness, if it exists
     #[arg(long, value_name = "NAME")]
     column: Option<String>,
-    /// Highest voltage of the amplifier, in V
-    #[arg(long, default_value_t = 700.0, value_name = "V", allow_negative_numbers = true)]
-    limit_v: f64,
-    /// Lowest voltage of the amplifier, in V
-    #[arg(long, default_value_t = 0.0, value_name = "V", allow_negative_numbers = true)]
-    min_v: f64,
-    /// Slew limit of the amplifier, in V/s; default: none
-    #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
-    slew_v_per_s: Option<f64>,
-    /// Width of the DAC, in bits
-    #[arg(long, default_value_t = 12, value_name = "BITS")]
-    dac_bits: u32,
-    /// Proportional gain of the controller
-    #[arg(long, default_value_t = Gains::PAPER.proportional, value_name = "GAIN", allow_negative_numbers = true)]
-    kp: f64,
-    /// Integral gain of the controller, in 1/s
-    #[arg(long, default_value_t = Gains::PAPER.integral_per_s, value_name = "GAIN", allow_negative_numbers = true)]
-    ki: f64,
-    /// Time constant of the fast controller's approach to the target, in s, 0 to 1; default: 0
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    approach_s: Option<f64>,
-    #[command(flatten)]
-    known: Known,
-    /// Ticks per second, 100 to 10 000
-    #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
-    rate_hz: f64,
     /// Write stair.csv, stiffness.svg and voltage.svg to this folder, or the rows to this MCAP or Parquet file
     #[arg(long, value_name = "DIR|FILE.mcap|FILE.parquet")]
     out: Option<PathBuf>,
@@ -88,18 +61,6 @@ pub(crate) struct Arguments {
     /// One JSON object on stdout
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Controller {
-    /// No controller: the target is the voltage
-    None,
-    /// The report's proportional-integral pre-compensator
-    Paper,
-    /// Time-optimal: the end of the range until the target can be held, then the holding voltage
-    Fast,
-    /// As fast as every spring allows that is possible within the errors of --known
-    Robust,
 }
 
 /// Makes the arguments without a command line equal to the defaults of the options.
@@ -117,29 +78,24 @@ impl Arguments {
 
     /// The experiment on a plant file's spring.
     fn request<'a>(&self, plant: &'a PlantFile, target: Target<'a>) -> Result<Request<'a>> {
-        let margin = self.known.margin()?;
-        if margin.is_some() != (self.controller == Controller::Robust) {
-            bad_input!("--known belongs to the robust controller: expected --controller robust --known KEY=PERCENT");
-        }
+        let options = self.control.options();
+        // The loop without a controller is run beside one with the report's.
+        let compared = match options.controller {
+            Controller::None => Controller::Paper,
+            controller => controller,
+        };
+        let compensation = match self.known.margin()? {
+            Some(margin) => Compensation::Robust(margin),
+            None => Options { controller: compared, ..options }.compensation(),
+        };
         Ok(Request {
             plant,
-            paper: self.plant == "paper",
+            paper: self.control.plant == "paper",
             target,
-            compensation: match (self.controller, margin) {
-                (_, Some(margin)) => Compensation::Robust(margin),
-                (Controller::Fast, _) => {
-                    Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s.unwrap_or(0.0) })
-                }
-                _ => Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki }),
-            },
-            controlled: self.controller != Controller::None,
-            amplifier: Amplifier {
-                min_v: self.min_v,
-                slew_v_per_s: self.slew_v_per_s,
-                dac_bits: self.dac_bits,
-                ..Amplifier::up_to(self.limit_v)
-            },
-            rate_hz: self.rate_hz,
+            compensation,
+            controlled: options.controller != Controller::None,
+            amplifier: options.amplifier(),
+            rate_hz: options.rate_hz,
         })
     }
 
@@ -151,17 +107,20 @@ impl Arguments {
                 bad_input!("{option} has no effect with --input {}: expected --input FILE.csv", self.input);
             }
         }
-        if self.approach_s.is_some() && self.controller != Controller::Fast {
-            bad_input!("--approach-s applies to the fast controller only: expected --controller fast");
+        let options = self.control.options();
+        if self.known.margin()?.is_some() && options.controller != Controller::Paper {
+            bad_input!("--known has a controller of its own: expected no --controller");
         }
-        Ok(())
+        options.check()
     }
 
     /// Number of ticks between two rows of the CSV.
     fn stride(&self) -> Result<usize> {
         match self.every {
             None => Ok(1),
-            Some(every) if every.is_finite() && every > 0.0 => Ok((every * self.rate_hz).round().max(1.0) as usize),
+            Some(every) if every.is_finite() && every > 0.0 => {
+                Ok((every * self.control.options().rate_hz).round().max(1.0) as usize)
+            }
             Some(every) => bad_input!("--every {}: expected a positive number of seconds", number(every)),
         }
     }
@@ -170,10 +129,10 @@ impl Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     arguments.check()?;
-    let file = plant_file::load(&arguments.plant)?;
+    let file = plant_file::load(&arguments.control.plant)?;
     let left_out = file.left_out();
     if !left_out.is_empty() {
-        remark(&format!("{}: not simulated: {}", arguments.plant, left_out.join(", ")));
+        remark(&format!("{}: not simulated: {}", arguments.control.plant, left_out.join(", ")));
     }
     let stride = arguments.stride()?;
     let record = match arguments.input.as_str() {
@@ -194,7 +153,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     })?;
     bar.finish_and_clear();
     let paths = match &arguments.out {
-        Some(folder) => write(folder, &answer, arguments.controller != Controller::None, stride)?,
+        Some(folder) => write(folder, &answer, arguments.control.options().controller != Controller::None, stride)?,
         None => Vec::new(),
     };
     print(&if arguments.json { json(&answer.report)? } else { stair::text(&answer.report) + &wrote(&paths) })

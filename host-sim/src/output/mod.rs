@@ -5,6 +5,7 @@
 //! | [`terminal`], [`screen`] | stdout and stderr; a status that is refreshed in place |
 //! | [`files`], [`file`] | the files of one run: all of them or none; a file alone |
 //! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`isolate`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
+//! | [`export`] | spring and controller for other programs |
 //! | [`log_file`] | the decoded log as MCAP or Parquet |
 //! | [`recording`] | telemetry as CSV, MCAP or Parquet while it arrives |
 //! | [`udp`] | telemetry as datagrams for PlotJuggler |
@@ -19,6 +20,7 @@ mod colours;
 pub mod compare;
 pub mod diagnosis;
 pub mod dynamics;
+pub mod export;
 pub mod figure;
 pub mod file;
 pub mod files;

@@ -1,7 +1,7 @@
 //! `cargo xtask dist`: the files of a release.
 //!
-//! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the
-//! images of both boards for each controller and amplifier, the manual, the page for a browser, this version's changes, the
+//! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the library
+//! that `vsj export fmu` packs, the C library with its header for this host and for a Cortex-M4, the images of both boards for each controller and amplifier, the manual, the page for a browser, this version's changes, the
 //! licences of all dependencies, and the SHA-256 of every file.
 
 mod licences;
@@ -37,6 +37,7 @@ pub(crate) fn run() -> Result<()> {
     let program = program(&target)?;
     files::copy(&program, &new.join(program.file_name().context("a program has a name")?))?;
     commands(&program, &new)?;
+    libraries(&target, &program, &host, &new)?;
     images(&new.join("firmware"))?;
     for text in TEXTS {
         files::copy(&shell::root().join(text), &new.join(text))?;
@@ -78,6 +79,20 @@ fn commands(program: &Path, folder: &Path) -> Result<()> {
     for (shell_name, file) in COMPLETIONS {
         let script = shell::output(shell::command(program).args(["completions", shell_name]))?;
         files::write(&completions.join(file), script)?;
+    }
+    Ok(())
+}
+
+/// Copies the library that `vsj` finds beside itself, and writes the folder `c`: settings, header and example of `vsj export c`, and
+/// the library for this host and for the MCU.
+fn libraries(target: &Path, program: &Path, host: &str, folder: &Path) -> Result<()> {
+    let file = format!("{}vsj_fmu{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    // Built with `vsj`, which depends on it.
+    files::copy(&target.join("dist/deps").join(&file), &folder.join(&file))?;
+    let c = folder.join("c");
+    shell::output(shell::command(program).args(["export", "c", "--out"]).arg(&c))?;
+    for (name, library) in [(host, build::c_library(false)?), (shell::MCU, build::c_library(true)?)] {
+        files::copy(&library, &c.join("lib").join(name).join(library.file_name().context("a library has a name")?))?;
     }
     Ok(())
 }

@@ -6,12 +6,17 @@
 mod apt;
 mod toolchain;
 
+use std::path::PathBuf;
+
 use anyhow::{Context, Result};
 
 use crate::shell;
 
 /// The emulator: program and package in Debian and Ubuntu.
 const QEMU: [&str; 2] = ["qemu-system-arm"; 2];
+/// C for the MCU: GCC, without a C library.
+const ARM_GCC: [&str; 2] = ["arm-none-eabi-gcc", "gcc-arm-none-eabi"];
+const CMAKE: [&str; 2] = ["cmake"; 2];
 /// A browser for the tests of the page.
 const CHROMIUM: [&str; 2] = ["chromium"; 2];
 
@@ -29,6 +34,18 @@ pub fn target(name: &str) -> Result<()> {
 /// Installs QEMU with apt-get unless it starts.
 pub fn emulator() -> Result<()> {
     program(QEMU)
+}
+
+/// Installs GCC for the MCU and CMake with apt-get unless they start. Returns CMake's program: that of the Python package's virtual
+/// environment if it is there.
+pub fn c_tools() -> Result<PathBuf> {
+    program(ARM_GCC)?;
+    let installed = shell::target_directory()?.join("python-venv/bin/cmake");
+    if installed.exists() {
+        return Ok(installed);
+    }
+    program(CMAKE)?;
+    Ok(CMAKE[0].into())
 }
 
 /// Installs Chromium with apt-get unless it starts.

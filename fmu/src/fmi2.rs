@@ -1,0 +1,258 @@
+//! The functions of FMI 2.0 for co-simulation, by the names and with the arguments of `fmi2FunctionTypes.h`.
+#![allow(non_snake_case, reason = "the names of the standard")]
+
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use simulation::bad_input;
+
+use crate::description::{ERRORS, Version};
+use crate::ffi::{
+    DISCARD, ERROR, OK, Status, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
+};
+use crate::instance::Log;
+use crate::variables::Form;
+
+/// `fmi2CoSimulation`.
+const CO_SIMULATION: c_int = 1;
+/// `fmi2LastSuccessfulTime`.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
+/// FMI 2.0 accesses enumerations as integers.
+const INTEGERS: &[Form] = &[Form::Integer, Form::Controller];
+
+type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
+
+/// `fmi2CallbackFunctions`.
+#[repr(C)]
+struct Callbacks {
+    logger: Option<Logger>,
+    allocate_memory: Option<extern "C" fn(usize, usize) -> *mut c_void>,
+    free_memory: Option<extern "C" fn(*mut c_void)>,
+    step_finished: Option<extern "C" fn(*mut c_void, Status)>,
+    environment: *mut c_void,
+}
+
+/// The importer's logger as a function of a message.
+fn log(callbacks: *const Callbacks, name: *const c_char) -> Log {
+    let name = CString::new(text(name).unwrap_or_default()).unwrap_or_default();
+    // SAFETY: the importer passes its functions, or null.
+    let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return Box::new(|_| {}) };
+    let (logger, environment) = (callbacks.logger, callbacks.environment);
+    Box::new(move |message| {
+        // The message is a format of `printf`.
+        let message = CString::new(message.replace('%', "%%").replace('\0', " ")).unwrap_or_default();
+        let category = CString::new(ERRORS).unwrap_or_default();
+        if let Some(logger) = logger {
+            // SAFETY: the importer's logger stays as long as its instance; the texts live as long as the call.
+            unsafe { logger(environment, name.as_ptr(), ERROR, category.as_ptr(), message.as_ptr()) }
+        }
+    })
+}
+
+/// The path of a URI with the scheme `file`.
+fn path(uri: &str) -> Result<PathBuf> {
+    let rest = uri.strip_prefix("file:").with_context(|| format!("{uri}: expected a URI that begins with file:"))?;
+    let rest = rest.strip_prefix("//").map_or(rest, |rest| rest.strip_prefix("localhost").unwrap_or(rest));
+    let (mut bytes, mut letters) = (Vec::new(), rest.bytes());
+    while let Some(byte) = letters.next() {
+        let digits = [letters.clone().next(), letters.clone().nth(1)];
+        let code = match digits {
+            [Some(high), Some(low)] if byte == b'%' => {
+                std::str::from_utf8(&[high, low]).ok().and_then(|digits| u8::from_str_radix(digits, 16).ok())
+            }
+            _ => None,
+        };
+        bytes.push(code.unwrap_or(byte));
+        if code.is_some() {
+            letters.nth(1);
+        }
+    }
+    let path = String::from_utf8(bytes)?;
+    // The letter of a drive stands behind a slash.
+    let drive = path.strip_prefix('/').filter(|rest| rest.as_bytes().get(1) == Some(&b':'));
+    Ok(PathBuf::from(drive.unwrap_or(&path)))
+}
+
+exported! {
+    fn fmi2GetTypesPlatform() -> *const c_char { c"default".as_ptr() }
+
+    fn fmi2GetVersion() -> *const c_char { c"2.0".as_ptr() }
+
+    fn fmi2SetDebugLogging(_instance: *mut c_void, _on: c_int, _count: usize, _categories: *const *const c_char) -> Status {
+        OK
+    }
+
+    fn fmi2Instantiate(
+        name: *const c_char,
+        kind: c_int,
+        token: *const c_char,
+        resources: *const c_char,
+        callbacks: *const Callbacks,
+        _visible: c_int,
+        _logging: c_int,
+    ) -> *mut c_void {
+        let resources = || {
+            if kind != CO_SIMULATION {
+                bad_input!("instantiated for model exchange: expected co-simulation");
+            }
+            path(text(resources)?)
+        };
+        instantiate(Version::Two, token, resources(), log(callbacks, name))
+    }
+
+    fn fmi2FreeInstance(instance: *mut c_void) { free(instance) }
+
+    fn fmi2SetupExperiment(
+        instance: *mut c_void,
+        _with_tolerance: c_int,
+        _tolerance: f64,
+        start_s: f64,
+        _with_stop: c_int,
+        _stop_s: f64,
+    ) -> Status {
+        call(instance, |instance| instance.begin_at(start_s))
+    }
+
+    fn fmi2EnterInitializationMode(instance: *mut c_void) -> Status { call(instance, |_| Ok(())) }
+
+    fn fmi2ExitInitializationMode(instance: *mut c_void) -> Status { call(instance, |instance| instance.initialize()) }
+
+    fn fmi2Terminate(instance: *mut c_void) -> Status { call(instance, |_| Ok(())) }
+
+    fn fmi2Reset(instance: *mut c_void) -> Status {
+        call(instance, |instance| {
+            instance.reset();
+            Ok(())
+        })
+    }
+
+    fn fmi2GetReal(instance: *mut c_void, references: *const u32, count: usize, values: *mut f64) -> Status {
+        get(instance, references, values, count, &[Form::Real], |value| value)
+    }
+
+    fn fmi2GetInteger(instance: *mut c_void, references: *const u32, count: usize, values: *mut c_int) -> Status {
+        get(instance, references, values, count, INTEGERS, |value| value as c_int)
+    }
+
+    fn fmi2GetBoolean(instance: *mut c_void, references: *const u32, count: usize, values: *mut c_int) -> Status {
+        get(instance, references, values, count, &[], |value| value as c_int)
+    }
+
+    fn fmi2GetString(instance: *mut c_void, references: *const u32, count: usize, values: *mut *const c_char) -> Status {
+        get(instance, references, values, count, &[], |_| c"".as_ptr())
+    }
+
+    fn fmi2SetReal(instance: *mut c_void, references: *const u32, count: usize, values: *const f64) -> Status {
+        set(instance, references, values, count, &[Form::Real], |value| value)
+    }
+
+    fn fmi2SetInteger(instance: *mut c_void, references: *const u32, count: usize, values: *const c_int) -> Status {
+        set(instance, references, values, count, INTEGERS, f64::from)
+    }
+
+    fn fmi2SetBoolean(instance: *mut c_void, references: *const u32, count: usize, values: *const c_int) -> Status {
+        set(instance, references, values, count, &[], f64::from)
+    }
+
+    fn fmi2SetString(instance: *mut c_void, references: *const u32, count: usize, values: *const *const c_char) -> Status {
+        set(instance, references, values, count, &[], |_| 0.0)
+    }
+
+    fn fmi2GetFMUstate(instance: *mut c_void, state: *mut *mut c_void) -> Status { save(instance, state) }
+
+    fn fmi2SetFMUstate(instance: *mut c_void, state: *mut c_void) -> Status { restore(instance, state) }
+
+    fn fmi2FreeFMUstate(_instance: *mut c_void, state: *mut *mut c_void) -> Status { free_state(state) }
+
+    fn fmi2SerializedFMUstateSize(instance: *mut c_void, _state: *mut c_void, _size: *mut usize) -> Status {
+        unsupported(instance, "fmi2SerializedFMUstateSize")
+    }
+
+    fn fmi2SerializeFMUstate(instance: *mut c_void, _state: *mut c_void, _bytes: *mut u8, _size: usize) -> Status {
+        unsupported(instance, "fmi2SerializeFMUstate")
+    }
+
+    fn fmi2DeSerializeFMUstate(instance: *mut c_void, _bytes: *const u8, _size: usize, _state: *mut *mut c_void) -> Status {
+        unsupported(instance, "fmi2DeSerializeFMUstate")
+    }
+
+    fn fmi2GetDirectionalDerivative(
+        instance: *mut c_void,
+        _unknowns: *const u32,
+        _unknown_count: usize,
+        _knowns: *const u32,
+        _known_count: usize,
+        _seed: *const f64,
+        _sensitivity: *mut f64,
+    ) -> Status {
+        unsupported(instance, "fmi2GetDirectionalDerivative")
+    }
+
+    fn fmi2SetRealInputDerivatives(
+        instance: *mut c_void,
+        _references: *const u32,
+        _count: usize,
+        _orders: *const c_int,
+        _values: *const f64,
+    ) -> Status {
+        unsupported(instance, "fmi2SetRealInputDerivatives")
+    }
+
+    fn fmi2GetRealOutputDerivatives(
+        instance: *mut c_void,
+        _references: *const u32,
+        _count: usize,
+        _orders: *const c_int,
+        _values: *mut f64,
+    ) -> Status {
+        unsupported(instance, "fmi2GetRealOutputDerivatives")
+    }
+
+    fn fmi2DoStep(instance: *mut c_void, from_s: f64, step_s: f64, _without_return: c_int) -> Status {
+        call(instance, |instance| instance.step(from_s, step_s))
+    }
+
+    fn fmi2CancelStep(instance: *mut c_void) -> Status { unsupported(instance, "fmi2CancelStep") }
+
+    fn fmi2GetStatus(_instance: *mut c_void, _kind: c_int, _value: *mut Status) -> Status { DISCARD }
+
+    fn fmi2GetRealStatus(instance: *mut c_void, kind: c_int, value: *mut f64) -> Status {
+        if kind != LAST_SUCCESSFUL_TIME {
+            return DISCARD;
+        }
+        call(instance, |instance| {
+            put(value, instance.time_s());
+            Ok(())
+        })
+    }
+
+    fn fmi2GetIntegerStatus(_instance: *mut c_void, _kind: c_int, _value: *mut c_int) -> Status { DISCARD }
+
+    fn fmi2GetBooleanStatus(_instance: *mut c_void, _kind: c_int, _value: *mut c_int) -> Status { DISCARD }
+
+    fn fmi2GetStringStatus(_instance: *mut c_void, _kind: c_int, _value: *mut *const c_char) -> Status { DISCARD }
+}
+
+/// The status of a function that the description does not promise.
+fn unsupported(instance: *mut c_void, name: &str) -> Status {
+    call(instance, |_| bad_input!("{name} is called: expected what modelDescription.xml says that the unit can"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_uri_becomes_a_path() {
+        for (uri, expected) in [
+            ("file:///tmp/a%20b/%c3%bc/resources", "/tmp/a b/\u{fc}/resources"),
+            ("file:/tmp/x", "/tmp/x"),
+            ("file://localhost/tmp/100%", "/tmp/100%"),
+            ("file:///C:/Users/x", "C:/Users/x"),
+        ] {
+            assert_eq!(path(uri).unwrap(), PathBuf::from(expected), "{uri}");
+        }
+        assert!(path("/tmp/x").is_err());
+    }
+}

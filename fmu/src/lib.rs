@@ -1,0 +1,29 @@
+//! The fixed-point spring and controller as co-simulation units (FMUs) of FMI 2.0 and 3.0.
+//!
+//! This crate is built twice: as a library of `vsj export fmu`, which writes the units, and as the shared library inside of them,
+//! which any program that imports FMUs loads. One shared library serves every unit: it reads from the unit's `resources` which
+//! spring and which settings it has.
+//!
+//! | module | content |
+//! | --- | --- |
+//! | [`mod@unit`] | a kind of unit, its spring and its settings, and their files in `resources` |
+//! | [`variables`] | the variables of a unit: names, units, ranges, start values |
+//! | [`description`] | `modelDescription.xml` for both versions |
+//! | `machine` | values of the variables in, ticks, values out |
+//! | `instance` | one instance: what may be called when, time, messages, saved states |
+//! | `ffi` | pointers of the C interface |
+//! | `fmi2`, `fmi3` | the functions that an importer calls |
+//!
+//! Errors have the text of the command's errors.
+
+pub mod description;
+mod ffi;
+mod fmi2;
+mod fmi3;
+mod instance;
+mod machine;
+pub mod unit;
+pub mod variables;
+
+pub use description::Version;
+pub use unit::{Kind, Unit};

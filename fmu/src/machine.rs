@@ -1,0 +1,119 @@
+//! The parts of a unit in motion: values of the variables in, ticks, values of the outputs out.
+
+use anyhow::{Context, Result};
+use model::{Input, Output as Tick, ScaledStiffness, Volts};
+use simulation::bad_input;
+use simulation::bad_input::BadInput;
+use simulation::control_loop::{ControlLoop, Controller, SpringAlone};
+use simulation::plant_file::{PlantFile, Reading};
+
+use crate::unit::Unit;
+use crate::variables::{Output, Role, Variable};
+
+/// Controller and spring of an instance, with their states.
+#[derive(Clone, Debug)]
+pub(crate) struct Machine {
+    control: Option<ControlLoop>,
+    spring: Option<SpringAlone>,
+    reading: Reading,
+    rate_hz: f64,
+}
+
+impl Machine {
+    /// The parts at rest at 0 V.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the first parameter out of its range, and the range.
+    pub(crate) fn new(unit: &Unit, variables: &[Variable], values: &[f64]) -> Result<Self> {
+        let mut options = unit.options;
+        let (mut model, mut spring) = (unit.plant.clone(), unit.plant.clone());
+        for (variable, &value) in variables.iter().zip(values) {
+            let place = match variable.role {
+                Role::Setting(setting) => {
+                    setting.put(&mut options, value);
+                    continue;
+                }
+                Role::Model(number) => number.place(&mut model),
+                Role::Spring(number) => number.place(&mut spring),
+                Role::Time | Role::Input | Role::Output(_) => continue,
+            };
+            *place.with_context(|| format!("{}: the plant file has none", variable.name))? = value;
+        }
+        if options.controller != Controller::Fast {
+            options.approach_s = None;
+        }
+        let control = match unit.kind.has_controller() {
+            false => None,
+            true => {
+                check("model", &model)?;
+                Some(ControlLoop::new(&model, &options)?)
+            }
+        };
+        let alone = match unit.kind.has_spring() {
+            false => None,
+            true => {
+                check("spring", &spring)?;
+                Some(SpringAlone::new(&spring, options.rate_hz)?)
+            }
+        };
+        let reading = spring.reading.unwrap_or_default();
+        Ok(Self { control, spring: alone, reading, rate_hz: options.rate_hz })
+    }
+
+    /// Ticks per second, in Hz.
+    pub(crate) const fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Runs `ticks` ticks, at least one, with `input` held; puts the outputs of the last one into their places in `values`.
+    ///
+    /// # Errors
+    /// [`BadInput`] for an input that is no voltage within +-2000 V.
+    pub(crate) fn run(&mut self, ticks: u64, variables: &[Variable], values: &mut [f64]) -> Result<()> {
+        let Some((name, input)) = variables.iter().zip(&*values).find(|(variable, _)| variable.role == Role::Input)
+        else {
+            bad_input!("the unit has no input");
+        };
+        let input = Volts::new(*input).map_err(|error| BadInput(format!("{}: {error}", name.name)))?;
+        let (mut stiffness, mut last) = (ScaledStiffness::default(), None);
+        let spring = &mut self.spring;
+        let mut apply = |applied| {
+            if let Some(spring) = spring {
+                stiffness = spring.run(applied);
+            }
+        };
+        match &mut self.control {
+            None => (0..ticks).for_each(|_| apply(input)),
+            Some(control) => {
+                let inputs = (0..ticks).map(|_| Input { target: input, ..Input::default() });
+                control.run(inputs, |output| {
+                    apply(output.applied);
+                    last = Some(output);
+                });
+            }
+        }
+        for (variable, value) in variables.iter().zip(values) {
+            if let Role::Output(output) = variable.role {
+                *value = self.output(output, last.as_ref(), stiffness);
+            }
+        }
+        Ok(())
+    }
+
+    fn output(&self, output: Output, tick: Option<&Tick>, stiffness: ScaledStiffness) -> f64 {
+        let of_tick = |value: fn(&Tick) -> f64| tick.map_or(0.0, value);
+        match output {
+            Output::Applied => of_tick(|tick| tick.applied.to_f64()),
+            Output::Code => of_tick(|tick| f64::from(tick.code.0)),
+            Output::Estimate => of_tick(|tick| tick.stiffness.to_f64()),
+            Output::Limits => of_tick(|tick| f64::from(tick.limits.bits())),
+            Output::Stiffness => stiffness.to_f64(),
+            Output::Reading => self.reading.zero + self.reading.gain * stiffness.to_f64(),
+        }
+    }
+}
+
+/// Checks a spring whose numbers may have been set; `part` is in front of the field's name.
+fn check(part: &str, plant: &PlantFile) -> Result<()> {
+    plant.check().map_err(|error| BadInput(format!("{part}.{error}")).into())
+}

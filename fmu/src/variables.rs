@@ -1,0 +1,379 @@
+//! The variables of a unit. A value reference is the variable's index in the list.
+//!
+//! Parameters are the options of the command and the numbers of the plant file, by their names there: `spring.` is the simulated
+//! spring, `model.` the controller's model of it.
+
+use simulation::control_loop::{CONTROLLERS, Controller, Options};
+use simulation::plant_file::PlantFile;
+
+use crate::unit::Unit;
+
+/// Slew limit, in V/s, that stands for none: at every rate a tick is long enough for any change.
+const NO_SLEW_LIMIT: f64 = 1e9;
+/// Largest magnitude of a voltage that the tick accepts, in V.
+const LARGEST_V: f64 = 2000.0;
+
+/// A scalar variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Name, in the structured naming convention.
+    pub name: String,
+    /// One sentence.
+    pub description: String,
+    /// What it is in the unit.
+    pub role: Role,
+    /// Data type.
+    pub form: Form,
+    /// Name of the unit of measurement; empty if it has none.
+    pub unit: String,
+    /// Lowest value, if there is one.
+    pub lowest: Option<f64>,
+    /// Highest value, if there is one.
+    pub highest: Option<f64>,
+    /// Value of a new instance.
+    pub start: f64,
+}
+
+/// Data type of a variable. Its value is kept as a double in any case, which holds each exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A double.
+    Real,
+    /// An integer of 32 bits.
+    Integer,
+    /// An enumeration of the names of [`CONTROLLERS`], beginning with 1.
+    Controller,
+}
+
+/// What a variable is in the unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Time, in s.
+    Time,
+    /// A setting of the controller.
+    Setting(Setting),
+    /// A number of the controller's model.
+    Model(Number),
+    /// A number of the simulated spring.
+    Spring(Number),
+    /// The input.
+    Input,
+    /// An output.
+    Output(Output),
+}
+
+impl Role {
+    /// True for what is set before the first step only.
+    pub const fn is_parameter(self) -> bool {
+        matches!(self, Self::Setting(_) | Self::Model(_) | Self::Spring(_))
+    }
+}
+
+/// A setting of the controller: a field of [`Options`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each is a field of `Options`")]
+pub enum Setting {
+    RateHz,
+    Controller,
+    LimitV,
+    MinV,
+    SlewVPerS,
+    DacBits,
+    Kp,
+    Ki,
+    ApproachS,
+}
+
+impl Setting {
+    /// Puts a value into the options.
+    pub fn put(self, options: &mut Options, value: f64) {
+        match self {
+            Self::RateHz => options.rate_hz = value,
+            // The instance accepts numbers of controllers only.
+            Self::Controller => options.controller = Controller::ALL[(value as usize).clamp(1, 3) - 1],
+            Self::LimitV => options.limit_v = value,
+            Self::MinV => options.min_v = value,
+            Self::SlewVPerS => options.slew_v_per_s = Some(value),
+            Self::DacBits => options.dac_bits = value as u32,
+            Self::Kp => options.kp = value,
+            Self::Ki => options.ki = value,
+            Self::ApproachS => options.approach_s = Some(value),
+        }
+    }
+}
+
+/// A number of a plant file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each is a key of a plant file, with its index in a list")]
+pub enum Number {
+    Share,
+    Tau(usize),
+    Weight(usize),
+    TauHigh,
+    TauHighAt,
+    Direct,
+    Threshold(usize),
+    PlayWeight(usize),
+    LawVoltage(usize),
+    LawStiffness(usize),
+    LeakageShare,
+    LeakageTau,
+    ReadingGain,
+    ReadingZero,
+}
+
+impl Number {
+    /// The number's place in a plant file; `None` if the file has none.
+    pub fn place(self, plant: &mut PlantFile) -> Option<&mut f64> {
+        let relaxation = &mut plant.relaxation;
+        match self {
+            Self::Share => Some(&mut relaxation.share),
+            Self::Tau(index) => relaxation.tau_s.get_mut(index),
+            Self::Weight(index) => relaxation.weights.get_mut(index),
+            Self::TauHigh => relaxation.tau_high_s.as_mut(),
+            Self::TauHighAt => relaxation.tau_high_at_v.as_mut(),
+            Self::Direct => plant.memory.as_mut().map(|memory| &mut memory.direct),
+            Self::Threshold(index) => plant.memory.as_mut()?.thresholds_v.get_mut(index),
+            Self::PlayWeight(index) => plant.memory.as_mut()?.weights.get_mut(index),
+            Self::LawVoltage(index) => plant.law.as_mut()?.voltage_v.get_mut(index),
+            Self::LawStiffness(index) => plant.law.as_mut()?.stiffness.get_mut(index),
+            Self::LeakageShare => plant.leakage.as_mut().map(|leakage| &mut leakage.share),
+            Self::LeakageTau => plant.leakage.as_mut().map(|leakage| &mut leakage.tau_s),
+            Self::ReadingGain => plant.reading.as_mut().map(|reading| &mut reading.gain),
+            Self::ReadingZero => plant.reading.as_mut().map(|reading| &mut reading.zero),
+        }
+    }
+
+    /// True for a number that only turns the stiffness into a reading.
+    const fn is_of_reading(self) -> bool {
+        matches!(self, Self::ReadingGain | Self::ReadingZero)
+    }
+}
+
+/// An output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Output {
+    /// Voltage of the DAC's code, in V.
+    Applied,
+    /// Code of the DAC.
+    Code,
+    /// Stiffness that the controller estimates, in V.
+    Estimate,
+    /// Limits that acted, as bits.
+    Limits,
+    /// Stiffness of the simulated spring, in V.
+    Stiffness,
+    /// Reading of the simulated spring, in the plant file's unit.
+    Reading,
+}
+
+impl Variable {
+    fn new(name: &str, role: Role, unit: &str, description: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            description: description.to_owned(),
+            role,
+            form: Form::Real,
+            unit: unit.to_owned(),
+            lowest: None,
+            highest: None,
+            start: 0.0,
+        }
+    }
+
+    fn within(self, lowest: f64, highest: f64) -> Self {
+        Self { lowest: Some(lowest), highest: Some(highest), ..self }
+    }
+
+    fn at(self, start: f64) -> Self {
+        Self { start, ..self }
+    }
+}
+
+/// The variables of a unit, in the order of their value references.
+pub fn variables(unit: &Unit) -> Vec<Variable> {
+    let mut all = vec![Variable::new("time", Role::Time, "s", "Time")];
+    let options = &unit.options;
+    if unit.kind.has_controller() {
+        all.extend(settings(options));
+        all.extend(
+            numbers("model", Role::Model, &unit.plant)
+                .filter(|it| !matches!(it.role, Role::Model(number) if number.is_of_reading())),
+        );
+    } else {
+        all.push(rate(options));
+    }
+    if unit.kind.has_spring() {
+        all.extend(numbers("spring", Role::Spring, &unit.plant));
+    }
+    all.push(input(unit));
+    all.extend(outputs(unit));
+    all
+}
+
+fn rate(options: &Options) -> Variable {
+    let description = "Ticks per second; steps are whole numbers of ticks";
+    Variable::new("rate_hz", Role::Setting(Setting::RateHz), "Hz", description)
+        .within(100.0, 10_000.0)
+        .at(options.rate_hz)
+}
+
+fn settings(options: &Options) -> impl Iterator<Item = Variable> {
+    let setting = |name, setting, unit, description| Variable::new(name, Role::Setting(setting), unit, description);
+    let controllers = CONTROLLERS.len() as f64;
+    [
+        rate(options),
+        Variable {
+            form: Form::Controller,
+            ..setting("controller", Setting::Controller, "", "The pre-compensator")
+                .within(1.0, controllers)
+                .at(1.0 + f64::from(options.controller as u8))
+        },
+        setting(
+            "limit_v",
+            Setting::LimitV,
+            "V",
+            "Highest voltage of the amplifier; the plant file's limit acts where it is lower",
+        )
+        .within(50.0, 1000.0)
+        .at(options.limit_v),
+        setting("min_v", Setting::MinV, "V", "Lowest voltage of the amplifier").within(0.0, 990.0).at(options.min_v),
+        setting("slew_v_per_s", Setting::SlewVPerS, "V/s", "Slew limit of the amplifier; 1e9 for none")
+            .within(1.0, NO_SLEW_LIMIT)
+            .at(options.slew_v_per_s.unwrap_or(NO_SLEW_LIMIT)),
+        Variable {
+            form: Form::Integer,
+            ..setting("dac_bits", Setting::DacBits, "", "Width of the DAC in bits")
+                .within(8.0, 16.0)
+                .at(f64::from(options.dac_bits))
+        },
+        setting("kp", Setting::Kp, "", "Proportional gain of the controller paper").within(0.001, 100.0).at(options.kp),
+        Variable {
+            lowest: Some(0.0),
+            ..setting("ki", Setting::Ki, "1/s", "Integral gain of the controller paper").at(options.ki)
+        },
+        setting(
+            "approach_s",
+            Setting::ApproachS,
+            "s",
+            "Time constant of the approach to the target of the controller fast",
+        )
+        .within(0.0, 1.0)
+        .at(options.approach_s.unwrap_or(0.0)),
+    ]
+    .into_iter()
+}
+
+/// The numbers that a plant file has, below `part`.
+fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> impl Iterator<Item = Variable> {
+    let mut plant = plant.clone();
+    let share = if plant.extended().plain().is_some() { 0.9 } else { 10.0 };
+    let reading = reading_unit(&plant).to_owned();
+    let per_volt = if reading.is_empty() { String::new() } else { format!("{reading}/V") };
+    let list = |table: &'static str, key: &'static str, count: usize, number: fn(usize) -> Number| {
+        (0..count).map(move |index| (format!("{table}.{key}[{}]", index + 1), number(index)))
+    };
+    // The first point of a law is the origin.
+    let is_free = |number: &Number| !matches!(number, Number::LawVoltage(0) | Number::LawStiffness(0));
+    let one = |name: &str, number| std::iter::once((name.to_owned(), number));
+    let (lags, weights) = (plant.relaxation.tau_s.len(), plant.relaxation.weights.len());
+    let plays = plant.memory.as_ref().map_or(0, |memory| memory.thresholds_v.len());
+    let points = plant.law.as_ref().map_or(0, |law| law.voltage_v.len());
+    let all = one("relaxation.share", Number::Share)
+        .chain(list("relaxation", "tau_s", lags, Number::Tau))
+        .chain(list("relaxation", "weights", weights, Number::Weight))
+        .chain(one("relaxation.tau_high_s", Number::TauHigh))
+        .chain(one("relaxation.tau_high_at_v", Number::TauHighAt))
+        .chain(one("memory.direct", Number::Direct))
+        .chain(list("memory", "thresholds_v", plays, Number::Threshold))
+        .chain(list("memory", "weights", plays, Number::PlayWeight))
+        .chain(list("law", "voltage_v", points, Number::LawVoltage))
+        .chain(list("law", "stiffness", points, Number::LawStiffness))
+        .chain(one("leakage.share", Number::LeakageShare))
+        .chain(one("leakage.tau_s", Number::LeakageTau))
+        .chain(one("reading.gain", Number::ReadingGain))
+        .chain(one("reading.zero", Number::ReadingZero));
+    let all: Vec<Variable> = all
+        .filter(|(_, number)| is_free(number))
+        .filter_map(|(name, number)| {
+            let start = *number.place(&mut plant)?;
+            let (unit, range, description) = about(number, share);
+            let unit = match number {
+                Number::ReadingGain => &per_volt,
+                Number::ReadingZero => &reading,
+                _ => unit,
+            };
+            let variable = Variable::new(&format!("{part}.{name}"), role(number), unit, description).at(start);
+            Some(match range {
+                Some((lowest, highest)) => variable.within(lowest, highest),
+                None => variable,
+            })
+        })
+        .collect();
+    all.into_iter()
+}
+
+/// Unit, range and description of a number; `share` is the largest instantaneous share.
+const fn about(number: Number, share: f64) -> (&'static str, Option<(f64, f64)>, &'static str) {
+    match number {
+        Number::Share => ("", Some((0.0, share)), "Part of a change that is instantaneous"),
+        Number::Tau(_) => ("s", Some((2e-4, 1e4)), "Time constant of a relaxation; at least two ticks"),
+        Number::Weight(_) => ("", Some((-10.0, 10.0)), "Weight of a relaxation"),
+        Number::TauHigh => ("s", Some((4e-4, 1e4)), "First time constant at the voltage tau_high_at_v, or at 500 V"),
+        Number::TauHighAt => ("V", None, "Voltage of tau_high_s"),
+        Number::Direct => ("", Some((-10.0, 10.0)), "Weight of the voltage itself beside the play operators"),
+        Number::Threshold(_) => ("V", Some((0.0, 1000.0)), "Half the width of a play operator"),
+        Number::PlayWeight(_) => ("", Some((-10.0, 10.0)), "Weight of a play operator"),
+        Number::LawVoltage(_) => ("V", Some((0.0, 1000.0)), "Voltage of a point of the static law"),
+        Number::LawStiffness(_) => ("V", Some((-LARGEST_V, LARGEST_V)), "Stiffness at a point of the static law"),
+        Number::LeakageShare => ("", Some((0.0, 1.0)), "Part of the stiffness that leaks away"),
+        Number::LeakageTau => ("s", Some((0.01, 1e5)), "Time constant of the leakage; at least 100 ticks"),
+        Number::ReadingGain => ("", None, "Change of the reading per volt of stiffness"),
+        Number::ReadingZero => ("", None, "Reading at 0 V"),
+    }
+}
+
+/// Name of the unit of a plant file's readings; empty if the file does not say.
+fn reading_unit(plant: &PlantFile) -> &str {
+    plant.units.as_ref().and_then(|units| units.reading.as_deref()).unwrap_or_default()
+}
+
+fn input(unit: &Unit) -> Variable {
+    let (name, description) = if unit.kind.has_controller() {
+        ("target_v", "Desired stiffness as the equivalent static voltage, held during a step")
+    } else {
+        ("applied_v", "Voltage across the spring, held during a step")
+    };
+    Variable::new(name, Role::Input, "V", description).within(-LARGEST_V, LARGEST_V)
+}
+
+fn outputs(unit: &Unit) -> Vec<Variable> {
+    let output = |name, output, unit, description| Variable::new(name, Role::Output(output), unit, description);
+    let mut all = Vec::new();
+    if unit.kind.has_controller() {
+        let code =
+            output("dac_code", Output::Code, "", "Code of the DAC in the step's last tick").within(0.0, 65_535.0);
+        let limits = "Limits that acted in the step's last tick: upper 1, lower 2, slew 4, target 8";
+        all.extend([
+            output("applied_v", Output::Applied, "V", "Voltage of the DAC's code in the step's last tick"),
+            Variable { form: Form::Integer, ..code },
+            output(
+                "estimate_v",
+                Output::Estimate,
+                "V",
+                "Stiffness that the controller estimates, just after the voltage was applied",
+            ),
+            Variable { form: Form::Integer, ..output("limits", Output::Limits, "", limits).within(0.0, 15.0) },
+        ]);
+    }
+    if unit.kind.has_spring() {
+        let description =
+            "Stiffness as the equivalent static voltage, just after the step's last tick applied the voltage";
+        all.push(output("stiffness_v", Output::Stiffness, "V", description));
+        if let Some(reading) = unit.plant.reading {
+            let description = "Reading of the stiffness in the unit of the plant file";
+            all.push(output("reading", Output::Reading, reading_unit(&unit.plant), description).at(reading.zero));
+        }
+    }
+    all
+}

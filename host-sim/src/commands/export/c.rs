@@ -1,0 +1,52 @@
+//! `vsj export c`: the settings of a controller for C.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use host_sim::output::export::c::{Answer, text, write};
+use host_sim::output::files::Files;
+use host_sim::output::terminal::{json, print, remark, wrote};
+use simulation::control_loop::ControlLoop;
+use simulation::plant_file;
+
+use super::super::loop_arguments::LoopArguments;
+
+/// Write the controller's settings for C, with the header of its library and an example
+///
+/// vsj_settings.h has the settings as a constant, vsj_tick.h is the header of libvsj_tick.a. main.c and CMakeLists.txt are an
+/// example for a host and for a Cortex-M4. The library is in the folder c of a release, or made by
+/// `cargo build --release -p capi [--target thumbv7em-none-eabihf]`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj export c                                        the report's spring
+  vsj export c --plant spring.toml --out out/c --controller fast --limit-v 1000
+
+Exit codes: 0 success, 1 a file cannot be written, 2 bad arguments, a plant file that the tick cannot run.")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    control: LoopArguments,
+    /// Write the files to this folder
+    #[arg(long, value_name = "DIR", default_value = "out/c")]
+    out: PathBuf,
+    /// One JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    let (name, options) = (&arguments.control.plant, arguments.control.options());
+    let plant = plant_file::load(name)?;
+    let not_simulated = plant.left_out();
+    if !not_simulated.is_empty() {
+        remark(&format!("{name}: not simulated: {}", not_simulated.join(", ")));
+    }
+    ControlLoop::new(&plant, &options)?;
+    let mut files = Files::new(&arguments.out)?;
+    write(&options.settings(&plant), name, &not_simulated, &mut files)?;
+    let paths = files.finish()?;
+    let answer = Answer::new(&paths, options.rate_hz, not_simulated);
+    print(&if arguments.json { json(&answer)? } else { text(&answer) + &wrote(&paths) })
+}

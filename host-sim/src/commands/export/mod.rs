@@ -1,0 +1,32 @@
+//! `vsj export`: spring and controller for other programs.
+
+mod c;
+mod fmu;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+/// Export spring and controller for other programs: FMI units, C
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  vsj export fmu --plant spring.toml        six units, for FMI 2.0 and 3.0
+  vsj export c --plant spring.toml          header, settings and an example")]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    C(c::Arguments),
+    Fmu(fmu::Arguments),
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<()> {
+    match &arguments.command {
+        Command::C(arguments) => c::run(arguments),
+        Command::Fmu(arguments) => fmu::run(arguments),
+    }
+}

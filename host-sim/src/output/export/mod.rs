@@ -1,0 +1,11 @@
+//! Files of `vsj export`.
+//!
+//! | module | what it is |
+//! | --- | --- |
+//! | [`library`] | compiled libraries, and where they are found |
+//! | [`c`] | the settings as a header, and an example around them |
+//! | [`fmu`] | archives of co-simulation units |
+
+pub mod c;
+pub mod fmu;
+pub mod library;
