@@ -3,11 +3,12 @@
 //! Stored settings run from the start on, or not at all: those of another format, out of range or beyond what the image
 //! contains are a `config` fault, and the built-in ones run. A damaged page counts as never written.
 
-use link::{Block, BlockId, Blocks, Reason, WireModel, WireSettings};
+use link::{Block, BlockId, Blocks, Field, Reason, WireModel, WireSettings};
 use model::supervisor::Fault;
 use model::{Amplifier, OutOfRange, device};
 
 use crate::control::Control;
+use crate::isolation::Terms;
 use crate::reset_cause::Cause;
 use crate::store::{Pages, Store};
 
@@ -31,7 +32,10 @@ pub struct Start {
     pub amplifier: Amplifier,
     /// Fault of the last run.
     pub last_fault: Option<Fault>,
-    /// Invalid field of the stored model, or `format`; `None` if it is valid.
+    /// The isolation bank of the running model.
+    pub isolation: Terms,
+    /// Invalid field of the stored model, or `format`, or `trip_on_cause` if no isolation bank runs that could trip; `None` if all is
+    /// valid.
     pub rejected: Option<&'static str>,
 }
 
@@ -72,13 +76,19 @@ pub fn control<'a>(
     let settings = &loaded.settings;
     let control = build(settings, place)?;
     let (model, amplifier) = (Blocks::default(), settings.control.amplifier);
-    let mut start = Start { model, amplifier, last_fault: cause.fault, rejected: None };
+    let isolation = Terms::new(settings, Some(settings.control.plant), amplifier.max_v);
+    let mut start = Start { model, amplifier, last_fault: cause.fault, isolation, rejected: None };
     if let Some((stored, payload)) = stored {
         start.model.stored = stored;
         match use_model(settings, control, payload) {
-            Ok(amplifier) => (start.model.active, start.amplifier) = (stored, amplifier),
+            Ok((amplifier, isolation)) => {
+                (start.model.active, start.amplifier, start.isolation) = (stored, amplifier, isolation);
+            }
             Err(field) => start.rejected = Some(field),
         }
+    }
+    if let Err(error) = start.isolation.check() {
+        start.rejected = start.rejected.or(Some(error.field));
     }
     // Every one of them has to be acknowledged; the state shows the first.
     let rejected = start.rejected.or(loaded.rejected).map(|_| Fault::Config);
@@ -96,7 +106,7 @@ pub fn control<'a>(
 pub fn check_model<P: Pages>(store: &Store<P>, payload: &[u8], built_in: &device::Settings) -> Result<(), Reason> {
     let model = WireModel::read(payload);
     let Some(model) = &model else { return Err(Reason::Damaged) };
-    Control::check(&load(store, built_in).settings.control, model).map_err(|error| Reason::of_model(&error))
+    check_together(&load(store, built_in).settings, model).map_err(|error| Reason::of_model(&error))
 }
 
 /// Validates the settings in `payload`, also for the stored model.
@@ -108,7 +118,18 @@ pub fn check_settings<P: Pages>(store: &Store<P>, payload: &[u8], built_in: &dev
     let settings = read(payload, built_in)?;
     let model = store.newest(Block::Model).and_then(|(_, payload)| WireModel::read(payload));
     let Some(model) = &model else { return Ok(()) };
-    Control::check(&settings.control, model).map_err(|error| Reason::of_settings(&error))
+    check_together(&settings, model).map_err(|error| Reason::of_settings(&error))
+}
+
+/// Checks a model and settings with each other.
+fn check_together(settings: &device::Settings, model: &WireModel) -> Result<(), OutOfRange> {
+    Control::check(&settings.control, model)?;
+    terms(settings, model).check()
+}
+
+/// The isolation bank for a model.
+fn terms(settings: &device::Settings, model: &WireModel) -> Terms {
+    Terms::new(settings, model.plant().plain(), model.behind(settings.control.amplifier).max_v)
 }
 
 /// Reads and validates settings; what they leave out is that of `built_in`.
@@ -117,16 +138,23 @@ fn read(payload: &[u8], built_in: &device::Settings) -> Result<device::Settings,
     let wire = WireSettings::read(payload);
     let Some(wire) = &wire else { return Err(Reason::Damaged) };
     let settings = wire.over(built_in).map_err(Reason::NotBuiltIn)?;
+    if !cfg!(feature = "isolation") && !settings.trip_on_cause.is_empty() {
+        return Err(Reason::NotBuiltIn(Field::named("trip_on_cause")));
+    }
     settings.check().map_err(|error| Reason::of_settings(&error))?;
     Ok(settings)
 }
 
 #[inline(never)]
-fn use_model(settings: &device::Settings, control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
+fn use_model(
+    settings: &device::Settings,
+    control: &mut Control,
+    payload: &[u8],
+) -> Result<(Amplifier, Terms), &'static str> {
     let model = WireModel::read(payload);
     let Some(model) = &model else { return Err("format") };
     control.use_model(&settings.control, model).map_err(|error| error.field)?;
-    Ok(model.behind(settings.control.amplifier))
+    Ok((model.behind(settings.control.amplifier), terms(settings, model)))
 }
 
 #[inline(never)]

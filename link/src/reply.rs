@@ -10,6 +10,7 @@ use crate::block::{Blocks, Part};
 use crate::capture::{Captured, Rows};
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::fault::Fault;
+use crate::isolation::IsolationReport;
 use crate::reason::Reason;
 use crate::value::WireVolts;
 
@@ -43,6 +44,8 @@ pub enum Reply {
     Captured(Captured),
     /// Rows of the fast capture.
     Rows(Rows),
+    /// What the isolation bank says.
+    Isolation(IsolationReport),
 }
 
 /// Report of the faults that have come since the start.

@@ -386,7 +386,7 @@ impl Decision {
             self.verdict = Verdict::Alarm;
         }
         self.proposed = says;
-        if let Some(cause) = self.verdict.cause() {
+        if let Some(cause) = self.verdict.causes().0 {
             self.size = self.sizes.get(cause as usize).copied().unwrap_or_default();
         }
         self.energies = (self.none, left);

@@ -172,7 +172,7 @@ impl Bank {
             ..sums
         };
         let ticks = f64::from(self.ticks);
-        let expected = self.block_s / self.settings.interval_s;
+        let expected = f64::from(self.settings.readings(self.block_s));
         let lags = sums.lags.map(|lag| lag / ticks);
         let vectors = self.signatures(
             sums.voltage / ticks,
@@ -182,6 +182,7 @@ impl Bank {
             sums.jumps,
         );
         if f64::from(sums.readings) < 0.75 * expected {
+            self.age += 1;
             return;
         }
         let residual = sums.residual / f64::from(sums.readings);
