@@ -377,7 +377,7 @@ impl Bank {
         let bar = least.max(n) + 2.0 * self.settings.margin_nats + excess;
         let rivals: Vec<Cause> = best[1..].iter().filter(|rival| rival.1 < bar).map(|rival| rival.0).collect();
         let among = self.among(cause, &rivals);
-        let named = best.iter().find(|known| Some(known.0) == among.cause());
+        let named = best.iter().find(|known| Some(known.0) == among.causes().0);
         self.least = named.map_or(least, |known| known.1);
         let says = if total < 2.0 * self.settings.margin_nats {
             Verdict::Alarm
@@ -398,7 +398,7 @@ impl Bank {
             self.verdict = Verdict::Alarm;
         }
         self.proposed = says;
-        if let Some(cause) = self.verdict.cause() {
+        if let Some(cause) = self.verdict.causes().0 {
             self.size = best.iter().find(|known| known.0 == cause).map_or((0.0, 0.0), |known| known.2);
         }
     }

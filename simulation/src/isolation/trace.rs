@@ -35,12 +35,7 @@ impl Event {
     pub fn new(report: &Report, time_s: f64, settings: &Settings, rate_hz: f64) -> Self {
         let finding = report.finding(settings, rate_hz);
         let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
-        let size = |Finding { cause, size, half_width, .. }| Size {
-            value: size,
-            low: size - half_width,
-            high: size + half_width,
-            unit: cause.unit(),
-        };
+        let size = |Finding { cause, size, half_width, .. }| Size::around(size, half_width, cause);
         Self {
             time_s,
             verdict: report.verdict.name(),
@@ -64,6 +59,13 @@ pub struct Size {
     pub high: f64,
     /// Unit; empty for a ratio.
     pub unit: &'static str,
+}
+
+impl Size {
+    /// The size `value` of a cause, with half of the width of its interval.
+    pub fn around(value: f64, half_width: f64, cause: Cause) -> Self {
+        Self { value, low: value - half_width, high: value + half_width, unit: cause.unit() }
+    }
 }
 
 /// What the bank says of a record.
