@@ -90,14 +90,15 @@ Examples:
     Story(story::Args),
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 128 KB, RAM below 16 KB and the
-    /// stack within its region.
+    /// Exits with 1 unless flash stays below 128 KB, RAM below 16 KB (with the isolation bank 24 KB) and the stack within its
+    /// region.
     #[command(after_help = "\
 Examples:
   cargo xtask size --json
   cargo xtask size --controller fast                   with the time-optimal controller
   cargo xtask size --controller fast --limit-v 1000    the same for an amplifier of 1000 V
-  cargo xtask size --feedback                          with a stiffness sensor")]
+  cargo xtask size --feedback                          with a stiffness sensor
+  cargo xtask size --isolation                         with a stiffness sensor and the isolation bank")]
     Size(size::Args),
     /// Run the image that is flashed on models of the STM32G474's registers
     ///

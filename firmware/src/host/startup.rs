@@ -14,7 +14,7 @@ use crate::start::{self, Loaded, Start};
 use crate::store::{Pages, Store};
 
 /// Controller, isolation bank and server.
-pub type Built = (&'static mut Control, &'static mut Isolation, &'static mut Server);
+type Built = (&'static mut Control, &'static mut Isolation, &'static mut Server);
 
 /// Builds controller, isolation bank and server from the settings and the stored model; `None` from the second call on. The nonces of the link's sessions
 /// follow from `seed`, which has to be another one at every start.
@@ -33,9 +33,9 @@ pub fn open<P: Pages>(
         log::refused(field);
     }
     isolation::set_terms(start.isolation);
-    let isolation = singleton!(: Isolation = Isolation::new(&start.isolation));
-    let server = server(&start, loaded, seed)?;
-    Ok(isolation.zip(server).map(|(isolation, server)| (control, isolation, server)))
+    let Some(isolation) = singleton!(: Isolation = Isolation::NEW) else { return Ok(None) };
+    isolation.start(&start.isolation);
+    Ok(server(&start, loaded, seed)?.map(|server| (control, isolation, server)))
 }
 
 /// Builds the server. Not inlined, so that its stack frame is released.

@@ -91,15 +91,23 @@ pub struct Isolation {
 }
 
 impl Isolation {
-    /// The bank for a spring at rest at 0 V.
+    /// No bank runs. A constant: the state is too large for the stack.
+    pub const NEW: Self = Self {
+        config: None,
+        trip_on_cause: Causes::NONE,
+        last: None,
+        told: (Verdict::Quiet, 0, 0),
+        state: isolation::State::NEW,
+    };
+
+    /// Starts the bank for a spring at rest at 0 V. Call it before the first tick.
     #[inline(never)]
-    pub fn new(terms: &Terms) -> Self {
-        let config = terms.bank.ok().and_then(|bank| {
+    pub fn start(&mut self, terms: &Terms) {
+        self.config = terms.bank.ok().and_then(|bank| {
             let sample_time = SampleTime::from_rate(terms.rate_hz).ok()?;
             Some(bank.validate(sample_time).ok()?.quantize())
         });
-        let (trip_on_cause, state) = (terms.trip_on_cause, isolation::State::default());
-        Self { config, trip_on_cause, last: None, told: (Verdict::Quiet, 0, 0), state }
+        self.trip_on_cause = terms.trip_on_cause;
     }
 
     /// Before a tick: the acknowledgement of the bank's fault ends its alarm. Returns that fault as long as a cause of the setting

@@ -243,28 +243,33 @@ pub struct State {
     released: bool,
 }
 
+impl State {
+    /// A spring at rest at 0 V. A constant, so that a program can place it in memory without a copy on its stack.
+    pub const NEW: Self = Self {
+        sums: sums::Sums::NEW,
+        means: sums::Means::NEW,
+        filters: signatures::Filters::NEW,
+        vectors: [0; SLOTS],
+        last: [0; SLOTS],
+        whitened: [0; SLOTS],
+        tests: sequential::Tests::NEW,
+        products: products::Products::NEW,
+        mode: products::Mode { fresh: true, ..products::Mode::NEW },
+        decision: decision::Decision::NEW,
+        working: false,
+        alarmed: false,
+        blocks: 0,
+        age: 0,
+        since_decision: 0,
+        pinned: false,
+        pinned_at: None,
+        released: false,
+    };
+}
+
 impl Default for State {
     fn default() -> Self {
-        Self {
-            sums: Default::default(),
-            means: Default::default(),
-            filters: Default::default(),
-            vectors: [0; SLOTS],
-            last: [0; SLOTS],
-            whitened: [0; SLOTS],
-            tests: Default::default(),
-            products: Default::default(),
-            mode: products::Mode { fresh: true, ..Default::default() },
-            decision: Default::default(),
-            working: false,
-            alarmed: false,
-            blocks: 0,
-            age: 0,
-            since_decision: 0,
-            pinned: false,
-            pinned_at: None,
-            released: false,
-        }
+        Self::NEW
     }
 }
 
@@ -374,7 +379,7 @@ impl Config {
         if state.mode.halve {
             state.blocks >>= 1;
         }
-        state.mode = products::Mode::default();
+        state.mode = products::Mode::NEW;
     }
 
     #[inline(always)]
@@ -395,9 +400,9 @@ impl State {
     /// Ends an alarm: the bank looks for a fault anew, and one that lasts is found again.
     pub fn acknowledge(&mut self) {
         self.alarmed = false;
-        self.tests = Default::default();
+        self.tests = sequential::Tests::NEW;
         self.decision.reset();
-        self.mode = products::Mode { fresh: true, ..Default::default() };
+        self.mode = products::Mode { fresh: true, ..products::Mode::NEW };
         self.restart();
     }
 
