@@ -79,13 +79,14 @@ Examples:
     /// The emulated board drives a spring with a hidden effect up and down a stair, in lock step; `vsj diagnose` names
     /// the cause; the extended model goes over the link, is checked, stored and run after a restart. Prints the true
     /// stiffness error before and after. With --feedback the board reads the spring's sensor instead, which then falls
-    /// silent.
+    /// silent. With --isolation the spring changes meanwhile, and the board names the cause.
     #[command(after_help = "\
 Examples:
   cargo xtask story                                three effects, as in `test`
   cargo xtask story --effect hysteresis gain-error
   cargo xtask story --controller fast
   cargo xtask story --feedback                     the paper's model, without the sensor and with it
+  cargo xtask story --isolation                    what changes is named by the board
   cargo xtask story --all --json")]
     Story(story::Args),
     /// Flash, RAM and worst stack of each image

@@ -1,6 +1,6 @@
 //! Checks of an image's machine code:
 //!
-//! - No call from the control tick leads to a panic, directly or through other functions, and none has an unknown
+//! - No call from the control tick, or from that of the isolation bank, leads to a panic, directly or through other functions, and none has an unknown
 //!   target. The tick contains no undefined instruction.
 //! - The tick uses no floats: it calls no float arithmetic of the compiler's and has no instruction of the float unit.
 //! - The image has no allocator.
@@ -14,9 +14,20 @@ use super::thumb::Code;
 
 /// Beginning and end of the demangled name of the function that must not panic.
 const TICK: (&str, &str) = ("firmware::control::Control", "tick");
+/// The same of the isolation bank, in an image that contains it.
+const ISOLATION: (&str, &str) = ("firmware::isolation::enabled::Isolation", "tick");
 
 /// Runs all checks. Returns the number of functions that the tick consists of, its callees included.
 pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
+    check(bytes, &[TICK])
+}
+
+/// Runs all checks, those of the control tick for the tick of the isolation bank as well.
+pub(crate) fn with_isolation(bytes: &[u8]) -> Result<usize> {
+    check(bytes, &[TICK, ISOLATION])
+}
+
+fn check(bytes: &[u8], names: &[(&str, &str)]) -> Result<usize> {
     let functions = elf::functions(bytes)?;
     if let Some(found) = functions.iter().find(|f| is_heap(&f.name)) {
         bail!("`{}` is an allocator's", found.name);
@@ -26,10 +37,11 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
     ensure!(functions.iter().any(|f| is_float(&f.name)), "the image has no float at all: have names changed?");
     let code = Code::new(bytes)?;
     let by_address: BTreeMap<u32, &Function> = functions.iter().map(|f| (f.address, f)).collect();
-    let ticks = ticks(&functions)?;
-
     let mut seen = BTreeSet::new();
-    let mut open: Vec<(&Function, String)> = ticks.iter().map(|f| (*f, f.name.clone())).collect();
+    let mut open: Vec<(&Function, String)> = Vec::new();
+    for name in names {
+        open.extend(instances(&functions, *name)?.into_iter().map(|f| (f, f.name.clone())));
+    }
     while let Some((function, path)) = open.pop() {
         if !seen.insert(function.address) {
             continue;
@@ -52,11 +64,15 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
 
 /// Every compiled instance of the control tick. None is an error.
 pub(crate) fn ticks(functions: &[Function]) -> Result<Vec<&Function>> {
-    let is_tick =
-        |f: &&Function| f.name.trim_start_matches('<').starts_with(TICK.0) && plain(&f.name).ends_with(TICK.1);
-    let ticks: Vec<&Function> = functions.iter().filter(is_tick).collect();
-    ensure!(!ticks.is_empty(), "no function `{}::{}` in the image", TICK.0, TICK.1);
-    Ok(ticks)
+    instances(functions, TICK)
+}
+
+/// Every compiled instance of a function with this beginning and end of its name.
+fn instances<'a>(functions: &'a [Function], (start, end): (&str, &str)) -> Result<Vec<&'a Function>> {
+    let is_one = |f: &&Function| f.name.trim_start_matches('<').starts_with(start) && plain(&f.name).ends_with(end);
+    let found: Vec<&Function> = functions.iter().filter(is_one).collect();
+    ensure!(!found.is_empty(), "no function `{start}::{end}` in the image");
+    Ok(found)
 }
 
 /// A function's name without generic arguments at its end.

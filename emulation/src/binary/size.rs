@@ -19,7 +19,7 @@ const MOST_RAM: u32 = 16 << 10;
 const MOST_RAM_ISOLATION: u32 = 24 << 10;
 
 /// Features of an image with the isolation bank.
-pub(crate) const ISOLATION: &[&str] = &["feedback", "isolation"];
+pub(crate) const ISOLATION: &[&str] = &["isolation"];
 
 /// Options of `cargo xtask size`.
 #[derive(clap::Args)]
