@@ -312,19 +312,55 @@ mod tests {
         }
     }
 
+    /// Settings with a sensor, and with these causes as a trip.
+    fn with_sensor(trip_on_cause: u16) -> WireSettings {
+        let sensor = Some([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]);
+        WireSettings { sensor, trip_on_cause, ..built_in_settings() }
+    }
+
+    /// Only a plain spring has an isolation bank, without which a trip would never come.
+    #[cfg(feature = "isolation")]
+    #[test]
+    fn a_trip_and_an_extended_spring_exclude_each_other() {
+        let plain = model(0.1).payload().unwrap();
+        let extended = WireModel { leakage: Some((0.1, 40.0)), ..model(0.1) }.payload().unwrap();
+        let [quiet, trip] = [0, 0x8000].map(|trip| with_sensor(trip).payload().unwrap());
+        for (model, settings, accepted) in
+            [(&plain, &quiet, true), (&plain, &trip, true), (&extended, &quiet, true), (&extended, &trip, false)]
+        {
+            let of_settings = check_settings(&store(&[(Block::Model, model)]), settings, &BUILT_IN);
+            let of_model = check_model(&store(&[(Block::Settings, settings)]), model, &BUILT_IN);
+            let field = Field::named("trip_on_cause");
+            if accepted {
+                assert_eq!((of_settings, of_model), (Ok(()), Ok(())));
+            } else {
+                assert!(matches!(of_settings, Err(Reason::BadSettings { field: found, .. }) if found == field));
+                assert!(matches!(of_model, Err(Reason::BadModel { field: found, .. }) if found == field));
+            }
+            let (mut place, loaded) = (None, load(&store(&[(Block::Settings, settings)]), &BUILT_IN));
+            let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
+            let stored = Some((BlockId::of(3, model), &model[..]));
+            let (control, start) = control(&loaded, stored, &cause, &mut place).unwrap();
+            assert_eq!(start.rejected, if accepted { None } else { Some("trip_on_cause") });
+            assert_eq!(control.supervisor().standing() == Faults::NONE, accepted);
+        }
+    }
+
     /// The features of this build decide, as those of an image do.
     #[test]
     fn what_the_image_does_not_contain_is_refused_by_its_name() {
         let check = |wire: WireSettings| check_settings(&store(&[]), &wire.payload().unwrap(), &BUILT_IN);
         let fast = WireSettings { controller: Controller::Fast, ..built_in_settings() };
-        let sensor =
-            WireSettings { sensor: Some([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]), ..built_in_settings() };
+        let sensor = with_sensor(0);
         let contains =
             |feature: bool, field| if feature { Ok(()) } else { Err(Reason::NotBuiltIn(Field::named(field))) };
         let fast_is_there = model::Approach::new(0.0).is_some();
         let sensor_is_there = model::Feedback::from_values([1.0; 8]).is_some();
         assert_eq!(check(fast), contains(fast_is_there, "controller"));
         assert_eq!(check(sensor), contains(sensor_is_there, "sensor"));
+        if sensor_is_there {
+            assert_eq!(check(with_sensor(0x8000)), contains(cfg!(feature = "isolation"), "trip_on_cause"));
+        }
         assert_eq!(check(WireSettings { controller: Controller::None, ..built_in_settings() }), Ok(()));
     }
 

@@ -62,7 +62,8 @@ pub(super) fn check(stage: &Stage) -> Result<()> {
         one(stage, &vsj, name, disturbance, *named).with_context(|| (*name).to_owned())
     };
     let lines: Vec<String> = CASES.par_iter().map(run).collect::<Result<_>>()?;
-    lines.iter().for_each(|line| eprintln!("{line}"));
+    lines.iter().for_each(|line| println!("{line}"));
+    println!("each as the host and vsj isolate, bit for bit, with the codes of a host without the bank");
     Ok(())
 }
 
@@ -75,20 +76,30 @@ fn one(stage: &Stage, vsj: &Path, name: &str, disturbance: &Disturbance, named: 
     ensure!(board == host, "the board says {board:?}, the host {host:?}");
     let isolated = isolated(vsj, &record)?;
     ensure!(board == isolated, "the board says {board:?}, vsj isolate {isolated:?}");
-    let says = match board.iter().rfind(|said| said.verdict == "named") {
-        None => "nothing is named".to_owned(),
-        Some(Said { tick, since_tick, cause, .. }) => {
-            let [at_s, since_s] = [tick, since_tick].map(|tick| f64::from(*tick) * TICK_S);
-            let Cause { name, size, high, .. } = cause.as_ref().context("a name without a cause")?;
-            ensure!(Some(name.as_str()) == named, "{board:?}");
-            format!("{name} {size:.4} +- {:.4} at {at_s:.1} s, since {since_s:.2} s", high - size)
+    let names: Vec<&str> = board
+        .iter()
+        .filter(|said| said.verdict == "named")
+        .filter_map(|said| Some(said.cause.as_ref()?.name.as_str()))
+        .collect();
+    match named {
+        None => ensure!(board.is_empty(), "{board:?}"),
+        Some(named) => ensure!(!names.is_empty() && names.iter().all(|name| *name == named), "{board:?}"),
+    }
+    let says = board.iter().map(describe).collect::<Vec<_>>();
+    let says = if says.is_empty() { "nothing is said".to_owned() } else { says.join(", ") };
+    Ok(format!("{name}: {says}"))
+}
+
+/// A change of the verdict for people.
+fn describe(Said { tick, since_tick, verdict, cause }: &Said) -> String {
+    let [at_s, since_s] = [tick, since_tick].map(|tick| f64::from(*tick) * TICK_S);
+    match cause {
+        None => format!("{verdict} at {at_s:.1} s"),
+        Some(Cause { name, size, high, .. }) => {
+            let half_width = high - size;
+            format!("{verdict} {name} at {at_s:.1} s ({size:.5} +- {half_width:.5} since {since_s:.2} s)")
         }
-    };
-    ensure!(named.is_some() || board.is_empty(), "{board:?}");
-    ensure!(named.is_none() || board.iter().any(|said| said.verdict == "named"), "{board:?}");
-    Ok(format!(
-        "isolation, {name}: {says}; as the host and vsj isolate, bit for bit, with the codes of a host without it"
-    ))
+    }
 }
 
 /// The change of the verdict in a line of the log, without its first word.
