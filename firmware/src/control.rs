@@ -2,7 +2,6 @@
 //!
 //! The tick is a pure function of its inputs and its state, without clock, pins and log: host and MCU compute the same bits.
 
-use crate::isolation::News;
 use link::{Command, WireModel};
 use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
@@ -10,6 +9,8 @@ use model::{
     Config, ExtendedPlant, Input, OutOfRange, Output, Reading, ScaledStiffness, Settings, State, Validated, Volts,
     estimator, extended,
 };
+
+use crate::isolation::News;
 
 /// Inputs of one tick from the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Checks of an image's machine code:
 //!
-//! - No call from the control tick, or from that of the isolation bank, leads to a panic, directly or through other functions, and none has an unknown
-//!   target. The tick contains no undefined instruction.
+//! - No call from the control tick, or from that of the isolation bank, leads to a panic, directly or through other
+//!   functions, and none has an unknown target. The tick contains no undefined instruction.
 //! - The tick uses no floats: it calls no float arithmetic of the compiler's and has no instruction of the float unit.
 //! - The image has no allocator.
 

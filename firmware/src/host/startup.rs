@@ -16,8 +16,8 @@ use crate::store::{Pages, Store};
 /// Controller, isolation bank and server.
 type Built = (&'static mut Control, &'static mut Isolation, &'static mut Server);
 
-/// Builds controller, isolation bank and server from the settings and the stored model; `None` from the second call on. The nonces of the link's sessions
-/// follow from `seed`, which has to be another one at every start.
+/// Builds controller, isolation bank and server from the settings and the stored model; `None` from the second call on. The nonces
+/// of the link's sessions follow from `seed`, which has to be another one at every start.
 ///
 /// # Errors
 /// [`OutOfRange`] names the invalid setting.

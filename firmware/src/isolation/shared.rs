@@ -33,12 +33,7 @@ pub fn publish(news: &News, tick: u64) {
 
 /// True once after the host's acknowledgement.
 pub fn take_acknowledged() -> bool {
-    // A swap would need interrupts off on some processors; only the control task clears it.
-    let acknowledged = ACKNOWLEDGED.load(Ordering::Relaxed);
-    if acknowledged {
-        ACKNOWLEDGED.store(false, Ordering::Relaxed);
-    }
-    acknowledged
+    ACKNOWLEDGED.swap(false, Ordering::Relaxed)
 }
 
 /// Executes a request of the host at `tick`.
