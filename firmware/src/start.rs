@@ -167,7 +167,7 @@ mod tests {
     use super::*;
     use crate::settings::BUILT_IN;
     use crate::settings::{SETTINGS, built_in};
-    use crate::store::{FlashError, PAGE, PAGES, Page, WORD};
+    use crate::store::Memory;
     use link::wire_model::FORMAT;
     use link::{Controller, Field, frame, wire_settings};
     use model::supervisor::{Faults, State};
@@ -175,28 +175,9 @@ mod tests {
 
     const PAPER: Loaded = Loaded::fixed(built_in(SETTINGS));
 
-    /// Flash that never fails.
-    struct Flash([[u8; PAGE]; PAGES]);
-
-    impl Pages for Flash {
-        fn bytes(&self, page: Page) -> &[u8; PAGE] {
-            &self.0[page.index()]
-        }
-
-        fn erase(&mut self, page: Page) -> Result<(), FlashError> {
-            self.0[page.index()].fill(0xff);
-            Ok(())
-        }
-
-        fn program(&mut self, page: Page, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
-            self.0[page.index()][at..at + WORD].copy_from_slice(&word);
-            Ok(())
-        }
-    }
-
     /// A store with these payloads, as an earlier firmware may have left them.
-    fn store(contents: &[(Block, &[u8])]) -> Store<Flash> {
-        let mut store = Store::new(Flash([[0xff; PAGE]; PAGES]));
+    fn store(contents: &[(Block, &[u8])]) -> Store<Memory> {
+        let mut store = Store::new(Memory::default());
         for (block, payload) in contents {
             for (number, part) in (0..).zip(payload.chunks(link::block::PART)) {
                 let bytes: Vec<u8> = part.iter().copied().chain([0; link::block::PART]).collect();

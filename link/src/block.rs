@@ -8,6 +8,7 @@
 
 use core::fmt;
 
+use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::checksum::checksum;
@@ -57,6 +58,28 @@ impl Part {
             *byte = *from;
         }
         Self { number, length: payload.len() as u16, bytes }
+    }
+}
+
+/// Serialises the content of a block as a payload. `None` if it is longer than `N` bytes.
+pub(crate) fn write<const N: usize>(format: u8, content: &impl Serialize) -> Option<Vec<u8, N, u16>> {
+    let mut bytes = Vec::new();
+    bytes.resize_default(N).ok()?;
+    let (first, message) = bytes.split_first_mut()?;
+    *first = format;
+    let length = 1 + postcard::to_slice(content, message).ok()?.len();
+    bytes.truncate(length);
+    Some(bytes)
+}
+
+/// Deserialises a payload. `None` for another format and for bytes that are not exactly one content.
+pub(crate) fn read<'a, T: Deserialize<'a>>(format: u8, payload: &'a [u8]) -> Option<T> {
+    match payload.split_first() {
+        Some((first, message)) if *first == format => match postcard::take_from_bytes(message) {
+            Ok((content, [])) => Some(content),
+            _ => None,
+        },
+        _ => None,
     }
 }
 

@@ -12,7 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::reply::{State, Telemetry};
+use crate::telemetry::{State, Telemetry};
 use crate::value::WireVolts;
 
 /// Number of rows in a reply.

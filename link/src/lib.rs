@@ -21,6 +21,7 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`request`], [`reply`], [`reason`] | The messages. |
+//! | [`telemetry`] | One sample of the control loop, and the state of the output. |
 //! | [`value`] | Voltages and desired stiffness in their wire format. |
 //! | [`block`] | Blocks that the MCU stores: their identity, and the parts in which they are sent. |
 //! | [`capture`] | Rows of the fast capture, and the requests that start and read it. |
@@ -59,6 +60,7 @@ pub mod sequence;
 pub mod server;
 pub mod session;
 mod stuffing;
+pub mod telemetry;
 pub mod value;
 pub mod wire_model;
 pub mod wire_settings;
@@ -73,11 +75,12 @@ pub use isolation::IsolationReport;
 pub use nonce::{Nonce, Stamp};
 pub use reason::Reason;
 pub use receiver::Receiver;
-pub use reply::{Controller, FaultReport, Reply, State, Status, Telemetry};
+pub use reply::{Controller, FaultReport, Reply, Status};
 pub use request::Request;
 pub use sequence::Sequence;
 pub use server::{About, Server, Step, Update, View};
 pub use session::{Action, Session};
+pub use telemetry::{State, Telemetry};
 pub use value::{Desired, WireVolts};
 pub use wire_model::WireModel;
 pub use wire_settings::WireSettings;

@@ -1,17 +1,16 @@
 //! Replies of the MCU.
 
-use core::fmt;
-
 use model::Compensation;
-use model::supervisor::{self, Faults, Supervisor};
+use model::supervisor::Faults;
 use serde::{Deserialize, Serialize};
 
 use crate::block::{Blocks, Part};
 use crate::capture::{Captured, Rows};
-use crate::diagnosis::{Mismatch, Sensor};
+use crate::diagnosis::Mismatch;
 use crate::fault::Fault;
 use crate::isolation::IsolationReport;
 use crate::reason::Reason;
+use crate::telemetry::{State, Telemetry};
 use crate::value::WireVolts;
 
 /// Reply to a request, with the sequence number of that request. Telemetry has sequence numbers of its own.
@@ -68,20 +67,6 @@ impl FaultReport {
     pub fn faults(&self) -> impl Iterator<Item = Fault> {
         Faults::from_bits(self.standing).iter().map(Fault::from)
     }
-}
-
-/// State of the output.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum State {
-    /// 0 V, output disabled; can be armed.
-    #[default]
-    Disarmed,
-    /// The output is enabled and the controller follows the target.
-    Armed,
-    /// Armed, but the host is silent: the target ramps down to 0 V, then the MCU disarms. An accepted frame ends the ramp.
-    Ramping,
-    /// 0 V, output disabled; the fault must be acknowledged first.
-    Faulted,
 }
 
 /// Complete state of the MCU.
@@ -174,59 +159,5 @@ impl Controller {
             Self::Paper => "paper",
             Self::Fast => "fast",
         }
-    }
-}
-
-/// One sample of the control loop; all values are of the same tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Telemetry {
-    /// Number of the tick, counted from the start.
-    pub tick: u64,
-    /// State of the output.
-    pub state: State,
-    /// Target after limitation and ramping, as equivalent static voltage.
-    pub target: WireVolts,
-    /// Voltage that corresponds to `code`.
-    pub applied: WireVolts,
-    /// Estimated stiffness, as equivalent static voltage.
-    pub estimate: WireVolts,
-    /// Measured stiffness, as equivalent static voltage; `None` without a new reading.
-    pub measured: Option<WireVolts>,
-    /// Code written to the DAC, 0 to 65 535.
-    pub code: u16,
-    /// Active limits as [`model::Limits::bits`]: upper 1, lower 2, slew 4, target 8.
-    pub limits: u8,
-    /// What disagrees with the output; of a monitor fault, what it was found by.
-    pub mismatch: Mismatch,
-    /// Diagnosis of the stiffness sensor.
-    pub sensor: Sensor,
-}
-
-impl From<&Supervisor> for State {
-    fn from(supervisor: &Supervisor) -> Self {
-        match supervisor.state() {
-            supervisor::State::Disarmed => Self::Disarmed,
-            supervisor::State::Armed if supervisor.ramping() => Self::Ramping,
-            supervisor::State::Armed => Self::Armed,
-            supervisor::State::Faulted(_) => Self::Faulted,
-        }
-    }
-}
-
-impl State {
-    /// Name for tables and JSON.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Disarmed => "disarmed",
-            Self::Armed => "armed",
-            Self::Ramping => "ramping",
-            Self::Faulted => "faulted",
-        }
-    }
-}
-
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }

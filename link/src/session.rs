@@ -28,9 +28,10 @@ use crate::nonce::{Nonce, Nonces, Stamp};
 use crate::reason::Reason;
 use crate::receiver::Receiver;
 pub use crate::reply::Counters;
-use crate::reply::{FaultReport, Reply, Telemetry};
+use crate::reply::{FaultReport, Reply};
 use crate::request::Request;
 use crate::sequence::Sequence;
+use crate::telemetry::Telemetry;
 
 /// Reaction to a received byte.
 #[derive(Clone, Copy, Debug, PartialEq)]

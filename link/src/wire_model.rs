@@ -9,7 +9,7 @@ use model::extended::{lags::MAX_LAGS, law::MAX_POINTS, memory::MAX_PLAYS};
 use model::{Amplifier, ExtendedPlant};
 use serde::{Deserialize, Serialize};
 
-use crate::block::PART;
+use crate::block::{self, PART};
 
 /// Version of the payload's format.
 pub const FORMAT: u8 = 1;
@@ -108,25 +108,13 @@ impl WireModel {
 
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the largest model.
     pub fn payload(&self) -> Option<Vec<u8, MOST_BYTES, u16>> {
-        let mut bytes = Vec::new();
-        bytes.resize_default(MOST_BYTES).ok()?;
-        let (format, message) = bytes.split_first_mut()?;
-        *format = FORMAT;
-        let length = 1 + postcard::to_slice(self, message).ok()?.len();
-        bytes.truncate(length);
-        Some(bytes)
+        block::write(FORMAT, self)
     }
 
     /// Deserialises a payload. `None` for another format and for bytes that are not exactly one model.
     #[inline(never)]
     pub fn read(payload: &[u8]) -> Option<Self> {
-        match payload.split_first() {
-            Some((&FORMAT, message)) => match postcard::take_from_bytes(message) {
-                Ok((model, [])) => Some(model),
-                _ => None,
-            },
-            _ => None,
-        }
+        block::read(FORMAT, payload)
     }
 }
 

@@ -9,7 +9,7 @@ use model::isolation::Causes;
 use model::{Amplifier, Approach, Compensation, Feedback, Gains, Settings, supervisor};
 use serde::{Deserialize, Serialize};
 
-use crate::block::PART;
+use crate::block::{self, PART};
 use crate::field::Field;
 use crate::reply::Controller;
 
@@ -159,34 +159,20 @@ impl WireSettings {
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the longest.
     #[inline(never)]
     pub fn payload(&self) -> Option<Payload> {
-        let mut bytes = Payload::new();
-        bytes.resize_default(MOST_BYTES).ok()?;
-        let (format, message) = bytes.split_first_mut()?;
-        let length = if self.trip_on_cause == 0 {
-            *format = FIRST;
-            1 + postcard::to_slice(self, message).ok()?.len()
+        if self.trip_on_cause == 0 {
+            block::write(FIRST, self)
         } else {
-            *format = FORMAT;
-            1 + postcard::to_slice(&(self, self.trip_on_cause), message).ok()?.len()
-        };
-        bytes.truncate(length);
-        Some(bytes)
+            block::write(FORMAT, &(self, self.trip_on_cause))
+        }
     }
 
     /// Deserialises a payload. `None` for a newer format and for bytes that are not exactly one set of settings.
     #[inline(never)]
     pub fn read(payload: &[u8]) -> Option<Self> {
-        match payload.split_first() {
-            Some((&FIRST, message)) => match postcard::take_from_bytes(message) {
-                Ok((settings, [])) => Some(settings),
-                _ => None,
-            },
-            Some((&FORMAT, message)) => match postcard::take_from_bytes::<(Self, u16)>(message) {
-                Ok(((settings, trip_on_cause), [])) => Some(Self { trip_on_cause, ..settings }),
-                _ => None,
-            },
-            _ => None,
-        }
+        block::read(FIRST, payload).or_else(|| {
+            let (settings, trip_on_cause) = block::read::<(Self, u16)>(FORMAT, payload)?;
+            Some(Self { trip_on_cause, ..settings })
+        })
     }
 }
 

@@ -175,9 +175,9 @@ function steps({ steps, bound_from }) {
 function summary({ steps, max_fixed_point_error, limited_ticks }, remarks) {
   const times = steps.map(({ t97_s }) => t97_s);
   const slowest = times.some((time) => time == null) ? "not all changes reach 97 %" : `97 % of each change within ${digits(Math.max(...times), 3)} s`;
-  const told = steps.length ? slowest : "No change between two plateaus of at least 1 s";
+  const changes = steps.length ? slowest : "No change between two plateaus of at least 1 s";
   const limited = limited_ticks.upper + limited_ticks.lower + limited_ticks.slew;
-  const sentences = [told, `fixed point within ${digits(max_fixed_point_error, 3)} V of the reference`, `limits acted in ${limited} ticks`];
+  const sentences = [changes, `fixed point within ${digits(max_fixed_point_error, 3)} V of the reference`, `limits acted in ${limited} ticks`];
   return [`${sentences.join("; ")}.`, ...remarks].join(" ");
 }
 

@@ -1,10 +1,10 @@
 //! `cargo xtask image`: the MCU's images as ELF, bin and hex, each with its software bill of materials.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use xtask::build::{self, Board, Opt};
+use xtask::files;
 use xtask::segments;
 use xtask::variant::Variant;
 
@@ -40,15 +40,11 @@ pub(crate) fn files(variant: Variant, board: Board) -> Result<[PathBuf; 4]> {
     let path = build::image_with(&variant.features(), board, Opt::S)?;
     let flash = segments::flash(&build::read(&path)?).with_context(|| format!("in {}", path.display()))?;
     let [bin, hex, bom] = ["bin", "hex", "cdx.json"].map(|extension| path.with_extension(extension));
-    write(&bin, &flash.bytes)?;
-    write(&hex, intel_hex(flash.address, &flash.bytes).as_bytes())?;
+    files::write(&bin, &flash.bytes)?;
+    files::write(&hex, intel_hex(flash.address, &flash.bytes))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    write(&bom, sbom::of_image(board, &variant.features(), &name)?.as_bytes())?;
+    files::write(&bom, sbom::of_image(board, &variant.features(), &name)?)?;
     Ok([path, bin, hex, bom])
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Formats bytes that begin at `address` as Intel HEX, 16 bytes a line.

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use xtask::build;
+use xtask::files;
 use xtask::shell;
 use xtask::tool::Tool;
 
@@ -42,15 +43,16 @@ pub(crate) fn build() -> Result<PathBuf> {
     let mdbook = MDBOOK.program()?;
     let folder = target.join("manual");
     let sources = folder.join("src");
-    if sources.exists() {
-        fs::remove_dir_all(&sources).with_context(|| format!("cannot remove {}", sources.display()))?;
+    files::remove(&sources)?;
+    // As they are now.
+    for file in files::tracked(&SOURCES)?.iter().filter(|file| *file != CONTENTS) {
+        files::copy(&shell::root().join(file), &sources.join(file))?;
     }
-    copy(&sources)?;
     let commands = commands(&build::vsj()?, &sources.join("commands"))?;
     let contents =
         fs::read_to_string(shell::root().join(CONTENTS)).with_context(|| format!("cannot read {CONTENTS}"))?;
-    write(&sources.join("SUMMARY.md"), &contents_of_book(&contents, &causes()?, &commands)?)?;
-    write(&folder.join("book.toml"), BOOK)?;
+    files::write(&sources.join("SUMMARY.md"), &contents_of_book(&contents, &causes()?, &commands)?)?;
+    files::write(&folder.join("book.toml"), BOOK)?;
     shell::run(shell::command(&mdbook).arg("build").arg(&folder))?;
     Ok(folder.join("book"))
 }
@@ -61,21 +63,9 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// Copies the documents that git tracks, as they are now.
-fn copy(to: &Path) -> Result<()> {
-    let files = shell::output(shell::command("git").args(["ls-files", "-z"]).args(SOURCES))?;
-    for file in files.split('\0').filter(|file| !file.is_empty() && *file != CONTENTS) {
-        let (from, to) = (shell::root().join(file), to.join(file));
-        let parent = to.parent().context("a file in a folder")?;
-        fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
-        fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
-    }
-    Ok(())
-}
-
 /// Writes a page with the help of each command of `vsj`, and one with those of `cargo xtask`. Returns their lines of the contents.
 fn commands(vsj: &Path, folder: &Path) -> Result<String> {
-    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    files::make(folder)?;
     let pages = folder.join("man");
     shell::output(shell::command(vsj).arg("man").arg("--out").arg(&pages))?;
     let mut names = Vec::new();
@@ -83,12 +73,12 @@ fn commands(vsj: &Path, folder: &Path) -> Result<String> {
         let name = entry?.file_name().to_string_lossy().into_owned();
         names.extend(name.strip_suffix(".1").map(str::to_owned));
     }
-    fs::remove_dir_all(&pages).with_context(|| format!("cannot remove {}", pages.display()))?;
+    files::remove(&pages)?;
     names.sort();
     let mut lines = String::new();
     let mut page = |name: &str, file: &str, help: &str, depth: usize| {
         lines += &format!("{}- [{name}](commands/{file}.md)\n", "  ".repeat(depth));
-        write(&folder.join(format!("{file}.md")), &format!("# {name}\n\n```text\n{}\n```\n", help.trim_end()))
+        files::write(&folder.join(format!("{file}.md")), format!("# {name}\n\n```text\n{}\n```\n", help.trim_end()))
     };
     for file in &names {
         let words: Vec<&str> = file.split('-').collect();
@@ -102,9 +92,8 @@ fn commands(vsj: &Path, folder: &Path) -> Result<String> {
 
 /// The lines of the contents for the causes, the page about all of them first.
 fn causes() -> Result<String> {
-    let files = shell::output(shell::command("git").args(["ls-files", "-z", "docs/causes/*.md"]))?;
-    let mut names: Vec<&str> =
-        files.split('\0').filter_map(|file| file.rsplit('/').next()?.strip_suffix(".md")).collect();
+    let pages = files::tracked(&["docs/causes/*.md"])?;
+    let mut names: Vec<&str> = pages.iter().filter_map(|page| page.rsplit('/').next()?.strip_suffix(".md")).collect();
     names.sort_by_key(|name| (*name != "README", *name));
     ensure!(names.first() == Some(&"README"), "docs/causes has no README.md");
     let title = |name: &str| if name == "README" { "All causes".to_owned() } else { name.to_owned() };
@@ -119,10 +108,6 @@ fn contents_of_book(contents: &str, causes: &str, commands: &str) -> Result<Stri
     let with_causes = contents.replace(CAUSES, causes.trim_end());
     let relative = with_causes.replace("](", "](docs/").replace("](docs/../", "](");
     Ok(relative.replace(COMMANDS, commands.trim_end()))
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 #[cfg(test)]

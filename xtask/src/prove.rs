@@ -24,11 +24,6 @@ pub(crate) struct Args {
     verbose: bool,
 }
 
-impl Args {
-    /// The share that `cargo xtask test` runs: all claims, a tenth of the ticks.
-    pub(crate) const SHARE: Self = Self { ticks: 1_000_000, seed: 1, verbose: false };
-}
-
 /// Proves the claims, then compares the tick that they are about with the one in Rust.
 pub(crate) fn run(args: &Args) -> Result<()> {
     let target = shell::target_directory()?;

@@ -1,10 +1,11 @@
 //! `cargo xtask reproducible`: builds the images in two folders with names of different lengths, and compares the files.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use xtask::build::{self, Board};
+use xtask::files;
 use xtask::segments;
 use xtask::shell;
 use xtask::variant::Variant;
@@ -38,19 +39,13 @@ fn first(one: &[u8], other: &[u8]) -> String {
 
 /// Copies every file that git tracks, as it is now, to `folder`; what was built there before stays.
 fn copy_sources(folder: &Path) -> Result<()> {
-    let files = shell::output(shell::command("git").args(["ls-files", "-z"]))?;
-    for file in files.split('\0').filter(|file| !file.is_empty()) {
-        let (from, to): (PathBuf, PathBuf) = (shell::root().join(file), folder.join(file));
-        // Tracked, but deleted since.
-        if !from.is_file() {
-            continue;
-        }
-        let parent = to.parent().context("a file in a folder")?;
-        fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
-        let bytes = build::read(&from)?;
+    for file in files::tracked(&[])? {
+        let to = folder.join(&file);
+        files::make(to.parent().context("a file in a folder")?)?;
+        let bytes = build::read(&shell::root().join(&file))?;
         // Unchanged files keep their time, so that cargo does not compile them again.
         if fs::read(&to).ok().as_ref() != Some(&bytes) {
-            fs::write(&to, bytes).with_context(|| format!("cannot write {}", to.display()))?;
+            files::write(&to, bytes)?;
         }
     }
     Ok(())

@@ -1,37 +1,114 @@
-//! Calls of cargo in sequence, for `cargo xtask check` and `cargo xtask test`.
+//! Command lines in sequence, for `cargo xtask check` and `cargo xtask test`.
 
-use std::fmt::Write;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::env;
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+use std::panic::resume_unwind;
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result, ensure};
 use xtask::shell;
 
-/// One call of cargo.
+/// What a step starts.
+#[derive(Clone, Copy)]
+enum Program {
+    Cargo,
+    /// This program again.
+    Xtask,
+    /// The program that verifies the firmware's images. It has to be built: cargo would wait for a build in the same folder.
+    Emulation,
+}
+
+/// One command line.
 pub(crate) struct Step {
     /// At most 10 characters.
     pub(crate) name: &'static str,
-    /// Arguments of cargo.
-    pub(crate) args: &'static [&'static str],
+    program: Program,
+    args: &'static [&'static str],
     /// A variable of its environment.
-    pub(crate) env: Option<(&'static str, &'static str)>,
+    env: Option<(&'static str, &'static str)>,
 }
 
 impl Step {
+    /// A call of cargo.
     pub(crate) const fn new(name: &'static str, args: &'static [&'static str]) -> Self {
-        Self { name, args, env: None }
+        Self { name, program: Program::Cargo, args, env: None }
+    }
+
+    /// Another command of this program.
+    pub(crate) const fn xtask(name: &'static str, args: &'static [&'static str]) -> Self {
+        Self { program: Program::Xtask, ..Self::new(name, args) }
+    }
+
+    /// A command of the emulation.
+    pub(crate) const fn emulation(name: &'static str, args: &'static [&'static str]) -> Self {
+        Self { program: Program::Emulation, ..Self::new(name, args) }
+    }
+
+    /// The same with a variable of its environment.
+    pub(crate) const fn with(self, key: &'static str, value: &'static str) -> Self {
+        Self { env: Some((key, value)), ..self }
+    }
+
+    fn command(&self) -> Result<Command> {
+        // By name: a build beside this may have replaced the file of this program.
+        let built = |name| env::current_exe().map(|own| own.with_file_name(name)).context("cannot find this program");
+        let mut command = match self.program {
+            Program::Cargo => shell::cargo(),
+            Program::Xtask => shell::command(built("xtask")?),
+            Program::Emulation => shell::command(built("emulation")?),
+        };
+        command.args(self.args).envs(self.env);
+        Ok(command)
     }
 
     pub(crate) fn run(&self) -> Result<()> {
-        shell::run(shell::cargo().args(self.args).envs(self.env))
+        shell::run(&mut self.command()?)
     }
+
+    /// Runs the step, then prints its output, so that it does not mix with that of a step beside it.
+    fn run_beside(&self) -> Result<()> {
+        let output = self.command()?.output().with_context(|| format!("cannot start step `{}`", self.name))?;
+        let mut all = output.stderr;
+        all.extend(output.stdout);
+        io::stderr().lock().write_all(&all)?;
+        ensure!(output.status.success(), "step `{}` failed ({})", self.name, output.status);
+        Ok(())
+    }
+}
+
+/// Runs steps one after the other, and others beside them. After the first that fails no other is begun.
+pub(crate) fn run_beside(steps: &[Step], beside: &[Step], progress: &Progress) -> Result<()> {
+    let failed = AtomicBool::new(false);
+    let run_all = |steps: &[Step], run: fn(&Step) -> Result<()>| {
+        for step in steps {
+            if failed.load(Ordering::Relaxed) {
+                break;
+            }
+            progress.begin(step.name);
+            run(step).inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
+        }
+        Ok(())
+    };
+    thread::scope(|scope| {
+        let other = scope.spawn(|| run_all(beside, Step::run_beside));
+        let own = run_all(steps, Step::run);
+        own.and(other.join().unwrap_or_else(|panic| resume_unwind(panic)))
+    })
 }
 
 /// The steps for `--help`: name and command line of each.
 pub(crate) fn help(steps: &[Step]) -> String {
-    steps.iter().fold(String::new(), |mut help, Step { name, args, env }| {
+    steps.iter().fold(String::new(), |mut help, Step { name, program, args, env }| {
         let env = env.map(|(key, value)| format!("{key}={value} ")).unwrap_or_default();
-        let _ = writeln!(help, "  {name:<10} {env}cargo {}", args.join(" "));
+        let program = match program {
+            Program::Cargo => "cargo",
+            Program::Xtask | Program::Emulation => "cargo xtask",
+        };
+        let _ = writeln!(help, "  {name:<10} {env}{program} {}", args.join(" "));
         help
     })
 }

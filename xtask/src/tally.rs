@@ -9,7 +9,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
 
-use crate::shell;
+use crate::{files, shell};
 
 /// What one command has counted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,9 +41,9 @@ impl Tally {
     pub fn write(&self, command: &str) -> Result<()> {
         let path = file(command)?;
         let folder = path.parent().context("a file in a folder")?;
-        fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        files::make(folder)?;
         let text = serde_json::to_string_pretty(&self.to_json())? + "\n";
-        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+        files::write(&path, text)
     }
 
     /// The counts of the last run of a command, none if it has not run.

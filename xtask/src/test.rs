@@ -3,33 +3,36 @@
 use anyhow::Result;
 use xtask::{setup, shell};
 
-use crate::emulation;
-use crate::package;
-use crate::prove;
 use crate::steps::{self, Progress, Step};
 
-/// Calls of cargo, the quick ones first. Without a board the firmware's library is an ordinary one. Each image is
-/// linted for its board alone, with and without the optional features, because an image with a feature hides what is
-/// left out without it.
-const STEPS: &[Step] = &[
+/// What the others need, and what a slip of the hand breaks.
+const FIRST: &[Step] = &[
     Step::new("format", &["fmt", "--all", "--check"]),
+    Step::new("emulation", &["build", "--quiet", "--package", "emulation"]),
+];
+
+/// Steps that build in the folder of the development profile. Without a board the firmware's library is an ordinary one.
+const HOST: &[Step] = &[
     Step::new("lint host", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),
+    Step::new("document", &["doc", "--no-deps", "--workspace"]).with("RUSTDOCFLAGS", "-Dwarnings"),
+    Step::new("test", &["test", "--workspace"]),
+];
+
+/// Steps that build in other folders, and so need not wait for the first. Each image is linted for its board alone, with and without the
+/// optional features, because an image with a feature hides what is left out without it. Of the four images `boot` runs the first and
+/// the one that differs from it in everything.
+const BESIDE: &[Step] = &[
     Step::new("lint nucleo", &lint("-pfirmware", "nucleo-g474re")),
     Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,feedback,kilovolt")),
     Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
     Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,feedback,kilovolt")),
-    Step { name: "document", args: &["doc", "--no-deps", "--workspace"], env: Some(("RUSTDOCFLAGS", "-Dwarnings")) },
-    Step::new("test", &["test", "--workspace"]),
     Step::new("build vsj", &["build", "--release", "-p", "host-sim", "--bin", "vsj"]),
-];
-
-/// Command lines of the emulation, the long ones first. Of the four images `boot` runs the first and the one that differs from it in
-/// everything.
-const EMULATION: &[(&str, &[&str])] = &[
-    ("firmware", &["proof"]),
-    ("boot", &["boot"]),
-    ("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
-    ("story", &["story", "--check"]),
+    Step::xtask("python", &["python"]),
+    Step::xtask("prove", &["prove", "--ticks", "1000000"]),
+    Step::emulation("firmware", &["proof"]),
+    Step::emulation("boot", &["boot"]),
+    Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
+    Step::emulation("story", &["story", "--check"]),
 ];
 
 #[rustfmt::skip]
@@ -40,31 +43,24 @@ const fn lint(package: &'static str, features: &'static str) -> [&'static str; 1
 
 /// The steps for `--help`.
 pub(crate) fn help() -> String {
-    let line = |(name, args): &(&str, &[&str])| format!("  {name:<10} cargo xtask {}\n", args.join(" "));
-    let emulation: String = EMULATION.iter().map(line).collect();
-    let python = "  python     cargo xtask python\n  prove      cargo xtask prove --ticks 1000000\n";
-    let setup = "  setup      cargo xtask setup\n";
     format!(
-        "Steps, stopping at the first that fails, the last {} two at a time:\n{setup}{}{python}{emulation}",
-        EMULATION.len(),
-        steps::help(STEPS)
+        "Steps; the first that fails ends the run:\n  setup      cargo xtask setup\n{}\nthen\n{}\nand, beside these,\n{}",
+        steps::help(FIRST),
+        steps::help(HOST),
+        steps::help(BESIDE)
     )
 }
 
 /// Runs every step; an error names the first that fails.
 pub(crate) fn run() -> Result<()> {
-    let progress = Progress::of(3 + STEPS.len() + EMULATION.len());
+    let progress = Progress::of(1 + FIRST.len() + HOST.len() + BESIDE.len());
     progress.begin("setup");
     setup::run()?;
-    for step in STEPS {
+    for step in FIRST {
         progress.begin(step.name);
         step.run()?;
     }
-    progress.begin("python");
-    package::run()?;
-    progress.begin("prove");
-    prove::run(&prove::Args::SHARE)?;
-    emulation::run_all(EMULATION, |name| progress.begin(name))?;
+    steps::run_beside(HOST, BESIDE, &progress)?;
     progress.end();
     Ok(())
 }

@@ -9,6 +9,10 @@
 //! sealed by its last word. Without that word the page is invalid, and the other page is not modified, so that a power cut at
 //! any time preserves the old or the new block. Of two sealed pages, the one with the higher number is valid.
 
+mod memory;
+
+pub use memory::Memory;
+
 use link::block::PART;
 use link::wire_model::MOST_BYTES;
 use link::{Block, BlockId, Reason, frame};

@@ -13,7 +13,8 @@ use host_sim::watch::{Names, Settings, terminal};
 use simulation::schedule::Between;
 
 use super::choice::{BETWEEN, one_of};
-use super::link::record::{rows_hz, schedule};
+use super::link::record::rows_hz;
+use super::link::schedule::schedule;
 use super::link::session::seconds;
 
 /// Show and command the running MCU on a full screen, with plots; --emulated needs no board

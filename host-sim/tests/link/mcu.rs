@@ -14,7 +14,7 @@ use firmware::capture::Recorder;
 use firmware::control::{Control, Sensors, Untimed};
 use firmware::reset_cause::Cause;
 use firmware::start::{self, Start};
-use firmware::store::{FlashError, PAGE, PAGES, Page, Pages, Store, WORD};
+use firmware::store::{Memory, Store};
 use firmware::update;
 use link::isolation::Isolation;
 use link::reply::Firmware;
@@ -66,33 +66,7 @@ pub(crate) struct Shared {
     /// Seed of the nonces since the last start.
     pub(crate) seed: u32,
     /// Memory that survives a restart.
-    pub(crate) flash: Flash,
-}
-
-/// Pages of flash memory.
-#[derive(Clone, Debug)]
-pub(crate) struct Flash([[u8; PAGE]; PAGES]);
-
-impl Default for Flash {
-    fn default() -> Self {
-        Self([[0xff; PAGE]; PAGES])
-    }
-}
-
-impl Pages for Flash {
-    fn bytes(&self, page: Page) -> &[u8; PAGE] {
-        &self.0[page.index()]
-    }
-
-    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
-        self.0[page.index()].fill(0xff);
-        Ok(())
-    }
-
-    fn program(&mut self, page: Page, at: usize, word: [u8; WORD]) -> Result<(), FlashError> {
-        self.0[page.index()][at..at + WORD].copy_from_slice(&word);
-        Ok(())
-    }
+    pub(crate) flash: Memory,
 }
 
 /// A running MCU, stopped when dropped.
@@ -252,7 +226,7 @@ struct Chip {
     shared: Arc<Mutex<Shared>>,
     server: Server,
     control: Control,
-    store: Store<Flash>,
+    store: Store<Memory>,
     view: View,
     settings: device::Settings,
     recorder: Recorder,
@@ -358,7 +332,7 @@ impl Chip {
                 out.extend_from_slice(bytes);
                 let mut shared = self.shared.lock().unwrap();
                 shared.restart = true;
-                shared.flash = if self.setup.forgets { Flash::default() } else { self.store.pages().clone() };
+                shared.flash = if self.setup.forgets { Memory::default() } else { self.store.pages().clone() };
             }
             None => {}
         }

@@ -25,9 +25,10 @@ use crate::command::Command;
 use crate::fault::Fault;
 use crate::isolation::Isolation;
 use crate::reason::Reason;
-use crate::reply::{Firmware, Reply, Status, Telemetry};
+use crate::reply::{Firmware, Reply, Status};
 use crate::request::Request;
 use crate::session::{Action, Counters, Session};
+use crate::telemetry::Telemetry;
 use crate::value::WireVolts;
 use reports::Reports;
 

@@ -60,7 +60,7 @@ impl Reports {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reply::Telemetry;
+    use crate::telemetry::Telemetry;
     use model::supervisor::{self, State};
 
     fn view(tick: u64, fault: Option<supervisor::Fault>) -> View {

@@ -17,7 +17,7 @@ use crate::ground_truth::{Live, Noise};
 pub struct Alarms {
     /// Number of ticks.
     pub ticks: u64,
-    /// Number of alarms; each is acknowledged at once.
+    /// Number of alarms; each is acknowledged immediately.
     pub alarms: u64,
 }
 

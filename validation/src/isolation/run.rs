@@ -38,8 +38,6 @@ pub enum Says {
 /// Outcome of a run; times in s after the fault began.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
-    /// True if there was an alarm before the fault.
-    pub false_alarm: bool,
     /// Time of the alarm.
     pub alarm_s: Option<f64>,
     /// Time at which the log-likelihood ratio of the true change is expected to reach the alarm threshold.
@@ -56,8 +54,6 @@ pub struct Outcome {
     pub rival_right: bool,
     /// Largest deviations of the rival's parameters.
     pub deviations: [f64; 3],
-    /// Size of the fault in the unit of its cause.
-    pub magnitude: f64,
 }
 
 fn says(verdict: Verdict, fault: Fault) -> Says {
@@ -104,7 +100,6 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
     let ticks = (RUN_S * RATE_HZ) as u32;
     let mut live = Live::new(&[], noise, seed, 500.0, ticks as usize);
     let mut outcome = Outcome {
-        false_alarm: false,
         alarm_s: None,
         limit_s: None,
         first: None,
@@ -113,7 +108,6 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
         rival_s: None,
         rival_right: false,
         deviations: [0.0; 3],
-        magnitude: effect.as_ref().map_or(0.0, |effect| effect.magnitude()),
     };
     let (mut begun, mut at, mut nats, mut sums) = (false, 0, 0.0, (0.0, 0.0));
     let (mut measured, mut last_read) = (None, 0.0);
@@ -164,7 +158,6 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
         let verdict = bank.verdict();
         if verdict != Verdict::Quiet && outcome.alarm_s.is_none() {
             outcome.alarm_s = Some(since_s);
-            outcome.false_alarm = !begun;
         }
         if outcome.first.is_none() && matches!(verdict, Verdict::Named(_)) {
             outcome.first = Some((since_s, says(verdict, fault) == Says::Right));

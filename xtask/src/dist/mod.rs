@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use sha2::{Digest, Sha256};
 use xtask::build::{self, Board};
+use xtask::files;
 use xtask::shell;
 use xtask::variant::Variant;
 
@@ -31,22 +32,22 @@ pub(crate) fn run() -> Result<()> {
     let name = format!("vsj-{version}-{host}");
     let releases = target.join("releases");
     let (folder, new) = (releases.join(&name), releases.join("new"));
-    remove(&new)?;
-    make(&new)?;
+    files::remove(&new)?;
+    files::make(&new)?;
     let program = program(&target)?;
-    copy(&program, &new.join(program.file_name().context("a program has a name")?))?;
+    files::copy(&program, &new.join(program.file_name().context("a program has a name")?))?;
     commands(&program, &new)?;
     images(&new.join("firmware"))?;
     for text in TEXTS {
-        copy(&shell::root().join(text), &new.join(text))?;
+        files::copy(&shell::root().join(text), &new.join(text))?;
     }
     copy_folder(&manual::build()?, &new.join("manual"))?;
     copy_folder(&page::build()?, &new.join("page"))?;
     let changes = fs::read_to_string(shell::root().join("CHANGELOG.md")).context("cannot read CHANGELOG.md")?;
-    write(&new.join("CHANGES.md"), section(&changes, version)?.as_bytes())?;
-    write(&new.join("THIRD-PARTY.txt"), licences::all(&["host-sim", "firmware", "test-bench", "page"])?.as_bytes())?;
-    write(&new.join(CHECKSUMS), checksums(&new)?.as_bytes())?;
-    remove(&folder)?;
+    files::write(&new.join("CHANGES.md"), section(&changes, version)?)?;
+    files::write(&new.join("THIRD-PARTY.txt"), licences::all(&["host-sim", "firmware", "test-bench", "page"])?)?;
+    files::write(&new.join(CHECKSUMS), checksums(&new)?)?;
+    files::remove(&folder)?;
     fs::rename(&new, &folder).with_context(|| format!("cannot write {}", folder.display()))?;
     let archive = releases.join(format!("{name}.tar.gz"));
     shell::run(shell::command("tar").arg("-C").arg(&releases).arg("-czf").args([archive.as_os_str(), name.as_ref()]))?;
@@ -73,17 +74,17 @@ fn program(target: &Path) -> Result<PathBuf> {
 fn commands(program: &Path, folder: &Path) -> Result<()> {
     shell::output(shell::command(program).arg("man").arg("--out").arg(folder.join("man")))?;
     let completions = folder.join("completions");
-    make(&completions)?;
+    files::make(&completions)?;
     for (shell_name, file) in COMPLETIONS {
         let script = shell::output(shell::command(program).args(["completions", shell_name]))?;
-        write(&completions.join(file), script.as_bytes())?;
+        files::write(&completions.join(file), script)?;
     }
     Ok(())
 }
 
 /// Copies the images of both boards for each controller and amplifier.
 fn images(folder: &Path) -> Result<()> {
-    make(folder)?;
+    files::make(folder)?;
     for variant in Variant::ALL {
         for board in Board::ALL {
             for file in image::files(variant, board)? {
@@ -91,7 +92,7 @@ fn images(folder: &Path) -> Result<()> {
                 if file.extension().is_none() {
                     name.push(".elf");
                 }
-                copy(&file, &folder.join(name))?;
+                files::copy(&file, &folder.join(name))?;
             }
         }
     }
@@ -100,12 +101,10 @@ fn images(folder: &Path) -> Result<()> {
 
 /// Copies a folder with all that it contains.
 fn copy_folder(from: &Path, to: &Path) -> Result<()> {
-    let mut files = Vec::new();
-    list(from, &mut files)?;
-    for file in files {
-        let to = to.join(file.strip_prefix(from)?);
-        make(to.parent().context("a file in a folder")?)?;
-        copy(&file, &to)?;
+    let mut found = Vec::new();
+    list(from, &mut found)?;
+    for file in found {
+        files::copy(&file, &to.join(file.strip_prefix(from)?))?;
     }
     Ok(())
 }
@@ -124,41 +123,22 @@ fn section<'a>(changes: &'a str, version: &str) -> Result<&'a str> {
 
 /// One line for each file below a folder: SHA-256 and path.
 fn checksums(folder: &Path) -> Result<String> {
-    let mut files = Vec::new();
-    list(folder, &mut files)?;
-    files.sort();
+    let mut found = Vec::new();
+    list(folder, &mut found)?;
+    found.sort();
     let line = |file: &PathBuf| -> Result<String> {
         let sum: String = Sha256::digest(build::read(file)?).iter().map(|byte| format!("{byte:02x}")).collect();
         Ok(format!("{sum}  {}\n", file.strip_prefix(folder)?.display()))
     };
-    files.iter().map(line).collect()
+    found.iter().map(line).collect()
 }
 
-fn list(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+fn list(folder: &Path, found: &mut Vec<PathBuf>) -> Result<()> {
     for entry in fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
         let path = entry?.path();
-        if path.is_dir() { list(&path, files)? } else { files.push(path) }
+        if path.is_dir() { list(&path, found)? } else { found.push(path) }
     }
     Ok(())
-}
-
-fn make(folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
-}
-
-fn remove(folder: &Path) -> Result<()> {
-    if folder.exists() {
-        fs::remove_dir_all(folder).with_context(|| format!("cannot remove {}", folder.display()))?;
-    }
-    Ok(())
-}
-
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    fs::copy(from, to).map(drop).with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@ mod browser;
 mod bundle;
 mod test;
 
-use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +12,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use xtask::{build, setup, shell};
+use xtask::{build, files, setup, shell};
 
 use bundle::bundle;
 
@@ -58,11 +57,11 @@ pub(crate) fn build() -> Result<PathBuf> {
     let engine = format!("window.vsjEngine = \"{}\";\n", STANDARD.encode(engine));
 
     let folder = target.join(FOLDER);
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    files::make(&folder)?;
     let mut all = 0;
     for (name, text) in [("index.html", index()?), ("engine.js", engine)] {
         let path = folder.join(name);
-        fs::write(&path, &text).with_context(|| format!("cannot write {}", path.display()))?;
+        files::write(&path, &text)?;
         let size = gzip(text.as_bytes())?.len();
         println!("{}: {} bytes, compressed {size}", path.display(), text.len());
         all += size;

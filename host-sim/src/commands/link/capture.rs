@@ -13,11 +13,10 @@ use link::{Reason, Request, Telemetry};
 use model::{DacCode, SampleTime, Validate, amplifier, device};
 use serde_json::json;
 use simulation::bad_input;
-use simulation::schedule::{Between, Schedule};
+use simulation::schedule::Schedule;
 
-use super::record::{self, Drive};
+use super::schedule::{Drive, ScheduleArguments, check_schedule};
 use super::session::{Session, seconds, stop_on_interrupt, stopped};
-use crate::commands::choice::{BETWEEN, one_of};
 
 /// Longest accepted capture, in s: more than any MCU has RAM for.
 const LONGEST_S: f64 = 1e6;
@@ -32,12 +31,8 @@ pub(super) struct Arguments {
     /// Length of the capture; default: that of --input
     #[arg(long, value_name = "S", required_unless_present = "input", allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v
-    #[arg(long, value_name = "stair|step|FILE.csv")]
-    input: Option<String>,
-    /// Interpolation of the voltage between two rows of an input file
-    #[arg(long, default_value = "hold", value_parser = one_of(BETWEEN))]
-    between: Between,
+    #[command(flatten)]
+    schedule: ScheduleArguments,
     /// Arm the MCU first; it is disarmed before the rows are sent
     #[arg(long)]
     arm: bool,
@@ -48,19 +43,15 @@ pub(super) struct Arguments {
 
 impl Arguments {
     pub(super) fn check(&self) -> Result<()> {
-        self.schedule()?;
+        self.schedule.read()?;
         self.seconds.map(|time| seconds("--seconds", time, LONGEST_S)).transpose().map(drop)
-    }
-
-    fn schedule(&self) -> Result<Option<Schedule>> {
-        self.input.as_deref().map(|input| record::schedule(input, self.between)).transpose()
     }
 }
 
 pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
-    let schedule = arguments.schedule()?;
-    if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {
-        record::check_schedule(session, schedule, name, arguments.arm)?;
+    let schedule = arguments.schedule.read()?;
+    if let (Some(schedule), Some(name)) = (&schedule, &arguments.schedule.input) {
+        check_schedule(session, schedule, name, arguments.arm)?;
     }
     let name = session.client.name().to_owned();
     let length_s = arguments.seconds.or(schedule.as_ref().map(|it| it.end_s() - it.start_s())).unwrap_or_default();

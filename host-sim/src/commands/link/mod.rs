@@ -3,6 +3,7 @@
 mod capture;
 mod model;
 pub(super) mod record;
+pub(super) mod schedule;
 pub(super) mod session;
 mod settings;
 mod watch;

@@ -1,26 +1,20 @@
 //! `vsj link PORT record`: writes telemetry to a file, and optionally commands a schedule.
 
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
+use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args;
-use host_sim::link::heartbeat;
 use host_sim::output::recording::{Every, Recording};
 use host_sim::output::terminal::{print, remark};
 use indicatif::{ProgressBar, ProgressStyle};
-use link::{Desired, Request};
+use link::Request;
 use serde_json::json;
 use simulation::bad_input;
-use simulation::bad_input::number;
-use simulation::record::{MEASURED, Record};
-use simulation::schedule::{Between, Reader, Schedule};
+use simulation::schedule::Schedule;
 
+use super::schedule::{Drive, ScheduleArguments, check_schedule};
 use super::session::{Session, seconds, stop_on_interrupt, stopped};
-use crate::commands::choice::{BETWEEN, one_of};
-
-/// Longest accepted input, in s; much more cannot be expressed as a [`Duration`].
-const LONGEST_S: f64 = 1e9;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -34,13 +28,8 @@ pub(super) struct Arguments {
     /// written
     #[arg(long, default_value_t = 100.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v that
-    /// lasts at most 1e9 s
-    #[arg(long, value_name = "stair|step|FILE.csv")]
-    input: Option<String>,
-    /// Interpolation of the voltage between two rows of an input file
-    #[arg(long, default_value = "hold", value_parser = one_of(BETWEEN))]
-    between: Between,
+    #[command(flatten)]
+    schedule: ScheduleArguments,
     /// Arm the MCU first
     #[arg(long)]
     arm: bool,
@@ -51,7 +40,7 @@ pub(super) struct Arguments {
 
 impl Arguments {
     pub(super) fn check(&self) -> Result<()> {
-        self.schedule()?;
+        self.schedule.read()?;
         self.time().map(drop)
     }
 
@@ -59,26 +48,6 @@ impl Arguments {
         rows_hz(self.rate_hz)?;
         self.seconds.map(|time| seconds("--seconds", time, f64::INFINITY)).transpose()
     }
-
-    fn schedule(&self) -> Result<Option<Schedule>> {
-        self.input.as_deref().map(|input| schedule(input, self.between)).transpose()
-    }
-}
-
-/// Reads `--input`: the report's stair, its ideal steps, or a file.
-pub(crate) fn schedule(input: &str, between: Between) -> Result<Schedule> {
-    Ok(match input {
-        "stair" => Schedule::stair(),
-        "step" => Schedule::ideal_stair(),
-        file => {
-            let schedule = Schedule::from_record(&Record::open(Path::new(file), MEASURED)?, between);
-            let length_s = schedule.end_s() - schedule.start_s();
-            if length_s > LONGEST_S {
-                bad_input!("{file} lasts {} s; expected at most {LONGEST_S} s", number(length_s));
-            }
-            schedule
-        }
-    })
 }
 
 /// Checks `--rate-hz`, rows per second.
@@ -90,8 +59,8 @@ pub(crate) fn rows_hz(rate_hz: f64) -> Result<f64> {
 }
 
 pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Result<()> {
-    let schedule = arguments.schedule()?;
-    if let (Some(schedule), Some(name)) = (&schedule, &arguments.input) {
+    let schedule = arguments.schedule.read()?;
+    if let (Some(schedule), Some(name)) = (&schedule, &arguments.schedule.input) {
         check_schedule(session, schedule, name, arguments.arm)?;
     }
     let length = schedule.as_ref().map(|schedule| Duration::from_secs_f64(schedule.end_s() - schedule.start_s()));
@@ -116,55 +85,6 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
         print(&format!("{report}\n"))
     } else {
         print(&format!("wrote {file}: {} rows, {} s, {} lost\n", summary.rows, summary.seconds, summary.lost))
-    }
-}
-
-/// Checks the schedule called `name` before anything is armed or written.
-pub(super) fn check_schedule(session: &Session, schedule: &Schedule, name: &str, arm: bool) -> Result<()> {
-    if !arm && session.status.sample.state != link::State::Armed {
-        bail!("{}: not armed ({}); expected --arm with --input", session.client.name(), session.status.sample.state);
-    }
-    schedule.check_range(name, session.status.lowest.to_f64(), session.status.highest.to_f64())
-}
-
-/// Commands a schedule and keeps the host heard.
-pub(super) struct Drive<'a> {
-    /// Time at which the schedule starts.
-    start: Instant,
-    /// First time of the schedule, in s, and its voltage.
-    reader: Option<(f64, Reader<'a>)>,
-    heartbeat: Duration,
-    /// The last commanded voltage.
-    commanded: Option<f64>,
-    /// When the MCU last heard from this program.
-    heard: Instant,
-}
-
-impl<'a> Drive<'a> {
-    /// Starts now.
-    pub(super) fn new(session: &Session, schedule: Option<&'a Schedule>) -> Self {
-        let start = Instant::now();
-        let reader = schedule.map(|schedule| (schedule.start_s(), schedule.reader()));
-        Self { start, reader, heartbeat: heartbeat(&session.status), commanded: None, heard: start }
-    }
-
-    /// Commands the voltage of this moment if it has changed, or sends a heartbeat if one is due.
-    pub(super) fn step(&mut self, session: &mut Session) -> Result<()> {
-        if let Some((from, reader)) = &mut self.reader {
-            let volts = reader.at(*from + self.start.elapsed().as_secs_f64());
-            if self.commanded != Some(volts) {
-                session.order(Request::Set(Desired::ScaledVolts(volts)))?;
-                (self.commanded, self.heard) = (Some(volts), Instant::now());
-            }
-        }
-        if self.heard.elapsed() >= self.heartbeat {
-            let (state, _) = session.order(Request::Heartbeat)?;
-            if self.reader.is_some() {
-                session.still_armed(state)?;
-            }
-            self.heard = Instant::now();
-        }
-        Ok(())
     }
 }
 
