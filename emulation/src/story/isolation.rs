@@ -14,8 +14,9 @@ use rayon::prelude::*;
 use serde_json::Value;
 use test_bench::script::Script;
 use test_bench::simulation::simulate_with;
-use xtask::variant::Controller;
-use xtask::{build, shell};
+use xtask::build::{self, Board};
+use xtask::shell;
+use xtask::variant::{Controller, Variant};
 
 use super::lock_step::{Disturbance, Moment, TICK_S};
 use super::sensor::sensing;
@@ -48,10 +49,13 @@ struct Cause {
     explained: f64,
 }
 
-/// Builds the image with the bank, whose tick cannot panic.
+/// Builds the image with the bank, whose tick cannot panic and which keeps the bounds of its size.
 pub(super) fn stage() -> Result<Stage> {
     let stage = Stage::new(Controller::Paper, size::ISOLATION)?;
     audit::with_isolation(&build::read(&stage.elf)?)?;
+    let size = size::measure(Variant::of(Controller::Paper), size::ISOLATION, Board::Mps2)?;
+    size.check()?;
+    eprintln!("with the isolation bank: {size}");
     Ok(stage)
 }
 

@@ -48,8 +48,9 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                     send(line, bytes).await;
                 }
                 Some(Step::Isolation(request)) => {
-                    let reply = isolation::execute(request, view.sample.tick).await;
-                    send(line, server.answered(&reply)).await;
+                    // Nor here.
+                    let bytes = server.answered(&isolation::execute(request, view.sample.tick).await);
+                    send(line, bytes).await;
                 }
                 Some(Step::Restart(bytes)) => {
                     send(line, bytes).await;
