@@ -5,7 +5,7 @@
 //! | [`Port`] | a serial device, a unix socket or a TCP socket, as bytes |
 //! | [`Client`] | sends requests and repeats them until they are answered; collects telemetry |
 //! | [`heartbeat`] | how often an armed MCU must hear of its host |
-//! | [`StatusReport`], [`Row`] | status and telemetry of the MCU, as text and JSON |
+//! | [`StatusReport`], [`IsolationRow`], [`Row`] | status, isolation bank and telemetry of the MCU, as text and JSON |
 
 mod client;
 mod port;
@@ -13,4 +13,4 @@ mod report;
 
 pub use client::{Client, Failure, Patience, heartbeat};
 pub use port::Port;
-pub use report::{Row, StatusReport};
+pub use report::{IsolationRow, Row, StatusReport};
