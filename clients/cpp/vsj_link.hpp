@@ -218,8 +218,8 @@ inline const char* name(State state) {
 /// Name of a fault's code; 0 is none.
 inline std::string fault_name(std::uint8_t code) {
     static const char* const names[] = {"none",   "panic",  "hard-fault", "overrun", "interlock", "watchdog",
-                                        "monitor", "config", "supply",     "self-test"};
-    return std::string(code < 10 ? names[code] : "unknown") + " (" + std::to_string(code) + ")";
+                                        "monitor", "config", "supply",     "self-test", "isolation"};
+    return std::string(code < 11 ? names[code] : "unknown") + " (" + std::to_string(code) + ")";
 }
 
 /// Unit of a desired stiffness: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip.

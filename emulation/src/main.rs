@@ -88,25 +88,27 @@ Examples:
     /// The emulated board drives a spring with a hidden effect up and down a stair, in lock step; `vsj diagnose` names
     /// the cause; the extended model goes over the link, is checked, stored and run after a restart. Prints the true
     /// stiffness error before and after. With --feedback the board reads the spring's sensor instead, which then falls
-    /// silent.
+    /// silent. With --isolation the spring changes meanwhile, and the board names the cause.
     #[command(after_help = "\
 Examples:
   cargo xtask story                                three effects, as in `test`
   cargo xtask story --effect hysteresis gain-error
   cargo xtask story --controller fast
   cargo xtask story --feedback                     the paper's model, without the sensor and with it
+  cargo xtask story --isolation                    what changes is named by the board
   cargo xtask story --all --json")]
     Story(story::Args),
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 128 KB, RAM below 16 KB and the
-    /// stack within its region.
+    /// Exits with 1 unless flash stays below 128 KB, RAM below 16 KB (with the isolation bank 24 KB) and the stack within its
+    /// region.
     #[command(after_help = "\
 Examples:
   cargo xtask size --json
   cargo xtask size --controller fast                   with the time-optimal controller
   cargo xtask size --controller fast --limit-v 1000    the same for an amplifier of 1000 V
-  cargo xtask size --feedback                          with a stiffness sensor")]
+  cargo xtask size --feedback                          with a stiffness sensor
+  cargo xtask size --isolation                         with a stiffness sensor and the isolation bank")]
     Size(size::Args),
     /// Run the image that is flashed on models of the STM32G474's registers
     ///

@@ -10,6 +10,8 @@ use model::{
     estimator, extended,
 };
 
+use crate::isolation::News;
+
 /// Inputs of one tick from the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sensors {
@@ -63,6 +65,14 @@ pub trait Source {
 
     /// Called after each tick with its result and the number of ticks missed so far.
     fn done(&mut self, _tick: &Tick, _control: &Control, _overruns: u32) {}
+
+    /// True once after the host has acknowledged the alarm of the isolation bank.
+    fn take_acknowledged(&mut self) -> bool {
+        false
+    }
+
+    /// Called after [`Source::done`] of a tick in which what the isolation bank says has changed.
+    fn isolated(&mut self, _news: &News) {}
 }
 
 /// Controller and supervisor, with configuration and state.
@@ -135,6 +145,15 @@ impl Control {
     /// The supervisor, for the log and the replies to the host.
     pub fn supervisor(&self) -> &Supervisor {
         &self.supervisor
+    }
+
+    /// The model's stiffness just after the voltage of the last tick, whose `output` this is, without the sensor's correction.
+    pub fn uncorrected(&self, output: &Output) -> ScaledStiffness {
+        let correction = match &self.spring {
+            Spring::Plain(spring) => spring.state.correction(),
+            Spring::Extended(spring) => spring.state.correction(),
+        };
+        ScaledStiffness(output.stiffness.0.saturating_sub(correction.0))
     }
 
     /// Executes one tick. Not inlined, so that the audit of the image finds it and verifies that it cannot panic.

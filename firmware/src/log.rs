@@ -12,8 +12,12 @@ use embassy_sync::channel::Channel;
 use embassy_time::Instant;
 use link::Controller;
 use micromath::F32Ext;
+#[cfg(feature = "isolation")]
+use model::isolation::{Cause, Verdict};
 use model::supervisor::{Fault, Mismatch};
 use model::{Amplifier, Sensor, Volts, device};
+
+use crate::isolation::News;
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
@@ -30,6 +34,9 @@ pub enum Event {
     Limits(u8, u32),
     /// Change of the stiffness sensor's diagnosis, and the tick.
     Sensor(Sensor, u32),
+    /// Change of the isolation bank's verdict, and the tick.
+    #[cfg(feature = "isolation")]
+    Isolation(News, u32),
     /// Statistics, once per second.
     Summary(Summary),
 }
@@ -68,6 +75,16 @@ pub fn queue(event: Event) {
     if EVENTS.try_send(event).is_err() {
         DROPPED.fetch_add(1, Ordering::Relaxed);
     }
+}
+
+/// Queues a change of the isolation bank's verdict at `tick`.
+pub fn isolation(news: &News, tick: u32) {
+    #[cfg(feature = "isolation")]
+    if news.report.verdict != news.before {
+        queue(Event::Isolation(*news, tick));
+    }
+    #[cfg(not(feature = "isolation"))]
+    let _ = (news, tick);
 }
 
 /// Logs the first lines after a reset: its cause, the code of the last fault, and rate, controller and amplifier in use.
@@ -127,6 +144,8 @@ pub fn event(event: Event) {
         Event::Mismatch(it, tick) => warn!("monitor {=str} tick={=u32}", it.name(), tick),
         Event::Limits(bits, tick) => warn!("limit bits={=u8} tick={=u32}", bits, tick),
         Event::Sensor(sensor, tick) => warn!("sensor {=str} tick={=u32}", sensor.name(), tick),
+        #[cfg(feature = "isolation")]
+        Event::Isolation(news, tick) => isolated(&news, tick),
         Event::Summary(s) => info!(
             "summary tick={=u32} overruns={=u32} worst_lateness_us={=u32} rms_lateness_us={=f32} limited_ticks={=u32} state={=str} target_mv={=i32} applied_mv={=i32} stiffness_mv={=i32}",
             s.tick,
@@ -139,6 +158,41 @@ pub fn event(event: Event) {
             millivolts(s.applied),
             millivolts(s.stiffness)
         ),
+    }
+}
+
+/// Logs the isolation bank's verdict. A name that goes is `withdrawn`.
+#[cfg(feature = "isolation")]
+#[inline(never)]
+fn isolated(news: &News, tick: u32) {
+    let News { report, since_ticks, before } = news;
+    let since_tick = tick.saturating_sub(*since_ticks);
+    let said = crate::isolation::describe(report, 0, 0);
+    match (report.verdict, before) {
+        (Verdict::Named(_) | Verdict::Ambiguous(..), _) => {
+            let (cause, other) = report.verdict.causes();
+            warn!(
+                "isolation {=str} cause={=str} other={=str} size={=f64} half_width={=f64} explained={=f64} since_tick={=u32} tick={=u32}",
+                report.verdict.name(),
+                cause.map_or("-", Cause::name),
+                other.map_or("-", Cause::name),
+                said.size,
+                said.half_width,
+                said.explained,
+                since_tick,
+                tick
+            )
+        }
+        (verdict, Verdict::Named(cause)) => {
+            warn!(
+                "isolation withdrawn cause={=str} verdict={=str} since_tick={=u32} tick={=u32}",
+                cause.name(),
+                verdict.name(),
+                since_tick,
+                tick
+            )
+        }
+        (verdict, _) => warn!("isolation {=str} since_tick={=u32} tick={=u32}", verdict.name(), since_tick, tick),
     }
 }
 

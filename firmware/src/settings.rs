@@ -2,6 +2,7 @@
 //! replaces those of [`link::WireSettings`], see [`crate::start`]; the others need another image.
 
 use model::device::{self, Watchdogs};
+use model::isolation::Causes;
 use model::{Amplifier, Feedback, Settings, supervisor};
 #[cfg(feature = "fast")]
 use model::{Approach, Compensation};
@@ -51,7 +52,7 @@ pub const BUILT_IN: device::Settings = built_in(FLASHED);
 
 /// All settings of an image with the settings `control` of its loop.
 pub const fn built_in(control: Settings) -> device::Settings {
-    device::Settings { control, supervision: SUPERVISION, watchdogs: WATCHDOGS }
+    device::Settings { control, supervision: SUPERVISION, watchdogs: WATCHDOGS, trip_on_cause: Causes::NONE }
 }
 
 /// The paper's controller with `amplifier`, without a sensor.

@@ -3,11 +3,12 @@
 //! Stored settings run from the start on, or not at all: those of another format, out of range or beyond what the image
 //! contains are a `config` fault, and the built-in ones run. A damaged page counts as never written.
 
-use link::{Block, BlockId, Blocks, Reason, WireModel, WireSettings};
+use link::{Block, BlockId, Blocks, Field, Reason, WireModel, WireSettings};
 use model::supervisor::Fault;
 use model::{Amplifier, OutOfRange, device};
 
 use crate::control::Control;
+use crate::isolation::Terms;
 use crate::reset_cause::Cause;
 use crate::store::{Pages, Store};
 
@@ -31,7 +32,10 @@ pub struct Start {
     pub amplifier: Amplifier,
     /// Fault of the last run.
     pub last_fault: Option<Fault>,
-    /// Invalid field of the stored model, or `format`; `None` if it is valid.
+    /// The isolation bank of the running model.
+    pub isolation: Terms,
+    /// Invalid field of the stored model, or `format`, or `trip_on_cause` if no isolation bank runs that could trip; `None` if all is
+    /// valid.
     pub rejected: Option<&'static str>,
 }
 
@@ -72,13 +76,19 @@ pub fn control<'a>(
     let settings = &loaded.settings;
     let control = build(settings, place)?;
     let (model, amplifier) = (Blocks::default(), settings.control.amplifier);
-    let mut start = Start { model, amplifier, last_fault: cause.fault, rejected: None };
+    let isolation = Terms::new(settings, Some(settings.control.plant), amplifier.max_v);
+    let mut start = Start { model, amplifier, last_fault: cause.fault, isolation, rejected: None };
     if let Some((stored, payload)) = stored {
         start.model.stored = stored;
         match use_model(settings, control, payload) {
-            Ok(amplifier) => (start.model.active, start.amplifier) = (stored, amplifier),
+            Ok((amplifier, isolation)) => {
+                (start.model.active, start.amplifier, start.isolation) = (stored, amplifier, isolation);
+            }
             Err(field) => start.rejected = Some(field),
         }
+    }
+    if let Err(error) = start.isolation.check() {
+        start.rejected = start.rejected.or(Some(error.field));
     }
     // Every one of them has to be acknowledged; the state shows the first.
     let rejected = start.rejected.or(loaded.rejected).map(|_| Fault::Config);
@@ -96,7 +106,7 @@ pub fn control<'a>(
 pub fn check_model<P: Pages>(store: &Store<P>, payload: &[u8], built_in: &device::Settings) -> Result<(), Reason> {
     let model = WireModel::read(payload);
     let Some(model) = &model else { return Err(Reason::Damaged) };
-    Control::check(&load(store, built_in).settings.control, model).map_err(|error| Reason::of_model(&error))
+    check_together(&load(store, built_in).settings, model).map_err(|error| Reason::of_model(&error))
 }
 
 /// Validates the settings in `payload`, also for the stored model.
@@ -108,7 +118,18 @@ pub fn check_settings<P: Pages>(store: &Store<P>, payload: &[u8], built_in: &dev
     let settings = read(payload, built_in)?;
     let model = store.newest(Block::Model).and_then(|(_, payload)| WireModel::read(payload));
     let Some(model) = &model else { return Ok(()) };
-    Control::check(&settings.control, model).map_err(|error| Reason::of_settings(&error))
+    check_together(&settings, model).map_err(|error| Reason::of_settings(&error))
+}
+
+/// Checks a model and settings with each other.
+fn check_together(settings: &device::Settings, model: &WireModel) -> Result<(), OutOfRange> {
+    Control::check(&settings.control, model)?;
+    terms(settings, model).check()
+}
+
+/// The isolation bank for a model.
+fn terms(settings: &device::Settings, model: &WireModel) -> Terms {
+    Terms::new(settings, model.plant().plain(), model.behind(settings.control.amplifier).max_v)
 }
 
 /// Reads and validates settings; what they leave out is that of `built_in`.
@@ -117,16 +138,23 @@ fn read(payload: &[u8], built_in: &device::Settings) -> Result<device::Settings,
     let wire = WireSettings::read(payload);
     let Some(wire) = &wire else { return Err(Reason::Damaged) };
     let settings = wire.over(built_in).map_err(Reason::NotBuiltIn)?;
+    if !cfg!(feature = "isolation") && !settings.trip_on_cause.is_empty() {
+        return Err(Reason::NotBuiltIn(Field::named("trip_on_cause")));
+    }
     settings.check().map_err(|error| Reason::of_settings(&error))?;
     Ok(settings)
 }
 
 #[inline(never)]
-fn use_model(settings: &device::Settings, control: &mut Control, payload: &[u8]) -> Result<Amplifier, &'static str> {
+fn use_model(
+    settings: &device::Settings,
+    control: &mut Control,
+    payload: &[u8],
+) -> Result<(Amplifier, Terms), &'static str> {
     let model = WireModel::read(payload);
     let Some(model) = &model else { return Err("format") };
     control.use_model(&settings.control, model).map_err(|error| error.field)?;
-    Ok(model.behind(settings.control.amplifier))
+    Ok((model.behind(settings.control.amplifier), terms(settings, model)))
 }
 
 #[inline(never)]
@@ -265,19 +293,55 @@ mod tests {
         }
     }
 
+    /// Settings with a sensor, and with these causes as a trip.
+    fn with_sensor(trip_on_cause: u16) -> WireSettings {
+        let sensor = Some([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]);
+        WireSettings { sensor, trip_on_cause, ..built_in_settings() }
+    }
+
+    /// Only a plain spring has an isolation bank, without which a trip would never come.
+    #[cfg(feature = "isolation")]
+    #[test]
+    fn a_trip_and_an_extended_spring_exclude_each_other() {
+        let plain = model(0.1).payload().unwrap();
+        let extended = WireModel { leakage: Some((0.1, 40.0)), ..model(0.1) }.payload().unwrap();
+        let [quiet, trip] = [0, 0x8000].map(|trip| with_sensor(trip).payload().unwrap());
+        for (model, settings, accepted) in
+            [(&plain, &quiet, true), (&plain, &trip, true), (&extended, &quiet, true), (&extended, &trip, false)]
+        {
+            let of_settings = check_settings(&store(&[(Block::Model, model)]), settings, &BUILT_IN);
+            let of_model = check_model(&store(&[(Block::Settings, settings)]), model, &BUILT_IN);
+            let field = Field::named("trip_on_cause");
+            if accepted {
+                assert_eq!((of_settings, of_model), (Ok(()), Ok(())));
+            } else {
+                assert!(matches!(of_settings, Err(Reason::BadSettings { field: found, .. }) if found == field));
+                assert!(matches!(of_model, Err(Reason::BadModel { field: found, .. }) if found == field));
+            }
+            let (mut place, loaded) = (None, load(&store(&[(Block::Settings, settings)]), &BUILT_IN));
+            let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
+            let stored = Some((BlockId::of(3, model), &model[..]));
+            let (control, start) = control(&loaded, stored, &cause, &mut place).unwrap();
+            assert_eq!(start.rejected, if accepted { None } else { Some("trip_on_cause") });
+            assert_eq!(control.supervisor().standing() == Faults::NONE, accepted);
+        }
+    }
+
     /// The features of this build decide, as those of an image do.
     #[test]
     fn what_the_image_does_not_contain_is_refused_by_its_name() {
         let check = |wire: WireSettings| check_settings(&store(&[]), &wire.payload().unwrap(), &BUILT_IN);
         let fast = WireSettings { controller: Controller::Fast, ..built_in_settings() };
-        let sensor =
-            WireSettings { sensor: Some([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]), ..built_in_settings() };
+        let sensor = with_sensor(0);
         let contains =
             |feature: bool, field| if feature { Ok(()) } else { Err(Reason::NotBuiltIn(Field::named(field))) };
         let fast_is_there = model::Approach::new(0.0).is_some();
         let sensor_is_there = model::Feedback::from_values([1.0; 8]).is_some();
         assert_eq!(check(fast), contains(fast_is_there, "controller"));
         assert_eq!(check(sensor), contains(sensor_is_there, "sensor"));
+        if sensor_is_there {
+            assert_eq!(check(with_sensor(0x8000)), contains(cfg!(feature = "isolation"), "trip_on_cause"));
+        }
         assert_eq!(check(WireSettings { controller: Controller::None, ..built_in_settings() }), Ok(()));
     }
 

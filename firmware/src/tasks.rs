@@ -8,6 +8,7 @@ use model::{Limits, Sensor, Volts, device};
 
 use crate::board::{Amplifier, Board};
 use crate::control::{Control, Sensors, Source, Stopwatch, Tick};
+use crate::isolation::Isolation;
 use crate::log::{self, EVENTS, Event, Summary, queue};
 use crate::pace::Pace;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
@@ -32,10 +33,11 @@ impl Timing {
     }
 }
 
-/// Runs control ticks until `source` ends. Returns the numbers of executed and of missed ticks.
+/// Runs control ticks, and after each of them the isolation bank, until `source` ends. Returns the numbers of executed and of missed ticks.
 pub async fn control<B: Board>(
     board: &mut B,
     control: &mut Control,
+    isolation: &mut Isolation,
     source: &mut impl Source,
     stopwatch: &mut impl Stopwatch,
     timing: Timing,
@@ -50,11 +52,15 @@ pub async fn control<B: Board>(
         Timer::at(Instant::from_micros(pace.due_us())).await;
         let arrival = pace.arrive(Instant::now().as_micros());
         let Some(command) = source.command(ticks) else { break };
+        if source.take_acknowledged() {
+            isolation.acknowledge();
+        }
+        let cause = isolation.begin(&command, control.supervisor().state());
         let sensors = Sensors {
             interlock_closed: board.interlock_closed(),
             missed_ticks: arrival.missed_ticks,
             monitors: board.amplifier().monitors(),
-            fault: (incomplete > timing.incomplete_ticks).then_some(Fault::Watchdog).or(board.fault()),
+            fault: (incomplete > timing.incomplete_ticks).then_some(Fault::Watchdog).or(board.fault()).or(cause),
             measured: board.amplifier().measured(),
         };
         let tick = control.tick(&command, &sensors, stopwatch);
@@ -67,6 +73,11 @@ pub async fn control<B: Board>(
         stop::TICK.store(ticks, Ordering::Relaxed);
         report.late(arrival.lateness_us);
         report.tick(ticks, control, &tick);
+        // Last: nothing of the output waits for it.
+        if let Some(news) = isolation.tick(control, &tick) {
+            source.isolated(&news);
+            log::isolation(&news, ticks);
+        }
 
         hang_guard::feed(timing.hang_ms);
         TASK_WATCHDOG.check_in(Task::Control);

@@ -10,9 +10,10 @@ use std::time::{Duration, Instant, SystemTime};
 
 use link::block::PART;
 use link::capture::{Capture, Captured, Row};
+use link::isolation::Isolation;
 use link::{
-    Block, BlockId, Blocks, FaultReport, Frame, Nonce, Packet, Part, Reason, Receiver, Reply, Request, Sequence,
-    Status, Telemetry, Unreadable, WireModel, WireSettings,
+    Block, BlockId, Blocks, FaultReport, Frame, IsolationReport, Nonce, Packet, Part, Reason, Receiver, Reply, Request,
+    Sequence, Status, Telemetry, Unreadable, WireModel, WireSettings,
 };
 
 use crate::Port;
@@ -266,6 +267,19 @@ impl Client {
             return Err(Failure::NotRun { what: "settings", sent, blocks });
         }
         Ok(blocks)
+    }
+
+    /// What the isolation bank says; `None` if the MCU's program does not know the request.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn isolation(&mut self, request: Isolation) -> Result<Option<IsolationReport>, Failure> {
+        match self.ask(Request::Isolation(request)) {
+            Ok(Reply::Isolation(report)) => Ok(Some(report)),
+            Ok(other) => Err(Failure::Unexpected(Box::new(other))),
+            Err(Failure::Refused(Reason::UnknownRequest)) => Ok(None),
+            Err(failure) => Err(failure),
+        }
     }
 
     /// How far the fast capture is, and for how many rows the MCU has room.

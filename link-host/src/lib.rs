@@ -6,7 +6,7 @@
 //! | [`Client`] | sends requests and repeats them until they are answered; collects telemetry |
 //! | [`fault`] | the fault with a name or a number |
 //! | [`heartbeat`] | how often an armed MCU must hear of its host |
-//! | [`StatusReport`], [`Row`] | status and telemetry of the MCU, as text and JSON |
+//! | [`StatusReport`], [`IsolationRow`], [`Row`] | status, isolation bank and telemetry of the MCU, as text and JSON |
 
 mod client;
 mod command;
@@ -16,4 +16,4 @@ mod report;
 pub use client::{Client, Failure, Patience, heartbeat};
 pub use command::fault;
 pub use port::Port;
-pub use report::{Row, StatusReport};
+pub use report::{IsolationRow, Row, StatusReport};

@@ -1,9 +1,14 @@
 //! Status and telemetry of the MCU as text and JSON.
 
+use link::isolation::Off;
 use link::session::Counters;
-use link::{Status, Telemetry};
+use link::{IsolationReport, Status, Telemetry};
 use model::Limits;
+use model::isolation::Cause;
 use serde::Serialize;
+use simulation::isolation::trace as isolation;
+
+use crate::output::isolate::said;
 
 /// One telemetry sample of the loop.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -30,6 +35,48 @@ pub struct Row {
     pub monitors: &'static str,
     /// Diagnosis of the stiffness sensor: `none` without one, `trusted`, or its fault.
     pub sensor: &'static str,
+}
+
+/// What the isolation bank of the MCU says, with the fields of `vsj isolate`; times are those since the MCU started.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct IsolationRow {
+    /// The verdict is `off` if no bank runs.
+    #[serde(flatten)]
+    pub said: isolation::Event,
+    /// Why no bank runs: `not-built-in`, `no-sensor`, `extended-spring` or `out-of-range`; `None` if one does.
+    pub why: Option<&'static str>,
+    /// Codes of the causes that are a fault once they are named.
+    pub trip_on_cause: Vec<&'static str>,
+}
+
+impl IsolationRow {
+    /// Converts a report of an MCU with `rate_hz` ticks per second.
+    pub fn new(report: &IsolationReport, rate_hz: u32) -> Self {
+        let (cause, other) = report.verdict().unwrap_or_default().causes();
+        let IsolationReport { tick, since_tick, size, half_width, explained, .. } = *report;
+        let seconds = |tick: u64| tick as f64 / f64::from(rate_hz.max(1));
+        let said = isolation::Event {
+            time_s: seconds(tick),
+            verdict: report.word(),
+            cause: cause.map(Cause::name),
+            other: other.map(Cause::name),
+            since_s: (since_tick > 0).then(|| seconds(since_tick)),
+            size: cause.map(|cause| isolation::Size::around(size, half_width, cause)),
+            explained: cause.map(|_| explained),
+        };
+        let trip_on_cause = report.trips().map(Cause::name).collect();
+        Self { said, why: report.why_off().map(Off::name), trip_on_cause }
+    }
+
+    /// What the bank says in a line.
+    pub fn text(&self) -> String {
+        let why = self.why.map(|why| format!(": {why}")).unwrap_or_default();
+        let trips = match self.trip_on_cause.as_slice() {
+            [] => String::new(),
+            causes => format!("; a fault if it names {}", causes.join(", ")),
+        };
+        format!("{}{why}{trips}", said(&self.said))
+    }
 }
 
 /// The status of the MCU.
@@ -59,6 +106,8 @@ pub struct StatusReport {
     pub last_fault: &'static str,
     /// The latest sample.
     pub sample: Row,
+    /// What the isolation bank says; `None` if the MCU's program does not know the request.
+    pub isolation: Option<IsolationRow>,
     /// Counters of received frames.
     pub link: Counters,
 }
@@ -106,8 +155,8 @@ impl Row {
 }
 
 impl StatusReport {
-    /// Converts a status.
-    pub fn new(status: &Status) -> Self {
+    /// Converts a status, and what the isolation bank says.
+    pub fn new(status: &Status, isolation: Option<&IsolationReport>) -> Self {
         let firmware = &status.firmware;
         let revision = match firmware.revision {
             0 => String::new(),
@@ -126,6 +175,7 @@ impl StatusReport {
             fault_code: status.fault.0,
             last_fault: status.last_fault.name(),
             sample: Row::new(&status.sample, status.rate_hz),
+            isolation: isolation.map(|report| IsolationRow::new(report, status.rate_hz)),
             link: status.counters,
         }
     }
@@ -137,6 +187,7 @@ impl StatusReport {
         let measured = sample.measured_v.map_or_else(|| "no sensor".to_owned(), |volts| format!("{volts:.3} V"));
         let remedy = link::Fault(self.fault_code).remedy().map(|remedy| format!("remedy     {remedy}\n"));
         let remedy = remedy.unwrap_or_default();
+        let isolation = self.isolation.as_ref().map(|row| format!("isolation  {}\n", row.text())).unwrap_or_default();
         let limits = if sample.limits.is_empty() { "none".to_owned() } else { sample.limits.join(", ") };
         format!(
             "state      {}, fault {fault}, last reset's {last_fault}\n\
@@ -144,7 +195,7 @@ impl StatusReport {
              applied    {:.3} V, DAC code {}\n\
              stiffness  {:.3} V estimated; measured: {measured}\n\
              limits     {limits}; monitors: {}, sensor: {}\n\
-             running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
+             {isolation}running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
              firmware   {firmware}, controller {controller}, protocol {protocol}, host may be silent for {silence_limit_s} s\n\
              link       {} accepted, {} repeated, {} damaged, {} oversize, {} bad version, {} out of order, {} unknown, \
              {} samples dropped\n",

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Field(pub u8);
 
 /// Names in the order of their codes. The order is part of the protocol: new names are appended.
-const NAMES: [&str; 42] = [
+const NAMES: [&str; 45] = [
     "memory.direct",
     "memory.thresholds_v",
     "memory.weights",
@@ -53,6 +53,9 @@ const NAMES: [&str; 42] = [
     "hang_ms",
     "stall_ms",
     "reset_ms",
+    "trip_on_cause",
+    "range_v",
+    "plant.time_constant_s",
 ];
 
 impl Field {

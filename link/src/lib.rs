@@ -25,6 +25,7 @@
 //! | [`value`] | Voltages and desired stiffness in their wire format. |
 //! | [`block`] | Blocks that the MCU stores: their identity, and the parts in which they are sent. |
 //! | [`capture`] | Rows of the fast capture, and the requests that start and read it. |
+//! | [`isolation`] | What the isolation bank says, and the request for it. |
 //! | [`wire_model`], [`wire_settings`] | A spring's model and the MCU's settings in the format in which they are sent and stored. |
 //! | [`fault`], [`field`] | Numeric codes of the MCU's faults and of the fields of a model or of settings. |
 //! | [`diagnosis`] | Numeric codes of what the amplifier's monitors and the sensor show. |
@@ -49,6 +50,7 @@ pub mod diagnosis;
 pub mod fault;
 pub mod field;
 pub mod frame;
+pub mod isolation;
 pub mod nonce;
 pub mod reason;
 pub mod receiver;
@@ -69,6 +71,7 @@ pub use diagnosis::{Mismatch, Sensor};
 pub use fault::Fault;
 pub use field::Field;
 pub use frame::{Frame, Message, Packet, Unreadable};
+pub use isolation::IsolationReport;
 pub use nonce::{Nonce, Stamp};
 pub use reason::Reason;
 pub use receiver::Receiver;

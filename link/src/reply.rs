@@ -8,6 +8,7 @@ use crate::block::{Blocks, Part};
 use crate::capture::{Captured, Rows};
 use crate::diagnosis::Mismatch;
 use crate::fault::Fault;
+use crate::isolation::IsolationReport;
 use crate::reason::Reason;
 use crate::telemetry::{State, Telemetry};
 use crate::value::WireVolts;
@@ -42,6 +43,8 @@ pub enum Reply {
     Captured(Captured),
     /// Rows of the fast capture.
     Rows(Rows),
+    /// What the isolation bank says.
+    Isolation(IsolationReport),
 }
 
 /// Report of the faults that have come since the start.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::block::PART;
 use crate::capture::Capture;
 use crate::fault::Fault;
+use crate::isolation::Isolation;
 use crate::value::Desired;
 
 /// Request of the host. The MCU sends exactly one [`crate::Reply`] to each, with the same sequence number.
@@ -82,6 +83,8 @@ pub enum Request {
     },
     /// Starts or reads the fast capture.
     Capture(Capture),
+    /// Reads what the isolation bank says, or ends its alarm.
+    Isolation(Isolation),
 }
 
 impl Request {

@@ -5,6 +5,7 @@
 
 use heapless::Vec;
 use model::device::{self, Watchdogs};
+use model::isolation::Causes;
 use model::{Amplifier, Approach, Compensation, Feedback, Gains, Settings, supervisor};
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +13,11 @@ use crate::block::{self, PART};
 use crate::field::Field;
 use crate::reply::Controller;
 
-/// Version of the payload's format.
-pub const FORMAT: u8 = 1;
+/// Newest version of the payload's format: the first one, and `trip_on_cause` behind it. A payload has the oldest version that holds
+/// its settings, so that programs which know no newer one go on reading what they can run.
+pub const FORMAT: u8 = 2;
+/// First version of the payload's format.
+const FIRST: u8 = 1;
 /// Largest number of parts of a payload.
 pub const MOST_PARTS: u8 = 7;
 /// Length of the longest payload, in bytes.
@@ -63,12 +67,15 @@ pub struct WireSettings {
     pub discharge_time_s: f64,
     /// Times of the three watchdogs, in ms: hang guard, task watchdog, hardware watchdog.
     pub watchdogs_ms: [u32; 3],
+    /// Causes that are a fault once the isolation bank has named them, as [`Causes::bits`]; 0 in a payload of the first version.
+    #[serde(skip)]
+    pub trip_on_cause: u16,
 }
 
 impl WireSettings {
     /// The part of `settings` that can be changed. What the chosen controller does not use has its default value.
     pub fn new(settings: &device::Settings) -> Self {
-        let device::Settings { control, supervision, watchdogs } = settings;
+        let device::Settings { control, supervision, watchdogs, trip_on_cause } = settings;
         let Settings { compensation, amplifier, feedback, .. } = control;
         let (gains, approach_s) = match compensation {
             Compensation::None | Compensation::Robust(_) => (Gains::PAPER, 0.0),
@@ -95,6 +102,7 @@ impl WireSettings {
             monitor_time_s: supervision.monitor_time_s,
             discharge_time_s: supervision.discharge_time_s,
             watchdogs_ms: [watchdogs.hang_ms, watchdogs.stall_ms, watchdogs.reset_ms],
+            trip_on_cause: trip_on_cause.bits(),
         }
     }
 
@@ -146,19 +154,27 @@ impl WireSettings {
                 ..fixed.supervision
             },
             watchdogs: Watchdogs { hang_ms, stall_ms, reset_ms },
+            trip_on_cause: Causes::from_bits(self.trip_on_cause),
         })
     }
 
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the longest.
     #[inline(never)]
     pub fn payload(&self) -> Option<Payload> {
-        block::write(FORMAT, self)
+        if self.trip_on_cause == 0 {
+            block::write(FIRST, self)
+        } else {
+            block::write(FORMAT, &(self, self.trip_on_cause))
+        }
     }
 
-    /// Deserialises a payload. `None` for another format and for bytes that are not exactly one set of settings.
+    /// Deserialises a payload. `None` for a newer format and for bytes that are not exactly one set of settings.
     #[inline(never)]
     pub fn read(payload: &[u8]) -> Option<Self> {
-        block::read(FORMAT, payload)
+        block::read(FIRST, payload).or_else(|| {
+            let (settings, trip_on_cause) = block::read::<(Self, u16)>(FORMAT, payload)?;
+            Some(Self { trip_on_cause, ..settings })
+        })
     }
 }
 
@@ -176,6 +192,7 @@ mod tests {
             watchdogs_ms: [most; 3],
             slew_v_per_s: Some(1.5),
             sensor: Some([2.5; 8]),
+            trip_on_cause: u16::MAX,
             ..WireSettings::new(&BUILT_IN)
         }
     }
@@ -183,7 +200,7 @@ mod tests {
     #[test]
     fn the_longest_settings_fit_and_survive_a_round_trip() {
         let payload = longest().payload().unwrap();
-        assert_eq!((payload.len(), WireSettings::read(&payload)), (205, Some(longest())));
+        assert_eq!((payload.len(), WireSettings::read(&payload)), (208, Some(longest())));
         assert!(payload.len() <= MOST_BYTES);
     }
 
@@ -201,6 +218,18 @@ mod tests {
             bytes[0] = format;
             assert_eq!(WireSettings::read(&bytes), None, "format {format}");
         }
+    }
+
+    /// What an earlier program has stored or sends is read, and it can read what it can run.
+    #[test]
+    fn settings_without_a_trip_are_a_payload_of_the_first_format() {
+        let with = WireSettings { trip_on_cause: 0x8001, ..WireSettings::new(&BUILT_IN) };
+        let without = WireSettings { trip_on_cause: 0, ..with };
+        let (newer, first) = (with.payload().unwrap(), without.payload().unwrap());
+        assert_eq!((newer[0], first[0]), (2, 1));
+        assert_eq!(newer[1..first.len()], first[1..], "the newer format has the first one in it");
+        assert_eq!((WireSettings::read(&newer), WireSettings::read(&first)), (Some(with), Some(without)));
+        assert_eq!(with.over(&BUILT_IN).map(|settings| settings.trip_on_cause.bits()), Ok(0x8001));
     }
 
     #[test]
@@ -226,7 +255,8 @@ mod tests {
             ..BUILT_IN.supervision
         };
         let watchdogs = Watchdogs { hang_ms: 20, stall_ms: 60, reset_ms: 200 };
-        let meant = device::Settings { control, supervision, watchdogs };
+        let trip_on_cause = Causes::NONE.with(model::isolation::Cause::GainError);
+        let meant = device::Settings { control, supervision, watchdogs, trip_on_cause };
         let payload = WireSettings::new(&meant).payload().unwrap();
         assert_eq!(WireSettings::read(&payload).unwrap().over(&BUILT_IN), Ok(meant));
         let none = Settings { compensation: Compensation::None, ..control };

@@ -5,11 +5,12 @@ mod by_hand;
 
 use by_hand::by_hand;
 use link::capture::{Capture, Captured, ROWS, Rows};
+use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, Message, Mismatch, Nonce, Part, Reason,
-    Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
+    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, IsolationReport, Message, Mismatch, Nonce,
+    Part, Reason, Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
 };
 
 /// Returns the message and its frame as a line of the file for other clients.
@@ -61,6 +62,8 @@ fn requests() {
         (Request::Capture(Capture::Start { rows: 10_000 }), "1100904e"),
         (Request::Capture(Capture::State), "1101"),
         (Request::Capture(Capture::Read { first: 300 }), "1102ac02"),
+        (Request::Isolation(Isolation::Read), "1200"),
+        (Request::Isolation(Isolation::Acknowledge), "1201"),
     ] {
         frames += &check(&request, b'Q', golden);
     }
@@ -176,6 +179,18 @@ fn replies() {
             &format!("09ac0202{}", "a5".repeat(8 * ROWS)),
         ),
         (
+            Reply::Isolation(IsolationReport {
+                tick: 70_000,
+                verdict: 0x4a0,
+                since_tick: 300,
+                size: 0.25,
+                half_width: 1.0,
+                explained: 0.0,
+                trip_on_cause: 0x8001,
+            }),
+            "0af0a204a009ac02000000000000d03f000000000000f03f0000000000000000818002",
+        ),
+        (
             Reply::SettingsPart(Part { number: 2, length: 300, bytes: [0xa5; 32] }),
             &format!("0702ac02{}", "a5".repeat(32)),
         ),
@@ -198,6 +213,9 @@ fn a_complete_frame() {
 
 #[test]
 fn fault_codes() {
-    let names = (0..=10).map(|code| Fault(code).name()).collect::<Vec<_>>().join(" ");
-    assert_eq!(names, "none panic hard-fault overrun interlock watchdog monitor config supply self-test unknown");
+    let names = (0..=11).map(|code| Fault(code).name()).collect::<Vec<_>>().join(" ");
+    assert_eq!(
+        names,
+        "none panic hard-fault overrun interlock watchdog monitor config supply self-test isolation unknown"
+    );
 }

@@ -18,10 +18,10 @@ fn a_fault_has_the_name_and_the_remedy_of_the_supervisor() {
 
 #[test]
 fn a_field_keeps_its_name_across_the_link() {
-    for name in ["memory.direct", "leakage.share", "integral_gain_per_s", "controller", "reset_ms"] {
+    for name in ["memory.direct", "leakage.share", "integral_gain_per_s", "controller", "reset_ms", "trip_on_cause"] {
         assert_eq!(Field::named(name).name(), name);
     }
-    for unknown in [Field::named("no such field"), Field(42)] {
+    for unknown in [Field::named("no such field"), Field(45)] {
         assert_eq!(unknown.name(), "another setting");
     }
     assert_eq!(Field::named("no such field"), Field::OTHER);

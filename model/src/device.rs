@@ -12,8 +12,11 @@
 
 use crate::controller;
 use crate::error::OutOfRange;
+use crate::estimator::Plant;
+use crate::isolation::{self, Causes};
 use crate::supervisor;
 use crate::units::SampleTime;
+use crate::validated::Validate;
 
 /// Lowest and highest rate of the tick on an MCU, in Hz.
 const RATES_HZ: (u32, u32) = (100, 2000);
@@ -39,6 +42,9 @@ pub struct Settings {
     pub supervision: supervisor::Settings,
     /// Times of the watchdogs.
     pub watchdogs: Watchdogs,
+    /// Causes that are a fault once the isolation bank has named them, so that the output is disabled; none by default. A set that is
+    /// not empty needs a sensor.
+    pub trip_on_cause: Causes,
 }
 
 /// Times after which the three watchdogs act, in ms.
@@ -66,7 +72,15 @@ impl Settings {
         control: controller::Settings::PAPER,
         supervision: supervisor::Settings::DEFAULT,
         watchdogs: Watchdogs::DEFAULT,
+        trip_on_cause: Causes::NONE,
     };
+
+    /// Returns the settings of the isolation bank for the spring `plant` behind an amplifier with this highest voltage, in V: noise and
+    /// interval are those of the sensor. `None` without one.
+    pub fn isolation(&self, plant: Plant, highest_v: f64) -> Option<isolation::Settings> {
+        let [noise_v, _, _, interval_s, ..] = self.control.feedback.as_ref()?.values();
+        Some(isolation::Settings { plant, noise_v, interval_s, range_v: highest_v, ..isolation::Settings::PAPER })
+    }
 
     /// Returns the rate of the tick, in whole Hz.
     pub fn rate_hz(&self) -> u32 {
@@ -78,10 +92,20 @@ impl Settings {
     /// # Errors
     /// [`OutOfRange`] names the first field outside its allowed range, its value and the range.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        let Self { control, supervision, watchdogs: Watchdogs { hang_ms, stall_ms, reset_ms } } = self;
+        let Self { control, supervision, watchdogs: Watchdogs { hang_ms, stall_ms, reset_ms }, trip_on_cause } = self;
         check_rate(control.rate_hz)?;
         control.validate()?;
-        supervision.validate(SampleTime::from_rate(control.rate_hz)?)?;
+        let sample_time = SampleTime::from_rate(control.rate_hz)?;
+        supervision.validate(sample_time)?;
+        if !trip_on_cause.is_empty() {
+            match self.isolation(control.plant, control.amplifier.max_v) {
+                Some(bank) => bank.validate(sample_time).map(drop)?,
+                None => {
+                    let count = trip_on_cause.iter().count() as f64;
+                    OutOfRange::check("trip_on_cause", count, 0.0..=0.0, "causes without a sensor")?;
+                }
+            }
+        }
         // A monitor with a wider tolerance could agree with anything.
         let most_v = MOST_TOLERANCE * control.amplifier.full_scale_v;
         OutOfRange::check("monitor_tolerance_v", supervision.monitor_tolerance_v, 1.0..=most_v, "V")?;
@@ -177,6 +201,25 @@ mod tests {
         assert_eq!(Settings { control, ..GOOD }.check().unwrap_err().field, "full_scale_v");
         let supervision = supervisor::Settings { ramp_v_per_s: 0.0, ..GOOD.supervision };
         assert_eq!(Settings { supervision, ..GOOD }.check().unwrap_err().field, "ramp_v_per_s");
+    }
+
+    #[test]
+    fn a_trip_needs_a_sensor_that_the_isolation_bank_can_use() {
+        let trip_on_cause = Causes::NONE.with(isolation::Cause::StuckSensor);
+        let with = |values: [f64; 8], trip_on_cause| {
+            let control = controller::Settings { feedback: crate::Feedback::from_values(values), ..GOOD.control };
+            Settings { control, trip_on_cause, ..GOOD }.check()
+        };
+        assert_eq!(Settings { trip_on_cause, ..GOOD }.check().unwrap_err().field, "trip_on_cause");
+        if let Some(feedback) = crate::Feedback::from_values([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]) {
+            let usual = feedback.values();
+            assert_eq!(with(usual, trip_on_cause), Ok(()));
+            // Readings every 80 ms correct the estimate, and are too few for a block of 128 ms.
+            let mut rare = usual;
+            rare[3] = 0.08;
+            assert_eq!(with(rare, Causes::NONE), Ok(()));
+            assert_eq!(with(rare, trip_on_cause).unwrap_err().field, "interval_s");
+        }
     }
 
     #[test]

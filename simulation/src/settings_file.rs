@@ -6,10 +6,13 @@
 //! [`model::device`], [`model::Settings`], [`model::supervisor::Settings`] and [`model::Feedback`] have the meaning and the range
 //! of each value.
 
+mod trips;
+
 use std::path::Path;
 
 use anyhow::Result;
 use link::{Controller, WireSettings};
+use model::isolation::Causes;
 use model::{OutOfRange, device};
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +20,8 @@ use crate::bad_input;
 use crate::bad_input::BadInput;
 use crate::bounded_file::read_text;
 use crate::plant_file::place;
+
+pub use trips::Trips;
 
 /// Largest size of a settings file, in MiB.
 const MOST_MIB: usize = 1;
@@ -51,6 +56,9 @@ pub struct SettingsFile {
     /// Times of the watchdogs.
     #[serde(default)]
     pub watchdogs: Watchdogs,
+    /// What the naming of a cause does.
+    #[serde(default)]
+    pub isolation: Isolation,
 }
 
 /// Name of a pre-compensator.
@@ -164,6 +172,14 @@ table! {
     }
 }
 
+table! {
+    /// The bank that isolates faults with the stiffness sensor.
+    Isolation {
+        /// Causes that are a fault once they are named.
+        trip_on_cause: Trips,
+    }
+}
+
 impl From<&WireSettings> for SettingsFile {
     /// A file with every value.
     fn from(wire: &WireSettings) -> Self {
@@ -201,6 +217,7 @@ impl From<&WireSettings> for SettingsFile {
                 discharge_time_s: Some(wire.discharge_time_s),
             },
             watchdogs: Watchdogs { hang_ms: Some(hang_ms), stall_ms: Some(stall_ms), reset_ms: Some(reset_ms) },
+            isolation: Isolation { trip_on_cause: Some(Trips(Causes::from_bits(wire.trip_on_cause))) },
         }
     }
 }
@@ -229,7 +246,7 @@ impl Sensor {
 impl SettingsFile {
     /// The settings to be sent: those of the file over the built-in ones.
     pub fn over(&self, built_in: &WireSettings) -> WireSettings {
-        let Self { gains, approach, amplifier, sensor, supervision, watchdogs, .. } = self;
+        let Self { gains, approach, amplifier, sensor, supervision, watchdogs, isolation, .. } = self;
         let [hang_ms, stall_ms, reset_ms] = built_in.watchdogs_ms;
         WireSettings {
             rate_hz: self.rate_hz.unwrap_or(built_in.rate_hz),
@@ -261,6 +278,7 @@ impl SettingsFile {
                 watchdogs.stall_ms.unwrap_or(stall_ms),
                 watchdogs.reset_ms.unwrap_or(reset_ms),
             ],
+            trip_on_cause: isolation.trip_on_cause.map_or(built_in.trip_on_cause, |trips| trips.0.bits()),
         }
     }
 
@@ -299,7 +317,7 @@ impl Source {
             let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
             BadInput(format!(
                 "{}: {what}; expected schema, rate_hz, controller, and [gains], [approach], [amplifier], [sensor], [supervision], \
-                 [watchdogs]; pins, converters, monitor scales and baud rate need another image",
+                 [watchdogs], [isolation]; pins, converters, monitor scales and baud rate need another image",
                 place::line_and_column(name, text, at)
             ))
         })?;
@@ -347,6 +365,8 @@ fn key(field: &str) -> String {
         "approach_s" => return "approach.tau_s".into(),
         "full_scale_v" | "min_v" | "max_v" | "slew_v_per_s" => "amplifier",
         "hang_ms" | "stall_ms" | "reset_ms" => "watchdogs",
+        "range_v" => return "amplifier.max_v".into(),
+        "trip_on_cause" => "isolation",
         "noise_v" | "model_uncertainty" | "fastest_s" | "interval_s" | "oldest_s" | "lowest_v" | "highest_v"
         | "fade_s" => "sensor",
         _ => "supervision",
@@ -393,6 +413,7 @@ mod tests {
             built_in(),
             WireSettings { controller: Controller::Fast, approach_s: 0.25, slew_v_per_s: Some(1e4), ..built_in() },
             WireSettings { sensor: Some(values), controller: Controller::None, ..built_in() },
+            WireSettings { sensor: Some(values), trip_on_cause: 0x8001, ..built_in() },
         ] {
             let text = SettingsFile::from(&wire).to_toml().unwrap();
             assert_eq!(over(&text).unwrap(), wire, "{text}");
@@ -421,6 +442,14 @@ mod tests {
                 "s.toml, line 3, column 16: ramp_v_per_s = NaN is not allowed",
             ),
             ("schema = 1\n[sensor]\nfade_s = 1e9", "s.toml, line 3, column 10: fade_s = 1000000000 is not allowed"),
+            (
+                "schema = 1\n[isolation]\ntrip_on_cause = [\"gain-error\"]",
+                "s.toml, line 3, column 17: trip_on_cause = 1 is not allowed: expected 0 causes without a sensor",
+            ),
+            (
+                "schema = 1\n[isolation]\ntrip_on_cause = [\"gain\"]",
+                "s.toml, line 3, column 17: invalid value: string \"gain\", expected \"off\" or a list of gain-error, ",
+            ),
             ("schema = 1\n[pins]\ndac = 4", "s.toml, line 2, column 2: unknown field `pins`"),
             ("schema = 1\ncontroller = 7", "s.toml, line 2, column 14:"),
             ("schema = 1\nrate_hz = -5", "s.toml, line 2, column 11:"),

@@ -41,7 +41,7 @@ fn both(error: SpringError, offset_v: f64) -> (Verdict, (f64, f64)) {
             compared += 1;
             assert_eq!(fixed.decisions(), reference.rounds, "tick {tick}");
             assert_eq!(fixed.verdict(), reference.verdict, "tick {tick}");
-            let (none, least) = fixed.energies();
+            let (none, least) = fixed.report().energies();
             assert!((none / reference.none - 1.0).abs() < 0.01, "tick {tick}: {none} {}", reference.none);
             // What is left is the small difference of large sums.
             let tolerance = 0.02 * reference.least + 1e-6 * reference.none + 5.0;
@@ -49,7 +49,7 @@ fn both(error: SpringError, offset_v: f64) -> (Verdict, (f64, f64)) {
         }
     }
     assert_eq!(compared == 0, fixed.verdict() == Verdict::Quiet);
-    let (size, deviation) = fixed.size();
+    let (size, deviation) = fixed.report().size();
     (fixed.verdict(), (size, deviation))
 }
 

@@ -14,10 +14,11 @@ use test_bench::script::FaultInjection;
 
 const PAGE: &str = "docs/promises.md";
 /// Commands of `cargo xtask` that count as evidence, and where each is.
-const COMMANDS: [(&str, &str); 4] = [
+const COMMANDS: [(&str, &str); 5] = [
     ("proof", "emulation/src/proof.rs"),
     ("prove", "xtask/src/prove.rs"),
     ("talk", "emulation/src/talk"),
+    ("story", "emulation/src/story/isolation.rs"),
     ("size", "emulation/src/binary/size.rs"),
 ];
 
@@ -171,6 +172,7 @@ fn within(fault: Fault) -> String {
         Fault::Config => "nothing was enabled".into(),
         Fault::Supply => "immediately, by the reset".into(),
         Fault::SelfTest => "nothing was enabled".into(),
+        Fault::Isolation => "the tick after the cause is named".into(),
     }
 }
 
@@ -186,6 +188,9 @@ fn drill(fault: Fault) -> &'static str {
         Fault::Config => "drill `unguarded`, boot `unguarded`",
         Fault::Supply => "boot `dip`",
         Fault::SelfTest => "boot `stuck bit`, boot `coupled bits`, boot `slow processor`",
+        Fault::Isolation => {
+            "`tests/tests/firmware_isolation.rs::a_cause_of_trip_on_cause_is_a_fault_until_it_is_acknowledged_and_another_cause_is_not`"
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Checks of an image's machine code:
 //!
-//! - No call from the control tick leads to a panic, directly or through other functions, and none has an unknown
-//!   target. The tick contains no undefined instruction.
+//! - No call from the control tick, or from that of the isolation bank, leads to a panic, directly or through other
+//!   functions, and none has an unknown target. The tick contains no undefined instruction.
 //! - The tick uses no floats: it calls no float arithmetic of the compiler's and has no instruction of the float unit.
 //! - The image has no allocator.
 
@@ -14,11 +14,22 @@ use super::thumb::Code;
 
 /// Beginning and end of the demangled name of the function that must not panic.
 const TICK: (&str, &str) = ("firmware::control::Control", "tick");
+/// The same of the isolation bank, in an image that contains it.
+const ISOLATION: (&str, &str) = ("firmware::isolation::enabled::Isolation", "tick");
 /// The tick of the C library.
 const C_TICK: &str = "vsj_tick";
 
 /// Runs all checks. Returns the number of functions that the tick consists of, its callees included.
 pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
+    check(bytes, &[TICK])
+}
+
+/// Runs all checks, those of the control tick for the tick of the isolation bank as well.
+pub(crate) fn with_isolation(bytes: &[u8]) -> Result<usize> {
+    check(bytes, &[TICK, ISOLATION])
+}
+
+fn check(bytes: &[u8], names: &[(&str, &str)]) -> Result<usize> {
     let functions = elf::functions(bytes)?;
     if let Some(found) = functions.iter().find(|f| is_heap(&f.name)) {
         bail!("`{}` is an allocator's", found.name);
@@ -26,7 +37,11 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
     // Otherwise a change of names would make every check pass.
     ensure!(functions.iter().any(|f| is_panic(&f.name)), "the image has no panic at all: have names changed?");
     ensure!(functions.iter().any(|f| is_float(&f.name)), "the image has no float at all: have names changed?");
-    walk(bytes, &functions, &ticks(&functions)?)
+    let mut roots = Vec::new();
+    for name in names {
+        roots.extend(instances(&functions, *name)?);
+    }
+    walk(bytes, &functions, &roots)
 }
 
 /// Runs the checks of a program around the C library, which contains no panic at all. Returns the number of functions that its
@@ -41,13 +56,12 @@ pub(crate) fn run_c(bytes: &[u8]) -> Result<usize> {
     walk(bytes, &functions, &[tick.with_context(|| format!("no function `{C_TICK}` in the image"))?])
 }
 
-/// Checks all that can be reached from `ticks`; returns the number of functions.
-fn walk(bytes: &[u8], functions: &[Function], ticks: &[&Function]) -> Result<usize> {
+/// Checks all that can be reached from `roots`; returns the number of functions.
+fn walk(bytes: &[u8], functions: &[Function], roots: &[&Function]) -> Result<usize> {
     let code = Code::new(bytes)?;
     let by_address: BTreeMap<u32, &Function> = functions.iter().map(|f| (f.address, f)).collect();
-
     let mut seen = BTreeSet::new();
-    let mut open: Vec<(&Function, String)> = ticks.iter().map(|f| (*f, f.name.clone())).collect();
+    let mut open: Vec<(&Function, String)> = roots.iter().map(|f| (*f, f.name.clone())).collect();
     while let Some((function, path)) = open.pop() {
         if !seen.insert(function.address) {
             continue;
@@ -70,11 +84,15 @@ fn walk(bytes: &[u8], functions: &[Function], ticks: &[&Function]) -> Result<usi
 
 /// Every compiled instance of the control tick. None is an error.
 pub(crate) fn ticks(functions: &[Function]) -> Result<Vec<&Function>> {
-    let is_tick =
-        |f: &&Function| f.name.trim_start_matches('<').starts_with(TICK.0) && plain(&f.name).ends_with(TICK.1);
-    let ticks: Vec<&Function> = functions.iter().filter(is_tick).collect();
-    ensure!(!ticks.is_empty(), "no function `{}::{}` in the image", TICK.0, TICK.1);
-    Ok(ticks)
+    instances(functions, TICK)
+}
+
+/// Every compiled instance of a function with this beginning and end of its name.
+fn instances<'a>(functions: &'a [Function], (start, end): (&str, &str)) -> Result<Vec<&'a Function>> {
+    let is_one = |f: &&Function| f.name.trim_start_matches('<').starts_with(start) && plain(&f.name).ends_with(end);
+    let found: Vec<&Function> = functions.iter().filter(is_one).collect();
+    ensure!(!found.is_empty(), "no function `{start}::{end}` in the image");
+    Ok(found)
 }
 
 /// A function's name without generic arguments at its end.

@@ -15,7 +15,7 @@ use validation::ground_truth::{Block, Cause};
 use xtask::variant::Controller;
 use xtask::{build, shell};
 
-use super::lock_step::{Moment, NEVER, TICK_S};
+use super::lock_step::{Disturbance, Moment, TICK_S};
 use super::stage::{EVERY, Errors, Stage, name};
 use crate::qemu::emulator;
 use crate::talk;
@@ -60,9 +60,10 @@ impl Demonstration {
     /// Runs the demonstration for one effect, or for a spring without any.
     pub(super) fn run(&self, cause: Option<Cause>, seed: u64) -> Result<Outcome> {
         let begin = Instant::now();
-        let folder = self.stage.folder(cause)?;
+        let folder = self.stage.folder(name(cause))?;
         let drive = |found: Option<&WireModel>| {
-            let pass = self.stage.drive(self.stage.run, &folder, self.stage.spring(cause, seed), NEVER, found)?;
+            let pass =
+                self.stage.drive(self.stage.run, &folder, self.stage.spring(cause, seed), &Disturbance::None, found)?;
             anyhow::Ok(pass.moments)
         };
         let first = drive(None)?;

@@ -14,6 +14,7 @@ use firmware::settings::SETTINGS;
 use model::Volts;
 use model::units::Signal;
 use validation::ground_truth::live::Live;
+use validation::ground_truth::{Cause, Effect};
 use xtask::shell;
 
 use crate::qemu::emulator::{self, Run};
@@ -22,11 +23,34 @@ use crate::qemu::emulator::{self, Run};
 const PIPES: [&str; 2] = ["to-spring", "from-spring"];
 /// Word to the board in place of a reading when the sensor is silent.
 const NO_READING: i32 = i32::MIN;
+/// Largest stiffness that a sensor has to show, in V.
+const TOP_V: f64 = 500.0;
 /// Period of the control tick, in s.
 pub(super) const TICK_S: f64 = 1.0 / SETTINGS.rate_hz;
 
-/// No silent ticks.
-pub(super) const NEVER: Range<usize> = 0..0;
+/// What happens to the spring or to its sensor during a run.
+#[derive(Clone, Debug)]
+pub(super) enum Disturbance {
+    /// Nothing.
+    None,
+    /// The sensor is silent in these ticks.
+    Silent(Range<usize>),
+    /// From this tick on the sensor repeats its last reading.
+    Stuck(usize),
+    /// From this tick on the spring has another gain.
+    Gain(usize, f64),
+}
+
+impl Disturbance {
+    /// What the board receives in a tick instead of the reading `bits`; `before` is what it received in the tick before.
+    fn received(&self, tick: usize, bits: i32, before: Option<i32>) -> Option<i32> {
+        match self {
+            Self::Silent(ticks) if ticks.contains(&tick) => None,
+            Self::Stuck(from) if tick >= *from => before,
+            _ => Some(bits),
+        }
+    }
+}
 
 /// One tick at the spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,14 +65,13 @@ pub(super) struct Moment {
     pub(super) received: Option<Volts>,
 }
 
-/// Runs the script `name` in `folder`, with a sensor that is silent in the ticks `silent`. Returns the run and every
-/// tick at the spring.
+/// Runs the script `name` in `folder` with a `disturbance`. Returns the run and every tick at the spring.
 pub(super) fn run(
     elf: &Path,
     name: &str,
     folder: &Path,
     spring: Live,
-    silent: Range<usize>,
+    disturbance: &Disturbance,
 ) -> Result<(Run, Vec<Moment>)> {
     for pipe in PIPES.map(|name| folder.join(name)) {
         match fs::remove_file(&pipe) {
@@ -57,7 +80,7 @@ pub(super) fn run(
         };
     }
     thread::scope(|scope| {
-        let server = scope.spawn(|| serve(folder, spring, silent));
+        let server = scope.spawn(|| serve(folder, spring, disturbance));
         let run = emulator::play_in(folder, elf, name, emulator::SHIFT, |_| {});
         // If the board did not start, this ends the server's wait for it to open a pipe.
         let [to, _from] = PIPES.map(|pipe| OpenOptions::new().read(true).write(true).open(folder.join(pipe)));
@@ -67,12 +90,17 @@ pub(super) fn run(
     })
 }
 
-fn serve(folder: &Path, mut spring: Live, silent: Range<usize>) -> Result<Vec<Moment>> {
+/// A spring with this gain.
+fn stiffer(gain: f64) -> Effect {
+    Effect { cause: Cause::GainError, form: 0, full_size: vec![gain], neutral: vec![1.0], size: 1.0 }
+}
+
+fn serve(folder: &Path, mut spring: Live, disturbance: &Disturbance) -> Result<Vec<Moment>> {
     let [to, from] = PIPES.map(|name| folder.join(name));
     let mut to = File::open(&to).with_context(|| format!("cannot open {}", to.display()))?;
     let mut from =
         OpenOptions::new().write(true).open(&from).with_context(|| format!("cannot open {}", from.display()))?;
-    let mut moments = Vec::new();
+    let (mut moments, mut before) = (Vec::new(), None);
     let mut word = [0; 2];
     loop {
         match to.read_exact(&mut word) {
@@ -82,9 +110,15 @@ fn serve(folder: &Path, mut spring: Live, silent: Range<usize>) -> Result<Vec<Mo
         let word = u16::from_le_bytes(word);
         let code = if word >> 15 == 1 { word & 0xfff } else { 0 };
         let commanded_v = f64::from(code) * SETTINGS.amplifier.volts_per_code();
+        if let Disturbance::Gain(tick, gain) = disturbance
+            && *tick == moments.len()
+        {
+            spring.change(&[stiffer(*gain)], TOP_V);
+        }
         let (stiffness_v, reading) = spring.hold(commanded_v, TICK_S);
-        let bits = Some((reading.read * f64::from(1 << 20)) as i32);
-        let received = bits.filter(|bits| *bits != NO_READING && !silent.contains(&moments.len()));
+        let bits = (reading.read * f64::from(1 << 20)) as i32;
+        let received = disturbance.received(moments.len(), bits, before).filter(|bits| *bits != NO_READING);
+        before = received;
         from.write_all(&received.unwrap_or(NO_READING).to_le_bytes())?;
         let received = received.map(|bits| Volts(Signal::from_bits(bits)));
         moments.push(Moment { commanded_v, stiffness_v, read_v: reading.read, received });

@@ -5,12 +5,14 @@
 //! 3. `vsj link` sends the extended model to the board, which checks it, stores it and restarts.
 //! 4. The restarted board drives the same spring up and down again.
 //!
+//! With `--isolation` the spring changes while the board drives it, and the board names the cause.
 //! With `--feedback` the board keeps its wrong model and reads the spring's sensor instead.
 //!
 //! The result is the error of the true stiffness, which the hidden spring reports, relative to the desired one. Every
 //! run is compared with the same code on the host, code by code.
 
 mod better_model;
+mod isolation;
 mod lock_step;
 mod sensor;
 mod stage;
@@ -47,6 +49,9 @@ pub(crate) struct Args {
     /// falls silent
     #[arg(long)]
     feedback: bool,
+    /// Let the board's isolation bank name what changes: nothing, a gain, a sensor that gets stuck
+    #[arg(long, conflicts_with_all = ["effect", "all", "feedback", "controller", "json"])]
+    isolation: bool,
     /// Seed of the effects' sizes and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -54,10 +59,10 @@ pub(crate) struct Args {
     #[arg(long)]
     json: bool,
     /// Approve the summary of the three effects as it is now
-    #[arg(long, conflicts_with_all = ["effect", "all", "controller", "feedback"])]
+    #[arg(long, conflicts_with_all = ["effect", "all", "controller", "feedback", "isolation"])]
     bless: bool,
     /// Compare the summary of the three effects with the approved one, and check a sensor that falls silent
-    #[arg(long, conflicts_with_all = ["effect", "all", "controller", "feedback", "seed", "json", "bless"])]
+    #[arg(long, conflicts_with_all = ["effect", "all", "controller", "feedback", "isolation", "seed", "json", "bless"])]
     check: bool,
 }
 
@@ -71,6 +76,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
     if args.check {
         return check();
+    }
+    if args.isolation {
+        return isolation::check(&isolation::stage()?);
     }
     let effects: Vec<Option<Cause>> = match (args.all, args.effect.as_slice()) {
         (true, _) => [None].into_iter().chain(Cause::ALL.map(Some)).collect(),
@@ -116,7 +124,7 @@ fn each<T: Send>(
 }
 
 /// The step of `cargo xtask test`: three effects, whose summary must be the approved one, and a sensor that falls
-/// silent.
+/// silent, and the isolation bank.
 fn check() -> Result<()> {
     let begin = Instant::now();
     let demonstration = Demonstration::new(Controller::Paper)?;
@@ -124,7 +132,11 @@ fn check() -> Result<()> {
     table::compare(&outcomes)?;
     eprintln!("end-to-end demonstration of three effects in {:.0} s, as approved", begin.elapsed().as_secs_f64());
     let begin = Instant::now();
-    sensor::check().context("with a sensor that falls silent")?;
+    let stage = isolation::stage()?;
+    sensor::check(&stage).context("with a sensor that falls silent")?;
     eprintln!("a sensor in the loop that falls silent, in {:.0} s", begin.elapsed().as_secs_f64());
+    let begin = Instant::now();
+    isolation::check(&stage)?;
+    eprintln!("the isolation bank beside the loop, in {:.0} s", begin.elapsed().as_secs_f64());
     Ok(())
 }

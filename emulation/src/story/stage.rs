@@ -1,7 +1,6 @@
 //! What both demonstrations need: the image, a spring that hides an effect, and one pass up and down the stair.
 
 use std::fs;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -18,7 +17,7 @@ use xtask::build::{self, Board, Opt};
 use xtask::shell;
 use xtask::variant::Controller;
 
-use super::lock_step::{self, Moment};
+use super::lock_step::{self, Disturbance, Moment};
 use crate::qemu::comparison::Comparison;
 
 /// Ticks between two rows of a record.
@@ -54,10 +53,18 @@ impl Errors {
 pub(super) struct Pass {
     /// Every tick at the spring.
     pub(super) moments: Vec<Moment>,
-    /// The board's log lines about the sensor.
-    pub(super) sensor: Vec<String>,
+    /// The board's log.
+    pub(super) log: Vec<String>,
     /// Most instructions in a tick of the model.
     pub(super) most_instructions: u32,
+}
+
+impl Pass {
+    /// The rest of each line of the log that begins with `word`.
+    pub(super) fn said(&self, word: &str) -> Vec<String> {
+        let rest = |line: &String| line.strip_prefix(word)?.strip_prefix(' ').map(str::to_owned);
+        self.log.iter().filter_map(rest).collect()
+    }
 }
 
 /// The image, and the folder that it runs in.
@@ -96,8 +103,8 @@ impl Stage {
     }
 
     /// Makes an empty folder for the board's files, with no model in its flash.
-    pub(super) fn folder(&self, cause: Option<Cause>) -> Result<PathBuf> {
-        let folder = self.folder.join(name(cause));
+    pub(super) fn folder(&self, name: &str) -> Result<PathBuf> {
+        let folder = self.folder.join(name);
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
         fs::write(folder.join("model.flash"), vec![0xff; 2 * firmware::store::PAGE])?;
@@ -119,19 +126,18 @@ impl Stage {
         run: &str,
         folder: &Path,
         spring: Live,
-        silent: Range<usize>,
+        disturbance: &Disturbance,
         found: Option<&WireModel>,
     ) -> Result<Pass> {
-        let (played, moments) = lock_step::run(&self.elf, run, folder, spring, silent)?;
+        let (played, moments) = lock_step::run(&self.elf, run, folder, spring, disturbance)?;
         ensure!(moments.len() == UP_DOWN_TICKS as usize, "{} ticks at the spring", moments.len());
         // A tick receives the reading at the end of the one before.
         let received = |tick: u32| moments.get(tick.checked_sub(1)? as usize)?.received;
         let comparison = Comparison::with(run, found, received, &played)?;
         comparison.check()?;
-        let said = played.log.iter().filter_map(|line| line.message.strip_prefix("sensor "));
-        let sensor = said.map(str::to_owned).collect();
+        let log = played.log.into_iter().map(|line| line.message).collect();
         let [.., most_instructions] = comparison.instructions;
-        Ok(Pass { moments, sensor, most_instructions })
+        Ok(Pass { moments, log, most_instructions })
     }
 }
 

@@ -11,6 +11,7 @@ use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
+use firmware::isolation::Isolation;
 use firmware::nucleo::uart::Uart;
 use firmware::nucleo::{Nucleo, clocks, random, reset, switch_amplifier_off};
 use firmware::settings::BUILT_IN;
@@ -65,9 +66,9 @@ fn main() -> ! {
     match host::open(&loaded, &store, &cause, seed.unwrap_or(0)) {
         // Impossible: this is the first call.
         Ok(None) => {}
-        Ok(Some((control, server))) => {
-            if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run(board, control, Timing::of(&loaded.settings)))
-            {
+        Ok(Some((control, isolation, server))) => {
+            let run = run(board, control, isolation, Timing::of(&loaded.settings));
+            if let (Ok(housekeeping), Ok(control)) = (housekeeping(), run) {
                 low.spawn(housekeeping);
                 high.spawn(control);
             }
@@ -89,9 +90,9 @@ fn main() -> ! {
 }
 
 #[embassy_executor::task]
-async fn run(mut board: Nucleo, control: &'static mut Control, timing: Timing) {
+async fn run(mut board: Nucleo, control: &'static mut Control, isolation: &'static mut Isolation, timing: Timing) {
     let mut host = Host::new(control);
-    tasks::control(&mut board, control, &mut host, &mut Untimed, timing).await;
+    tasks::control(&mut board, control, isolation, &mut host, &mut Untimed, timing).await;
     // Returning would drop the DAC, and its pin would float.
     pending().await
 }

@@ -12,6 +12,7 @@ use model::supervisor::State;
 use crate::capture::Recorder;
 use crate::capture_memory;
 use crate::control::{Control, Source, Tick};
+use crate::isolation::{self, News};
 use crate::mailbox::Mailbox;
 
 static MAILBOX: Mutex<CriticalSectionRawMutex, Cell<Mailbox>> = Mutex::new(Cell::new(Mailbox::EMPTY));
@@ -89,5 +90,13 @@ impl Source for Host {
         if self.took_command {
             DONE.signal(view);
         }
+    }
+
+    fn take_acknowledged(&mut self) -> bool {
+        isolation::take_acknowledged()
+    }
+
+    fn isolated(&mut self, news: &News) {
+        isolation::publish(news, self.tick);
     }
 }

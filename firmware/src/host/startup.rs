@@ -7,13 +7,17 @@ use model::stiffness::{Cantilever, YoungsModulus};
 use model::{OutOfRange, SampleTime, Spring};
 
 use crate::control::Control;
+use crate::isolation::{self, Isolation};
 use crate::log;
 use crate::reset_cause::Cause;
 use crate::start::{self, Loaded, Start};
 use crate::store::{Pages, Store};
 
-/// Builds controller and server from the settings and the stored model; `None` from the second call on. The nonces of the link's sessions
-/// follow from `seed`, which has to be another one at every start.
+/// Controller, isolation bank and server.
+type Built = (&'static mut Control, &'static mut Isolation, &'static mut Server);
+
+/// Builds controller, isolation bank and server from the settings and the stored model; `None` from the second call on. The nonces
+/// of the link's sessions follow from `seed`, which has to be another one at every start.
 ///
 /// # Errors
 /// [`OutOfRange`] names the invalid setting.
@@ -22,13 +26,16 @@ pub fn open<P: Pages>(
     store: &Store<P>,
     cause: &Cause,
     seed: u32,
-) -> Result<Option<(&'static mut Control, &'static mut Server)>, OutOfRange> {
+) -> Result<Option<Built>, OutOfRange> {
     let Some(place) = singleton!(: Option<Control> = None) else { return Ok(None) };
     let (control, start) = start::control(loaded, store.newest(Block::Model), cause, place)?;
     for field in loaded.rejected.into_iter().chain(start.rejected) {
         log::refused(field);
     }
-    Ok(server(&start, loaded, seed)?.map(|server| (control, server)))
+    isolation::set_terms(start.isolation);
+    let Some(isolation) = singleton!(: Isolation = Isolation::NEW) else { return Ok(None) };
+    isolation.start(&start.isolation);
+    Ok(server(&start, loaded, seed)?.map(|server| (control, isolation, server)))
 }
 
 /// Builds the server. Not inlined, so that its stack frame is released.

@@ -6,8 +6,8 @@ use link::{Server, Step, View};
 use super::shared_mailbox::{capture, hand_over, with_mailbox};
 use super::shared_store;
 use crate::board::Line;
-use crate::stop;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
+use crate::{isolation, stop};
 
 /// Longest wait for a byte, and thereby the period of the check whether telemetry is due.
 const READ_TIMEOUT: Duration = Duration::from_millis(1);
@@ -44,7 +44,12 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                 }
                 Some(Step::Capture(request)) => {
                     // The reply is not kept while the frame is sent.
-                    let bytes = server.captured(&capture(request));
+                    let bytes = server.answered(&capture(request));
+                    send(line, bytes).await;
+                }
+                Some(Step::Isolation(request)) => {
+                    // Nor here.
+                    let bytes = server.answered(&isolation::execute(request, view.sample.tick).await);
                     send(line, bytes).await;
                 }
                 Some(Step::Restart(bytes)) => {

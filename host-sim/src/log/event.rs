@@ -33,6 +33,16 @@ pub enum Event {
         /// Tick of the change.
         tick: u32,
     },
+    /// `isolation .. tick=..`: the verdict of the isolation bank has changed.
+    Isolation {
+        /// `alarm`, `named`, `ambiguous`, `unknown` or `quiet`; `withdrawn` if a name has gone.
+        verdict: String,
+        /// Code of the cause that explains most, or whose name has gone; `None` if there is none.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        cause: Option<String>,
+        /// Tick of the change.
+        tick: u32,
+    },
     /// `summary tick=.. ..`: sent once a second; counts are since the start.
     Summary {
         /// Number of ticks.
@@ -127,6 +137,7 @@ impl Event {
             Self::State { .. } => "state",
             Self::Fault { .. } => "fault",
             Self::Limit { .. } => "limit",
+            Self::Isolation { .. } => "isolation",
             Self::Summary { .. } => "summary",
             Self::Done(_) => "done",
             Self::Dropped { .. } => "dropped",
@@ -174,6 +185,12 @@ impl Values {
                 Event::Fault { code: self.number("code=")?, name: self.text("name=")?, tick: self.number("tick=")? }
             }
             "limit" => Event::Limit { bits: self.number("bits=")?, tick: self.number("tick=")? },
+            "isolation" => Event::Isolation {
+                // The verdict is a value, but for the word of a name that has gone.
+                verdict: self.text("isolation").unwrap_or_else(|| "withdrawn".into()),
+                cause: self.text("cause="),
+                tick: self.number("tick=")?,
+            },
             "summary" => Event::Summary {
                 tick: self.number("tick=")?,
                 overruns: self.number("overruns=")?,
@@ -249,6 +266,22 @@ mod tests {
         assert_eq!(controller(event(format, &values[..5])), None);
         let newer = format!("{format} controller={{=str}}");
         assert_eq!(controller(event(&newer, &values)).as_deref(), Some("fast"));
+    }
+
+    #[test]
+    fn a_verdict_of_the_isolation_bank_and_a_name_that_has_gone_are_recognised() {
+        let isolation = |verdict: &str, cause: Option<&str>, tick| {
+            let (verdict, cause) = (verdict.to_owned(), cause.map(str::to_owned));
+            Event::Isolation { verdict, cause, tick }
+        };
+        let named = "isolation {=str} cause={=str} other={=str} size={=f64} since_tick={=u32} tick={=u32}";
+        let values = ["named", "gain-error", "-", "0.1", "20096", "51000"];
+        assert_eq!(event(named, &values), isolation("named", Some("gain-error"), 51_000));
+        let withdrawn = "isolation withdrawn cause={=str} verdict={=str} since_tick={=u32} tick={=u32}";
+        let values = ["gain-error", "alarm", "20096", "60000"];
+        assert_eq!(event(withdrawn, &values), isolation("withdrawn", Some("gain-error"), 60_000));
+        let alarm = event("isolation {=str} since_tick={=u32} tick={=u32}", &["alarm", "20096", "20600"]);
+        assert_eq!(alarm, isolation("alarm", None, 20_600));
     }
 
     #[test]

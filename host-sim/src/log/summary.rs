@@ -36,6 +36,8 @@ pub struct Summary {
     /// The kinds of faults, in order of first occurrence; a fault reported again after the restart that it caused
     /// counts once.
     pub faults: Vec<Fault>,
+    /// The causes that the isolation bank has named, in order of first occurrence.
+    pub causes: Vec<Cause>,
     /// Number of panics.
     pub panics: u64,
     /// Number of lines that the firmware reports as dropped.
@@ -65,6 +67,17 @@ pub struct Fault {
     pub name: String,
     /// Number of occurrences.
     pub count: u64,
+}
+
+/// A cause that the isolation bank has named.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Cause {
+    /// Code of the cause.
+    pub cause: String,
+    /// How often it was named.
+    pub named: u64,
+    /// How often its name has gone.
+    pub withdrawn: u64,
 }
 
 /// Number of limit lines that name each limit; a line may name several.
@@ -180,6 +193,12 @@ impl Summary {
                     *lines += u64::from(bits & limit.bits() != 0);
                 }
             }
+            Event::Isolation { verdict, cause, tick } => {
+                self.tick(*tick, line.time_us);
+                if let Some(cause) = cause {
+                    self.isolation(verdict, cause);
+                }
+            }
             Event::Summary { tick, overruns, worst_lateness_us, limited_ticks, .. } => {
                 // Only summary lines are guaranteed to be in order.
                 if self.start.whole(*tick, line.time_us) < self.start.last_summary {
@@ -202,6 +221,17 @@ impl Summary {
             Event::Panic { .. } => self.panics += 1,
             Event::State { from, .. } if from == link::State::Faulted.name() => self.start.standing.clear(),
             Event::State { .. } | Event::Text => {}
+        }
+    }
+
+    /// Counts a line of the isolation bank with a cause.
+    fn isolation(&mut self, verdict: &str, cause: &str) {
+        let index = self.causes.iter().position(|known| known.cause == cause);
+        match (verdict, index) {
+            ("named", Some(index)) => self.causes[index].named += 1,
+            ("named", None) => self.causes.push(Cause { cause: cause.to_owned(), named: 1, withdrawn: 0 }),
+            ("withdrawn", Some(index)) => self.causes[index].withdrawn += 1,
+            _ => {}
         }
     }
 
@@ -278,6 +308,22 @@ mod tests {
     }
 
     /// 2^32 ticks of 1 ms are 49.7 days.
+    #[test]
+    fn named_causes_are_counted_and_so_are_the_names_that_have_gone() {
+        let isolation = |verdict: &str, cause: Option<&str>| {
+            line(1, Event::Isolation { verdict: verdict.into(), cause: cause.map(str::to_owned), tick: 1 })
+        };
+        let gain = Some("gain-error");
+        let summary = of(&[
+            isolation("alarm", None),
+            isolation("ambiguous", Some("delay")),
+            isolation("named", gain),
+            isolation("withdrawn", gain),
+            isolation("named", gain),
+        ]);
+        assert_eq!(summary.causes, [Cause { cause: "gain-error".into(), named: 2, withdrawn: 1 }]);
+    }
+
     #[test]
     fn a_wrapped_tick_is_not_a_restart() {
         const WRAP: u64 = 1 << 32;

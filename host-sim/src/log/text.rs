@@ -5,6 +5,7 @@ use std::fmt::{Display, Write};
 
 use model::Limits;
 
+use crate::log::summary::Cause;
 use crate::log::{Event, Item, Line, Summary};
 
 /// Header of the table.
@@ -48,6 +49,9 @@ pub fn summary_text(summary: &Summary) -> String {
     entry(&mut text, "worst lateness", &optional(summary.worst_lateness_us, " us"));
     entry(&mut text, "time in limits", &time_in_limits(summary));
     entry(&mut text, "faults", &faults(summary));
+    if !summary.causes.is_empty() {
+        entry(&mut text, "named causes", &causes(summary));
+    }
     if summary.panics > 0 {
         entry(&mut text, "panics", &summary.panics.to_string());
     }
@@ -109,6 +113,14 @@ fn faults(summary: &Summary) -> String {
         text += &format!("{} (code {}) x{}", one_line(&fault.name), fault.code, fault.count);
     }
     text
+}
+
+fn causes(summary: &Summary) -> String {
+    let one = |Cause { cause, named, withdrawn }: &Cause| {
+        let withdrawn = if *withdrawn > 0 { format!(", withdrawn x{withdrawn}") } else { String::new() };
+        format!("{} x{named}{withdrawn}", one_line(cause))
+    };
+    summary.causes.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// Names of the limits in a limit line.

@@ -14,7 +14,12 @@ pub fn text(trace: &Trace) -> String {
 }
 
 fn describe(event: &Event) -> String {
-    let mut text = format!("{:>10.2} s  {}", event.time_s, event.verdict);
+    format!("{:>10.2} s  {}", event.time_s, said(event))
+}
+
+/// What the bank says: verdict, cause, size, part of the energy, beginning.
+pub fn said(event: &Event) -> String {
+    let mut text = event.verdict.to_owned();
     match (event.cause, event.other) {
         (Some(cause), Some(other)) => text += &format!(" {cause} or {other}"),
         (Some(cause), None) => text += &format!(" {cause}"),

@@ -1,6 +1,6 @@
 //! What the worker reports to the screen, and what the screen orders.
 
-use link::{Desired, FaultReport, Status, Telemetry};
+use link::{Desired, FaultReport, IsolationReport, Status, Telemetry};
 
 /// What happened on the link.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,6 +18,8 @@ pub enum Event {
         /// The samples.
         samples: Vec<Telemetry>,
     },
+    /// What the isolation bank says.
+    Isolation(IsolationReport),
     /// The MCU has reported faults.
     Faults(FaultReport),
     /// An order was carried out; what it did.

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use link::{Fault, State, Status, Telemetry};
+use link::{Fault, IsolationReport, State, Status, Telemetry};
 
 use super::history::History;
 use super::message::{Event, Playing, Progress};
@@ -55,6 +55,8 @@ pub struct View {
     pub(super) status: Status,
     pub(super) sample: Telemetry,
     pub(super) history: History,
+    /// What the isolation bank says.
+    pub(super) isolation: Option<IsolationReport>,
     /// Standing faults, as last reported, besides the one that the status shows.
     reported: Vec<Fault>,
     pub(super) note: Option<Note>,
@@ -81,6 +83,7 @@ impl View {
             status,
             sample: status.sample,
             history: History::default(),
+            isolation: None,
             reported: Vec::new(),
             note: None,
             prompt: None,
@@ -103,6 +106,7 @@ impl View {
                     self.note("connected again", false);
                 }
                 self.connection = Connection::Connected;
+                self.isolation = None;
                 self.arrivals.clear();
                 self.take_status(status);
             }
@@ -120,6 +124,7 @@ impl View {
                     self.take_sample(*sample);
                 }
             }
+            Event::Isolation(report) => self.isolation = Some(report),
             Event::Faults(report) => self.reported = report.faults().collect(),
             Event::Done(text) => self.note(&text, false),
             Event::Failed(text) => self.note(&text, true),

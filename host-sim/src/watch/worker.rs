@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use link::isolation::Isolation;
 use link::{Desired, Reason, Request, State, Status};
 use simulation::schedule::{Reader, Schedule};
 
@@ -79,6 +80,8 @@ pub struct Worker<'a> {
     state: State,
     /// True if a disarm could not be sent.
     must_disarm: bool,
+    /// False once the MCU's program has refused to report what the isolation bank says.
+    knows_isolation: bool,
     begin: Instant,
     outcome: Outcome,
 }
@@ -96,6 +99,7 @@ impl<'a> Worker<'a> {
             every: Every::at(settings.rows_hz, status.rate_hz, settings.baud),
             state: status.sample.state,
             must_disarm: false,
+            knows_isolation: true,
             begin: Instant::now(),
             outcome: Outcome::default(),
         }
@@ -191,6 +195,11 @@ impl<'a> Worker<'a> {
         self.status = client.status()?;
         self.state = self.status.sample.state;
         self.say(Event::Status(self.status));
+        if self.knows_isolation {
+            let isolation = client.isolation(Isolation::Read)?;
+            self.knows_isolation = isolation.is_some();
+            isolation.into_iter().for_each(|report| self.say(Event::Isolation(report)));
+        }
         Ok(())
     }
 

@@ -7,7 +7,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use link::{Frame, Reply, State, Status};
+use link::isolation::Off;
+use link::{Frame, IsolationReport, Reply, State, Status};
+use model::isolation::{Cause, Causes, Finding, Verdict};
 use model::supervisor;
 use serialport::{SerialPort, TTYPort};
 use simulation::record::{MEASURED, Record};
@@ -47,6 +49,29 @@ fn a_session(mcu: &Mcu) {
     assert!(mcu.with(|shared| shared.sample.target.to_f64()) > 100.0, "refused targets leave the last one");
     assert_eq!(json(port, &["disarm"])["state"], "disarmed");
     assert_eq!(mcu.with(|shared| shared.sample.code), 0);
+}
+
+#[test]
+fn status_and_isolation_show_what_the_isolation_bank_says_and_its_alarm_is_acknowledged() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let port = &mcu.port;
+    let trips = Causes::NONE.with(Cause::StuckSensor);
+    mcu.with(|shared| shared.isolation = IsolationReport::off(Off::NoSensor, 0, Causes::NONE));
+    assert_eq!(json(port, &["status"])["isolation"]["why"], "no-sensor");
+    assert!(good(port, &["status"]).contains("isolation  off: no-sensor\n"));
+    let finding = Finding { cause: Cause::GainError, other: None, size: 0.1, half_width: 0.002, explained: 0.998 };
+    let report = IsolationReport::new(Verdict::Named(Cause::GainError), Some(finding), 0, 20_096, trips);
+    mcu.with(|shared| shared.isolation = report);
+    let said = "named gain-error, size 0.1000 (0.0980 to 0.1020), explains 99.80 %, since 20.10 s; a fault if it names stuck-sensor";
+    assert!(good(port, &["status"]).contains(&format!("isolation  {said}\n")));
+    assert_eq!(good(port, &["isolation"]), format!("{said}\n"));
+    let status = json(port, &["status"]);
+    let isolation = &status["isolation"];
+    assert_eq!((&isolation["verdict"], &isolation["cause"]), (&"named".into(), &"gain-error".into()));
+    assert_eq!((&isolation["size"]["low"], &isolation["size"]["unit"]), (&0.098.into(), &"".into()));
+    assert_eq!((&isolation["since_s"], &isolation["trip_on_cause"][0]), (&20.096.into(), &"stuck-sensor".into()));
+    assert_eq!(json(port, &["isolation", "--acknowledge"])["verdict"], "quiet");
+    assert!(good(port, &["status"]).contains("isolation  quiet\n"));
 }
 
 #[test]
@@ -129,15 +154,15 @@ fn watch_on_a_terminal_refreshes_in_place() {
     let mut watching =
         vsj(&mcu.port, &["watch", "--every", "0.05"]).stdout(terminal.try_clone().unwrap()).spawn().unwrap();
     let mut text = String::new();
-    while text.matches("\x1b[8A").count() < 3 {
+    while text.matches("\x1b[9A").count() < 3 {
         let mut buffer = [0; 256];
         let count = screen.read(&mut buffer).unwrap();
         text += std::str::from_utf8(&buffer[..count]).unwrap();
     }
     watching.kill().unwrap();
     watching.wait().unwrap();
-    let shown = text.split("\x1b[8A").nth(1).unwrap();
-    assert_eq!(shown.matches("\x1b[K").count(), 8, "{shown}");
+    let shown = text.split("\x1b[9A").nth(1).unwrap();
+    assert_eq!(shown.matches("\x1b[K").count(), 9, "{shown}");
     assert!(shown.starts_with("state      disarmed, fault none"), "{shown}");
 }
 

@@ -16,9 +16,10 @@ use firmware::reset_cause::Cause;
 use firmware::start::{self, Start};
 use firmware::store::{Memory, Store};
 use firmware::update;
+use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{About, Block, Command, Controller, Fault, Server, State, Step, Telemetry, View};
+use link::{About, Block, Command, Controller, Fault, IsolationReport, Reply, Server, State, Step, Telemetry, View};
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Spring, device, supervisor};
 use serialport::{SerialPort, TTYPort};
@@ -54,6 +55,8 @@ pub(crate) struct Shared {
     pub(crate) sample: Telemetry,
     /// Counters of received frames.
     pub(crate) counters: Counters,
+    /// What the isolation bank says.
+    pub(crate) isolation: IsolationReport,
     /// True if the interlock is open.
     pub(crate) interlock_open: bool,
     /// Fault that another part of the program finds in the next tick.
@@ -314,7 +317,16 @@ impl Chip {
             }
             Some(Step::Capture(request)) => {
                 let reply = self.recorder.execute(&self.memory, request);
-                out.extend_from_slice(self.server.captured(&reply));
+                out.extend_from_slice(self.server.answered(&reply));
+            }
+            Some(Step::Isolation(request)) => {
+                let mut shared = self.shared.lock().unwrap();
+                if request == Isolation::Acknowledge {
+                    shared.isolation = IsolationReport::default();
+                }
+                let reply = Reply::Isolation(IsolationReport { tick: self.view.sample.tick, ..shared.isolation });
+                drop(shared);
+                out.extend_from_slice(self.server.answered(&reply));
             }
             Some(Step::Restart(bytes)) => {
                 out.extend_from_slice(bytes);

@@ -5,8 +5,8 @@
 //! 1. Pass each received byte to [`Server::on_byte`] with the latest [`View`]. [`Step::Send`]: send the bytes.
 //!    [`Step::Command`]: pass the command to the control tick, wait until that tick has run, then send what
 //!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::Update`]: likewise with the
-//!    store and [`Server::updated`]. [`Step::ReadSettings`], [`Step::Capture`]: send what
-//!    [`Server::settings_part`], [`Server::captured`] returns.
+//!    store and [`Server::updated`]. [`Step::ReadSettings`]: send what [`Server::settings_part`]
+//!    returns. [`Step::Capture`], [`Step::Isolation`]: send what [`Server::answered`] returns.
 //!    [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
 //! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns.
@@ -23,6 +23,7 @@ use crate::block::{Block, BlockId, Blocks, PART, Part};
 use crate::capture::Capture;
 use crate::command::Command;
 use crate::fault::Fault;
+use crate::isolation::Isolation;
 use crate::reason::Reason;
 use crate::reply::{Firmware, Reply, Status};
 use crate::request::Request;
@@ -81,8 +82,10 @@ pub enum Step<'a> {
         /// Number of the part.
         number: u8,
     },
-    /// Execute the request, then call [`Server::captured`] with the reply.
+    /// Execute the request, then call [`Server::answered`] with the reply.
     Capture(Capture),
+    /// Execute the request, then call [`Server::answered`] with the reply.
+    Isolation(Isolation),
     /// Send the bytes, then restart.
     Restart(&'a [u8]),
 }
@@ -127,6 +130,7 @@ impl Server {
                 Request::Model => Reply::Model(self.about.model),
                 Request::Settings => Reply::Settings(self.about.settings),
                 Request::Capture(capture) => return Some(Step::Capture(capture)),
+                Request::Isolation(isolation) => return Some(Step::Isolation(isolation)),
                 Request::ReadSettings { built_in, number } => return Some(Step::ReadSettings { built_in, number }),
                 Request::ModelPart { .. }
                 | Request::ModelEnd { .. }
@@ -215,8 +219,8 @@ impl Server {
         self.session.answer(&Reply::SettingsPart(part))
     }
 
-    /// The reply to the request of the last [`Step::Capture`].
-    pub fn captured(&mut self, reply: &Reply) -> &[u8] {
+    /// The reply to the request of the last [`Step::Capture`] or [`Step::Isolation`].
+    pub fn answered(&mut self, reply: &Reply) -> &[u8] {
         self.session.answer(reply)
     }
 

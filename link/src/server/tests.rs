@@ -4,6 +4,7 @@ use super::*;
 use crate::capture::Captured;
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::frame::Frame;
+use crate::isolation::IsolationReport;
 use crate::nonce::Nonce;
 use crate::receiver::Receiver;
 use crate::reply::FaultReport;
@@ -81,7 +82,8 @@ fn exchange(request: Request, before: &View, after: &View) -> (Option<Command>, 
                 answer = Some(reply(server.command_done(after)));
             }
             Some(Step::Send(bytes) | Step::Restart(bytes)) => answer = Some(reply(bytes)),
-            Some(Step::Capture(_)) => answer = Some(reply(server.captured(&Reply::Captured(Captured::default())))),
+            Some(Step::Capture(_)) => answer = Some(reply(server.answered(&Reply::Captured(Captured::default())))),
+            Some(Step::Isolation(_)) => answer = Some(reply(server.answered(&Reply::Isolation(Default::default())))),
             Some(Step::Update(block, _)) => answer = Some(reply(server.updated(block, Ok(None), after))),
             Some(Step::ReadSettings { built_in, number }) => {
                 let payload: &[u8] = if built_in { b"built in" } else { &[b'r'; 40] };
@@ -192,11 +194,15 @@ fn the_running_and_the_built_in_settings_can_be_read_in_any_state() {
 }
 
 #[test]
-fn a_capture_is_started_and_read_in_any_state() {
+fn a_capture_and_the_isolation_bank_are_read_in_any_state() {
     for view in [ARMED, DISARMED, FAULTED] {
         for capture in [Capture::Start { rows: 9 }, Capture::State, Capture::Read { first: 3 }] {
             let (command, reply) = exchange(Request::Capture(capture), &view, &view);
             assert_eq!((command, reply), (None, Reply::Captured(Captured::default())));
+        }
+        for isolation in [Isolation::Read, Isolation::Acknowledge] {
+            let (command, reply) = exchange(Request::Isolation(isolation), &view, &view);
+            assert_eq!((command, reply), (None, Reply::Isolation(IsolationReport::default())));
         }
     }
 }

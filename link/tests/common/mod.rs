@@ -1,11 +1,12 @@
 //! Strategies that generate every kind of message.
 
 use link::capture::{Capture, Captured, ROWS, Rows};
+use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Mismatch, Part, Reason, Reply, Request, Sensor,
-    State, Status, Telemetry, WireVolts,
+    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, IsolationReport, Mismatch, Part, Reason, Reply,
+    Request, Sensor, State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
@@ -46,6 +47,7 @@ pub(crate) fn request() -> impl Strategy<Value = Request> {
         any::<u32>().prop_map(|rows| Request::Capture(Capture::Start { rows })),
         Just(Request::Capture(Capture::State)),
         any::<u32>().prop_map(|first| Request::Capture(Capture::Read { first })),
+        prop::sample::select(vec![Isolation::Read, Isolation::Acknowledge]).prop_map(Request::Isolation),
     ]
 }
 
@@ -164,6 +166,12 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
         }),
         any::<[u32; 3]>().prop_map(|[most, wanted, captured]| Reply::Captured(Captured { most, wanted, captured })),
         any::<(u32, u8, [[u8; 8]; ROWS])>().prop_map(|(first, count, rows)| Reply::Rows(Rows { first, count, rows })),
+        (any::<[u64; 2]>(), any::<[u16; 2]>(), [number(), number(), number()]).prop_map(
+            |([tick, since_tick], [verdict, trip_on_cause], [size, half_width, explained])| {
+                let report = IsolationReport { tick, verdict, since_tick, size, half_width, explained, trip_on_cause };
+                Reply::Isolation(report)
+            }
+        ),
         (model(), model()).prop_map(|(active, stored)| Reply::Settings(Blocks { active, stored })),
         any::<(u8, u16, [u8; 32])>().prop_map(|(number, length, bytes)| Reply::SettingsPart(Part {
             number,

@@ -59,6 +59,22 @@ impl Cause {
         Self::StuckSensor,
     ];
 
+    /// Returns the cause with this code; `None` if there is none.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|cause| cause.name() == name)
+    }
+
+    /// Returns the unit of the size; empty for a ratio.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Hysteresis | Self::StaticNonlinearity | Self::AmplifierLimit | Self::ReadingOffset => "V",
+            Self::AmplifierSlew => "s/V",
+            Self::Delay | Self::SeriesLag => "s",
+            Self::Drift => "1/s",
+            _ => "",
+        }
+    }
+
     /// Returns the cause code, as in the findings of `vsj diagnose`; `stuck-sensor` has none there.
     pub const fn name(self) -> &'static str {
         match self {
@@ -79,5 +95,46 @@ impl Cause {
             Self::SensorSaturation => "sensor-saturation",
             Self::StuckSensor => "stuck-sensor",
         }
+    }
+}
+
+const _: () = assert!(Cause::ALL.len() == 16, "the bits of a set are those of an u16");
+
+/// A set of causes: one bit for each, bit 0 for the first of [`Cause::ALL`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Causes(u16);
+
+impl Causes {
+    /// The empty set.
+    pub const NONE: Self = Self(0);
+
+    /// Returns the set of the causes that have a bit in `bits`: each of the 16 has one.
+    pub const fn from_bits(bits: u16) -> Self {
+        Self(bits)
+    }
+
+    /// Returns one bit for each cause of the set.
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// Returns the set with `cause` in it.
+    pub const fn with(self, cause: Cause) -> Self {
+        Self(self.0 | 1 << cause as u16)
+    }
+
+    /// Returns true if `cause` is in the set.
+    pub const fn contains(self, cause: Cause) -> bool {
+        self.0 & 1 << cause as u16 != 0
+    }
+
+    /// Returns true if the set has no cause.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Returns the causes of the set, in the order of their numbers.
+    pub fn iter(self) -> impl Iterator<Item = Cause> {
+        Cause::ALL.into_iter().filter(move |cause| self.contains(*cause))
     }
 }

@@ -93,41 +93,9 @@ pub(super) struct Decision {
     pub(super) energies: (i64, i64),
 }
 
-impl Default for Decision {
-    fn default() -> Self {
-        Self {
-            stage: Stage::Idle,
-            hypothesis: 0,
-            offset: 0,
-            pivot: 0,
-            row: 0,
-            column: 0,
-            matrix: [0; 64],
-            own: [0; 8],
-            scales: [0; 8],
-            reciprocal: 0,
-            shift: 0,
-            information: 0,
-            blocks: 0,
-            none: 0,
-            least: [i64::MAX; CAUSES],
-            best: 0,
-            sizes: [Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 }; CAUSES],
-            bar: 0,
-            rivals: 0,
-            left: 0,
-            now: Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 },
-            first: (0, None),
-            second: (0, None),
-            proposed: Verdict::Quiet,
-            agreed: 0,
-            against: 0,
-            verdict: Verdict::Quiet,
-            size: Size { numerator: 0, denominator: 0, exponent: 0, scale: 0 },
-            rounds: 0,
-            energies: (0, 0),
-        }
-    }
+impl Size {
+    /// No size.
+    const NEW: Self = Self { numerator: 0, denominator: 0, exponent: 0, scale: 0 };
 }
 
 /// Returns the index of an element; 8 columns.
@@ -148,6 +116,40 @@ fn shifted(value: i64, by: i32) -> i64 {
 }
 
 impl Decision {
+    /// Before the first decision.
+    pub(super) const NEW: Self = Self {
+        stage: Stage::Idle,
+        hypothesis: 0,
+        offset: 0,
+        pivot: 0,
+        row: 0,
+        column: 0,
+        matrix: [0; 64],
+        own: [0; 8],
+        scales: [0; 8],
+        reciprocal: 0,
+        shift: 0,
+        information: 0,
+        blocks: 0,
+        none: 0,
+        least: [i64::MAX; CAUSES],
+        best: 0,
+        sizes: [Size::NEW; CAUSES],
+        bar: 0,
+        rivals: 0,
+        left: 0,
+        now: Size::NEW,
+        first: (0, None),
+        second: (0, None),
+        proposed: Verdict::Quiet,
+        agreed: 0,
+        against: 0,
+        verdict: Verdict::Quiet,
+        size: Size::NEW,
+        rounds: 0,
+        energies: (0, 0),
+    };
+
     /// True if no decision is being made.
     pub(super) fn idle(&self) -> bool {
         self.stage == Stage::Idle
@@ -165,7 +167,7 @@ impl Decision {
 
     /// Drops the decision and its verdict.
     pub(super) fn reset(&mut self) {
-        *self = Self { rounds: self.rounds, ..Self::default() };
+        *self = Self { rounds: self.rounds, ..Self::NEW };
     }
 
     /// Does one step.
@@ -386,7 +388,7 @@ impl Decision {
             self.verdict = Verdict::Alarm;
         }
         self.proposed = says;
-        if let Some(cause) = self.verdict.cause() {
+        if let Some(cause) = self.verdict.causes().0 {
             self.size = self.sizes.get(cause as usize).copied().unwrap_or_default();
         }
         self.energies = (self.none, left);

@@ -33,13 +33,15 @@ pub mod bank;
 mod cause;
 mod decision;
 mod products;
+mod report;
 mod sequential;
 mod settings;
 mod signatures;
 mod sums;
 pub mod thresholds;
 
-pub use cause::Cause;
+pub use cause::{Cause, Causes};
+pub use report::{Finding, Report};
 pub use settings::Settings;
 
 use crate::coefficient::{Gain, Rate, Weight, WideGain};
@@ -72,11 +74,12 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Returns the cause that explains most; `None` unless named or ambiguous.
-    pub const fn cause(self) -> Option<Cause> {
+    /// Returns the cause that explains most, `None` unless named or ambiguous, and the other one, `None` unless ambiguous.
+    pub const fn causes(self) -> (Option<Cause>, Option<Cause>) {
         match self {
-            Self::Named(cause) | Self::Ambiguous(cause, _) => Some(cause),
-            Self::Quiet | Self::Alarm | Self::Unknown => None,
+            Self::Named(cause) => (Some(cause), None),
+            Self::Ambiguous(cause, other) => (Some(cause), Some(other)),
+            Self::Quiet | Self::Alarm | Self::Unknown => (None, None),
         }
     }
 
@@ -85,6 +88,17 @@ impl Verdict {
         match (self, other) {
             (Self::Ambiguous(a, b), Self::Ambiguous(c, d)) => (a, b) == (c, d) || (a, b) == (d, c),
             _ => self == other,
+        }
+    }
+
+    /// Returns the word for logs and JSON: `quiet`, `alarm`, `named`, `ambiguous` or `unknown`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Quiet => "quiet",
+            Self::Alarm => "alarm",
+            Self::Unknown => "unknown",
+            Self::Named(_) => "named",
+            Self::Ambiguous(..) => "ambiguous",
         }
     }
 
@@ -98,6 +112,20 @@ impl Verdict {
             Self::Named(cause) => 3 << 8 | cause as u16,
             Self::Ambiguous(cause, other) => 4 << 8 | (other as u16) << 4 | cause as u16,
         }
+    }
+
+    /// Returns the verdict with this number; `None` if there is none.
+    pub fn from_code(code: u16) -> Option<Self> {
+        let cause = |number: u16| Cause::ALL.get(usize::from(number & 15)).copied();
+        let verdict = match code >> 8 {
+            0 => Self::Quiet,
+            1 => Self::Alarm,
+            2 => Self::Unknown,
+            3 => Self::Named(cause(code)?),
+            4 => Self::Ambiguous(cause(code)?, cause(code >> 4)?),
+            _ => return None,
+        };
+        (verdict.code() == code).then_some(verdict)
     }
 }
 
@@ -159,7 +187,7 @@ impl Validated<'_, Settings> {
             slew_shift: ticks.trailing_zeros() - bank::SLEW_TICKS.trailing_zeros(),
             half: ticks / 2,
             three_quarters: ticks / 4 * 3,
-            fewest: ((block_s / settings.interval_s) as u32 * bank::FEWEST).div_ceil(256).max(1),
+            fewest: (settings.readings(block_s) * bank::FEWEST).div_ceil(256),
             reach: bank::SLEW_RATES
                 .map(|rate| signal(rate * range / tau * sample_time.seconds() * f64::from(bank::SLEW_TICKS)).to_bits()),
             share: Gain::new(share),
@@ -215,28 +243,33 @@ pub struct State {
     released: bool,
 }
 
+impl State {
+    /// A spring at rest at 0 V. A constant, so that a program can place it in memory without a copy on its stack.
+    pub const NEW: Self = Self {
+        sums: sums::Sums::NEW,
+        means: sums::Means::NEW,
+        filters: signatures::Filters::NEW,
+        vectors: [0; SLOTS],
+        last: [0; SLOTS],
+        whitened: [0; SLOTS],
+        tests: sequential::Tests::NEW,
+        products: products::Products::NEW,
+        mode: products::Mode { fresh: true, ..products::Mode::NEW },
+        decision: decision::Decision::NEW,
+        working: false,
+        alarmed: false,
+        blocks: 0,
+        age: 0,
+        since_decision: 0,
+        pinned: false,
+        pinned_at: None,
+        released: false,
+    };
+}
+
 impl Default for State {
     fn default() -> Self {
-        Self {
-            sums: Default::default(),
-            means: Default::default(),
-            filters: Default::default(),
-            vectors: [0; SLOTS],
-            last: [0; SLOTS],
-            whitened: [0; SLOTS],
-            tests: Default::default(),
-            products: Default::default(),
-            mode: products::Mode { fresh: true, ..Default::default() },
-            decision: Default::default(),
-            working: false,
-            alarmed: false,
-            blocks: 0,
-            age: 0,
-            since_decision: 0,
-            pinned: false,
-            pinned_at: None,
-            released: false,
-        }
+        Self::NEW
     }
 }
 
@@ -248,6 +281,11 @@ const DECIDE: u32 = ADD + products::STEPS;
 const _: () = assert!(DECIDE < 116 && bank::VECTORS < SLOTS, "a block of 128 ticks leaves time for the decision");
 
 impl Config {
+    /// Returns the number of ticks of a block.
+    pub const fn block_ticks(&self) -> u32 {
+        self.ticks
+    }
+
     /// Advances the bank by one tick: applied voltage, the model's stiffness just after it was applied without the sensor's
     /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop.
     #[inline]
@@ -273,6 +311,10 @@ impl Config {
         if step < WHITEN {
             state.filters.step(self, &state.means, state.age, step, &mut state.vectors);
         } else if !state.means.usable {
+            if step == WHITEN {
+                // A gap in the readings is a part of the time since the restart.
+                state.age = state.age.saturating_add(1);
+            }
             self.decide(state);
         } else if step < TEST {
             self.whiten(state, (step - WHITEN) * WHITENED);
@@ -337,7 +379,7 @@ impl Config {
         if state.mode.halve {
             state.blocks >>= 1;
         }
-        state.mode = products::Mode::default();
+        state.mode = products::Mode::NEW;
     }
 
     #[inline(always)]
@@ -358,9 +400,9 @@ impl State {
     /// Ends an alarm: the bank looks for a fault anew, and one that lasts is found again.
     pub fn acknowledge(&mut self) {
         self.alarmed = false;
-        self.tests = Default::default();
+        self.tests = sequential::Tests::NEW;
         self.decision.reset();
-        self.mode = products::Mode { fresh: true, ..Default::default() };
+        self.mode = products::Mode { fresh: true, ..products::Mode::NEW };
         self.restart();
     }
 
@@ -377,28 +419,18 @@ impl State {
         self.decision.rounds
     }
 
-    /// Returns for how many blocks the fault has been there: since the last restart of the sums; 0 without an alarm.
+    /// Returns for how many blocks the fault has been there, those without readings included: since the last restart of the sums; 0
+    /// without an alarm.
     pub fn since_blocks(&self) -> u32 {
         if self.alarmed { self.age } else { 0 }
     }
 
-    /// Returns the energy of the innovations that no cause explains and what the best cause leaves, in variances, at the last
-    /// decision. Floating point: for the host.
-    pub fn energies(&self) -> (f64, f64) {
-        let (none, least) = self.decision.energies;
-        (none as f64 / 1_048_576.0, least as f64 / 1_048_576.0)
-    }
-
-    /// Returns the size of the verdict's cause in units of [`Settings::unit`] and its standard deviation, at the last decision. Floating
-    /// point: for the host.
-    pub fn size(&self) -> (f64, f64) {
+    /// Returns what the bank says, in the numbers of the tick.
+    pub fn report(&self) -> Report {
         let decision::Size { numerator, denominator, exponent, scale } = self.decision.size;
-        if denominator <= 0 {
-            return (0.0, 0.0);
-        }
-        let size = f64::from(numerator) / f64::from(denominator) * libm::exp2(f64::from(exponent));
-        let information = f64::from(denominator) * libm::exp2(2.0 * f64::from(scale) - 20.0);
-        (size, 1.0 / libm::sqrt(information))
+        let (verdict, since_blocks) = (self.verdict(), self.since_blocks());
+        let (none, left) = self.decision.energies;
+        Report { verdict, since_blocks, numerator, denominator, exponent, scale, none, left }
     }
 }
 

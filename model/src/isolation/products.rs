@@ -49,7 +49,7 @@ const fn pairs() -> [(u8, u8); PRODUCTS] {
 }
 
 /// What happens to the sums with the present block.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mode {
     /// The sums start with this block.
     pub(super) fresh: bool,
@@ -59,6 +59,11 @@ pub(super) struct Mode {
     pub(super) copy: bool,
 }
 
+impl Mode {
+    /// The sums go on.
+    pub(super) const NEW: Self = Self { fresh: false, halve: false, copy: false };
+}
+
 /// Sums of the products, in variances with 20 fraction bits, and their copy for a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Products {
@@ -66,13 +71,10 @@ pub(super) struct Products {
     pub(super) copy: [i64; PRODUCTS],
 }
 
-impl Default for Products {
-    fn default() -> Self {
-        Self { sums: [0; PRODUCTS], copy: [0; PRODUCTS] }
-    }
-}
-
 impl Products {
+    /// Before the first block.
+    pub(super) const NEW: Self = Self { sums: [0; PRODUCTS], copy: [0; PRODUCTS] };
+
     /// Adds the products of one step.
     #[inline(never)]
     pub(super) fn step(&mut self, step: u32, mode: Mode, whitened: &[i32; SLOTS]) {

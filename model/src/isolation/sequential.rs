@@ -20,7 +20,7 @@ const MOST: i64 = (thresholds::MOST_NATS * ONE) as i64;
 const LN_2: i64 = (core::f64::consts::LN_2 * ONE) as i64;
 
 /// Statistics of the tests, in nats with 20 fraction bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Tests {
     upward: [i32; SMALLEST.len()],
     downward: [i32; SMALLEST.len()],
@@ -36,6 +36,10 @@ fn added(statistic: i32, nats: i64) -> i32 {
 }
 
 impl Tests {
+    /// Before the first block.
+    pub(super) const NEW: Self =
+        Self { upward: [0; SMALLEST.len()], downward: [0; SMALLEST.len()], energy: 0, highest: 0 };
+
     /// Advances one test; the whitened values have 10 fraction bits.
     #[inline(never)]
     pub(super) fn step(&mut self, config: &Config, step: u32, whitened: &[i32; SLOTS]) {

@@ -52,11 +52,16 @@ impl Settings {
         }
     }
 
+    /// Returns the number of readings in a block of `block_s` s, at least 1.
+    pub fn readings(&self, block_s: f64) -> u32 {
+        libm::rint(block_s / self.interval_s).max(1.0) as u32
+    }
+
     /// Returns the standard deviation of the readings' mean over a block of `block_s` s, in V, and the correlation of
     /// neighbouring blocks.
     pub fn block_noise(&self, block_s: f64) -> (f64, f64) {
-        let count = libm::rint(block_s / self.interval_s).max(1.0);
-        let readings = count as u32;
+        let readings = self.readings(block_s);
+        let count = f64::from(readings);
         let next =
             if self.noise_correlation_s > 0.0 { libm::exp(-self.interval_s / self.noise_correlation_s) } else { 0.0 };
         let (mut own, mut neighbour, mut power) = (count, 0.0, 1.0);

@@ -13,7 +13,7 @@ pub(super) const STEPS: u32 = 25;
 const ONE: i32 = 1 << 20;
 
 /// States of the filters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Filters {
     nuisances: [Accumulator; 3],
     time_constant: [Accumulator; 3],
@@ -50,6 +50,26 @@ fn product(a: i32, b: i32) -> i32 {
 }
 
 impl Filters {
+    /// At rest.
+    pub(super) const NEW: Self = Self {
+        nuisances: [Accumulator::ZERO; 3],
+        time_constant: [Accumulator::ZERO; 3],
+        creep: [Accumulator::ZERO; 2],
+        leakage: [Accumulator::ZERO; 2],
+        springs: [Accumulator::ZERO; 12],
+        series: [Accumulator::ZERO; 3],
+        plays: [0; 3],
+        past: [0; 8],
+        tails: [0; 2],
+        end: 0,
+        newest: 0,
+        longest: 0,
+        relaxed: 0,
+        z: 0,
+        part: 0,
+        bow: 0,
+    };
+
     /// Sets the nuisances to 256 V.
     pub(super) fn restart(&mut self) {
         self.nuisances = [Accumulator::from_num(256); 3];

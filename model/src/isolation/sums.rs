@@ -9,7 +9,7 @@ use crate::units::{ScaledStiffness, Signal, Volts, saturated_to_32};
 const SMOOTH: u32 = (SMOOTH_V * 1_048_576.0) as u32;
 
 /// Sums over the ticks of the present block, divided by their number: in V with 20 fraction bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sums {
     /// Number of ticks in the sums.
     pub(super) ticks: u32,
@@ -28,7 +28,7 @@ pub(super) struct Sums {
 }
 
 /// Means over a block, in V with 20 fraction bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Means {
     pub(super) voltage: i32,
     pub(super) model: i32,
@@ -48,7 +48,40 @@ pub(super) struct Means {
     pub(super) pinned: bool,
 }
 
+impl Means {
+    /// Before the first block.
+    pub(super) const NEW: Self = Self {
+        voltage: 0,
+        model: 0,
+        jumps: 0,
+        lags: [0; 3],
+        tails: [0; 2],
+        end: 0,
+        residual: 0,
+        usable: false,
+        last_reading: 0,
+        pinned: false,
+    };
+}
+
 impl Sums {
+    /// Before the first tick.
+    pub(super) const NEW: Self = Self {
+        ticks: 0,
+        voltage: 0,
+        model: 0,
+        jumps: 0,
+        residual: 0,
+        readings: 0,
+        identical: 0,
+        lags: [0; 3],
+        tails: [0; 2],
+        slewed: [0; 3],
+        last_voltage: 0,
+        last_model: 0,
+        last_reading: 0,
+    };
+
     /// Adds one tick.
     #[inline(always)]
     pub(super) fn add(&mut self, config: &Config, voltage: Volts, model: ScaledStiffness, reading: Option<Signal>) {
@@ -102,7 +135,7 @@ impl Sums {
             pinned: self.readings >= 4 && 4 * self.identical >= 3 * self.readings,
         };
         let Self { slewed, last_voltage, last_model, last_reading, .. } = *self;
-        *self = Self { slewed, last_voltage, last_model, last_reading, ..Self::default() };
+        *self = Self { slewed, last_voltage, last_model, last_reading, ..Self::NEW };
         means
     }
 }

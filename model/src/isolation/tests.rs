@@ -92,6 +92,33 @@ fn a_stuck_sensor_is_named_and_an_acknowledged_alarm_comes_again() {
     assert_eq!((state.verdict(), alarms), (Verdict::Named(Cause::StuckSensor), 1));
 }
 
+/// The mean of a block is that of the readings that have come, so that the fault of a sensor that is silent for 20 s is the same one.
+#[test]
+fn a_gap_in_the_readings_is_a_part_of_the_time_since_the_fault_began() {
+    let (config, mut bits) = (config(1000.0), 7u32);
+    let (mut whole, mut gap) = (State::default(), State::default());
+    for tick in 0..60_000u32 {
+        let level = Signal::from_num([100, 300, 0, 200][(tick / 6000) as usize % 4]);
+        let noise = Signal::from_bits((next(&mut bits) & 0x3f_ffff) as i32 - 0x1f_ffff);
+        let offset = if tick < 20_000 { Signal::ZERO } else { Signal::from_num(20) };
+        let reading = Some(ScaledStiffness(level + noise + offset));
+        config.tick(&mut whole, Volts(level), ScaledStiffness(level), reading);
+        let heard = !(30_000..50_000).contains(&tick);
+        config.tick(&mut gap, Volts(level), ScaledStiffness(level), reading.filter(|_| heard));
+    }
+    assert!(whole.since_blocks() > 300, "{}", whole.since_blocks());
+    assert_eq!(gap.since_blocks(), whole.since_blocks());
+}
+
+/// 0.128 / 0.0128 is less than 10 in floating point.
+#[test]
+fn a_block_with_all_the_readings_that_its_interval_promises_is_used() {
+    let settings = Settings { interval_s: 0.0128, ..Settings::PAPER };
+    assert_eq!(settings.readings(0.128), 10);
+    let short = Settings { interval_s: 0.001_000_000_01, ..Settings::PAPER };
+    assert_eq!(short.readings(0.128), 128);
+}
+
 #[test]
 fn missing_readings_leave_the_bank_quiet() {
     let (config, mut state) = (config(1000.0), State::default());
@@ -108,6 +135,12 @@ fn numbers_of_verdicts_and_places_of_causes_agree() {
     let verdict = Verdict::Ambiguous(Cause::Delay, Cause::SeriesLag);
     assert_eq!(verdict.code(), 4 << 8 | (Cause::SeriesLag as u16) << 4 | Cause::Delay as u16);
     assert_eq!([Verdict::Quiet, Verdict::Alarm, Verdict::Unknown].map(Verdict::code), [0, 256, 512]);
+    let known = (0..=u16::MAX).filter_map(|code| Some((code, Verdict::from_code(code)?)));
+    assert!(known.clone().all(|(code, verdict)| verdict.code() == code));
+    assert_eq!(known.count(), 3 + 16 + 256);
+    let set = Causes::NONE.with(Cause::Delay).with(Cause::StuckSensor);
+    assert_eq!((set.bits(), Causes::from_bits(set.bits()).iter().count()), (1 << 10 | 1 << 15, 2));
+    assert!(set.contains(Cause::Delay) && !set.contains(Cause::GainError) && !set.is_empty());
 }
 
 #[test]

@@ -23,11 +23,13 @@ pub enum Fault {
     Supply = 8,
     /// A test at the start failed: the RAM, or the processor's clock.
     SelfTest = 9,
+    /// The isolation bank has named a cause for which a setting demands a fault.
+    Isolation = 10,
 }
 
 impl Fault {
     /// Every fault, in the order of the numbers.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Panic,
         Self::HardFault,
         Self::Overrun,
@@ -37,6 +39,7 @@ impl Fault {
         Self::Config,
         Self::Supply,
         Self::SelfTest,
+        Self::Isolation,
     ];
 
     /// Returns the stable number, 1 to 255; zero stands for no fault.
@@ -56,6 +59,7 @@ impl Fault {
             Self::Config => "config",
             Self::Supply => "supply",
             Self::SelfTest => "self-test",
+            Self::Isolation => "isolation",
         }
     }
 
@@ -71,6 +75,7 @@ impl Fault {
             Self::Config => "the start: rejected settings, a rejected model, no guards",
             Self::Supply => "the chip's brown-out reset, with RAM that has kept its content",
             Self::SelfTest => "the start: a word of the RAM, or the processor's clock compared with the watchdog's",
+            Self::Isolation => "the isolation bank: it has named a cause of the setting trip_on_cause",
         }
     }
 
@@ -85,6 +90,9 @@ impl Fault {
             Self::Monitor => "remove what the monitors name, and wait until the spring is discharged",
             Self::Config => "send another model or other settings, or flash an image with valid ones",
             Self::Supply => "check the supply, and let the spring settle",
+            Self::Isolation => {
+                "read the cause in the status or the log and remove it; the acknowledgement restarts the bank"
+            }
             Self::SelfTest => "read the log, which names the part; restart the chip, and replace one that repeats it",
         }
     }
@@ -147,7 +155,7 @@ mod tests {
         let both = Faults::NONE.with(Fault::Supply).with(Fault::Panic).with(Fault::Panic);
         assert!(both.iter().eq([Fault::Panic, Fault::Supply]));
         assert_eq!(both.bits(), 0x81);
-        assert_eq!(Faults::from_bits(0xfe81), both, "bits without a fault are dropped");
+        assert_eq!(Faults::from_bits(0xfc81), both, "bits without a fault are dropped");
         assert_eq!(both.without(Fault::Panic).without(Fault::Panic), Faults::from_bits(0x80));
         assert_eq!(both.except(Faults::NONE.with(Fault::Supply)), Faults::from_bits(1));
         assert_eq!(Fault::ALL.into_iter().fold(Faults::NONE, Faults::with).iter().count(), Fault::ALL.len());
@@ -158,7 +166,7 @@ mod tests {
         for fault in Fault::ALL {
             assert_eq!(Fault::from_code(fault.code()), Some(fault));
         }
-        assert_eq!((Fault::from_code(0), Fault::from_code(10)), (None, None));
-        assert_eq!(Fault::ALL.map(Fault::code), [1, 2, 3, 4, 5, 6, 7, 8, 9], "these numbers must not change");
+        assert_eq!((Fault::from_code(0), Fault::from_code(11)), (None, None));
+        assert_eq!(Fault::ALL.map(Fault::code), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10], "these numbers must not change");
     }
 }

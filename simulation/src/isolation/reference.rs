@@ -172,7 +172,7 @@ impl Bank {
             ..sums
         };
         let ticks = f64::from(self.ticks);
-        let expected = self.block_s / self.settings.interval_s;
+        let expected = f64::from(self.settings.readings(self.block_s));
         let lags = sums.lags.map(|lag| lag / ticks);
         let vectors = self.signatures(
             sums.voltage / ticks,
@@ -182,6 +182,7 @@ impl Bank {
             sums.jumps,
         );
         if f64::from(sums.readings) < 0.75 * expected {
+            self.age += 1;
             return;
         }
         let residual = sums.residual / f64::from(sums.readings);
@@ -376,7 +377,7 @@ impl Bank {
         let bar = least.max(n) + 2.0 * self.settings.margin_nats + excess;
         let rivals: Vec<Cause> = best[1..].iter().filter(|rival| rival.1 < bar).map(|rival| rival.0).collect();
         let among = self.among(cause, &rivals);
-        let named = best.iter().find(|known| Some(known.0) == among.cause());
+        let named = best.iter().find(|known| Some(known.0) == among.causes().0);
         self.least = named.map_or(least, |known| known.1);
         let says = if total < 2.0 * self.settings.margin_nats {
             Verdict::Alarm
@@ -397,7 +398,7 @@ impl Bank {
             self.verdict = Verdict::Alarm;
         }
         self.proposed = says;
-        if let Some(cause) = self.verdict.cause() {
+        if let Some(cause) = self.verdict.causes().0 {
             self.size = best.iter().find(|known| known.0 == cause).map_or((0.0, 0.0), |known| known.2);
         }
     }

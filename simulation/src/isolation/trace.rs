@@ -3,7 +3,7 @@
 
 use anyhow::Result;
 use model::estimator::Estimator;
-use model::isolation::{Cause, Settings, State, Verdict, bank};
+use model::isolation::{Cause, Finding, Report, Settings, State, Verdict, bank};
 use model::{OutOfRange, SampleTime, ScaledStiffness, Validate, Volts};
 use serde::Serialize;
 
@@ -30,6 +30,24 @@ pub struct Event {
     pub explained: Option<f64>,
 }
 
+impl Event {
+    /// What `report` says at `time_s` of a bank with these settings and ticks of `rate_hz`.
+    pub fn new(report: &Report, time_s: f64, settings: &Settings, rate_hz: f64) -> Self {
+        let finding = report.finding(settings, rate_hz);
+        let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
+        let size = |Finding { cause, size, half_width, .. }| Size::around(size, half_width, cause);
+        Self {
+            time_s,
+            verdict: report.verdict.name(),
+            cause: finding.map(|finding| finding.cause.name()),
+            other: finding.and_then(|finding| finding.other).map(Cause::name),
+            since_s: (report.verdict != Verdict::Quiet).then(|| time_s - f64::from(report.since_blocks) * block_s),
+            size: finding.map(size),
+            explained: finding.map(|finding| finding.explained),
+        }
+    }
+}
+
 /// A size with its 95 % interval. The interval holds the noise only, not the error of the linear signature.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Size {
@@ -41,6 +59,13 @@ pub struct Size {
     pub high: f64,
     /// Unit; empty for a ratio.
     pub unit: &'static str,
+}
+
+impl Size {
+    /// The size `value` of a cause, with half of the width of its interval.
+    pub fn around(value: f64, half_width: f64, cause: Cause) -> Self {
+        Self { value, low: value - half_width, high: value + half_width, unit: cause.unit() }
+    }
 }
 
 /// What the bank says of a record.
@@ -60,16 +85,6 @@ pub struct Trace {
     pub last: Event,
     /// Every change of what it says.
     pub trace: Vec<Event>,
-}
-
-fn unit(cause: Cause) -> &'static str {
-    match cause {
-        Cause::Hysteresis | Cause::StaticNonlinearity | Cause::AmplifierLimit | Cause::ReadingOffset => "V",
-        Cause::AmplifierSlew => "s/V",
-        Cause::Delay | Cause::SeriesLag => "s",
-        Cause::Drift => "1/s",
-        _ => "",
-    }
 }
 
 /// Standard deviation of the readings' noise, in V, if it is white, from the median of the magnitudes of their second
@@ -102,31 +117,7 @@ pub fn run(record: &Record, mut settings: Settings) -> Result<Trace> {
     let plant = settings.plant.validate(sample_time).map_err(refused)?.quantize();
     let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
     let (mut spring, mut state) = (Default::default(), State::default());
-    let event = |state: &State, time_s: f64| {
-        let (verdict, cause, other) = match state.verdict() {
-            Verdict::Quiet => ("quiet", None, None),
-            Verdict::Alarm => ("alarm", None, None),
-            Verdict::Unknown => ("unknown", None, None),
-            Verdict::Named(cause) => ("named", Some(cause), None),
-            Verdict::Ambiguous(cause, other) => ("ambiguous", Some(cause), Some(other)),
-        };
-        let size = cause.map(|cause| {
-            let (size, deviation) = state.size();
-            let factor = settings.unit(cause, rate_hz);
-            let (value, half) = (factor * size, 1.96 * factor * deviation);
-            Size { value, low: value - half, high: value + half, unit: unit(cause) }
-        });
-        let (none, least) = state.energies();
-        Event {
-            time_s,
-            verdict,
-            cause: cause.map(Cause::name),
-            other: other.map(Cause::name),
-            since_s: (verdict != "quiet").then(|| time_s - f64::from(state.since_blocks()) * block_s),
-            size,
-            explained: cause.map(|_| 1.0 - least / none.max(least)),
-        }
-    };
+    let event = |state: &State, time_s: f64| Event::new(&state.report(), time_s, &settings, rate_hz);
     let mut trace = vec![event(&state, first.time_s)];
     let mut says = state.verdict();
     let mut tick = 0u64;

@@ -11,6 +11,7 @@ use embassy_sync::signal::Signal;
 use firmware::board::Board;
 use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
+use firmware::isolation::Isolation;
 use firmware::settings::{BUILT_IN, built_in};
 use firmware::start::{self, Loaded};
 use firmware::store::Store;
@@ -83,8 +84,8 @@ fn main() -> ! {
     if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
-    let (control, server) = match host::open(&loaded, &store, &cause, semihosting::seed()) {
-        Ok(Some(both)) => both,
+    let (control, isolation, server) = match host::open(&loaded, &store, &cause, semihosting::seed()) {
+        Ok(Some(built)) => built,
         Ok(None) => semihosting::exit(1),
         Err(error) => {
             log::refused(error.field);
@@ -120,13 +121,13 @@ fn main() -> ! {
     }
     match mode {
         Mode::Play(script) => {
-            if let Ok(control) = play(board, control, script, timing) {
+            if let Ok(control) = play(board, control, isolation, script, timing) {
                 high.spawn(control);
             }
         }
         Mode::Link => {
             INTERLOCK_CLOSED.store(true, Ordering::Relaxed);
-            if let (Ok(talk), Ok(control)) = (talk(server), obey(board, control, timing)) {
+            if let (Ok(talk), Ok(control)) = (talk(server), obey(board, control, isolation, timing)) {
                 low.spawn(talk);
                 high.spawn(control);
             }
@@ -143,17 +144,23 @@ fn main() -> ! {
 }
 
 #[embassy_executor::task]
-async fn play(mut board: Mps2, control: &'static mut Control, script: Script, timing: Timing) {
+async fn play(
+    mut board: Mps2,
+    control: &'static mut Control,
+    isolation: &'static mut Isolation,
+    script: Script,
+    timing: Timing,
+) {
     let mut player = Player::new(script);
     let mut counter = Counter::begin();
-    let (ticks, missed) = tasks::control(&mut board, control, &mut player, &mut counter, timing).await;
+    let (ticks, missed) = tasks::control(&mut board, control, isolation, &mut player, &mut counter, timing).await;
     DONE.signal(Done { ticks, missed, digest: player.digest(), instructions: counter.instructions() });
 }
 
 #[embassy_executor::task]
-async fn obey(mut board: Mps2, control: &'static mut Control, timing: Timing) {
+async fn obey(mut board: Mps2, control: &'static mut Control, isolation: &'static mut Isolation, timing: Timing) {
     let mut host = Host::new(control);
-    tasks::control(&mut board, control, &mut host, &mut Untimed, timing).await;
+    tasks::control(&mut board, control, isolation, &mut host, &mut Untimed, timing).await;
 }
 
 #[embassy_executor::task]

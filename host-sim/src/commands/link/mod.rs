@@ -12,11 +12,12 @@ use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
 use host_sim::link::{Client, Patience, Port, fault as parse_fault};
 use host_sim::output::terminal::remark;
+use link::isolation::Isolation;
 use link::{Desired, Fault, Request};
 use session::{Session, seconds};
 use simulation::bad_input;
 
-/// Communicate with the MCU over its serial link: status, set, arm, disarm, watch, record, capture, model, settings
+/// Communicate with the MCU over its serial link: status, set, arm, disarm, isolation, watch, record, capture, model, settings
 #[derive(Args, Debug)]
 #[command(
     arg_required_else_help = false,
@@ -75,6 +76,12 @@ enum Command {
     Acknowledge {
         /// Name or number of the fault
         fault: String,
+    },
+    /// Show what the isolation bank says of the spring and its sensor
+    Isolation {
+        /// End its alarm first: it looks for a fault anew
+        #[arg(long)]
+        acknowledge: bool,
     },
     /// Show the running loop, and keep the MCU from detecting a silent host
     Watch(watch::Arguments),
@@ -184,6 +191,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
                 remark(&format!("{}: {fault} is acknowledged; another fault stands: {next}", arguments.port));
             }
             session.show(done)
+        }
+        Command::Isolation { acknowledge } => {
+            session.show_isolation(if *acknowledge { Isolation::Acknowledge } else { Isolation::Read })
         }
         Command::Watch(arguments) => watch::run(&mut session, arguments, baud),
         Command::Record(record) => record::run(&mut session, record, baud),

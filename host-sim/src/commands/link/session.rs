@@ -4,10 +4,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use host_sim::link::{Client, StatusReport, heartbeat};
+use host_sim::link::{Client, IsolationRow, StatusReport, heartbeat};
 use host_sim::output::terminal::{json, print, remark};
 use host_sim::signals::on_ctrl_c;
-use link::{Request, Status, WireVolts};
+use link::isolation::Isolation;
+use link::{IsolationReport, Request, Status, WireVolts};
 use serde::Serialize;
 use simulation::bad_input;
 use simulation::bad_input::number;
@@ -51,8 +52,27 @@ impl Session {
         }
     }
 
-    pub(super) fn show_status(&self) -> Result<()> {
-        let report = StatusReport::new(&self.status);
+    /// What the isolation bank says; `None` if the MCU's program does not know the request.
+    pub(super) fn isolation(&mut self, request: Isolation) -> Result<Option<IsolationReport>> {
+        self.client.isolation(request).with_context(|| self.client.name().to_owned())
+    }
+
+    /// The latest status, with what the isolation bank says.
+    pub(super) fn report(&mut self) -> Result<StatusReport> {
+        let isolation = self.isolation(Isolation::Read)?;
+        Ok(StatusReport::new(&self.status, isolation.as_ref()))
+    }
+
+    pub(super) fn show_isolation(&mut self, request: Isolation) -> Result<()> {
+        let Some(report) = self.isolation(request)? else {
+            bail!("{}: the MCU's program does not know the isolation bank", self.client.name());
+        };
+        let row = IsolationRow::new(&report, self.status.rate_hz);
+        print(&if self.json { json(&row)? } else { row.text() + "\n" })
+    }
+
+    pub(super) fn show_status(&mut self) -> Result<()> {
+        let report = self.report()?;
         print(&if self.json { json(&report)? } else { report.text() })
     }
 

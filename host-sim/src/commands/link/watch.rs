@@ -70,9 +70,10 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     let mut screen = Screen::new(session.json);
     let (start, heartbeat) = (Instant::now(), heartbeat(&session.status));
     let (mut samples, mut next) = (0, start);
-    let mut report = StatusReport::new(&session.status);
+    let mut report = session.report()?;
     while start.elapsed() < whole && !stopped() {
-        report = StatusReport::new(&session.refresh()?);
+        session.refresh()?;
+        report = session.report()?;
         if Instant::now() >= next {
             samples += 1;
             if !screen.show(&report)? {

@@ -11,6 +11,7 @@ mod plot;
 use std::path::Path;
 
 use link::State;
+use model::isolation::Verdict;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
@@ -18,6 +19,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::view::{Connection, View};
+use crate::link::IsolationRow;
 
 /// Height of a panel with its border, in lines.
 const PANEL: u16 = 7;
@@ -29,7 +31,8 @@ const TWO_PLOTS: u16 = 16;
 /// Draws the whole screen.
 pub fn draw(view: &View, frame: &mut Frame<'_>) {
     let area = frame.area();
-    let fault = wrapped(&fault(view).unwrap_or_default(), area.width);
+    let mut fault = wrapped(&fault(view).unwrap_or_default(), area.width);
+    fault.extend(wrapped(&isolation(view).unwrap_or_default(), area.width));
     let below = 2 + fault.len() as u16;
     let panel = if area.height > PANEL + below { PANEL } else { 0 };
     let [top, plots, panels, warning, note, keys] = Layout::vertical([
@@ -147,6 +150,13 @@ fn fault(view: &View) -> Option<String> {
     let others: Vec<String> = view.other_faults().map(|fault| fault.to_string()).collect();
     let others = if others.is_empty() { String::new() } else { format!("; also {}", others.join(", ")) };
     Some(format!("FAULT {fault}{remedy}{others}"))
+}
+
+/// What the isolation bank says; `None` if it is quiet or does not run.
+fn isolation(view: &View) -> Option<String> {
+    let report =
+        view.isolation.as_ref().filter(|report| report.verdict().is_some_and(|says| says != Verdict::Quiet))?;
+    Some(format!("ISOLATION {}", IsolationRow::new(report, view.status.rate_hz).text()))
 }
 
 /// What is being typed, or the latest news.

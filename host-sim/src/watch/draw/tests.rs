@@ -1,7 +1,8 @@
 use std::path::{Path, PathBuf};
 
 use link::reply::{Counters, Firmware};
-use link::{Controller, Fault, FaultReport, Mismatch, Sensor, State, Status, Telemetry, WireVolts};
+use link::{Controller, Fault, FaultReport, IsolationReport, Mismatch, Sensor, State, Status, Telemetry, WireVolts};
+use model::isolation::{Cause, Verdict};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
@@ -121,6 +122,25 @@ fn faults_with_remedy_and_a_lost_connection() {
     view.on_event(Event::Lost("the other side closed the connection".into()));
     let found = screen(&view, 80, 24);
     assert!(found.starts_with(" WAS FAULTED  LOST, reconnecting: the other side closed the connection"), "{found}");
+}
+
+#[test]
+fn a_cause_that_the_isolation_bank_has_named_is_shown_until_the_bank_is_quiet() {
+    let mut view = view();
+    let report = |verdict: Verdict| IsolationReport {
+        verdict: verdict.code(),
+        since_tick: 20_096,
+        size: 0.1,
+        half_width: 0.002,
+        explained: 0.998,
+        ..IsolationReport::default()
+    };
+    view.on_event(Event::Isolation(report(Verdict::Named(Cause::GainError))));
+    let found = screen(&view, 110, 30);
+    let expected = "ISOLATION named gain-error, size 0.1000 (0.0980 to 0.1020), explains 99.80 %, since 20.10 s";
+    assert!(found.contains(expected), "{found}");
+    view.on_event(Event::Isolation(report(Verdict::Quiet)));
+    assert!(!screen(&view, 110, 30).contains("ISOLATION"));
 }
 
 #[test]

@@ -341,6 +341,6 @@ fn every_state_and_event_leads_where_the_tables_say_and_only_armed_has_a_voltage
         }
     }
     std::println!("count: {pairs} pairs of state and event\ncount: {driven} pairs with a voltage");
-    assert_eq!(pairs, 12 * (4 + 9 * 256) * 1440, "a pair is missing");
+    assert_eq!(pairs, 12 * (4 + 10 * 512) * 1584, "a pair is missing");
     assert!(driven > 500, "{driven} pairs with a voltage show little");
 }

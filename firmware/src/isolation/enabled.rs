@@ -1,0 +1,151 @@
+//! The bank with its state, built with the feature `isolation`.
+
+use link::isolation::Off;
+use link::{Command, IsolationReport};
+use model::isolation::{self, Causes, Report, Verdict};
+use model::supervisor::{self, Fault, State};
+use model::{OutOfRange, Plant, SampleTime, ScaledStiffness, Validate, Volts, device};
+
+use crate::control::{Control, Tick};
+
+/// Properties of the bank that are constant from the start on, in SI units.
+#[derive(Clone, Copy, Debug)]
+pub struct Terms {
+    bank: Result<isolation::Settings, Off>,
+    rate_hz: f64,
+    trip_on_cause: Causes,
+}
+
+impl Terms {
+    /// The bank for the spring `plant`, `None` for one that is not plain, behind an amplifier with this highest voltage, in V.
+    #[inline(never)]
+    pub fn new(settings: &device::Settings, plant: Option<Plant>, highest_v: f64) -> Self {
+        let rate_hz = settings.control.rate_hz;
+        let bank = match (&settings.control.feedback, plant) {
+            (None, _) => Err(Off::NoSensor),
+            (_, None) => Err(Off::ExtendedSpring),
+            (_, Some(plant)) => settings.isolation(plant, highest_v).ok_or(Off::NoSensor),
+        };
+        let in_range = |bank: isolation::Settings| {
+            let valid = SampleTime::from_rate(rate_hz).and_then(|sample_time| bank.validate(sample_time).map(drop));
+            valid.map(|()| bank).map_err(|_| Off::OutOfRange)
+        };
+        Self { bank: bank.and_then(in_range), rate_hz, trip_on_cause: settings.trip_on_cause }
+    }
+
+    /// Checks that a bank runs if the settings demand a trip.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names `trip_on_cause`, of which no cause is allowed.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        if self.bank.is_ok() || self.trip_on_cause.is_empty() {
+            return Ok(());
+        }
+        let value = self.trip_on_cause.iter().count() as f64;
+        let unit = "causes, since no isolation bank runs";
+        Err(OutOfRange { field: "trip_on_cause", value, lowest: 0.0, highest: 0.0, unit })
+    }
+
+    /// Returns `report` in SI units for the host, at `tick`; `since_tick` is the tick after which the fault has been there.
+    #[inline(never)]
+    pub fn describe(&self, report: &Report, tick: u64, since_tick: u64) -> IsolationReport {
+        match &self.bank {
+            Err(why) => IsolationReport::off(*why, tick, self.trip_on_cause),
+            Ok(bank) => {
+                let finding = report.finding(bank, self.rate_hz);
+                IsolationReport::new(report.verdict, finding, tick, since_tick, self.trip_on_cause)
+            }
+        }
+    }
+}
+
+/// What has changed in what the bank says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct News {
+    /// What it says now.
+    pub report: Report,
+    /// For how many ticks the fault has been there; 0 without an alarm.
+    pub since_ticks: u32,
+    /// The verdict before.
+    pub before: Verdict,
+}
+
+/// What a reading is compared with.
+#[derive(Clone, Copy, Debug)]
+struct Moment {
+    applied: Volts,
+    /// The model's stiffness just after the voltage was applied.
+    model: ScaledStiffness,
+    enabled: bool,
+}
+
+/// The bank beside a controller.
+#[derive(Debug)]
+pub struct Isolation {
+    config: Option<isolation::Config>,
+    trip_on_cause: Causes,
+    last: Option<Moment>,
+    /// Verdict, age and number of decisions of the last news.
+    told: (Verdict, u32, u32),
+    state: isolation::State,
+}
+
+impl Isolation {
+    /// No bank runs. A constant: the state is too large for the stack.
+    pub const NEW: Self = Self {
+        config: None,
+        trip_on_cause: Causes::NONE,
+        last: None,
+        told: (Verdict::Quiet, 0, 0),
+        state: isolation::State::NEW,
+    };
+
+    /// Starts the bank for a spring at rest at 0 V. Call it before the first tick.
+    #[inline(never)]
+    pub fn start(&mut self, terms: &Terms) {
+        self.config = terms.bank.ok().and_then(|bank| {
+            let sample_time = SampleTime::from_rate(terms.rate_hz).ok()?;
+            Some(bank.validate(sample_time).ok()?.quantize())
+        });
+        self.trip_on_cause = terms.trip_on_cause;
+    }
+
+    /// Before a tick: the acknowledgement of the bank's fault ends its alarm. Returns that fault as long as a cause of the setting
+    /// `trip_on_cause` is named.
+    #[inline]
+    pub fn begin(&mut self, command: &Command, state: State) -> Option<Fault> {
+        if command.arming == Some(supervisor::Command::Disarm) && state == State::Faulted(Fault::Isolation) {
+            self.acknowledge();
+        }
+        match self.state.verdict() {
+            Verdict::Named(cause) if self.trip_on_cause.contains(cause) => Some(Fault::Isolation),
+            _ => None,
+        }
+    }
+
+    /// After the output of a tick is written: advances the bank. Returns what has changed. Bounded work, no float, no panic: not
+    /// inlined, so that the audit of the image verifies it.
+    #[inline(never)]
+    pub fn tick(&mut self, control: &Control, tick: &Tick) -> Option<News> {
+        let config = self.config.as_ref()?;
+        let Tick { drive, output, measured } = tick;
+        let now = Moment { applied: output.applied, model: control.uncorrected(output), enabled: drive.enabled() };
+        if let Some(last) = self.last.replace(now) {
+            // The reading was sampled after the output of the tick before.
+            let reading = measured.filter(|_| last.enabled).map(|volts| ScaledStiffness(volts.0));
+            config.tick(&mut self.state, last.applied, last.model, reading);
+        }
+        let says = (self.state.verdict(), self.state.since_blocks(), self.state.decisions());
+        if says == self.told {
+            return None;
+        }
+        let (before, ..) = core::mem::replace(&mut self.told, says);
+        let report = self.state.report();
+        Some(News { report, since_ticks: report.since_blocks.saturating_mul(config.block_ticks()), before })
+    }
+
+    /// Ends an alarm: the bank looks for a fault anew.
+    pub fn acknowledge(&mut self) {
+        self.state.acknowledge();
+    }
+}

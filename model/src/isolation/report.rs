@@ -1,0 +1,74 @@
+//! What the bank says: in the numbers of the tick, and in SI units.
+
+use super::{Cause, Settings, Verdict};
+
+/// What the bank says, in the numbers of the tick: the same bits on every machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Number of blocks since the fault began: since the last restart of the sums; 0 without an alarm.
+    pub since_blocks: u32,
+    /// The size of the verdict's cause at the last decision is `numerator / denominator * 2^exponent`, in units of [`Settings::unit`].
+    pub(super) numerator: i32,
+    /// Zero without a size.
+    pub(super) denominator: i32,
+    pub(super) exponent: i8,
+    /// The information of the size is `denominator * 2^(2 scale)`, with 20 fraction bits.
+    pub(super) scale: u8,
+    /// Energy of the innovations without a cause at the last decision, in variances with 20 fraction bits.
+    pub(super) none: i64,
+    /// What of it the best cause leaves.
+    pub(super) left: i64,
+}
+
+/// The cause that explains most, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finding {
+    /// The cause.
+    pub cause: Cause,
+    /// The other cause if the verdict is ambiguous.
+    pub other: Option<Cause>,
+    /// Size of the cause, in the unit of [`Cause::unit`].
+    pub size: f64,
+    /// Half of the width of the 95 % interval of the size. It holds the noise only, not the error of the linear signature.
+    pub half_width: f64,
+    /// Part of the residual's energy, its noise included, that the cause explains, 0 to 1.
+    pub explained: f64,
+}
+
+/// Returns `2^exponent`, for exponents of normal numbers.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
+impl Report {
+    /// Returns the energy of the innovations that no cause explains and what the best cause leaves, in variances, at the last
+    /// decision. Floating point: not for the tick, nor are the next two.
+    pub fn energies(&self) -> (f64, f64) {
+        (self.none as f64 / 1_048_576.0, self.left as f64 / 1_048_576.0)
+    }
+
+    /// Returns the size of the verdict's cause in units of [`Settings::unit`] and its standard deviation, at the last decision.
+    pub fn size(&self) -> (f64, f64) {
+        if self.denominator <= 0 {
+            return (0.0, 0.0);
+        }
+        let denominator = f64::from(self.denominator);
+        let size = f64::from(self.numerator) / denominator * power_of_two(self.exponent.into());
+        let information = denominator * power_of_two(2 * i32::from(self.scale) - 20);
+        (size, 1.0 / libm::sqrt(information))
+    }
+
+    /// Returns the cause that explains most in SI units, for a bank with these settings and ticks of `rate_hz`; `None` unless one is
+    /// named or two are ambiguous.
+    pub fn finding(&self, settings: &Settings, rate_hz: f64) -> Option<Finding> {
+        let (cause, other) = self.verdict.causes();
+        let cause = cause?;
+        let (size, deviation) = self.size();
+        let (none, left) = self.energies();
+        let factor = settings.unit(cause, rate_hz);
+        let explained = 1.0 - left / none.max(left);
+        Some(Finding { cause, other, size: factor * size, half_width: 1.96 * factor * deviation, explained })
+    }
+}
