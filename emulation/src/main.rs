@@ -5,7 +5,7 @@
 //!
 //! - [`binary`] reads an image's machine code: panics, floats, stack, size.
 //! - [`qemu`] runs an image under QEMU and compares the run with the same code on the host: [`emulate`], [`rivals`],
-//!   [`blocks`], [`isolation`], [`drill`], [`talk`], [`story`].
+//!   [`blocks`], [`isolation`], [`drill`], [`talk`], [`clients`], [`story`].
 //! - [`boot`] runs the image that is flashed on models of the chip's registers.
 //! - [`capi`] builds the C library's example and compares its run on this machine and under QEMU with the same in Rust.
 //! - [`soak`] runs random ticks of the control on the host and checks every invariant in each.
@@ -15,6 +15,7 @@ mod binary;
 mod blocks;
 mod boot;
 mod capi;
+mod clients;
 mod drill;
 mod emulate;
 mod isolation;
@@ -76,6 +77,12 @@ Examples:
     /// in about a minute; then a model by `vsj link`. Exits with 1 if a hostile frame is followed, a tick is missed or
     /// the model is not run. A part of `test`.
     Talk,
+    /// Let the clients in C++ and Python command the emulated firmware
+    ///
+    /// Compiles the header clients/cpp/vsj_link.hpp with CMake, checks every frame of the protocol, and lets its client and that of
+    /// the Python package, which `cargo xtask python` has installed, arm, set, watch, record and disarm a board each. A part of
+    /// `test`.
+    Clients,
     /// End-to-end demonstration: run, diagnose, extend, run again
     ///
     /// The emulated board drives a spring with a hidden effect up and down a stair, in lock step; `vsj diagnose` names
@@ -140,6 +147,7 @@ fn main() -> ExitCode {
         Command::Proof => setup::emulator().and_then(|()| proof::run()),
         Command::Drill(args) => drill::run(&args),
         Command::Talk => talk::command(),
+        Command::Clients => clients::run(),
         Command::Story(args) => story::run(&args),
         Command::Size(args) => size::run(&args),
         Command::Boot(variant) => boot::run(variant),

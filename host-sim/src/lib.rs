@@ -4,12 +4,12 @@
 //! | --- | --- |
 //! | [`output`] | terminal, CSV, plots, report page |
 //! | [`log`] | the log that the firmware writes, decoded |
-//! | [`mod@link`] | the host's side of the serial link to the MCU |
+//! | [`mod@link`] | the host's side of the serial link to the MCU, the crate `link-host` |
 //! | [`watch`] | the running loop on a full screen |
 //! | [`qemu`] | the emulated board |
 //! | [`signals`] | what Ctrl-C and other signals do |
 
-pub mod link;
+pub use link_host as link;
 pub mod log;
 pub mod output;
 pub mod qemu;

@@ -13,7 +13,8 @@ use link::{
     Part, Reason, Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
 };
 
-fn check<M: Message>(message: &M, kind: u8, golden: &str) {
+/// Returns the message and its frame as a line of the file for other clients.
+fn check<M: Message>(message: &M, kind: u8, golden: &str) -> String {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     let mut bytes: Vec<u8> =
         (0..golden.len() / 2).map(|at| u8::from_str_radix(&golden[2 * at..2 * at + 2], 16).unwrap()).collect();
@@ -21,10 +22,22 @@ fn check<M: Message>(message: &M, kind: u8, golden: &str) {
     let frame = Frame::new(Nonce(0x0304_0506).stamp(Sequence(0x0102)), message);
     bytes.extend([6, 5, 4, 3]);
     assert_eq!(hex(frame.as_bytes()), hex(&by_hand(link::VERSION, kind, 0x0102, &bytes)), "expected message {golden}");
+    format!("{golden} {}\n", hex(frame.as_bytes()))
+}
+
+/// Compares the frames with the file that the tests of `clients/cpp` read; writes it with `GOLDEN=write`.
+fn check_file(name: &str, frames: &str) {
+    let path = format!("{}/../clients/cpp/golden/{name}", env!("CARGO_MANIFEST_DIR"));
+    if std::env::var_os("GOLDEN").is_some_and(|what| what == "write") {
+        std::fs::write(&path, frames).unwrap();
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    assert_eq!(written, frames, "{path} is out of date: GOLDEN=write cargo test -p link --test golden");
 }
 
 #[test]
 fn requests() {
+    let mut frames = String::new();
     for (request, golden) in [
         (Request::Hello, "00"),
         (Request::Status, "01"),
@@ -52,8 +65,9 @@ fn requests() {
         (Request::Isolation(Isolation::Read), "1200"),
         (Request::Isolation(Isolation::Acknowledge), "1201"),
     ] {
-        check(&request, b'Q', golden);
+        frames += &check(&request, b'Q', golden);
     }
+    check_file("requests.txt", &frames);
 }
 
 #[test]
@@ -91,6 +105,7 @@ fn replies() {
             telemetry_dropped: 17,
         },
     };
+    let mut frames = String::new();
     for (reply, golden) in [
         (Reply::Ack { state: State::Disarmed, target: WireVolts(0) }, "000000"),
         (Reply::Ack { state: State::Armed, target: WireVolts(1) }, "000102"),
@@ -180,11 +195,12 @@ fn replies() {
             &format!("0702ac02{}", "a5".repeat(32)),
         ),
     ] {
-        check(&reply, b'A', golden);
+        frames += &check(&reply, b'A', golden);
         if let Reply::Refused(reason) = reply {
             assert_eq!(golden[2..4], format!("{:02x}", reason.code()), "{reason}");
         }
     }
+    check_file("replies.txt", &frames);
 }
 
 /// The bytes of one complete frame on the wire.

@@ -5,9 +5,10 @@
 //! | module | what it is |
 //! | --- | --- |
 //! | [`error`] | the library's errors as exceptions |
-//! | [`table`] | columns in memory as the text of a data file, so that they are read as the command reads a file |
+//! | [`table`] | columns as Python hands them over |
 //! | [`records`] | the options of a record, and its rows |
 //! | [`interrupt`] | computations that Ctrl-C ends |
+//! | [`link`] | a running MCU over its serial link |
 //! | [`analysis`] | identification, diagnosis, plan |
 //! | [`controller`] | the controller's tick, and the spring alone |
 
@@ -15,6 +16,7 @@ mod analysis;
 mod controller;
 mod error;
 mod interrupt;
+mod link;
 mod records;
 mod table;
 
@@ -26,7 +28,9 @@ mod _vsj {
     #[pymodule_export]
     use crate::controller::{Controller, predict, simulate};
     #[pymodule_export]
-    use crate::error::BadInput;
+    use crate::error::{BadInput, LinkError};
+    #[pymodule_export]
+    use crate::link::Port;
 
     /// The style sheet of the command's report pages.
     #[pymodule_export]

@@ -8,9 +8,10 @@ use pyo3::prelude::*;
 use simulation::bad_input;
 use simulation::csv_table::dialect::Dialect;
 use simulation::csv_table::text::Source;
+use simulation::record::columns::{self, Column};
 use simulation::record::{ColumnNames, Format, MeasuredRecord, Record, columns_file, remarks_on};
 
-use crate::table::{Cells, Column, source};
+use crate::table::Cells;
 
 /// A record as Python hands it over: its name and columns, or the path of a file and no columns.
 pub(crate) type Given<'py> = (String, Option<Vec<(String, Cells<'py>)>>);
@@ -61,8 +62,7 @@ impl Options {
             Some(columns) => {
                 let mut format = format.clone();
                 format.dialect.separator = Some(",".parse()?);
-                let source: Source = source(name, columns)?;
-                format.read(source)
+                format.read(Source::new(name, columns::text(name, columns)?))
             }
         };
         let measured: Vec<MeasuredRecord> = records.iter().map(read).collect::<Result<_>>()?;

@@ -25,9 +25,20 @@ pub fn read(path: &Path) -> Result<String> {
     Source::open(path)?.utf_8()
 }
 
+/// How messages number the rows of a table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Numbering {
+    /// By their lines in the text file, from 1.
+    #[default]
+    Lines,
+    /// By rows of data, from 1: the table comes from a file without lines, and its text is one line a row.
+    Rows,
+}
+
 /// A table, read row by row.
 pub struct Table<'a> {
     name: &'a str,
+    numbering: Numbering,
     header: StringRecord,
     header_line: usize,
     separator: Separator,
@@ -40,10 +51,11 @@ pub struct Table<'a> {
 /// A row of a [`Table`].
 pub struct Row<'t> {
     name: &'t str,
+    numbering: Numbering,
     header: &'t StringRecord,
     numbers: &'t Numbers,
     record: &'t StringRecord,
-    /// Line of the file, from 1.
+    /// Line of the file, or number of the row, from 1.
     pub line: usize,
 }
 
@@ -53,14 +65,14 @@ impl<'a> Table<'a> {
     /// # Errors
     /// [`BadInput`] with the line of an invalid header.
     pub fn new(name: &'a str, text: &'a str) -> Result<Self> {
-        Self::with_dialect(name, text, Dialect::default())
+        Self::with_dialect(name, text, Dialect::default(), Numbering::Lines)
     }
 
     /// Reads the header of a table whose dialect may be known.
     ///
     /// # Errors
     /// The errors of [`Table::new`].
-    pub fn with_dialect(name: &'a str, text: &'a str, dialect: Dialect) -> Result<Self> {
+    pub fn with_dialect(name: &'a str, text: &'a str, dialect: Dialect, numbering: Numbering) -> Result<Self> {
         let preamble = Preamble::of(text);
         let text = &text[preamble.bytes..];
         let separator = dialect.separator.or(preamble.separator).unwrap_or_else(|| Separator::of(text));
@@ -78,10 +90,10 @@ impl<'a> Table<'a> {
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
         if let Some((_, column)) = header.iter().enumerate().find(twice) {
             let column = excerpt(column);
-            bad_input!("{name}, line {line}: column `{column}` appears twice; expected every column once");
+            bad_input!("{}: column `{column}` appears twice; expected every column once", numbering.header(name, line));
         }
-        let numbers = Numbers::new(dialect, separator);
-        Ok(Self { name, header, header_line: line, separator, numbers, reader, record: StringRecord::new(), lines })
+        let (numbers, record) = (Numbers::new(dialect, separator), StringRecord::new());
+        Ok(Self { name, numbering, header, header_line: line, separator, numbers, reader, record, lines })
     }
 
     /// Name of the table in messages.
@@ -109,9 +121,9 @@ impl<'a> Table<'a> {
         self.columns().position(|name| name == column).or_else(alike)
     }
 
-    /// Line of the header, from 1.
-    pub fn header_line(&self) -> usize {
-        self.header_line
+    /// File and line of the header, for messages.
+    pub fn header_place(&self) -> String {
+        self.numbering.header(self.name, self.header_line)
     }
 
     /// Index of a column that must exist; `expected` lists the columns for the error.
@@ -125,19 +137,15 @@ impl<'a> Table<'a> {
         if self.columns().all(str::is_empty) {
             return BadInput(format!("{name}: no header; expected one with {expected}"));
         }
-        let line = self.header_line;
+        let place = self.header_place();
         if self.columns().any(unclosed) {
-            return BadInput(format!("{name}, line {line}: {UNCLOSED}; expected a header with {expected}"));
+            return BadInput(format!("{place}: {UNCLOSED}; expected a header with {expected}"));
         }
         if self.columns().all(|column| column.parse::<f64>().is_ok()) {
-            return BadInput(format!(
-                "{name}, line {line}: numbers instead of names; expected a header with {expected}"
-            ));
+            return BadInput(format!("{place}: numbers instead of names; expected a header with {expected}"));
         }
         let found = excerpt(&self.columns().collect::<Vec<_>>().join(","));
-        BadInput(format!(
-            "{name}, line {line}: no column `{column}`; expected a header with {expected}, found `{found}`"
-        ))
+        BadInput(format!("{place}: no column `{column}`; expected a header with {expected}, found `{found}`"))
     }
 
     /// Reads the next row; `None` after the last.
@@ -145,7 +153,7 @@ impl<'a> Table<'a> {
     /// # Errors
     /// [`BadInput`] with the line of a row that has not as many fields as the header; empty ones at its end do not count.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>> {
-        let (name, expected) = (self.name, self.header.len());
+        let (name, numbering, expected) = (self.name, self.numbering, self.header.len());
         loop {
             match self.reader.read_record(&mut self.record) {
                 Ok(false) => return Ok(None),
@@ -169,8 +177,22 @@ impl<'a> Table<'a> {
                     if has_decimal_commas { " (decimal commas need another separator, `;` or a tab)" } else { "" };
                 bad_input!("{name}, line {line}: {found} field(s){why}; expected {expected} as in the header{hint}");
             }
-            return Ok(Some(Row { name, header: &self.header, numbers: &self.numbers, record: &self.record, line }));
+            let line = if numbering == Numbering::Rows { line - self.header_line } else { line };
+            let (header, numbers, record) = (&self.header, &self.numbers, &self.record);
+            return Ok(Some(Row { name, numbering, header, numbers, record, line }));
         }
+    }
+}
+
+impl Numbering {
+    /// What a row's number is called.
+    pub(crate) fn word(self) -> &'static str {
+        ["line", "row"][self as usize]
+    }
+
+    /// File and line of a header; a file without lines has the names of its columns elsewhere.
+    fn header(self, name: &str, line: usize) -> String {
+        if self == Self::Lines { format!("{name}, line {line}") } else { name.to_owned() }
     }
 }
 
@@ -209,11 +231,17 @@ impl Row<'_> {
     /// File, line and column of a cell, for messages.
     pub fn place(&self, column: usize) -> String {
         format!(
-            "{}, line {}, column {}",
+            "{}, {} {}, column {}",
             self.name,
+            self.numbering.word(),
             self.line,
             excerpt(&self.header[column]).replace(['\n', '\r'], " ")
         )
+    }
+
+    /// What the row's number is called, `line` or `row`.
+    pub(crate) fn numbered(&self) -> &'static str {
+        self.numbering.word()
     }
 
     /// The number in a cell, `None` if it has none; NaN and infinities are numbers here.

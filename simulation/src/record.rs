@@ -1,6 +1,7 @@
 //! Records of an experiment as CSV: the columns `time_s`, `voltage_v` and optionally a measured one. Records with other
-//! columns and units are opened by [`Format`].
+//! columns and units are opened by [`Format`], and those of files without lines come as [`columns`].
 
+pub mod columns;
 pub mod columns_file;
 pub mod gaps;
 mod measured;
@@ -8,7 +9,7 @@ mod names;
 mod times;
 
 pub use measured::{Format, MeasuredRecord, remarks_on};
-pub use names::ColumnNames;
+pub use names::{ColumnNames, with_unit};
 
 use std::path::Path;
 
@@ -21,7 +22,7 @@ use crate::csv_table::{Table, read};
 /// One row of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Line of the file, counted from 1.
+    /// Line of the file, or number of the row in a file without lines; counted from 1.
     pub line: usize,
     /// Time, in s, increasing from row to row.
     pub time_s: f64,

@@ -149,6 +149,28 @@ fn csv_has_one_row_a_line_and_json_is_one_object() {
     assert_eq!(json["summary"]["done"]["digest"], "00000000beef0042");
 }
 
+/// The lines of `summary` have numbers, which are read as a record.
+#[test]
+fn a_log_is_written_as_mcap_and_parquet_with_the_numbers_of_its_lines() {
+    let folder = folder("rzcobs", &frames("rzcobs")[..9].concat());
+    let summary = run(&folder, &["fw.elf", "log.bin"]);
+    for name in ["log.mcap", "log.parquet"] {
+        let output = run(&folder, &["fw.elf", "log.bin", "--out", name]);
+        assert_eq!(code(&output), 0);
+        let printed = text(&output.stdout);
+        assert!(printed.starts_with("summary\n") && printed.ends_with(&format!("wrote {name}\n")), "{printed}");
+        assert!(text(&summary.stdout).contains(printed.trim_end_matches(&format!("wrote {name}\n"))));
+        let columns = ["--voltage", "applied_v", "--reading", "estimate_v"];
+        let read = vsj().current_dir(&folder).args(["identify", name]).args(columns).output().expect("vsj starts");
+        let error = text(&read.stderr);
+        let expected = format!("vsj: {name}, row 1, column applied_v: `NaN` is not a finite number");
+        assert!(read.status.code() == Some(2) && error.starts_with(&expected), "{error}");
+    }
+    let output = run(&folder, &["fw.elf", "log.bin", "--out", "log.txt"]);
+    assert_eq!(code(&output), 2);
+    assert!(text(&output.stderr).contains("expected a name that ends in .mcap or .parquet"));
+}
+
 #[test]
 fn damage_in_the_middle_loses_only_the_damaged_frames() {
     let mut frames = frames("rzcobs");

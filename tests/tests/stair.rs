@@ -38,6 +38,27 @@ fn the_reference_reproduces_the_simulated_columns_of_table_3() {
 }
 
 #[test]
+fn the_rows_are_the_same_in_csv_mcap_and_parquet() {
+    let folder = tempdir().unwrap();
+    let run_of = |out: &str, reading: &str| {
+        let written = run(folder.path(), &["stair", "--out", out, "--every", "0.05"]);
+        assert!(written.status.success(), "{}", text(&written.stderr));
+        let file = if out == "csv" { "csv/stair.csv" } else { out };
+        let columns = ["--voltage", "applied_v:V", "--reading", reading];
+        json(folder.path(), &[&["identify", file, "--json"], &columns[..]].concat())
+    };
+    for reading in ["stiffness:V", "youngs_modulus_pa:Pa"] {
+        let expected = run_of("csv", reading);
+        for out in ["stair.mcap", "stair.parquet"] {
+            let found = run_of(out, reading);
+            assert_eq!((&found["rows"], &found["unit"]), (&expected["rows"], &expected["unit"]), "{out}");
+            let (own, other) = (&found["nominal"]["share"], &expected["nominal"]["share"]);
+            assert!((number(own, "value") / number(other, "value") - 1.0).abs() < 1e-4, "{own} {other}");
+        }
+    }
+}
+
+#[test]
 fn the_fixed_point_loop_stays_within_50_mv_of_the_reference() {
     for rate in ["1000", "10000"] {
         for (input, limit) in [("stair", "700"), ("stair", "1000"), ("step", "700"), ("step", "1000")] {

@@ -83,6 +83,8 @@ enum Command {
     Drill(Forwarded),
     /// Let a host talk to the emulated firmware
     Talk(Forwarded),
+    /// Let the clients in C++ and Python command the emulated firmware
+    Clients(Forwarded),
     /// End-to-end demonstration: run, diagnose, extend, run again
     Story(Forwarded),
     /// Write the image to the real board and show its log (probe-rs)
@@ -265,7 +267,7 @@ fn arguments() -> Vec<OsString> {
 /// Runs a command. `args` are the command line, for the commands of the emulation.
 fn run(command: Command, args: &[OsString]) -> Result<()> {
     use Command::{
-        Bench, Boot, Capi, Check, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof,
+        Bench, Boot, Capi, Check, Clients, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof,
     };
     use Command::{Manual, Prove, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
     match command {
@@ -287,7 +289,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Sanitize(args) => sanitize::run(&args),
         Deny { require_advisories } => deny::run(require_advisories),
         Reproducible(variant) => reproducible::run(variant),
-        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Story(_) | Size(_) | Boot(_) | Capi(_) | Soak(_) => {
+        Emulate(_) | Proof(_) | Drill(_) | Talk(_) | Clients(_) | Story(_) | Size(_) | Boot(_) | Capi(_) | Soak(_) => {
             emulation::replace(args).map(|never: Infallible| match never {})
         }
     }

@@ -32,6 +32,7 @@ const BESIDE: &[Step] = &[
     Step::emulation("firmware", &["proof"]),
     Step::emulation("boot", &["boot"]),
     Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
+    Step::emulation("clients", &["clients"]),
     Step::emulation("story", &["story", "--check"]),
     Step::emulation("c library", &["capi"]),
 ];

@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use host_sim::log::{Decoder, Formats, Summary, silence_the_decoder};
+use host_sim::log::{Decoder, Formats, Item, Summary, silence_the_decoder};
 use host_sim::output::log::{Format, MOST_IN_JSON, Printer};
+use host_sim::output::log_file::LogFile;
+use host_sim::output::terminal::{print, wrote};
 use host_sim::signals::on_ctrl_c;
+use record_files::Container;
 use simulation::bad_input;
 use simulation::bounded_file::read;
 
@@ -20,6 +23,7 @@ Examples:
   tail -f capture.bin | vsj log firmware.elf  live; ends with a summary
   vsj log firmware.elf capture.bin --csv      time_s,level,event,message
   vsj log firmware.elf capture.bin --json     one object, summary included
+  vsj log firmware.elf capture.bin --out log.mcap  for Foxglove, PlotJuggler
 
 Exit codes: 0 decoded completely, 1 damaged or cut off, with the readable part printed, 2 not the log of this ELF file.")]
 pub(crate) struct Arguments {
@@ -35,6 +39,9 @@ pub(crate) struct Arguments {
     /// One JSON object on stdout, at the end; for at most 1 000 000 lines
     #[arg(long)]
     json: bool,
+    /// Write the lines to this MCAP or Parquet file, which has its name when it is complete, and print the summary
+    #[arg(long, value_name = "FILE.mcap|FILE.parquet", conflicts_with_all = ["csv", "json"])]
+    out: Option<PathBuf>,
 }
 
 /// Largest size of an ELF file, in MiB; one of the firmware has 2 to 20 with its debug information.
@@ -48,7 +55,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Err(error) => bad_input!("{}: {error:#}", arguments.elf.display()),
     };
     let source = open(&arguments.file)?;
-    decode(source, formats, arguments)
+    let file = arguments.out.as_deref().map(log_file).transpose()?;
+    decode(source, formats, arguments, file)
+}
+
+/// Creates the file of `--out`.
+fn log_file(path: &Path) -> Result<LogFile> {
+    match Container::of(path) {
+        Some(container) => LogFile::create(path, container),
+        None => {
+            bad_input!("{}: expected a name that ends in .mcap or .parquet; CSV is printed by --csv", path.display())
+        }
+    }
 }
 
 fn open(path: &Path) -> Result<Box<dyn Read>> {
@@ -71,13 +89,14 @@ fn open(path: &Path) -> Result<Box<dyn Read>> {
     }
 }
 
-fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) -> Result<()> {
+fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments, mut file: Option<LogFile>) -> Result<()> {
     let encoding = formats.encoding();
     let mut decoder = Decoder::new(formats);
     let mut summary = Summary::default();
     let mut buffer = [0; 1 << 13];
     let mut broken = None;
     let mut printer = Printer::new(match (arguments.json, arguments.csv) {
+        _ if file.is_some() => Format::Summary,
         (true, _) => Format::Json,
         (_, true) => Format::Csv,
         _ => Format::Table,
@@ -98,6 +117,9 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) ->
         };
         for item in decoder.feed(&buffer[..read]) {
             summary.add(&item);
+            if let (Some(file), Item::Line(line)) = (&mut file, &item) {
+                file.line(line)?;
+            }
             printer.item(item);
         }
         if printer.is_full() {
@@ -110,7 +132,13 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments) ->
         printer.item(item);
     }
     let verdict = verdict(arguments, &summary);
+    if let Some(file) = file {
+        file.finish()?;
+    }
     printer.end(encoding, summary)?;
+    if let Some(path) = &arguments.out {
+        print(&wrote(std::slice::from_ref(path)))?;
+    }
     let name = name(&arguments.file);
     match broken {
         Some(error) => {

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::output::terminal::remark;
 use identify::Input;
+use record_files::open;
 use simulation::bad_input::BadInput;
 use simulation::csv_table::dialect::{Decimal, Dialect, Separator};
 use simulation::record::{ColumnNames, Format, MeasuredRecord, columns_file, remarks_on};
@@ -15,8 +16,8 @@ use super::choice::{INPUT, one_of};
 /// The records and how their files are written.
 #[derive(Args, Debug)]
 pub(crate) struct RecordArguments {
-    /// The records: tables with a header, separated by commas, semicolons, tabs or blanks, of at most 1 000 000 rows and
-    /// 512 MiB
+    /// The records: tables with a header, separated by commas, semicolons, tabs or blanks, or MCAP or Parquet files; of at most
+    /// 1 000 000 rows and 512 MiB
     #[arg(value_name = "DATA.csv", required = true)]
     data: Vec<PathBuf>,
     /// Column of the time and its unit: ns, us, ms, s, min, h or d; or a column of ISO 8601 time stamps; default: time_s
@@ -41,6 +42,9 @@ pub(crate) struct RecordArguments {
     /// Decimal mark, `.` or `,`; default: found in the file
     #[arg(long, value_name = "MARK")]
     decimal: Option<Decimal>,
+    /// Topic of the messages of an MCAP file; default: the only one that has the columns
+    #[arg(long, value_name = "TOPIC")]
+    topic: Option<String>,
     /// Order the rows by time; rows at the same time become one, with the mean of their readings
     #[arg(long)]
     sort: bool,
@@ -57,7 +61,8 @@ impl RecordArguments {
     /// [`simulation::bad_input::BadInput`] with file, line, column and what was expected.
     pub(crate) fn open(&self) -> Result<(Vec<MeasuredRecord>, Input)> {
         let (format, input) = self.format()?;
-        let records: Vec<MeasuredRecord> = self.data.iter().map(|path| format.open(path)).collect::<Result<_>>()?;
+        let read = |path: &PathBuf| open(path, &format, self.topic.as_deref());
+        let records: Vec<MeasuredRecord> = self.data.iter().map(read).collect::<Result<_>>()?;
         for text in remarks_on(&records)? {
             remark(&text);
         }

@@ -7,12 +7,14 @@ use super::loop_arguments::LoopArguments;
 use super::spring_error::Known;
 use anyhow::Result;
 use clap::{Args, Parser};
-use host_sim::output::files::{Files, write_csv};
+use host_sim::output::file::write_whole;
+use host_sim::output::files::{Files, write_csv, write_sheet};
 use host_sim::output::terminal::{json, print, remark, wrote};
 use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
 use model::Compensation;
 use paper::stair::request::{Answer, Request, Target};
+use record_files::Container;
 use simulation::bad_input;
 use simulation::bad_input::number;
 use simulation::control_loop::{Controller, Options};
@@ -28,6 +30,7 @@ use simulation::schedule::Between;
 Examples:
   vsj stair                                 the report's experiment
   vsj stair --out out/stair                 with CSV and plots
+  vsj stair --out stair.mcap                a file for Foxglove, PlotJuggler
   vsj stair --controller none --input step  no controller, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7  another amplifier, other gains
   vsj stair --controller fast --input step  as fast as the amplifier allows
@@ -49,8 +52,8 @@ pub(crate) struct Arguments {
     /// Column of an input file with the measured stiffness; default: stiffness, if it exists
     #[arg(long, value_name = "NAME")]
     column: Option<String>,
-    /// Write stair.csv, stiffness.svg and voltage.svg to this folder
-    #[arg(long, value_name = "DIR")]
+    /// Write stair.csv, stiffness.svg and voltage.svg to this folder, or the rows to this MCAP or Parquet file
+    #[arg(long, value_name = "DIR|FILE.mcap|FILE.parquet")]
     out: Option<PathBuf>,
     /// Time between two rows of the CSV, in s; default: every tick
     #[arg(long, value_name = "S", allow_negative_numbers = true, requires = "out")]
@@ -160,6 +163,10 @@ fn write(folder: &Path, answer: &Answer, controlled: bool, stride: usize) -> Res
     let Answer { experiment, run, report } = answer;
     let samples = if controlled { &run.with } else { &run.without };
     let spring = paper_spring()?;
+    if let Some(container) = Container::of(folder) {
+        write_whole(folder, |out| write_sheet(out, container, experiment, run, samples, &spring, stride))?;
+        return Ok(vec![folder.to_owned()]);
+    }
     let mut files = Files::new(folder)?;
     files.add("stair.csv", |out| write_csv(out, experiment, run, samples, &spring, stride))?;
     for (name, svg) in [

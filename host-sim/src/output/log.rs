@@ -21,6 +21,8 @@ pub enum Format {
     Csv,
     /// One JSON object, at the end.
     Json,
+    /// The summary alone, since the lines are written to a file.
+    Summary,
 }
 
 /// The answer of `vsj log --json`.
@@ -59,13 +61,16 @@ impl Printer {
         let text = match format {
             Format::Table => format!("{TABLE_HEADER}\n"),
             Format::Csv => format!("{CSV_HEADER}\n"),
-            Format::Json => String::new(),
+            Format::Json | Format::Summary => String::new(),
         };
         Self { format, text, lines: Vec::new(), damaged: Vec::new(), run: None }
     }
 
     /// Adds an item; of a run of damaged frames only the first, then their number.
     pub fn item(&mut self, item: Item) {
+        if self.format == Format::Summary {
+            return;
+        }
         if self.format == Format::Json {
             match item {
                 Item::Line(line) => self.lines.push(line),
@@ -126,6 +131,7 @@ impl Printer {
                 }
             }
             Format::Table => self.text += &format!("\n{}", summary_text(&summary)),
+            Format::Summary => self.text += &summary_text(&summary),
         }
         print(&self.text)
     }

@@ -92,9 +92,13 @@ impl Recorder {
 
     /// Closes the recording; returns what it contains, as a sentence.
     pub(super) fn close(&mut self) -> Option<String> {
-        let (path, recording) = self.current.take()?;
+        let (path, mut recording) = self.current.take()?;
+        let finished = recording.finish();
         let summary = recording.summary();
         let (path, seconds) = (path.display(), summary.seconds);
+        if let Err(error) = finished {
+            return Some(format!("{error:#}"));
+        }
         let kind = if summary.stiffness == "estimate" { " (estimates, no measurement)" } else { "" };
         Some(format!("wrote {path}: {} rows{kind}, {seconds} s, {} lost", summary.rows, summary.lost))
     }

@@ -3,6 +3,7 @@
 
 mod capture;
 mod command;
+mod containers;
 mod damage;
 mod mcu;
 mod model;

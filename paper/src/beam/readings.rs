@@ -42,11 +42,7 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<Reading>> {
         return Err(table.lacks("force_un_<V>v", COLUMNS).into());
     }
     if voltages.len() > MOST_VOLTAGES {
-        bad_input!(
-            "{name}, line {}: {} columns of forces; expected at most {MOST_VOLTAGES}",
-            table.header_line(),
-            voltages.len()
-        );
+        bad_input!("{}: {} columns of forces; expected at most {MOST_VOLTAGES}", table.header_place(), voltages.len());
     }
     let mut readings = Vec::new();
     while let Some(row) = table.next_row()? {

@@ -28,7 +28,7 @@ impl Separator {
     /// One or more blanks.
     pub(super) const BLANKS: Self = Self(b' ');
     /// The comma.
-    pub(super) const COMMA: Self = Self(b',');
+    pub const COMMA: Self = Self(b',');
     /// The separators that are recognised, the rarest inside a name first.
     const USUAL: [Self; 4] = [Self(b'\t'), Self(b';'), Self::COMMA, Self::BLANKS];
 

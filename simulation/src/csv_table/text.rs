@@ -9,11 +9,12 @@ use encoding_rs::{Encoding, UTF_8, WINDOWS_1252};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
+use crate::csv_table::Numbering;
 
 /// Largest number of rows: a row of a record takes 40 bytes, its diagnosis 500.
-const MOST_ROWS: usize = 1_000_000;
+pub const MOST_ROWS: usize = 1_000_000;
 /// Largest size of a file, in bytes.
-const MOST_BYTES: usize = 1 << 29;
+pub const MOST_BYTES: usize = 1 << 29;
 /// Largest size of a file in another encoding than UTF-8, in bytes: its text is a second copy.
 const MOST_CONVERTED: usize = MOST_BYTES / 8;
 /// Largest length of a line, in bytes: a thousand columns of a thousand characters.
@@ -24,6 +25,7 @@ pub struct Source {
     /// Name in messages.
     pub name: String,
     bytes: Vec<u8>,
+    numbering: Numbering,
 }
 
 impl Source {
@@ -51,7 +53,7 @@ impl Source {
         let (mut feeds, mut returns, mut line_start) = (0, 0, 0);
         loop {
             let chunk = match file.fill_buf() {
-                Ok([]) => return Ok(Self { name, bytes }),
+                Ok([]) => return Ok(Self { name, bytes, numbering: Numbering::Lines }),
                 Ok(chunk) => chunk,
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                 Err(error) => return Err(unreadable(error).into()),
@@ -90,7 +92,17 @@ impl Source {
 
     /// Wraps bytes that were read elsewhere.
     pub fn new(name: &str, bytes: impl Into<Vec<u8>>) -> Self {
-        Self { name: name.to_owned(), bytes: bytes.into() }
+        Self { name: name.to_owned(), bytes: bytes.into(), numbering: Numbering::Lines }
+    }
+
+    /// Wraps the text of [`crate::record::columns::text`], made of a file that has rows and no lines.
+    pub fn of_rows(name: &str, text: String) -> Self {
+        Self { name: name.to_owned(), bytes: text.into(), numbering: Numbering::Rows }
+    }
+
+    /// How messages number the rows.
+    pub(crate) fn numbering(&self) -> Numbering {
+        self.numbering
     }
 
     /// Returns the text of a file in UTF-8, with or without byte order mark.

@@ -4,15 +4,16 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use super::columns;
 use super::gaps::{median_interval, missed_turns};
 use super::names::{Column, ColumnNames, Columns};
 use super::times::{Clock, Time};
 use super::{MOST_READING, MOST_V, Record, Row};
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
-use crate::csv_table::Table;
-use crate::csv_table::dialect::Dialect;
+use crate::csv_table::dialect::{Decimal, Dialect, Separator};
 use crate::csv_table::text::Source;
+use crate::csv_table::{Numbering, Table};
 use crate::units::{Unit, Units, usual_volts};
 
 /// How to read a file with a measured record; everything that is not said is found in the file.
@@ -117,15 +118,31 @@ impl Format {
         self.read(Source::open(path)?)
     }
 
+    /// Indices of the columns of time, voltage and reading among the columns with these names, of a file that has rows and no
+    /// lines.
+    ///
+    /// # Errors
+    /// [`BadInput`] that lists the columns and an option line that names them.
+    pub fn indices<'a>(&self, name: &str, columns: impl IntoIterator<Item = &'a str>) -> Result<[usize; 3]> {
+        let header = columns::header(columns);
+        let dialect = Dialect { separator: Some(Separator::COMMA), ..self.dialect };
+        let columns = self.columns.find(&Table::with_dialect(name, &header, dialect, Numbering::Rows)?)?;
+        Ok([columns.time, columns.voltage, columns.reading].map(|column| column.index))
+    }
+
     /// Reads a record from the bytes of a file.
     ///
     /// # Errors
     /// The errors of [`Format::open`].
     pub fn read(&self, source: Source) -> Result<MeasuredRecord> {
-        let name = source.name.clone();
+        let (name, numbering) = (source.name.clone(), source.numbering());
+        let dialect = match numbering {
+            Numbering::Lines => self.dialect,
+            Numbering::Rows => Dialect { separator: Some(Separator::COMMA), decimal: Some(Decimal::Point) },
+        };
         let (text, remark) = source.decode()?;
         let mut remarks: Vec<String> = remark.into_iter().collect();
-        let table = || Table::with_dialect(&name, &text, self.dialect);
+        let table = || Table::with_dialect(&name, &text, dialect, numbering);
 
         let columns = self.columns.find(&table()?)?;
         let below_header = below_header(&mut table()?, &columns)?;
@@ -150,7 +167,7 @@ impl Format {
             }
         }
         if self.sort {
-            timed = sorted(&name, timed, &mut remarks)?;
+            timed = sorted(&name, numbering, timed, &mut remarks)?;
         }
         let missing = timed.iter().filter(|(_, row)| row.measured.is_none()).count();
         if missing > 0 {
@@ -172,8 +189,9 @@ impl Format {
             let column = excerpt(table()?.column(columns.time.index)).replace(['\n', '\r'], " ");
             let (after_s, longest_s) = (number(time_s - start_s), number(longest_s));
             bad_input!(
-                "{name}, line {line}, column {column}: {after_s} s after the first row; expected at most {longest_s} s for rows \
-                 as close as these"
+                "{name}, {} {line}, column {column}: {after_s} s after the first row; expected at most {longest_s} s for rows \
+                 as close as these",
+                numbering.word()
             );
         }
         let column = table()?.column(columns.reading.index).to_owned();
@@ -263,10 +281,11 @@ impl Rows<'_> {
                 && !at.is_after(*last)
             {
                 bad_input!(
-                    "{}: {} follows {}; expected increasing times after line {line} (--sort orders them)",
+                    "{}: {} follows {}; expected increasing times after {} {line} (--sort orders them)",
                     row.place(time.index),
                     if self.clock.has_stamps() { row.text(time.index).to_owned() } else { number(at.value) },
-                    if self.clock.has_stamps() { "a later or equal time".to_owned() } else { number(last.value) }
+                    if self.clock.has_stamps() { "a later or equal time".to_owned() } else { number(last.value) },
+                    row.numbered()
                 );
             }
             rows.push((at, Row { line: row.line, time_s: at.value, voltage_v, measured }));
@@ -291,7 +310,12 @@ fn are_closer_than_digits(rows: &[(Time, Row)]) -> bool {
 }
 
 /// Orders rows by time; those at the same time become one, whose reading is the mean.
-fn sorted(name: &str, mut rows: Vec<(Time, Row)>, remarks: &mut Vec<String>) -> Result<Vec<(Time, Row)>> {
+fn sorted(
+    name: &str,
+    numbering: Numbering,
+    mut rows: Vec<(Time, Row)>,
+    remarks: &mut Vec<String>,
+) -> Result<Vec<(Time, Row)>> {
     let disordered = rows.windows(2).filter(|pair| pair[0].0.is_after(pair[1].0)).count();
     rows.sort_by(|(a, _), (b, _)| a.value.total_cmp(&b.value).then(a.since_first.total_cmp(&b.since_first)));
     let (mut merged, mut repeated, mut averaged) = (Vec::new(), 0, 0);
@@ -299,7 +323,8 @@ fn sorted(name: &str, mut rows: Vec<(Time, Row)>, remarks: &mut Vec<String>) -> 
         let (time, mut row) = same[0];
         if let Some((_, other)) = same.iter().find(|(_, other)| other.voltage_v != row.voltage_v) {
             bad_input!(
-                "{name}, lines {} and {}: two voltages at the same time, {} V and {} V; expected one",
+                "{name}, {}s {} and {}: two voltages at the same time, {} V and {} V; expected one",
+                numbering.word(),
                 row.line,
                 other.line,
                 number(row.voltage_v),

@@ -101,9 +101,8 @@ impl ColumnNames {
         };
         if has_estimates(&found[Role::Reading as usize]) {
             bad_input!(
-                "{}, line {}: column `{ESTIMATE}` is the controller's own estimate, recorded without a sensor, and follows its                  model whatever the spring does; expected a column of readings",
-                table.name(),
-                table.header_line()
+                "{}: column `{ESTIMATE}` is the controller's own estimate, recorded without a sensor, and follows its                  model whatever the spring does; expected a column of readings",
+                table.header_place()
             );
         }
         for role in Role::ALL {
@@ -119,9 +118,8 @@ impl ColumnNames {
         if voltage.index == time.index || (reading.index == time.index && self.stiffness.is_none()) {
             let column = excerpt(table.column(time.index)).replace(['\n', '\r'], " ");
             bad_input!(
-                "{}, line {}: column `{column}` is the time; expected another one for --voltage and --reading",
-                table.name(),
-                table.header_line()
+                "{}: column `{column}` is the time; expected another one for --voltage and --reading",
+                table.header_place()
             );
         }
         Ok(Columns { time, voltage, reading })
@@ -245,6 +243,16 @@ fn split_unit(name: &str) -> (&str, Option<String>) {
     (name, None)
 }
 
+/// Returns the name of a column that says its unit: the name itself where it does, or where the unit is the one that is taken
+/// without a word, else `NAME [UNIT]`.
+pub fn with_unit(name: &str, unit: &str) -> String {
+    let own = split_unit(name).1;
+    let unit = unit.trim();
+    let is_said = own.is_some() && own == Some(usual(unit).unwrap_or_else(|| unit.to_owned()));
+    let is_default = [MEASURED, ESTIMATE].contains(&name) && usual_volts(unit).as_deref() == Some("V");
+    if unit.is_empty() || is_said || is_default { name.to_owned() } else { format!("{name} [{unit}]") }
+}
+
 /// The name of a usual unit of time, voltage or reading; `None` for a word that is none.
 fn usual(unit: &str) -> Option<String> {
     // A header in capitals: `TIME_MS`. A single capital is another unit.
@@ -281,6 +289,22 @@ mod tests {
             ("[mm]", "[mm]", None),
         ] {
             assert_eq!(split_unit(name), (base, unit.map(str::to_owned)), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_unit_is_added_to_a_name_that_does_not_say_it() {
+        for (name, unit, said) in [
+            ("time_s", "s", "time_s"),
+            ("t_ms", "msec", "t_ms"),
+            ("t_ms", "s", "t_ms [s]"),
+            ("x", "mm", "x [mm]"),
+            ("U", "kv", "U [kv]"),
+            ("stiffness", "V", "stiffness"),
+            ("stiffness", "N/m", "stiffness [N/m]"),
+            ("gauge", "", "gauge"),
+        ] {
+            assert_eq!(with_unit(name, unit), said);
         }
     }
 

@@ -25,7 +25,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// The file to write
+    /// The file to write: MCAP or Parquet if its name ends in .mcap or .parquet, otherwise CSV
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Length of the capture; default: that of --input
@@ -90,6 +90,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let read = all.iter().find(|row| row.measured).map(|row| row.stiffness);
     if session.status.sample.measured.is_none() && read.is_some() {
         session.status.sample.measured = read;
+        recording.finish()?;
         recording = Recording::new(&arguments.out, true, &session.status, every)?;
     }
     let mut tick = 0;
@@ -97,6 +98,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         tick += 1 + u64::from(row.missed);
         recording.add(&telemetry(tick, row, &volts))?;
     }
+    recording.finish()?;
     let (summary, file) = (recording.summary(), arguments.out.display());
     summary.remarks(&file.to_string()).iter().for_each(|text| remark(text));
     if session.json {

@@ -10,7 +10,7 @@ mod watch;
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
-use host_sim::link::{Client, Patience, Port};
+use host_sim::link::{Client, Patience, Port, fault as parse_fault};
 use host_sim::output::terminal::remark;
 use link::isolation::Isolation;
 use link::{Desired, Fault, Request};
@@ -27,7 +27,9 @@ Examples:
   vsj link /dev/ttyACM0 set 300 --arm --keep 60         arm, 300 V for a minute
   vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
   vsj link unix:/tmp/mcu.sock watch                     the emulator
+  vsj link /dev/ttyACM0 watch --udp                     live in PlotJuggler
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
+  vsj link /dev/ttyACM0 record out.mcap                 for Foxglove, PlotJuggler
   vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
   vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate
@@ -83,7 +85,7 @@ enum Command {
     },
     /// Show the running loop, and keep the MCU from detecting a silent host
     Watch(watch::Arguments),
-    /// Record time, voltage and stiffness as CSV for `vsj diagnose`
+    /// Record time, voltage and stiffness as CSV, MCAP or Parquet for `vsj diagnose`
     Record(record::Arguments),
     /// Record every tick of a few seconds in the MCU's RAM, then send it as CSV for `vsj diagnose`
     Capture(capture::Arguments),
@@ -122,7 +124,7 @@ enum Unit {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let json = arguments.json;
     let timeout = seconds("--timeout", arguments.timeout, 3600.0)?;
-    let patience = Patience::of(timeout);
+    let (patience, baud) = (Patience::of(timeout), arguments.baud);
     // The arguments are checked before anything is sent.
     let fault = match &arguments.command {
         Command::Acknowledge { fault } => parse_fault(fault)?,
@@ -157,7 +159,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         _ => None,
     };
 
-    let port = Port::open(&arguments.port, arguments.baud, timeout)?;
+    let port = Port::open(&arguments.port, baud, timeout)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
     let mut session = Session { client, status, json };
     match &arguments.command {
@@ -193,24 +195,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Isolation { acknowledge } => {
             session.show_isolation(if *acknowledge { Isolation::Acknowledge } else { Isolation::Read })
         }
-        Command::Watch(arguments) => watch::run(&mut session, arguments),
-        Command::Record(record) => record::run(&mut session, record, arguments.baud),
+        Command::Watch(arguments) => watch::run(&mut session, arguments, baud),
+        Command::Record(record) => record::run(&mut session, record, baud),
         Command::Capture(arguments) => capture::run(&mut session, arguments),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
         Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
-    }
-}
-
-fn parse_fault(text: &str) -> Result<Fault> {
-    let known = (1..=u8::MAX).map(Fault).filter(|fault| fault.name() != "unknown");
-    if let Some(fault) = known.clone().find(|fault| fault.name() == text) {
-        return Ok(fault);
-    }
-    match text.parse() {
-        Ok(code) if code > 0 => Ok(Fault(code)),
-        _ => {
-            let names: Vec<_> = known.map(Fault::name).collect();
-            bad_input!("{text} is not a fault; expected {} or a number of 1 to 255", names.join(", "))
-        }
     }
 }

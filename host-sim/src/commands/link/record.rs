@@ -18,7 +18,7 @@ use super::session::{Session, seconds, stop_on_interrupt, stopped};
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
-    /// The file to write
+    /// The file to write: MCAP or Parquet if its name ends in .mcap or .parquet, otherwise CSV
     #[arg(value_name = "FILE.csv")]
     file: PathBuf,
     /// Stop after this many seconds; default: at the end of --input, or with Ctrl-C
@@ -75,8 +75,10 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     let done = follow(session, schedule.as_ref(), whole, &mut recording);
     // The MCU would also stop by itself once the host is silent.
     let stopped = session.order(Request::Stream { every_ticks: 0 });
+    let finished = recording.finish();
     let (summary, file) = (recording.summary(), arguments.file.display());
     done.with_context(|| format!("{file} contains {} rows", summary.rows))?;
+    finished?;
     stopped?;
     summary.remarks(&file.to_string()).iter().for_each(|text| remark(text));
     if session.json {

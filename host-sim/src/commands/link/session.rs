@@ -4,11 +4,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use host_sim::link::{Client, Failure, IsolationRow, StatusReport, heartbeat};
+use host_sim::link::{Client, IsolationRow, StatusReport, heartbeat};
 use host_sim::output::terminal::{json, print, remark};
 use host_sim::signals::on_ctrl_c;
 use link::isolation::Isolation;
-use link::{Desired, IsolationReport, Reason, Request, Status, WireVolts};
+use link::{IsolationReport, Request, Status, WireVolts};
 use serde::Serialize;
 use simulation::bad_input;
 use simulation::bad_input::number;
@@ -30,18 +30,7 @@ pub(super) struct Session {
 impl Session {
     /// Sends a request. A stiffness out of reach is bad input; any other error is a failure.
     pub(super) fn order(&mut self, request: Request) -> Result<(link::State, WireVolts)> {
-        match self.client.order(request) {
-            Ok(done) => Ok(done),
-            Err(Failure::Refused(reason @ Reason::OutOfRange { .. })) => {
-                let unit = match request {
-                    Request::Set(Desired::Pascal(_)) => "Pa",
-                    Request::Set(Desired::NewtonPerMetre(_)) => "N/m",
-                    _ => "V",
-                };
-                bad_input!("{}: {reason} {unit}", self.client.name())
-            }
-            Err(failure) => Err(failure).with_context(|| self.client.name().to_owned()),
-        }
+        self.client.command(request)
     }
 
     pub(super) fn refresh(&mut self) -> Result<Status> {

@@ -1,34 +1,30 @@
-//! Telemetry as CSV with the columns `time_s,voltage_v,stiffness`, which a [`simulation::record::Record`] is read from; without
-//! a sensor the last one is `estimate`, which no diagnosis takes for a measurement.
+//! Telemetry as CSV, MCAP or Parquet with the columns `time_s,voltage_v,stiffness`, which a [`simulation::record::Record`] is
+//! read from; without a sensor the last one is `estimate`, which no diagnosis takes for a measurement.
 //!
 //! Rows follow each other at a fixed number of ticks. Between them stand the samples at which the voltage turns, up to down or
 //! down to up, so that no extreme value is lost.
 //!
-//! Each row is written in one piece as soon as it arrives: however the recording ends, by Ctrl-C, a lost connection or
-//! a full disk, the file ends with a complete row.
+//! However a recording ends, by Ctrl-C, a lost connection or a full disk, its rows can be read.
 
+mod sink;
 mod turns;
 
-use std::fs::File;
-use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use link::{Status, Telemetry};
 use serde::Serialize;
 
-use simulation::bad_input;
 use simulation::record::{ESTIMATE, MEASURED};
 
+use sink::Sink;
 pub use turns::Every;
 use turns::{Turn, Turns};
 
 /// A recording in progress.
 pub struct Recording {
     path: PathBuf,
-    file: File,
-    /// Number of bytes up to the end of the last complete row.
-    complete: u64,
+    sink: Sink,
     rate_hz: f64,
     /// Ticks between two samples that the MCU sends.
     sample_ticks: u64,
@@ -112,24 +108,26 @@ impl Summary {
 }
 
 impl Recording {
-    /// Creates the file. An existing one is kept unless `replace`, since a measurement cannot be repeated.
+    /// Creates the file, CSV unless its extension is `.mcap` or `.parquet`. An existing one is kept unless `replace`, since a
+    /// measurement cannot be repeated.
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] if the file exists or cannot be created.
     pub fn new(path: &Path, replace: bool, status: &Status, every: Every) -> Result<Self> {
-        let file = match File::options().write(true).create_new(!replace).create(replace).truncate(replace).open(path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                bad_input!("{}: already exists; expected a new file, or --force", path.display())
-            }
-            Err(error) => bad_input!("{}: cannot be created: {error}; expected a writable path", path.display()),
-        };
         let measured = status.sample.measured.is_some();
         let stiffness = if measured { "measured" } else { "estimate" };
-        let mut recording = Self {
+        let (origin, column) = if measured {
+            ("as measured by the sensor", MEASURED)
+        } else {
+            ("as estimated by the controller, without a sensor: no measurement", ESTIMATE)
+        };
+        let rate = status.rate_hz;
+        let source = format!(
+            "recorded over the serial link, control at {rate} Hz; voltage_v across the spring; stiffness {origin}"
+        );
+        Ok(Self {
             path: path.to_owned(),
-            file,
-            complete: 0,
+            sink: Sink::create(path, replace, column, &source)?,
             rate_hz: f64::from(status.rate_hz.max(1)),
             sample_ticks: u64::from(every.sample_ticks.max(1)),
             row_ticks: u64::from(every.row_ticks.max(1)),
@@ -139,18 +137,7 @@ impl Recording {
             last: None,
             turns: Turns::default(),
             summary: Summary { stiffness, ..Summary::default() },
-        };
-        let (source, column) = if measured {
-            ("as measured by the sensor", MEASURED)
-        } else {
-            ("as estimated by the controller, without a sensor: no measurement", ESTIMATE)
-        };
-        let rate = status.rate_hz;
-        recording.put(&format!(
-            "# recorded over the serial link, control at {rate} Hz; voltage_v across the spring; stiffness {source}\n\
-             time_s,voltage_v,{column}\n"
-        ))?;
-        Ok(recording)
+        })
     }
 
     /// Adds a sample; one that is not newer than the last is ignored.
@@ -192,9 +179,8 @@ impl Recording {
     fn row(&mut self, sample: &Telemetry, first: u64) -> Result<()> {
         let stiffness = if self.measured { sample.measured } else { Some(sample.estimate) };
         self.summary.without_reading += u64::from(stiffness.is_none());
-        let stiffness = stiffness.map_or("-".into(), |stiffness| format!("{:.6}", stiffness.to_f64()));
         let time = self.time_s(sample.tick - first);
-        self.put(&format!("{time},{:.6},{stiffness}\n", sample.applied.to_f64()))?;
+        self.sink.row(time, sample.applied.to_f64(), stiffness.map(|stiffness| stiffness.to_f64()))?;
         self.last_row = sample.tick;
         self.summary.rows += 1;
         self.summary.seconds = time;
@@ -211,16 +197,12 @@ impl Recording {
         &self.summary
     }
 
-    fn put(&mut self, text: &str) -> Result<()> {
-        let written = self.file.write_all(text.as_bytes());
-        if written.is_err() {
-            // Remove an incomplete row; if that fails too, the first error is reported.
-            let _ = self.file.set_len(self.complete);
-            let _ = self.file.seek(SeekFrom::Start(self.complete));
-        }
-        written.with_context(|| format!("{} cannot be written", self.path.display()))?;
-        self.complete += text.len() as u64;
-        Ok(())
+    /// Writes the end of the file, without which a Parquet file does not exist; the rows end here.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish(&mut self) -> Result<()> {
+        self.sink.finish()
     }
 }
 

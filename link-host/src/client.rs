@@ -16,7 +16,7 @@ use link::{
     Sequence, Status, Telemetry, Unreadable, WireModel, WireSettings,
 };
 
-use crate::link::Port;
+use crate::Port;
 
 /// How long to wait for an answer, and how often to repeat a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,13 +4,16 @@
 //! | --- | --- |
 //! | [`Port`] | a serial device, a unix socket or a TCP socket, as bytes |
 //! | [`Client`] | sends requests and repeats them until they are answered; collects telemetry |
+//! | [`fault`] | the fault with a name or a number |
 //! | [`heartbeat`] | how often an armed MCU must hear of its host |
 //! | [`StatusReport`], [`IsolationRow`], [`Row`] | status, isolation bank and telemetry of the MCU, as text and JSON |
 
 mod client;
+mod command;
 mod port;
 mod report;
 
 pub use client::{Client, Failure, Patience, heartbeat};
+pub use command::fault;
 pub use port::Port;
 pub use report::{IsolationRow, Row, StatusReport};

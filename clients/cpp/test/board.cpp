@@ -1,0 +1,57 @@
+// The client and a running board, whose port is the argument.
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+
+#include <vsj_link.hpp>
+
+namespace {
+
+void expect(bool is_so, const std::string& what) {
+    if (is_so) return;
+    std::cerr << "expected: " << what << '\n';
+    std::exit(1);
+}
+
+template <typename Work>
+std::string error_of(Work work) {
+    try {
+        work();
+    } catch (const vsj::Error& error) {
+        return error.what();
+    }
+    return "";
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    if (argc != 3) return 2;
+    const std::string port = argv[1], file = argv[2];
+    const auto patience = std::chrono::seconds(5);
+    expect(contains(error_of([] { vsj::Link link("unix:/nonexistent"); }), "cannot be opened"), "an error of the port");
+    {
+        vsj::Link link(port, 115'200, patience);
+        expect(link.status().sample.state == vsj::State::disarmed, "disarmed");
+        expect(contains(error_of([&] { link.set(10); }), port + ": refused: not armed"), "a refusal before arming");
+        expect(link.arm() == vsj::State::armed && link.set(300) == 300.0, "armed at 300 V");
+        // Longer than the MCU allows its host to be silent.
+        std::this_thread::sleep_for(std::chrono::duration<double>(1.2 * link.status().silence_limit_s));
+        expect(link.status().sample.state == vsj::State::armed, "armed by heartbeats");
+        const auto samples = link.watch(50, std::chrono::milliseconds(500));
+        expect(samples.size() >= 20 && samples.size() <= 26, std::to_string(samples.size()) + " samples to be 25");
+        for (std::size_t at = 1; at < samples.size(); ++at)
+            // Up to half a period is jitter, not a loss.
+            expect(samples[at].tick <= samples[at - 1].tick + 30, "no sample lost");
+        expect(samples.back().target_v == 300.0 && samples.back().applied_v > 300.0, "an overshooting voltage");
+        expect(contains(error_of([&] { link.set(5000); }), "out of range: expected 0 to 700"), "a bound");
+        expect(link.model().active.number == 0 && link.settings().active.number == 0, "what is built in");
+        expect(link.record(file, 100, std::chrono::milliseconds(300)) > 20, "rows of a recording");
+        expect(contains(error_of([&] { link.record(file, 100, patience); }), "cannot be created"), "an existing file kept");
+    }
+    vsj::Link link(port, 115'200, patience);
+    expect(link.status().sample.state == vsj::State::disarmed, "disarmed by the destructor");
+    std::puts("armed, set, kept, watched, recorded, disarmed");
+}

@@ -1,0 +1,761 @@
+// The host's side of the serial link to the microcontroller: one header for C++17 and POSIX, without dependencies.
+//
+//     vsj::Link link("/dev/ttyACM0");                 // or "unix:PATH", "tcp:HOST:PORT"
+//     link.arm();
+//     link.set(300.0);                                // in V; vsj::Unit::pascal, vsj::Unit::newton_per_metre
+//     for (const auto& sample : link.watch(100.0, std::chrono::seconds(2)))
+//         std::printf("%f %f\n", sample.time_s, sample.estimate_v);
+//     link.disarm();                                  // the destructor does it, too
+//
+// Heartbeats are sent by a thread, so that the microcontroller does not take the host for silent. All calls may come from any
+// thread; each waits until the microcontroller has answered, and throws vsj::Error if it does not or refuses.
+//
+// The protocol is described in docs/link.md. Frames: version 5 of it.
+
+#ifndef VSJ_LINK_HPP
+#define VSJ_LINK_HPP
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <termios.h>
+#include <unistd.h>
+
+namespace vsj {
+
+using Clock = std::chrono::steady_clock;
+using Bytes = std::vector<std::uint8_t>;
+
+/// A request that was refused or not answered, or a port that failed, as one line that names the port.
+class Error : public std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/// The encoding of frames.
+namespace wire {
+
+/// Version of the protocol.
+constexpr std::uint8_t version = 5;
+constexpr std::uint8_t request_kind = 'Q';
+constexpr std::uint8_t reply_kind = 'A';
+/// Largest number of bytes between two delimiters.
+constexpr std::size_t most_encoded = 130;
+
+/// CRC-32C (Castagnoli).
+inline std::uint32_t checksum(const Bytes& bytes) {
+    std::uint32_t crc = 0xffffffffu;
+    for (std::uint8_t byte : bytes) {
+        crc ^= byte;
+        for (int bit = 0; bit < 8; ++bit) crc = crc & 1 ? crc >> 1 ^ 0x82f63b78u : crc >> 1;
+    }
+    return ~crc;
+}
+
+/// Encodes a packet of less than 254 bytes without zeros.
+inline Bytes stuff(const Bytes& packet) {
+    Bytes out{1};
+    std::size_t start = 0;
+    for (std::uint8_t byte : packet) {
+        out.push_back(byte);
+        if (byte == 0) start = out.size() - 1;
+        out[start] = static_cast<std::uint8_t>(out.size() - start);
+    }
+    return out;
+}
+
+/// Decodes bytes that contain no zero; nothing if a block is incomplete.
+inline std::optional<Bytes> unstuff(const Bytes& bytes) {
+    Bytes out;
+    for (std::size_t from = 0; from < bytes.size();) {
+        const std::size_t end = from + bytes[from];
+        if (end > bytes.size()) return std::nullopt;
+        out.insert(out.end(), bytes.begin() + static_cast<std::ptrdiff_t>(from) + 1,
+                   bytes.begin() + static_cast<std::ptrdiff_t>(end));
+        from = end;
+        if (from < bytes.size()) out.push_back(0);
+    }
+    return out;
+}
+
+/// A message to be sent: its bytes in postcard's format.
+struct Writer {
+    Bytes bytes;
+
+    Writer& byte(std::uint8_t value) {
+        bytes.push_back(value);
+        return *this;
+    }
+    /// A number without sign: 7 bits a byte, the lowest first.
+    Writer& number(std::uint64_t value) {
+        for (; value >= 0x80; value >>= 7) byte(static_cast<std::uint8_t>(value | 0x80));
+        return byte(static_cast<std::uint8_t>(value));
+    }
+    Writer& real(double value) {
+        std::uint64_t bits;
+        static_assert(sizeof bits == sizeof value, "doubles of 64 bits");
+        std::memcpy(&bits, &value, sizeof bits);
+        return fixed(bits, 8);
+    }
+    /// The low bytes of a number, the lowest first.
+    Writer& fixed(std::uint64_t value, int count) {
+        for (int i = 0; i < count; ++i) byte(static_cast<std::uint8_t>(value >> (8 * i)));
+        return *this;
+    }
+};
+
+/// A message that was received; reading past its end makes it invalid.
+struct Reader {
+    const std::uint8_t* at;
+    const std::uint8_t* end;
+    bool valid = true;
+
+    explicit Reader(const Bytes& bytes) : at(bytes.data()), end(bytes.data() + bytes.size()) {}
+
+    std::uint8_t byte() {
+        if (at == end) {
+            valid = false;
+            return 0;
+        }
+        return *at++;
+    }
+    std::uint64_t number() {
+        std::uint64_t value = 0;
+        for (int shift = 0; shift < 64; shift += 7) {
+            const std::uint8_t next = byte();
+            value |= static_cast<std::uint64_t>(next & 0x7f) << shift;
+            if (next < 0x80) return value;
+        }
+        valid = false;
+        return 0;
+    }
+    std::int64_t integer() {
+        const std::uint64_t value = number();
+        return static_cast<std::int64_t>(value >> 1) ^ -static_cast<std::int64_t>(value & 1);
+    }
+    double real() {
+        std::uint64_t bits = 0;
+        for (int i = 0; i < 8; ++i) bits |= static_cast<std::uint64_t>(byte()) << (8 * i);
+        double value;
+        std::memcpy(&value, &bits, sizeof value);
+        return value;
+    }
+    /// Voltages are steps of 2^-20 V.
+    double volts() { return static_cast<double>(integer()) / 1048576.0; }
+    bool is_whole() const { return valid && at == end; }
+};
+
+/// The frame of a message.
+inline Bytes frame(std::uint8_t kind, std::uint16_t sequence, const Bytes& message, std::uint32_t session) {
+    Writer packet;
+    packet.byte(version).byte(kind).fixed(sequence, 2);
+    packet.bytes.insert(packet.bytes.end(), message.begin(), message.end());
+    packet.fixed(session, 4);
+    packet.fixed(checksum(packet.bytes), 4);
+    Bytes out = stuff(packet.bytes);
+    out.insert(out.begin(), 0);
+    out.push_back(0);
+    return out;
+}
+
+/// A packet whose checksum is right.
+struct Packet {
+    std::uint8_t version, kind;
+    std::uint16_t sequence;
+    std::uint32_t session;
+    Bytes message;
+};
+
+/// Decodes the bytes between two delimiters; nothing if they are damaged.
+inline std::optional<Packet> open(const Bytes& encoded) {
+    const auto packet = unstuff(encoded);
+    if (!packet || packet->size() < 12) return std::nullopt;
+    const auto word = [&](std::size_t at) {
+        std::uint32_t value = 0;
+        for (std::size_t i = 0; i < 4; ++i) value |= static_cast<std::uint32_t>((*packet)[at + i]) << (8 * i);
+        return value;
+    };
+    const std::size_t size = packet->size();
+    if (checksum(Bytes(packet->begin(), packet->end() - 4)) != word(size - 4)) return std::nullopt;
+    Bytes message(packet->begin() + 4, packet->end() - 8);
+    const auto sequence = static_cast<std::uint16_t>((*packet)[2] | (*packet)[3] << 8);
+    return Packet{(*packet)[0], (*packet)[1], sequence, word(size - 8), std::move(message)};
+}
+
+}  // namespace wire
+
+/// State of the output.
+enum class State : std::uint8_t { disarmed, armed, ramping, faulted };
+
+inline const char* name(State state) {
+    static const char* const names[] = {"disarmed", "armed", "ramping", "faulted"};
+    const auto code = static_cast<std::size_t>(state);
+    return code < 4 ? names[code] : "unknown";
+}
+
+/// Name of a fault's code; 0 is none.
+inline std::string fault_name(std::uint8_t code) {
+    static const char* const names[] = {"none",   "panic",  "hard-fault", "overrun", "interlock", "watchdog",
+                                        "monitor", "config", "supply",     "self-test"};
+    return std::string(code < 10 ? names[code] : "unknown") + " (" + std::to_string(code) + ")";
+}
+
+/// Unit of a desired stiffness: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip.
+enum class Unit : std::uint8_t { volt, pascal, newton_per_metre };
+
+/// One sample of the control loop; stiffnesses as the equivalent static voltage, in V.
+struct Sample {
+    /// Number of the tick, and its time in s, since the start.
+    std::uint64_t tick = 0;
+    double time_s = 0;
+    State state = State::disarmed;
+    /// Target stiffness, voltage across the spring, estimated stiffness, in V.
+    double target_v = 0, applied_v = 0, estimate_v = 0;
+    /// Measured stiffness in V, if there is a new reading.
+    std::optional<double> measured_v;
+    std::uint16_t dac_code = 0;
+    /// Limits that acted: 1 upper, 2 lower, 4 slew, 8 target.
+    std::uint8_t limits = 0;
+    /// What disagrees with the output, and the diagnosis of the sensor: codes of docs/link.md.
+    std::uint8_t mismatch = 0, sensor = 0;
+
+    static Sample read(wire::Reader& from, std::uint32_t rate_hz) {
+        Sample sample;
+        sample.tick = from.number();
+        sample.time_s = static_cast<double>(sample.tick) / std::max(rate_hz, 1u);
+        sample.state = static_cast<State>(from.number());
+        sample.target_v = from.volts();
+        sample.applied_v = from.volts();
+        sample.estimate_v = from.volts();
+        if (from.byte() != 0) sample.measured_v = from.volts();
+        sample.dac_code = static_cast<std::uint16_t>(from.number());
+        sample.limits = from.byte();
+        sample.mismatch = from.byte();
+        sample.sensor = from.byte();
+        return sample;
+    }
+};
+
+/// The status of the microcontroller.
+struct Status {
+    /// Version of the firmware: major, minor, patch.
+    std::array<std::uint8_t, 3> firmware{};
+    /// Git revision of the firmware, 0 if it is not known.
+    std::uint32_t revision = 0;
+    /// 0 none, 1 the paper's, 2 the fast one.
+    std::uint8_t controller = 0;
+    /// Ticks per second, in Hz.
+    std::uint32_t rate_hz = 0;
+    /// Longest silence of the host before the voltage ramps down, in s.
+    double silence_limit_s = 0;
+    /// Stiffness within reach, in V.
+    double lowest_v = 0, highest_v = 0;
+    /// Number of late ticks.
+    std::uint32_t overruns = 0;
+    /// Codes of the present fault and of the one that caused the last reset, 0 for none.
+    std::uint8_t fault = 0, last_fault = 0;
+    Sample sample;
+
+    static Status read(wire::Reader& from) {
+        Status status;
+        for (auto& part : status.firmware) part = from.byte();
+        status.revision = static_cast<std::uint32_t>(from.number());
+        status.controller = static_cast<std::uint8_t>(from.number());
+        status.rate_hz = static_cast<std::uint32_t>(from.number());
+        status.silence_limit_s = static_cast<double>(from.number()) / std::max(status.rate_hz, 1u);
+        status.lowest_v = from.volts();
+        status.highest_v = from.volts();
+        status.overruns = static_cast<std::uint32_t>(from.number());
+        status.fault = from.byte();
+        status.last_fault = from.byte();
+        status.sample = Sample::read(from, status.rate_hz);
+        for (int counter = 0; counter < 8; ++counter) from.number();
+        return status;
+    }
+};
+
+/// Identity of a model or of settings; number 0 is what is built in.
+struct BlockId {
+    std::uint32_t number = 0, format = 0, length = 0, checksum = 0;
+
+    static BlockId read(wire::Reader& from) {
+        BlockId id;
+        for (auto* part : {&id.number, &id.format, &id.length, &id.checksum})
+            *part = static_cast<std::uint32_t>(from.number());
+        return id;
+    }
+};
+
+/// What runs, and what is stored for the next start.
+struct Blocks {
+    BlockId active, stored;
+};
+
+/// A serial device or a socket.
+class Port {
+public:
+    Port(std::string name, unsigned baud, Clock::duration timeout) : name_(std::move(name)) {
+        const auto rest = [&](const char* prefix) -> std::optional<std::string> {
+            const std::size_t length = std::strlen(prefix);
+            if (name_.compare(0, length, prefix) != 0) return std::nullopt;
+            return name_.substr(length);
+        };
+        if (const auto path = rest("unix:")) {
+            unix_socket(*path, timeout);
+        } else if (const auto address = rest("tcp:")) {
+            tcp_socket(*address, timeout);
+        } else {
+            serial(baud);
+        }
+    }
+    ~Port() {
+        if (file_ >= 0) ::close(file_);
+    }
+    Port(const Port&) = delete;
+    Port& operator=(const Port&) = delete;
+
+    const std::string& name() const { return name_; }
+
+    /// Sends all bytes, within a second.
+    void write(const Bytes& bytes) {
+        const auto until = Clock::now() + std::chrono::seconds(1);
+        for (std::size_t sent = 0; sent < bytes.size();) {
+            if (!wait(POLLOUT, until)) throw Error(name_ + ": the port failed: it takes no bytes");
+            // No signal when the other side has gone.
+            const auto count = is_socket_ ? ::send(file_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL)
+                                          : ::write(file_, bytes.data() + sent, bytes.size() - sent);
+            if (count < 0 && errno != EAGAIN && errno != EINTR) fail("the port failed");
+            if (count > 0) sent += static_cast<std::size_t>(count);
+        }
+    }
+
+    /// Received bytes; none if none arrive before `until`.
+    Bytes read(Clock::time_point until) {
+        if (!wait(POLLIN, until)) return {};
+        Bytes bytes(1024);
+        const auto count = ::read(file_, bytes.data(), bytes.size());
+        if (count == 0) throw Error(name_ + ": the other side closed the connection");
+        if (count < 0 && errno != EAGAIN && errno != EINTR) fail("the port failed");
+        bytes.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
+        return bytes;
+    }
+
+private:
+    std::string name_;
+    int file_ = -1;
+    bool is_socket_ = false;
+
+    [[noreturn]] void fail(const std::string& what) const { throw Error(name_ + ": " + what + ": " + std::strerror(errno)); }
+
+    [[noreturn]] void cannot_open(const std::string& why) {
+        if (file_ >= 0) ::close(file_);
+        file_ = -1;
+        throw Error(name_ + ": cannot be opened: " + why + "; expected a serial device, unix:PATH or tcp:HOST:PORT");
+    }
+
+    bool wait(short event, Clock::time_point until) const {
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
+        pollfd polled{file_, event, 0};
+        const int ready = ::poll(&polled, 1, static_cast<int>(std::clamp<long long>(left, 0, 60'000)));
+        if (ready < 0 && errno != EINTR) fail("the port failed");
+        return ready > 0;
+    }
+
+    void connect(const sockaddr* address, socklen_t length, Clock::duration timeout) {
+        is_socket_ = true;
+        ::fcntl(file_, F_SETFL, ::fcntl(file_, F_GETFL) | O_NONBLOCK);
+        if (::connect(file_, address, length) == 0) return;
+        if (errno != EINPROGRESS) cannot_open(std::strerror(errno));
+        if (!wait(POLLOUT, Clock::now() + timeout)) cannot_open("no connection in time");
+        int error = 0;
+        socklen_t size = sizeof error;
+        ::getsockopt(file_, SOL_SOCKET, SO_ERROR, &error, &size);
+        if (error != 0) cannot_open(std::strerror(error));
+    }
+
+    void unix_socket(const std::string& path, Clock::duration timeout) {
+        sockaddr_un address{};
+        address.sun_family = AF_UNIX;
+        if (path.size() >= sizeof address.sun_path) cannot_open("the path is too long for a socket");
+        std::copy(path.begin(), path.end(), address.sun_path);
+        file_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        if (file_ < 0) cannot_open(std::strerror(errno));
+        connect(reinterpret_cast<const sockaddr*>(&address), sizeof address, timeout);
+    }
+
+    void tcp_socket(const std::string& address, Clock::duration timeout) {
+        const std::size_t colon = address.rfind(':');
+        if (colon == std::string::npos) cannot_open("no port in the address");
+        std::string host = address.substr(0, colon);
+        if (host.size() > 1 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+        addrinfo wanted{};
+        wanted.ai_socktype = SOCK_STREAM;
+        addrinfo* found = nullptr;
+        const int error = ::getaddrinfo(host.c_str(), address.substr(colon + 1).c_str(), &wanted, &found);
+        if (error != 0) cannot_open(::gai_strerror(error));
+        sockaddr_storage first{};
+        const socklen_t length = found->ai_addrlen;
+        std::memcpy(&first, found->ai_addr, length);
+        file_ = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        ::freeaddrinfo(found);
+        if (file_ < 0) cannot_open(std::strerror(errno));
+        const int now = 1;
+        ::setsockopt(file_, IPPROTO_TCP, TCP_NODELAY, &now, sizeof now);
+        connect(reinterpret_cast<const sockaddr*>(&first), length, timeout);
+    }
+
+    void serial(unsigned baud) {
+        file_ = ::open(name_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+        if (file_ < 0) cannot_open(std::strerror(errno));
+        termios line{};
+        if (::tcgetattr(file_, &line) != 0) cannot_open("not a serial device");
+        static const std::pair<unsigned, speed_t> rates[] = {
+            {9600, B9600},     {19200, B19200},   {38400, B38400},   {57600, B57600},
+            {115200, B115200}, {230400, B230400},
+        };
+        const auto* rate = std::find_if(std::begin(rates), std::end(rates), [&](auto& it) { return it.first == baud; });
+        if (rate == std::end(rates)) cannot_open("a baud rate of " + std::to_string(baud) + " is not usual");
+        ::cfmakeraw(&line);
+        line.c_cflag |= CLOCAL | CREAD;
+        ::cfsetspeed(&line, rate->second);
+        if (::tcsetattr(file_, TCSANOW, &line) != 0) cannot_open(std::strerror(errno));
+        // Other programs would interfere.
+        ::ioctl(file_, TIOCEXCL);
+    }
+};
+
+/// A connection to a running microcontroller.
+class Link {
+public:
+    /// Opens the port and begins a session; `timeout` is the longest wait for that and for each answer.
+    explicit Link(const std::string& port, unsigned baud = 115'200,
+                  std::chrono::milliseconds timeout = std::chrono::seconds(1))
+        : port_(port, baud, timeout), tries_(std::max<int>(1, static_cast<int>(timeout / each))) {
+        const auto now = std::chrono::system_clock::now().time_since_epoch();
+        // An answer to an earlier program may still be on its way.
+        sequence_ = static_cast<std::uint16_t>(std::chrono::duration_cast<std::chrono::microseconds>(now).count());
+        begin();
+        status();
+        // Telemetry sent before the greeting belongs to an earlier program.
+        samples_.clear();
+        const double beat_s = std::clamp(status_.silence_limit_s / 5.0, 0.01, 1.0);
+        beat_ = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(beat_s));
+        beating_ = std::thread([this] { heartbeats(); });
+    }
+
+    /// Disarms the microcontroller and closes the port.
+    ~Link() {
+        {
+            const std::lock_guard<std::mutex> guard(closing_lock_);
+            closing_ = true;
+        }
+        wake_.notify_all();
+        beating_.join();
+        try {
+            disarm();
+        } catch (const Error&) {
+            // Without its host the microcontroller ramps down by itself.
+        }
+    }
+    Link(const Link&) = delete;
+    Link& operator=(const Link&) = delete;
+
+    Status status() {
+        const Lock lock(mutex_);
+        const Bytes reply = ask({1});
+        status_ = read_status(reply);
+        return status_;
+    }
+
+    /// Enables the output; the target starts at 0 V.
+    State arm() { return order({3}).first; }
+
+    /// Disables the output immediately.
+    State disarm() { return order({4}).first; }
+
+    /// Sets the desired stiffness of an armed microcontroller; returns the target in V.
+    double set(double value, Unit unit = Unit::volt) {
+        return order(wire::Writer().byte(2).byte(static_cast<std::uint8_t>(unit)).real(value).bytes).second;
+    }
+
+    /// Acknowledges a fault by its code; after the last one the microcontroller is disarmed.
+    State acknowledge(std::uint8_t fault) { return order({5, fault}).first; }
+
+    /// The model that runs, and the one stored for the next start. `vsj link PORT model` sends another one.
+    Blocks model() { return blocks(8, 4); }
+
+    /// The settings that run, and those stored for the next start. `vsj link PORT settings` shows and sends them.
+    Blocks settings() { return blocks(13, 6); }
+
+    /// Asks for telemetry at a rate in Hz, 0 for none; `samples` returns it.
+    void stream(double rate_hz) {
+        const Lock lock(mutex_);
+        double ticks = 0;
+        if (rate_hz != 0) ticks = std::clamp(std::round(status_.rate_hz / rate_hz), 1.0, 65535.0);
+        samples_.clear();
+        every_ticks_ = static_cast<std::uint16_t>(ticks);
+        order(wire::Writer().byte(7).number(every_ticks_).bytes);
+    }
+
+    /// Telemetry that arrives within `wait`.
+    std::vector<Sample> samples(Clock::duration wait) {
+        const auto until = Clock::now() + wait;
+        for (;; std::this_thread::yield()) {
+            const Lock lock(mutex_);
+            // In short turns, between which other threads have theirs.
+            const auto turn = std::min(until, Clock::now() + std::chrono::milliseconds(5));
+            while (next_answer(turn)) {
+            }
+            beat_if_due();
+            if (Clock::now() >= until) {
+                std::vector<Sample> all(samples_.begin(), samples_.end());
+                samples_.clear();
+                return all;
+            }
+        }
+    }
+
+    /// All samples of a time; for endless ones use `stream` and `samples`.
+    std::vector<Sample> watch(double rate_hz, Clock::duration length) {
+        stream(rate_hz);
+        std::vector<Sample> all = samples(length);
+        stream(0);
+        return all;
+    }
+
+    /// Records to a CSV file for `vsj diagnose`; returns the number of rows.
+    std::size_t record(const std::string& path, double rate_hz, Clock::duration length) {
+        std::FILE* file = std::fopen(path.c_str(), "wx");
+        if (file == nullptr) throw Error(path + ": cannot be created: " + std::strerror(errno));
+        std::vector<Sample> rows;
+        try {
+            rows = watch(rate_hz, length);
+        } catch (...) {
+            std::fclose(file);
+            throw;
+        }
+        const bool has_sensor = std::any_of(rows.begin(), rows.end(), [](auto& row) { return row.measured_v.has_value(); });
+        std::fprintf(file, "# recorded over the serial link; stiffness %s\ntime_s,voltage_v,%s\n",
+                     has_sensor ? "as measured by the sensor" : "as estimated by the controller: no measurement",
+                     has_sensor ? "stiffness" : "estimate");
+        for (const auto& row : rows) {
+            std::fprintf(file, "%.9g,%.6f,", row.time_s - rows.front().time_s, row.applied_v);
+            const auto reading = has_sensor ? row.measured_v : row.estimate_v;
+            reading ? std::fprintf(file, "%.6f\n", *reading) : std::fprintf(file, "-\n");
+        }
+        if (std::fclose(file) != 0) throw Error(path + ": cannot be written: " + std::strerror(errno));
+        return rows.size();
+    }
+
+private:
+    using Lock = std::lock_guard<std::recursive_mutex>;
+    /// A request is repeated after this time.
+    static constexpr std::chrono::milliseconds each{100};
+    /// Requests after which a new session begins: a session has 65 536 numbers.
+    static constexpr unsigned most_requests = 60'000;
+
+    Port port_;
+    int tries_;
+    std::recursive_mutex mutex_;
+    std::uint16_t sequence_ = 0;
+    std::uint32_t session_ = 0;
+    unsigned requests_ = 0;
+    std::uint16_t every_ticks_ = 0;
+    Status status_;
+    /// Bytes since the last delimiter.
+    Bytes encoded_;
+    std::deque<std::uint8_t> received_;
+    std::deque<Sample> samples_;
+    /// Number of a report of faults whose receipt the microcontroller does not know of yet.
+    std::optional<std::uint32_t> unheard_;
+    Clock::duration beat_{};
+    Clock::time_point heard_ = Clock::now();
+    std::mutex closing_lock_;
+    std::condition_variable wake_;
+    bool closing_ = false;
+    std::thread beating_;
+
+    void heartbeats() {
+        std::unique_lock<std::mutex> guard(closing_lock_);
+        while (!wake_.wait_for(guard, beat_ / 4, [this] { return closing_; })) {
+            guard.unlock();
+            try {
+                const Lock lock(mutex_);
+                beat_if_due();
+            } catch (const Error&) {
+                // The next call meets the same.
+            }
+            guard.lock();
+        }
+    }
+
+    void beat_if_due() {
+        if (beat_.count() > 0 && Clock::now() - heard_ >= beat_) order({6});
+    }
+
+    /// A request that is answered with the state and the target.
+    std::pair<State, double> order(const Bytes& message) {
+        const Lock lock(mutex_);
+        const Bytes reply = ask(message);
+        wire::Reader from(reply);
+        const auto code = from.number();
+        const auto state = static_cast<State>(from.number());
+        const double target_v = from.volts();
+        if (code != 0 || !from.is_whole()) throw Error(port_.name() + ": unexpected answer");
+        return {state, target_v};
+    }
+
+    Blocks blocks(std::uint8_t request, std::uint8_t reply_code) {
+        const Lock lock(mutex_);
+        const Bytes reply = ask({request});
+        wire::Reader from(reply);
+        const auto code = from.number();
+        const BlockId active = BlockId::read(from), stored = BlockId::read(from);
+        if (code != reply_code || !from.is_whole()) throw Error(port_.name() + ": unexpected answer");
+        return {active, stored};
+    }
+
+    Status read_status(const Bytes& reply) const {
+        wire::Reader from(reply);
+        const auto code = from.number();
+        const Status status = Status::read(from);
+        if (code != 2 || !from.is_whole()) throw Error(port_.name() + ": unexpected answer");
+        return status;
+    }
+
+    /// Asks for a new session, which the next request begins.
+    void begin() {
+        session_ = 0;
+        status_ = read_status(exchange({0}));
+        requests_ = 0;
+    }
+
+    /// A request of the session, after what it needs.
+    Bytes ask(const Bytes& message) {
+        if (requests_ >= most_requests) {
+            begin();
+            if (every_ticks_ > 0) exchange(wire::Writer().byte(7).number(every_ticks_).bytes);
+        }
+        const Bytes reply = exchange(message);
+        if (unheard_) {
+            const auto number = *unheard_;
+            unheard_.reset();
+            exchange(wire::Writer().byte(12).number(number).bytes);
+        }
+        return reply;
+    }
+
+    /// Sends a request and repeats it until it is answered.
+    Bytes exchange(const Bytes& message) {
+        const bool is_hello = message[0] == 0;
+        ++sequence_;
+        ++requests_;
+        const Bytes frame = wire::frame(wire::request_kind, sequence_, message, session_);
+        for (int turn = 0; turn < tries_; ++turn) {
+            port_.write(frame);
+            const auto until = Clock::now() + each;
+            while (auto answer = next_answer(until)) {
+                if (answer->sequence != sequence_) continue;
+                heard_ = Clock::now();
+                if (answer->version != wire::version) refuse({3, answer->version});
+                if (is_hello) session_ = answer->session;
+                if (answer->message[0] == 1) refuse(Bytes(answer->message.begin() + 1, answer->message.end()));
+                return std::move(answer->message);
+            }
+        }
+        throw Error(port_.name() + ": no answer to " + std::to_string(tries_) +
+                    " requests; is the MCU running on this port?");
+    }
+
+    /// The next answer that arrives before `until`. Telemetry and reports of faults are kept.
+    std::optional<wire::Packet> next_answer(Clock::time_point until) {
+        for (;;) {
+            while (!received_.empty()) {
+                const std::uint8_t byte = received_.front();
+                received_.pop_front();
+                if (byte != 0) {
+                    if (encoded_.size() <= wire::most_encoded) encoded_.push_back(byte);
+                    continue;
+                }
+                auto packet = encoded_.size() <= wire::most_encoded ? wire::open(encoded_) : std::nullopt;
+                encoded_.clear();
+                if (!packet || packet->kind != wire::reply_kind || packet->message.empty()) continue;
+                if (packet->version != wire::version) return packet;
+                wire::Reader from(packet->message);
+                const auto code = from.number();
+                if (code == 3) {
+                    const Sample sample = Sample::read(from, status_.rate_hz);
+                    if (from.is_whole()) samples_.push_back(sample);
+                } else if (code == 5) {
+                    unheard_ = static_cast<std::uint32_t>(from.number());
+                } else {
+                    return packet;
+                }
+            }
+            if (Clock::now() >= until) return std::nullopt;
+            const Bytes bytes = port_.read(until);
+            received_.insert(received_.end(), bytes.begin(), bytes.end());
+        }
+    }
+
+    [[noreturn]] void refuse(const Bytes& reason) const {
+        wire::Reader from(reason);
+        const auto code = from.number();
+        const auto range = [&] {
+            const double lowest = from.real(), highest = from.real();
+            char text[80];
+            std::snprintf(text, sizeof text, "%g to %g", lowest, highest);
+            return std::string(text);
+        };
+        std::string why;
+        switch (code) {
+            case 0: why = "out of range: expected " + range(); break;
+            case 1: why = "not armed"; break;
+            case 2: why = "faulted: " + fault_name(from.byte()) + "; acknowledge it first"; break;
+            case 3:
+                why = "the MCU speaks version " + std::to_string(from.byte()) + " of the protocol, this program " +
+                      std::to_string(wire::version);
+                break;
+            case 4: why = "the MCU has restarted and waits for a Hello"; break;
+            case 5: why = "too late: request " + std::to_string(from.number()) + " is already accepted"; break;
+            case 6: why = "a different request has the same sequence number"; break;
+            case 7: why = "the MCU does not know this request"; break;
+            case 8: why = "the interlock is open"; break;
+            case 9: why = "a different fault is present: " + fault_name(from.byte()); break;
+            case 10: why = "the host was silent for too long"; break;
+            case 11: why = "armed; disarm it first"; break;
+            case 16: why = "the amplifier is off, and its monitors still show a voltage or a current"; break;
+            case 17: why = "the cause of the fault is still there: " + fault_name(from.byte()); break;
+            case 18: why = "the MCU is in a session with another program"; break;
+            case 19: why = "the supply of the MCU's converters is out of its range"; break;
+            default: why = "reason " + std::to_string(code) + " of docs/link.md"; break;
+        }
+        throw Error(port_.name() + ": refused: " + why);
+    }
+};
+
+}  // namespace vsj
+
+#endif

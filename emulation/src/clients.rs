@@ -1,0 +1,75 @@
+//! `cargo xtask clients`: the clients of the link in C++ and Python command the emulated firmware.
+//!
+//! In: the image, a C++ compiler with CMake, and the virtual environment of `cargo xtask python`, in which the package is
+//! installed. Out: one line on stdout for each client.
+
+use std::path::Path;
+use std::process::Command;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use xtask::build::{self, Board, Opt};
+use xtask::{setup, shell};
+
+use crate::qemu::emulator;
+
+/// Longest wait for the emulator's socket.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Folder of the C++ client and its tests.
+const CPP: &str = "clients/cpp";
+
+/// Builds the image and the C++ programs, and lets each client command a board of its own.
+pub(crate) fn run() -> Result<()> {
+    setup::emulator()?;
+    let elf = build::image(Board::Mps2, Opt::S)?;
+    let target = shell::target_directory()?;
+    cpp(&elf, &target)?;
+    python(&elf, &target)
+}
+
+/// Compiles the header with CMake, and runs its tests: every frame of the protocol, then the board.
+fn cpp(elf: &Path, target: &Path) -> Result<()> {
+    let built = target.join("clients-cpp");
+    let source = shell::root().join(CPP);
+    shell::run(shell::command("cmake").arg("-S").arg(&source).arg("-B").arg(&built).arg("-DCMAKE_BUILD_TYPE=Debug"))
+        .context("cmake and a C++ compiler are needed (Debian, Ubuntu: apt-get install cmake g++)")?;
+    shell::run(shell::command("cmake").arg("--build").arg(&built).args(["--parallel", "2"]))?;
+    shell::run(shell::command(built.join("frames")).arg(source.join("golden")))?;
+    let folder = tempfile::tempdir()?;
+    on_board(elf, "cpp", |port| {
+        let mut command = shell::command(built.join("board"));
+        command.arg(port).arg(folder.path().join("record.csv"));
+        command
+    })
+}
+
+/// Runs the tests of the Python package that need a board.
+fn python(elf: &Path, target: &Path) -> Result<()> {
+    let python = target.join("python-venv/bin/python");
+    ensure!(python.exists(), "{} is missing: run cargo xtask python", python.display());
+    on_board(elf, "python", |port| {
+        let mut command = shell::command(&python);
+        command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests/test_link.py"]);
+        command.env("VSJ", target.join("release/vsj")).env("VSJ_BOARD", port);
+        command
+    })
+}
+
+/// Starts a board and runs the command of its port.
+fn on_board(elf: &Path, name: &str, command: impl FnOnce(&str) -> Command) -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let socket = folder.path().join("link");
+    let port = format!("unix:{}", socket.display());
+    // What it stores ends with the folder.
+    let run = || {
+        let begin = Instant::now();
+        while !socket.exists() {
+            ensure!(begin.elapsed() < PATIENCE, "the emulator has not opened {}", socket.display());
+            thread::sleep(Duration::from_millis(10));
+        }
+        shell::run(&mut command(&port))
+    };
+    emulator::obey_in(folder.path(), elf, &socket, |_| {}, run).with_context(|| format!("the client in {name}"))?;
+    Ok(())
+}

@@ -1,0 +1,47 @@
+//! Requests with the errors of the command `vsj link`, in its words, for every program that sends them.
+
+use anyhow::{Context, Result};
+use link::{Desired, Fault, Reason, Request, State, WireVolts};
+use simulation::bad_input;
+
+use crate::client::{Client, Failure};
+
+impl Client {
+    /// Sends a request that is answered with an acknowledgement. A stiffness out of reach is bad input; any other error is a
+    /// failure. Both name the port.
+    ///
+    /// # Errors
+    /// [`simulation::BadInput`] for a stiffness out of reach; [`Failure`] for any other.
+    pub fn command(&mut self, request: Request) -> Result<(State, WireVolts)> {
+        match self.order(request) {
+            Ok(done) => Ok(done),
+            Err(Failure::Refused(reason @ Reason::OutOfRange { .. })) => {
+                let unit = match request {
+                    Request::Set(Desired::Pascal(_)) => "Pa",
+                    Request::Set(Desired::NewtonPerMetre(_)) => "N/m",
+                    _ => "V",
+                };
+                bad_input!("{}: {reason} {unit}", self.name())
+            }
+            Err(failure) => Err(failure).with_context(|| self.name().to_owned()),
+        }
+    }
+}
+
+/// The fault with a name or a number.
+///
+/// # Errors
+/// [`simulation::BadInput`] with the names that are known.
+pub fn fault(text: &str) -> Result<Fault> {
+    let known = (1..=u8::MAX).map(Fault).filter(|fault| fault.name() != "unknown");
+    if let Some(fault) = known.clone().find(|fault| fault.name() == text) {
+        return Ok(fault);
+    }
+    match text.parse() {
+        Ok(code) if code > 0 => Ok(Fault(code)),
+        _ => {
+            let names: Vec<_> = known.map(Fault::name).collect();
+            bad_input!("{text} is not a fault; expected {} or a number of 1 to 255", names.join(", "))
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! A running MCU over its serial link, for `vsj.Link`: the client of the command `vsj link`, with heartbeats from a thread.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use link::{Desired, Reason, Request, Status};
+use link_host::{Client, Failure, Patience, Row, StatusReport, heartbeat};
+use pyo3::prelude::*;
+use simulation::settings_file::{SettingsFile, Source};
+use simulation::{BadInput, bad_input, plant_file};
+
+use crate::analysis::Plant;
+use crate::error::link_exception;
+
+/// Longest time for which a call holds the connection: the heartbeat and the interpreter's signals wait so long.
+const TURN: Duration = Duration::from_millis(20);
+
+/// A connection, shared with the thread of its heartbeats.
+struct Connection {
+    client: Client,
+    status: Status,
+    heartbeat: Duration,
+    /// When the MCU last heard of this program.
+    heard: Instant,
+}
+
+impl Connection {
+    fn order(&mut self, request: Request) -> Result<(&'static str, f64)> {
+        let (state, target) = self.client.command(request)?;
+        self.heard = Instant::now();
+        Ok((state.name(), target.to_f64()))
+    }
+
+    /// Sends a heartbeat if one is due.
+    fn beat(&mut self) -> Result<()> {
+        if self.heard.elapsed() >= self.heartbeat { self.order(Request::Heartbeat).map(drop) } else { Ok(()) }
+    }
+
+    fn name(&self) -> String {
+        self.client.name().to_owned()
+    }
+
+    /// Reads the status, which also holds after a restart.
+    fn status(&mut self) -> Result<String> {
+        let name = self.name();
+        self.status = self.client.status().with_context(|| name)?;
+        self.heard = Instant::now();
+        Ok(serde_json::to_string(&StatusReport::new(&self.status))?)
+    }
+
+    fn models(&mut self, plant: Option<Plant>) -> Result<String> {
+        let (what, file) = match plant {
+            None => {
+                let name = self.name();
+                return Ok(serde_json::to_string(&self.client.models().with_context(|| name)?)?);
+            }
+            Some(Plant::Named(path)) => (path.clone(), plant_file::load(&path)?),
+            Some(Plant::Text((name, text))) => (name.clone(), plant_file::parse(&name, &text)?),
+        };
+        let model = file.wire().map_err(|error| BadInput(format!("{what}: {error}")))?;
+        let name = self.name();
+        match self.client.install(&model) {
+            Err(Failure::Refused(reason @ Reason::BadModel { .. })) => bad_input!("{what}: {reason}"),
+            answer => Ok(serde_json::to_string(&answer.with_context(|| name)?)?),
+        }
+    }
+
+    fn settings(&mut self, path: Option<PathBuf>) -> Result<(String, String)> {
+        let name = self.name();
+        let blocks = match &path {
+            None => self.client.settings(),
+            Some(path) => {
+                let source = Source::open(path)?;
+                let built_in = self.client.read_settings(true).with_context(|| name.clone())?;
+                self.client.install_settings(&source.over(&built_in)?)
+            }
+        };
+        let blocks = match blocks {
+            Err(Failure::Refused(reason @ (Reason::BadSettings { .. } | Reason::NotBuiltIn(_)))) => {
+                bad_input!("{}: {reason}", path.unwrap_or_default().display())
+            }
+            blocks => blocks.with_context(|| name.clone())?,
+        };
+        let running = self.client.read_settings(false).with_context(|| name)?;
+        Ok((serde_json::to_string(&blocks)?, SettingsFile::from(&running).to_toml()?))
+    }
+}
+
+/// An open port.
+#[pyclass(frozen, module = "vsj._vsj")]
+pub(crate) struct Port {
+    connection: Arc<Mutex<Option<Connection>>>,
+    closing: Arc<AtomicBool>,
+    beating: Mutex<Option<JoinHandle<()>>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Sends heartbeats until the port is closed; a lost connection is reported by the next call.
+fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) {
+    while !closing.load(Ordering::Relaxed) {
+        if let Some(connection) = lock(connection).as_mut() {
+            let _ = connection.beat();
+        }
+        thread::park_timeout(TURN / 4);
+    }
+}
+
+impl Port {
+    /// Does `work` with the connection, without the interpreter's lock.
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Connection) -> Result<T> + Send) -> PyResult<T> {
+        let done = py.detach(|| match lock(&self.connection).as_mut() {
+            Some(connection) => work(connection),
+            None => Err(anyhow::anyhow!("the link is closed")),
+        });
+        done.map_err(link_exception)
+    }
+}
+
+#[pymethods]
+impl Port {
+    #[new]
+    fn new(py: Python<'_>, port: &str, baud: u32, timeout: f64) -> PyResult<Self> {
+        let open = || {
+            if !(timeout > 0.0 && timeout <= 3600.0) {
+                bad_input!("timeout {timeout}: expected a positive number of seconds, at most 3600");
+            }
+            let timeout = Duration::from_secs_f64(timeout);
+            let opened = link_host::Port::open(port, baud, timeout)?;
+            let (client, status) = Client::greet(opened, Patience::of(timeout)).with_context(|| port.to_owned())?;
+            Ok(Connection { client, heartbeat: heartbeat(&status), status, heard: Instant::now() })
+        };
+        let connection = Arc::new(Mutex::new(Some(py.detach(open).map_err(link_exception)?)));
+        let closing = Arc::new(AtomicBool::new(false));
+        let (shared, until) = (connection.clone(), closing.clone());
+        let beating = thread::spawn(move || beat(&shared, &until));
+        Ok(Self { connection, closing, beating: Mutex::new(Some(beating)) })
+    }
+
+    fn status(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, Connection::status)
+    }
+
+    fn arm(&self, py: Python<'_>) -> PyResult<(&'static str, f64)> {
+        self.with(py, |it| it.order(Request::Arm))
+    }
+
+    fn disarm(&self, py: Python<'_>) -> PyResult<(&'static str, f64)> {
+        self.with(py, |it| it.order(Request::Disarm))
+    }
+
+    fn set(&self, py: Python<'_>, value: f64, unit: &str) -> PyResult<(&'static str, f64)> {
+        self.with(py, |it| {
+            if !value.is_finite() {
+                bad_input!("{value} is not a stiffness; expected a finite number");
+            }
+            it.order(Request::Set(match unit {
+                "V" => Desired::ScaledVolts(value),
+                "Pa" => Desired::Pascal(value),
+                "N/m" => Desired::NewtonPerMetre(value),
+                other => bad_input!("`{other}` is not a unit of stiffness; expected V, Pa or N/m"),
+            }))
+        })
+    }
+
+    fn acknowledge(&self, py: Python<'_>, fault: &str) -> PyResult<(&'static str, f64)> {
+        self.with(py, |it| it.order(Request::Acknowledge(link_host::fault(fault)?)))
+    }
+
+    /// Asks for telemetry at a rate in Hz, 0 for none; returns the MCU's ticks per second.
+    fn stream(&self, py: Python<'_>, rate_hz: f64) -> PyResult<u32> {
+        self.with(py, |it| {
+            let ticks_hz = it.status.rate_hz;
+            let every_ticks = match rate_hz {
+                0.0 => 0,
+                rate if (0.02..=10_000.0).contains(&rate) => {
+                    (f64::from(ticks_hz) / rate).round().clamp(1.0, f64::from(u16::MAX)) as u16
+                }
+                rate => bad_input!("rate_hz {rate}: expected 0.02 to 10000"),
+            };
+            // Samples of an earlier stream may have come after its end.
+            let name = it.name();
+            it.client.samples(Duration::ZERO).with_context(|| name)?.for_each(drop);
+            it.order(Request::Stream { every_ticks })?;
+            Ok(ticks_hz)
+        })
+    }
+
+    /// Telemetry that arrives within `wait_s`, as a JSON array. Ctrl-C is noticed within milliseconds.
+    fn samples(&self, py: Python<'_>, wait_s: f64) -> PyResult<String> {
+        let wait = Duration::try_from_secs_f64(wait_s).unwrap_or_default();
+        let (start, mut rows) = (Instant::now(), Vec::new());
+        loop {
+            let turn = wait.saturating_sub(start.elapsed()).min(TURN);
+            self.with(py, |it| {
+                it.beat()?;
+                let (name, rate_hz) = (it.name(), it.status.rate_hz);
+                let samples = it.client.samples(turn).with_context(|| name)?;
+                rows.extend(samples.map(|sample| Row::new(&sample, rate_hz)));
+                Ok(())
+            })?;
+            if start.elapsed() >= wait {
+                return serde_json::to_string(&rows).map_err(|error| link_exception(error.into()));
+            }
+            py.check_signals()?;
+        }
+    }
+
+    fn models(&self, py: Python<'_>, plant: Option<Plant>) -> PyResult<String> {
+        self.with(py, |it| it.models(plant))
+    }
+
+    fn settings(&self, py: Python<'_>, path: Option<PathBuf>) -> PyResult<(String, String)> {
+        self.with(py, |it| it.settings(path))
+    }
+
+    /// Ends the heartbeats and closes the port, without a word to the MCU.
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| {
+            self.closing.store(true, Ordering::Relaxed);
+            if let Some(beating) = lock(&self.beating).take() {
+                beating.thread().unpark();
+                let _ = beating.join();
+            }
+            drop(lock(&self.connection).take());
+        });
+    }
+}
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        self.closing.store(true, Ordering::Relaxed);
+    }
+}

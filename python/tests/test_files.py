@@ -1,0 +1,33 @@
+"""Parquet files of the command and of others."""
+
+import json
+
+import polars
+import pytest
+from conftest import SAMPLE
+
+
+def test_a_parquet_file_of_polars_is_the_record_that_its_csv_is(command, sample, tmp_path):
+    file = tmp_path / "sample.parquet"
+    polars.DataFrame(sample).write_parquet(file, compression="snappy")
+    found, expected = (json.loads(command("identify", record, "--json")) for record in (file, SAMPLE))
+    assert {**found, "start": None} == {**expected, "start": None}, "all but the name of the record"
+    polars.DataFrame(sample).write_parquet(file, compression="zstd")
+    assert "compressed by zstd; expected Snappy" in command.error("identify", file)
+    stamped = polars.DataFrame(sample).with_columns(
+        time=polars.datetime(2026, 1, 31) + polars.duration(milliseconds=polars.col("time_s") * 1000)
+    )
+    stamped.drop("time_s").write_parquet(file, compression="snappy")
+    found = json.loads(command("identify", file, "--json"))
+    tau_s = [answer["nominal"]["tau_s"][0]["value"] for answer in (found, expected)]
+    assert tau_s[0] == pytest.approx(tau_s[1], rel=1e-6)
+
+
+def test_polars_reads_what_the_command_writes(command, tmp_path):
+    file = tmp_path / "stair.parquet"
+    command("stair", "--out", file, "--every", "0.1")
+    frame = polars.read_parquet(file)
+    assert frame.columns == ["time_s", "target_v", "applied_v", "dac_code", "stiffness", "youngs_modulus_pa"]
+    assert frame.height == 701 and frame["time_s"][1] == 0.1 and frame["dac_code"].dtype == polars.Int64
+    attributes = json.loads(polars.read_parquet_metadata(file)["PANDAS_ATTRS"])
+    assert attributes["units"]["youngs_modulus_pa"] == "Pa"

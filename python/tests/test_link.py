@@ -1,0 +1,81 @@
+"""The client of the link: its errors without a board, and the emulated board of `cargo xtask clients`."""
+
+import os
+import time
+
+import pytest
+import vsj
+
+
+@pytest.fixture
+def board():
+    port = os.environ.get("VSJ_BOARD")
+    if port is None:
+        pytest.skip("no board; cargo xtask clients starts one")
+    return port
+
+
+def test_a_port_that_is_none_is_bad_input_with_the_words_of_the_command(command):
+    port = "unix:/nonexistent/link"
+    with pytest.raises(vsj.BadInput) as raised:
+        vsj.Link(port)
+    assert str(raised.value) == command.error("link", port, "status")
+    with pytest.raises(vsj.BadInput, match="timeout 0: expected a positive number of seconds"):
+        vsj.Link(port, timeout=0)
+
+
+def test_the_link_arms_sets_watches_and_disarms(board):
+    with vsj.Link(board, timeout=5) as link:
+        assert link.status()["sample"]["state"] == "disarmed"
+        assert (link.arm(), link.set(300)) == ("armed", 300.0)
+        # Longer than the MCU allows its host to be silent.
+        time.sleep(1.2 * link.status()["silence_limit_s"])
+        samples = list(link.watch(rate_hz=50, seconds=0.5))
+        assert {sample.state for sample in samples} == {"armed"}
+        # Up to half a period is jitter, not a loss.
+        assert all(10 < after.tick - before.tick < 30 for before, after in zip(samples, samples[1:]))
+        assert samples[-1].target_v == 300.0 and samples[-1].applied_v > 300
+    with vsj.Link(board, timeout=5) as link:
+        assert link.status()["sample"]["state"] == "disarmed"
+        with pytest.raises(vsj.LinkError, match="refused: not armed"):
+            link.set(10)
+    with pytest.raises(vsj.LinkError, match="the link is closed"):
+        link.status()
+
+
+def test_a_schedule_is_recorded_from_its_first_row_on(board):
+    with vsj.Link(board, timeout=5) as link:
+        link.arm()
+        for _ in link.watch(rate_hz=100, seconds=0.1):
+            pass
+        frame = link.record(schedule=[(0, 200), (0.2, 0), (0.4, 0)])
+        assert list(frame.columns) == ["time_s", "voltage_v", "estimate"]
+        assert frame.time_s[0] == 0 and frame.time_s.diff().max() < 0.015
+        assert frame.voltage_v.max() > 200 and frame.voltage_v.iloc[-1] < 200
+        with pytest.raises(vsj.BadInput, match="the controller's own estimate"):
+            vsj.identify(frame)
+
+
+def test_errors_of_requests_have_the_words_of_the_command(board, command):
+    with vsj.Link(board, timeout=5) as link:
+        link.arm()
+        for value, unit in [(5000, "V"), (1e12, "Pa")]:
+            with pytest.raises(vsj.BadInput, match=f"out of range: expected .* {unit}$"):
+                link.set(value, unit)
+        with pytest.raises(vsj.BadInput, match="expected V, Pa or N/m"):
+            link.set(1, "mm")
+        with pytest.raises(vsj.BadInput) as raised:
+            link.acknowledge("nonsense")
+        assert str(raised.value) == command.error("link", "unix:none", "acknowledge", "nonsense")
+
+
+def test_model_and_settings_are_sent_checked_and_run(board, tmp_path):
+    settings = tmp_path / "settings.toml"
+    settings.write_text("schema = 1\n[gains]\nproportional = 3.5\n")
+    with vsj.Link(board, timeout=5) as link:
+        assert link.model()["active"]["number"] == 0
+        assert "proportional = 3.5" in link.settings(settings)["toml"]
+        settings.write_text("schema = 1\n[gains]\nproportional = 1e9\n")
+        with pytest.raises(vsj.BadInput, match="proportional"):
+            link.settings(settings)
+        assert link.status()["sample"]["state"] == "disarmed"

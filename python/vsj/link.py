@@ -1,0 +1,232 @@
+"""A running microcontroller over its serial link."""
+
+import json
+import os
+import time
+from dataclasses import dataclass
+from typing import Any, Dict, Iterator, List, Optional, Tuple, Union
+
+from . import _vsj
+from .analysis import named_plant
+
+_TURN_S = 0.005
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One sample of the control loop; voltages and stiffnesses in V, a stiffness as the equivalent static voltage.
+
+    Attributes
+    ----------
+    time_s, tick
+        Time since the MCU's start in s, and number of the tick.
+    state
+        ``"disarmed"``, ``"armed"``, ``"ramping"`` (armed, the host was silent) or ``"faulted"``.
+    target_v, applied_v, estimate_v
+        Target stiffness, voltage across the spring, estimated stiffness.
+    measured_v
+        Measured stiffness, ``None`` without a new reading.
+    dac_code
+        Code of the DAC.
+    limits
+        Names of the limits that acted: ``"upper"``, ``"lower"``, ``"slew"``, ``"target"``.
+    monitors, sensor
+        What disagrees with the output, and the diagnosis of the sensor.
+    """
+
+    time_s: float
+    tick: int
+    state: str
+    target_v: float
+    applied_v: float
+    estimate_v: float
+    measured_v: Optional[float]
+    dac_code: int
+    limits: Tuple[str, ...]
+    monitors: str
+    sensor: str
+
+    @classmethod
+    def _of(cls, row: Dict[str, Any]) -> "Sample":
+        known = {name: row[name] for name in cls.__dataclass_fields__}
+        return cls(**{**known, "limits": tuple(row["limits"])})
+
+
+class Link:
+    """A connection to a running MCU, as of the command ``vsj link``.
+
+    While it is open, heartbeats are sent from a thread, so that the MCU does not take the host for silent. As a context manager it
+    disarms the MCU at the end, also after an exception. Calls wait without the interpreter's lock.
+
+    Parameters
+    ----------
+    port : str
+        A serial device, ``unix:PATH`` or ``tcp:HOST:PORT``.
+    baud : int
+        Baud rate of a serial device, in bit/s.
+    timeout : float
+        Longest wait for the port to open and for each answer, in s; a request is repeated every 0.1 s.
+
+    Raises
+    ------
+    BadInput
+        For a port that cannot be opened, and, by the methods, for a stiffness out of reach or a file that cannot be used.
+    LinkError
+        If the MCU does not answer, refuses a request, or the connection is lost.
+
+    Examples
+    --------
+    >>> with vsj.Link("/dev/ttyACM0") as link:  # doctest: +SKIP
+    ...     link.arm()
+    ...     link.set(300)
+    ...     record = link.record(seconds=5)
+    """
+
+    def __init__(self, port: str, *, baud: int = 115_200, timeout: float = 1.0):
+        self._port = _vsj.Port(port, baud, timeout)
+
+    def __enter__(self) -> "Link":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        try:
+            self.disarm()
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Close the port and end the heartbeats; an armed MCU then ramps down by itself."""
+        self._port.close()
+
+    def status(self) -> Dict[str, Any]:
+        """The status of the MCU, with the fields of ``vsj link PORT status --json``."""
+        return json.loads(self._port.status())
+
+    def arm(self) -> str:
+        """Enable the output; the target starts at 0 V. Returns the state."""
+        return self._port.arm()[0]
+
+    def disarm(self) -> str:
+        """Disable the output immediately. Returns the state."""
+        return self._port.disarm()[0]
+
+    def set(self, value: float, unit: str = "V") -> float:
+        """Set the desired stiffness of an armed MCU.
+
+        Parameters
+        ----------
+        value : float
+            The stiffness.
+        unit : {"V", "Pa", "N/m"}
+            V of equivalent static voltage, Pa of Young's modulus, N/m at the tip.
+
+        Returns
+        -------
+        float
+            The target in V.
+        """
+        return self._port.set(float(value), unit)[1]
+
+    def acknowledge(self, fault: Union[str, int]) -> str:
+        """Acknowledge a fault by its name or number. Returns the state."""
+        return self._port.acknowledge(str(fault))[0]
+
+    def watch(self, rate_hz: float = 100.0, seconds: Optional[float] = None) -> Iterator[Sample]:
+        """Iterate over samples as they arrive, until ``seconds`` have passed or the loop is left.
+
+        Parameters
+        ----------
+        rate_hz : float
+            Samples per second; 115 200 bit/s suffice for about 250.
+        seconds : float, optional
+            Length; default: without end.
+        """
+        for samples in self._turns(rate_hz, seconds, lambda: None):
+            yield from samples
+
+    def record(self, seconds: Optional[float] = None, rate_hz: float = 100.0, schedule: Any = None) -> Any:
+        """Record to a pandas DataFrame, which :func:`vsj.diagnose` takes.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            Length in s; default: that of the schedule.
+        rate_hz : float
+            Rows per second; 115 200 bit/s suffice for about 250.
+        schedule : sequence of (time_s, voltage_v) or array of shape (n, 2), optional
+            Targets that an armed MCU is commanded, each held until the next; times in s, increasing.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``time_s`` from 0, ``voltage_v`` across the spring, and ``stiffness`` in V, NaN where the sensor gave no
+            reading; without a sensor the last column is ``estimate``, which is no measurement. ``attrs["units"]`` has the units.
+        """
+        import pandas
+
+        has_sensor = self.status()["sample"]["measured_v"] is not None
+        steps = [(float(at), float(volts)) for at, volts in (schedule if schedule is not None else [])]
+        if any(after[0] <= before[0] for before, after in zip(steps, steps[1:])):
+            raise _vsj.BadInput("schedule: times that do not increase; expected increasing times in s")
+        if seconds is None and not steps:
+            raise _vsj.BadInput("record: neither seconds nor a schedule; expected one of them")
+        begin, waiting = time.monotonic(), steps[::-1]
+        length = seconds if seconds is not None else steps[-1][0] - steps[0][0]
+
+        def command() -> None:
+            due = None
+            while waiting and time.monotonic() - begin >= waiting[-1][0] - steps[0][0]:
+                due = waiting.pop()[1]
+            if due is not None:
+                self.set(due)
+
+        rows: List[Sample] = []
+        for samples in self._turns(rate_hz, length, command):
+            rows += samples
+            if rows and samples and samples[-1].tick < rows[0].tick:
+                raise _vsj.LinkError("the MCU restarted during the recording")
+        reading = "stiffness" if has_sensor or any(row.measured_v is not None for row in rows) else "estimate"
+        start_s = rows[0].time_s if rows else 0.0
+        frame = pandas.DataFrame(
+            {
+                # Nine decimals hide floating-point errors of decimal times.
+                "time_s": [round(row.time_s - start_s, 9) for row in rows],
+                "voltage_v": [row.applied_v for row in rows],
+                reading: [row.measured_v if reading == "stiffness" else row.estimate_v for row in rows],
+            },
+            dtype="float64",
+        )
+        frame.attrs["units"] = {"time_s": "s", "voltage_v": "V", reading: "V"}
+        return frame
+
+    def model(self, plant: Any = None) -> Dict[str, Any]:
+        """Which model of the spring the MCU runs and has stored; with a plant, send it to be checked and stored, and restart.
+
+        Parameters
+        ----------
+        plant : path or answer of :func:`vsj.identify` or :func:`vsj.diagnose`, optional
+            The model to send; ``"paper"`` for the built-in one.
+        """
+        return json.loads(self._port.models(None if plant is None else named_plant(plant)))
+
+    def settings(self, file: Optional[Union[str, "os.PathLike[str]"]] = None) -> Dict[str, Any]:
+        """The settings that the MCU runs; with a settings file, send it to be checked and stored, and restart.
+
+        Returns
+        -------
+        dict
+            ``active`` and ``stored`` as identities, and ``toml``, the running settings as the text of a settings file.
+        """
+        blocks, text = self._port.settings(None if file is None else os.fspath(file))
+        return {**json.loads(blocks), "toml": text}
+
+    def _turns(self, rate_hz: float, seconds: Optional[float], command: Any) -> Iterator[List[Sample]]:
+        """Samples in short turns, each after ``command``."""
+        self._port.stream(float(rate_hz))
+        begin = time.monotonic()
+        try:
+            while seconds is None or time.monotonic() - begin < seconds:
+                command()
+                yield [Sample._of(row) for row in json.loads(self._port.samples(_TURN_S))]
+        finally:
+            self._port.stream(0.0)
