@@ -118,12 +118,12 @@ typedef struct vsj_error {
 
 /* The settings in fixed point, made by vsj_configure. */
 typedef struct vsj_config {
-    uint64_t opaque[96];
+    uint64_t opaque[128];
 } vsj_config;
 
 /* What changes from tick to tick, made by vsj_start. */
 typedef struct vsj_state {
-    uint64_t opaque[56];
+    uint64_t opaque[64];
 } vsj_state;
 
 typedef struct vsj_input {

@@ -27,9 +27,9 @@ const CONFIGURED: u32 = 0x7673_6a43;
 const STARTED: u32 = 0x7673_6a53;
 
 /// Bytes of `vsj_config`, at least those of [`ConfigSlot`].
-pub const CONFIG_BYTES: usize = 768;
+pub const CONFIG_BYTES: usize = 1024;
 /// Bytes of `vsj_state`, at least those of [`StateSlot`].
-pub const STATE_BYTES: usize = 448;
+pub const STATE_BYTES: usize = 512;
 const _: () = assert!(size_of::<ConfigSlot>() <= CONFIG_BYTES && align_of::<ConfigSlot>() <= 8);
 const _: () = assert!(size_of::<StateSlot>() <= STATE_BYTES && align_of::<StateSlot>() <= 8);
 

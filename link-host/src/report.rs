@@ -8,8 +8,6 @@ use model::isolation::Cause;
 use serde::Serialize;
 use simulation::isolation::trace as isolation;
 
-use crate::output::isolate::said;
-
 /// One telemetry sample of the loop.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
@@ -75,7 +73,7 @@ impl IsolationRow {
             [] => String::new(),
             causes => format!("; a fault if it names {}", causes.join(", ")),
         };
-        format!("{}{why}{trips}", said(&self.said))
+        format!("{}{why}{trips}", self.said)
     }
 }
 

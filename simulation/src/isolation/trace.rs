@@ -1,6 +1,8 @@
 //! The fixed-point bank over a record: the model runs on the voltages of the record, which are held between its rows, and the
 //! readings of its rows are the sensor's.
 
+use std::fmt::{self, Display, Formatter};
+
 use anyhow::Result;
 use model::estimator::Estimator;
 use model::isolation::{Cause, Finding, Report, Settings, State, Verdict, bank};
@@ -28,6 +30,29 @@ pub struct Event {
     pub size: Option<Size>,
     /// Part of the residual's energy, its noise included, that the cause explains, 0 to 1.
     pub explained: Option<f64>,
+}
+
+/// What the bank says: verdict, cause, size, part of the energy, beginning.
+impl Display for Event {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(self.verdict)?;
+        match (self.cause, self.other) {
+            (Some(cause), Some(other)) => write!(f, " {cause} or {other}")?,
+            (Some(cause), None) => write!(f, " {cause}")?,
+            _ => {}
+        }
+        if let Some(size) = self.size {
+            let unit = if size.unit.is_empty() { String::new() } else { format!(" {}", size.unit) };
+            write!(f, ", size {:.4}{unit} ({:.4} to {:.4})", size.value, size.low, size.high)?;
+        }
+        if let Some(explained) = self.explained {
+            write!(f, ", explains {:.2} %", 100.0 * explained)?;
+        }
+        if let Some(since_s) = self.since_s {
+            write!(f, ", since {since_s:.2} s")?;
+        }
+        Ok(())
+    }
 }
 
 impl Event {
