@@ -67,6 +67,7 @@ mod enabled;
 pub const SENSOR_NAMES: [&str; 7] = ["none", "trusted", "absent", "stale", "stuck", "jumping", "out-of-range"];
 
 /// What became of a tick's reading.
+#[cfg_attr(not(feature = "feedback"), allow(dead_code, reason = "without a sensor there are no readings"))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Observed {
     /// The sensor is trusted, and its reading was used.

@@ -46,6 +46,7 @@ pub use enabled::{Margin, State};
 use crate::units::{Signal, Volts};
 
 /// What a tick asks the law for.
+#[cfg_attr(not(feature = "robust"), allow(dead_code, reason = "only the robust pre-compensator needs it"))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Aim {
     /// The desired stiffness, before and after the correction by the sensor.

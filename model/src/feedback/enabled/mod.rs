@@ -86,6 +86,7 @@ impl Config {
     /// Lets `seen` follow a signal as the correction follows the mismatch: by the gain at a reading, and back to 0 V while the sensor
     /// is not trusted.
     #[inline]
+    #[cfg_attr(not(feature = "robust"), allow(dead_code, reason = "only the robust pre-compensator needs it"))]
     pub(crate) fn follow(&self, observed: Observed, seen: &mut Accumulator, signal: Signal) {
         let distance = |to: Signal| to.saturating_sub(upper(*seen));
         let step = match observed {
