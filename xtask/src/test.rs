@@ -23,9 +23,9 @@ const HOST: &[Step] = &[
 /// the one that differs from it in everything.
 const BESIDE: &[Step] = &[
     Step::new("lint nucleo", &lint("-pfirmware", "nucleo-g474re")),
-    Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,feedback,kilovolt")),
+    Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,isolation,kilovolt")),
     Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
-    Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,robust,feedback,kilovolt")),
+    Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,robust,isolation,kilovolt")),
     Step::new("build vsj", &["build", "--release", "-p", "host-sim", "--bin", "vsj"]),
     Step::xtask("python", &["python"]),
     Step::xtask("prove", &["prove", "--ticks", "1000000"]),
