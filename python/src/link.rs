@@ -7,6 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use link::isolation::Isolation;
 use link::{Desired, Reason, Request, Status};
 use link_host::{Client, Failure, Patience, Row, StatusReport, heartbeat};
 use pyo3::prelude::*;
@@ -47,9 +48,10 @@ impl Connection {
     /// Reads the status, which also holds after a restart.
     fn status(&mut self) -> Result<String> {
         let name = self.name();
-        self.status = self.client.status().with_context(|| name)?;
+        self.status = self.client.status().with_context(|| name.clone())?;
+        let isolation = self.client.isolation(Isolation::Read).with_context(|| name)?;
         self.heard = Instant::now();
-        Ok(serde_json::to_string(&StatusReport::new(&self.status))?)
+        Ok(serde_json::to_string(&StatusReport::new(&self.status, isolation.as_ref()))?)
     }
 
     fn models(&mut self, plant: Option<Plant>) -> Result<String> {
