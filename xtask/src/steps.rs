@@ -7,7 +7,7 @@ use std::panic::resume_unwind;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use xtask::shell;
@@ -80,22 +80,30 @@ impl Step {
     }
 }
 
-/// Runs steps one after the other, and others beside them. After the first that fails no other is begun.
+/// Runs steps one after the other, of which the first builds the emulation, and others beside them. After the first that fails no other
+/// is begun.
 pub(crate) fn run_beside(steps: &[Step], beside: &[Step], progress: &Progress) -> Result<()> {
-    let failed = AtomicBool::new(false);
-    let run_all = |steps: &[Step], run: fn(&Step) -> Result<()>| {
+    let (built, failed) = (AtomicBool::new(false), AtomicBool::new(false));
+    let run_all = |steps: &[Step], run: fn(&Step) -> Result<()>, builds: bool| {
         for step in steps {
+            while matches!(step.program, Program::Emulation)
+                && !built.load(Ordering::Relaxed)
+                && !failed.load(Ordering::Relaxed)
+            {
+                thread::sleep(Duration::from_millis(200));
+            }
             if failed.load(Ordering::Relaxed) {
                 break;
             }
             progress.begin(step.name);
             run(step).inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
+            built.fetch_or(builds, Ordering::Relaxed);
         }
         Ok(())
     };
     thread::scope(|scope| {
-        let other = scope.spawn(|| run_all(beside, Step::run_beside));
-        let own = run_all(steps, Step::run);
+        let other = scope.spawn(|| run_all(beside, Step::run_beside, false));
+        let own = run_all(steps, Step::run, true);
         own.and(other.join().unwrap_or_else(|panic| resume_unwind(panic)))
     })
 }

@@ -5,14 +5,12 @@ use xtask::{setup, shell};
 
 use crate::steps::{self, Progress, Step};
 
-/// What the others need, and what a slip of the hand breaks.
-const FIRST: &[Step] = &[
-    Step::new("format", &["fmt", "--all", "--check"]),
-    Step::new("emulation", &["build", "--quiet", "--package", "emulation"]),
-];
+/// What a slip of the hand breaks.
+const FIRST: &[Step] = &[Step::new("format", &["fmt", "--all", "--check"])];
 
-/// Steps that build in the folder of the development profile. Without a board the firmware's library is an ordinary one.
+/// Steps that build in the folder of the development profile, first the program that the last steps beside them start. Without a board the firmware's library is an ordinary one.
 const HOST: &[Step] = &[
+    Step::new("emulation", &["build", "--quiet", "--package", "emulation"]),
     Step::new("lint host", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),
     Step::new("document", &["doc", "--no-deps", "--workspace"]).with("RUSTDOCFLAGS", "-Dwarnings"),
     Step::new("test", &["test", "--workspace"]),

@@ -3,7 +3,7 @@
 //! | module | what it writes |
 //! | --- | --- |
 //! | [`terminal`], [`screen`] | stdout and stderr; a status that is refreshed in place |
-//! | [`files`], [`file`] | the files of one run: all of them or none; a file alone |
+//! | [`files`], [`mod@file`] | the files of one run: all of them or none; a file alone |
 //! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`isolate`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`export`] | spring and controller for other programs |
 //! | [`log_file`] | the decoded log as MCAP or Parquet |
