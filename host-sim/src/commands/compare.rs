@@ -21,7 +21,7 @@ Examples:
   vsj compare --plant spring.toml --json  on another spring
   vsj compare --spring-error tau=10       time constant 10 % above the model's
   vsj compare --spring-error gain=-5 --sensor-noise 0.2  with a stiffness sensor
-  vsj compare --spring-error tau=3 --known tau=5         and a controller that allows for it")]
+  vsj compare --spring-error tau=3 --known tau=5  and a controller for it")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]

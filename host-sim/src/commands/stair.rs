@@ -34,7 +34,7 @@ Examples:
   vsj stair --controller none --input step  no controller, ideal steps
   vsj stair --limit-v 1000 --kp 8 --ki 2.7  another amplifier, other gains
   vsj stair --controller fast --input step  as fast as the amplifier allows
-  vsj stair --known tau=5 --known share=5   no overshoot beyond 2 % on any of these springs
+  vsj stair --known tau=5 --known share=5   a spring known to within 5 %
   vsj stair --plant spring.toml             another spring: hysteresis, creep
   vsj stair --input schedule.csv --json     columns time_s,voltage_v")]
 pub(crate) struct Arguments {
