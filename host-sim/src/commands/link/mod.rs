@@ -29,7 +29,7 @@ Examples:
   vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 watch --udp                     live in PlotJuggler
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
-  vsj link /dev/ttyACM0 record out.mcap                 for Foxglove, PlotJuggler
+  vsj link /dev/ttyACM0 record out.mcap                 for Foxglove
   vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
   vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate
