@@ -20,13 +20,13 @@ const LARGEST_ERROR: f64 = 0.25;
 /// use model::{Compensation, Input, Margin, OutOfRange, Settings, State, Volts};
 ///
 /// fn main() -> Result<(), OutOfRange> {
-///     // The share of 1/11 may be 10 % larger: a step of 100 V begins with less than the 1000 V that the model's share allows.
+///     // The share of 1/11 may be 10 % larger: a step of 90 V begins with less than the 988 V of the model's share.
 ///     let margin = Margin { time_constant: 0.05, share: 0.1, gain: 0.0, overshoot: 0.02 };
 ///     let amplifier = model::Amplifier::up_to(1000.0);
 ///     let settings = Settings { compensation: Compensation::Robust(margin), amplifier, ..Settings::PAPER };
 ///     let config = settings.validate()?.quantize();
 ///     let input = Input { target: Volts::new(90.0)?, ..Input::default() };
-///     assert_eq!(config.tick(&mut State::default(), input).applied.to_f64().round(), 899.0);
+///     assert_eq!(config.tick(&mut State::default(), input).applied.to_f64().round(), 898.0);
 ///     Ok(())
 /// }
 /// ```
