@@ -15,6 +15,7 @@ pub(crate) const fn settings(variant: Variant) -> Settings {
     match variant.controller {
         Controller::Paper => settings::paper(amplifier),
         Controller::Fast => settings::fast(amplifier),
+        Controller::Robust => settings::robust(amplifier),
     }
 }
 
@@ -24,6 +25,7 @@ pub(crate) const fn instructions(variant: Variant) -> RangeInclusive<u64> {
     match variant.controller {
         Controller::Paper => 305..=370,
         Controller::Fast => 390..=462,
+        Controller::Robust => 1..=2000,
     }
 }
 
@@ -50,7 +52,7 @@ mod tests {
         };
         let variant = Variant::of(Controller::Paper);
         let all: Vec<_> = [variant].into_iter().chain(variant.others()).collect();
-        assert_eq!(all.len(), 4);
+        assert_eq!(all.len(), 6);
         for one in all {
             for other in one.others() {
                 assert_ne!(codes(one), codes(other), "{one:?}, {other:?}");

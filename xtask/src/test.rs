@@ -17,13 +17,13 @@ const HOST: &[Step] = &[
 ];
 
 /// Steps that build in other folders, and so need not wait for the first. Each image is linted for its board alone, with and without the
-/// optional features, because an image with a feature hides what is left out without it. Of the four images `boot` runs the first and
+/// optional features, because an image with a feature hides what is left out without it. Of the six images `boot` runs the first and
 /// the one that differs from it in everything.
 const BESIDE: &[Step] = &[
     Step::new("lint nucleo", &lint("-pfirmware", "nucleo-g474re")),
-    Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,isolation,kilovolt")),
+    Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,robust,isolation,kilovolt")),
     Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
-    Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,robust,isolation,kilovolt")),
+    Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,robust,isolation,kilovolt")),
     Step::new("build vsj", &["build", "--release", "-p", "host-sim", "--bin", "vsj"]),
     Step::xtask("python", &["python"]),
     Step::xtask("prove", &["prove", "--ticks", "1000000"]),
