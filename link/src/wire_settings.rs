@@ -171,29 +171,37 @@ impl WireSettings {
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the longest.
     #[inline(never)]
     pub fn payload(&self) -> Option<Payload> {
-        match (self.margin, self.trip_on_cause) {
-            (None, 0) => block::write(FIRST, self),
-            (None, trip_on_cause) => block::write(SECOND, &(self, trip_on_cause)),
-            (Some(margin), trip_on_cause) => block::write(FORMAT, &(self, trip_on_cause, margin)),
-        }
+        let (format, behind) = match (self.margin, self.trip_on_cause) {
+            (None, 0) => (FIRST, Behind::Nothing),
+            (None, trip_on_cause) => (SECOND, Behind::Trip(trip_on_cause)),
+            (Some(margin), trip_on_cause) => (FORMAT, Behind::Margin(trip_on_cause, margin)),
+        };
+        block::write(format, &(self, behind))
     }
 
     /// Deserialises a payload. `None` for a newer format and for bytes that are not exactly one set of settings.
     #[inline(never)]
     pub fn read(payload: &[u8]) -> Option<Self> {
-        let (settings, trip_on_cause, margin): (Self, _, _) = match *payload.first()? {
-            FIRST => (block::read(FIRST, payload)?, 0, None),
-            SECOND => {
-                let (settings, trip_on_cause) = block::read(SECOND, payload)?;
-                (settings, trip_on_cause, None)
-            }
-            _ => {
-                let (settings, trip_on_cause, margin) = block::read(FORMAT, payload)?;
-                (settings, trip_on_cause, Some(margin))
-            }
-        };
-        Some(Self { trip_on_cause, margin, ..settings })
+        let (format, bytes) = payload.split_first()?;
+        let (mut settings, mut bytes) = postcard::take_from_bytes::<Self>(bytes).ok()?;
+        if *format >= SECOND {
+            (settings.trip_on_cause, bytes) = postcard::take_from_bytes(bytes).ok()?;
+        }
+        if *format == FORMAT {
+            let (margin, rest) = postcard::take_from_bytes(bytes).ok()?;
+            (settings.margin, bytes) = (Some(margin), rest);
+        }
+        ((FIRST..=FORMAT).contains(format) && bytes.is_empty()).then_some(settings)
     }
+}
+
+/// What a payload has behind the settings of the first format.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Behind {
+    Nothing,
+    Trip(u16),
+    Margin(u16, [f64; 4]),
 }
 
 #[cfg(test)]

@@ -129,10 +129,7 @@ impl<P: Model> Validated<'_, Settings<P>> {
                 let slew = step_v.map(|step_v| (settings.plant.smallest_step_gain(sample_time), step_v));
                 PreCompensator::TimeOptimal(self.part(approach).quantize(inverse, &step_gain, slew))
             }
-            Compensation::Robust(margin) => {
-                let quick = P::differing(plant, margin.factors(), resolution_v);
-                PreCompensator::Robust(self.part(margin).quantize(quick, step_v))
-            }
+            Compensation::Robust(margin) => self.robust(margin, step_v),
         };
         Config {
             estimator,
@@ -140,6 +137,14 @@ impl<P: Model> Validated<'_, Settings<P>> {
             amplifier: self.part(&settings.amplifier).quantize(),
             feedback: settings.feedback.as_ref().map(|feedback| self.part(feedback).quantize()),
         }
+    }
+
+    /// Quantizes the robust law. Not inlined: its second spring would be on the stack of every start.
+    #[inline(never)]
+    fn robust(&self, margin: &Margin, step_v: Option<f64>) -> PreCompensator<P::Config> {
+        let settings = self.settings();
+        let quick = P::differing(self.part(&settings.plant), margin.factors(), settings.amplifier.volts_per_code());
+        PreCompensator::Robust(self.part(margin).quantize(quick, step_v))
     }
 }
 
