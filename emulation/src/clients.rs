@@ -48,10 +48,11 @@ fn cpp(elf: &Path, target: &Path) -> Result<()> {
 fn python(elf: &Path, target: &Path) -> Result<()> {
     let python = target.join("python-venv/bin/python");
     ensure!(python.exists(), "{} is missing: run cargo xtask python", python.display());
+    let vsj = build::vsj()?;
     on_board(elf, "python", |port| {
         let mut command = shell::command(&python);
         command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests/test_link.py"]);
-        command.env("VSJ", target.join("release/vsj")).env("VSJ_BOARD", port);
+        command.env("VSJ", &vsj).env("VSJ_BOARD", port);
         command
     })
 }
