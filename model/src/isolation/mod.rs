@@ -254,7 +254,7 @@ impl State {
         whitened: [0; SLOTS],
         tests: sequential::Tests::NEW,
         products: products::Products::NEW,
-        mode: products::Mode { fresh: true, ..products::Mode::NEW },
+        mode: products::Mode::NEW,
         decision: decision::Decision::NEW,
         working: false,
         alarmed: false,
@@ -402,7 +402,7 @@ impl State {
         self.alarmed = false;
         self.tests = sequential::Tests::NEW;
         self.decision.reset();
-        self.mode = products::Mode { fresh: true, ..products::Mode::NEW };
+        self.mode = products::Mode::NEW;
         self.restart();
     }
 
