@@ -46,7 +46,7 @@ fn thresholds(percent: f64) -> Result<Thresholds, model::OutOfRange> {
 
 fn false_alarms(first_seed: u64) -> Result<String> {
     let mut text = "### False alarms\n\n".to_owned();
-    let block_s = f64::from(bank::block_ticks(RATE_HZ)) / RATE_HZ;
+    let block_s = bank::block_s(RATE_HZ);
     let mut lines = Vec::new();
     for (nats, seeds) in [(8.0, 8), (10.0, 24), (Settings::PAPER.alarm_nats, 30)] {
         let counted = count(NOISES[0], nats, first_seed..first_seed + seeds).map_err(|error| anyhow!("{error}"))?;
