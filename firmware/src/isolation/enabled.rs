@@ -38,12 +38,10 @@ impl Terms {
     /// # Errors
     /// [`OutOfRange`] names `trip_on_cause`, of which no cause is allowed.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        if self.bank.is_ok() || self.trip_on_cause.is_empty() {
-            return Ok(());
+        match self.bank {
+            Ok(_) => Ok(()),
+            Err(_) => self.trip_on_cause.check_none("causes, since no isolation bank runs"),
         }
-        let value = self.trip_on_cause.iter().count() as f64;
-        let unit = "causes, since no isolation bank runs";
-        Err(OutOfRange { field: "trip_on_cause", value, lowest: 0.0, highest: 0.0, unit })
     }
 
     /// Returns `report` in SI units for the host, at `tick`; `since_tick` is the tick after which the fault has been there.
