@@ -1,4 +1,4 @@
-//! A run of the isolation bank beside the controller, on the host and on the target, for counting instructions and comparing results
+//! A run of the isolation bank with the controller, on the host and on the target, for counting instructions and comparing results
 //! bit for bit.
 
 use firmware::control::{Stopwatch, whole_tick};

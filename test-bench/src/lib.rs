@@ -7,7 +7,7 @@
 //! | --- | --- |
 //! | `blocks` | Runs of the tick with each kind of spring and each controller, for counting instructions (feature `robust`). |
 //! | [`digest`] | Checksum of a whole run. |
-//! | [`isolation`] | A run of the isolation bank beside the controller, for counting instructions. |
+//! | [`isolation`] | A run of the isolation bank with the controller, for counting instructions. |
 //! | [`script`] | Commands and injected faults of every run. |
 //! | [`simulation`] | Execution of a script on a host, without a board. |
 //! | `mps2` | The emulated board. |
