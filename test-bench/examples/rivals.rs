@@ -11,19 +11,16 @@
 use core::hint::black_box;
 use core::time::Duration;
 
-use cortex_m::peripheral::Peripherals;
 use defmt_semihosting as _;
 use discrete_pid::pid::{PidConfigBuilder, PidController};
 use discrete_pid::time::Micros;
 use dsp_process::SplitProcess;
 use firmware::control::Stopwatch;
-use firmware::hang_guard;
 use idsp::Build;
 use idsp::iir::{Biquad, BiquadClamp, DirectForm1, pid::Builder};
 use model::units::Signal;
 use model::{Config, Gains, Input, Output, Plant, Settings, State, Volts};
-use test_bench::mps2::instructions::Counter;
-use test_bench::mps2::registers::CLOCK_HZ;
+use test_bench::mps2::instructions::{Counter, start_clock};
 use test_bench::mps2::semihosting;
 use test_bench::xorshift::Xorshift;
 
@@ -48,10 +45,7 @@ trait Contender {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    if let Some(mut core) = Peripherals::take() {
-        // Starts SysTick for the counter; without ticks the guard itself is inactive.
-        hang_guard::start(&mut core.SYST, CLOCK_HZ);
-    }
+    start_clock();
     let Ok(config) = SETTINGS.validate().map(|settings| settings.quantize()) else { semihosting::exit(1) };
     race("tick", &mut WholeTick { config, state: State::default() });
     race("tick_f64", &mut F64 { spring: Spring::default(), integral: 0.0, voltage: 0.0 });
