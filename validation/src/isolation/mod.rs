@@ -9,6 +9,7 @@ mod least_squares;
 mod page;
 mod run;
 mod tables;
+mod watched;
 
 pub use false_alarms::{Alarms, count, predicted_per_block};
 pub use fault::{Fault, SIZES};

@@ -6,7 +6,8 @@ use anyhow::{Result, anyhow};
 use model::isolation::{Settings, bank};
 use rayon::prelude::*;
 
-use super::run::{RATE_HZ, RUN_S};
+use super::run::RUN_S;
+use super::watched::RATE_HZ;
 use super::{Fault, NOISES, SIZES, Thresholds, count, predicted_per_block, rows, run, summary, table};
 
 /// First seed of the runs from which the rival's bands are found; no table has it.
