@@ -225,15 +225,19 @@ pub(crate) fn status(reply: Reply) -> Result<Status, Failure> {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use link::{About, Server, Step, View};
+    use link::block::PART;
+    use link::session::Counters;
+    use link::{About, Part, Server, Step, View};
     use model::Spring;
     use model::stiffness::{Cantilever, YoungsModulus};
     use model::supervisor::{Faults, State};
     use std::io::{Read, Write};
     use std::os::unix::net::UnixListener;
+    use std::thread::JoinHandle;
 
-    /// A disarmed MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange.
-    fn mcu(listener: UnixListener) -> link::session::Counters {
+    /// A disarmed MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange. The
+    /// settings have no end.
+    fn mcu(listener: UnixListener) -> Counters {
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
         let mut server = Server::new(spring, About { silence_limit_ticks: 1000, rate_hz: 1000, ..About::default() });
         let mut sample = Telemetry::default();
@@ -247,22 +251,41 @@ mod tests {
             sample.tick += 1;
             let view = View { sample, state: State::Disarmed, standing: Faults::NONE, refusal: None, overruns: 0 };
             for byte in &bytes[..count] {
-                if let Some(Step::Send(answer)) = server.on_byte(*byte, &view) {
-                    stream.write_all(answer).unwrap();
+                match server.on_byte(*byte, &view) {
+                    Some(Step::Send(answer)) => stream.write_all(answer).unwrap(),
+                    Some(Step::ReadSettings { number, .. }) => {
+                        let part = Part { number, length: u16::MAX, bytes: [0; PART] };
+                        stream.write_all(server.settings_part(part)).unwrap();
+                    }
+                    _ => {}
                 }
             }
             stream.write_all(server.telemetry(&view).unwrap_or_default()).unwrap();
         }
     }
 
-    #[test]
-    fn a_client_whose_numbers_run_out_begins_another_session_and_keeps_its_telemetry() {
+    /// A client of an MCU, and its thread.
+    fn connected() -> (Client, JoinHandle<Counters>) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mcu");
         let listener = UnixListener::bind(&path).unwrap();
         let thread = std::thread::spawn(move || mcu(listener));
         let port = Port::open(&format!("unix:{}", path.display()), 115_200, Duration::from_secs(1)).unwrap();
-        let (mut client, _) = Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap();
+        (Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap().0, thread)
+    }
+
+    #[test]
+    fn settings_with_more_parts_than_there_are_numbers_are_of_an_unknown_format() {
+        let (mut client, thread) = connected();
+        let failure = client.read_settings(true).unwrap_err();
+        assert!(matches!(failure, Failure::UnknownSettings), "{failure}");
+        drop(client);
+        thread.join().unwrap();
+    }
+
+    #[test]
+    fn a_client_whose_numbers_run_out_begins_another_session_and_keeps_its_telemetry() {
+        let (mut client, thread) = connected();
         let first = client.session;
         client.order(Request::Stream { every_ticks: 1 }).unwrap();
         client.requests = MOST_REQUESTS;

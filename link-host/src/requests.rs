@@ -65,7 +65,7 @@ impl Client {
     /// [`Failure`]
     pub fn read_settings(&mut self, built_in: bool) -> Result<WireSettings, Failure> {
         let mut payload = Vec::new();
-        for number in 0.. {
+        for number in 0..=u8::MAX {
             match self.ask(Request::ReadSettings { built_in, number })? {
                 Reply::SettingsPart(Part { number: of, length, bytes }) if of == number => {
                     payload.extend(bytes);
