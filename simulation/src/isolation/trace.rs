@@ -65,7 +65,8 @@ impl Event {
             verdict: report.verdict.name(),
             cause: finding.map(|finding| finding.cause.name()),
             other: finding.and_then(|finding| finding.other).map(Cause::name),
-            since_s: (report.verdict != Verdict::Quiet).then(|| time_s - f64::from(report.since_blocks) * bank::block_s(rate_hz)),
+            since_s: (report.verdict != Verdict::Quiet)
+                .then(|| time_s - f64::from(report.since_blocks) * bank::block_s(rate_hz)),
             size: finding.map(size),
             explained: finding.map(|finding| finding.explained),
         }
