@@ -32,9 +32,10 @@ pub(crate) fn run() -> Result<()> {
 fn cpp(elf: &Path, target: &Path) -> Result<()> {
     let built = target.join("clients-cpp");
     let source = shell::root().join(CPP);
-    shell::run(shell::command("cmake").arg("-S").arg(&source).arg("-B").arg(&built).arg("-DCMAKE_BUILD_TYPE=Debug"))
-        .context("cmake and a C++ compiler are needed (Debian, Ubuntu: apt-get install cmake g++)")?;
-    shell::run(shell::command("cmake").arg("--build").arg(&built).args(["--parallel", "2"]))?;
+    let cmake = setup::cmake()?;
+    shell::run(shell::command(&cmake).arg("-S").arg(&source).arg("-B").arg(&built).arg("-DCMAKE_BUILD_TYPE=Debug"))
+        .context("a C++ compiler is needed (Debian, Ubuntu: apt-get install g++)")?;
+    shell::run(shell::command(&cmake).arg("--build").arg(&built).args(["--parallel", "2"]))?;
     shell::run(shell::command(built.join("frames")).arg(source.join("golden")))?;
     let folder = tempfile::tempdir()?;
     on_board(elf, "cpp", |port| {

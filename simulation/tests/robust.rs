@@ -1,4 +1,4 @@
-//! The robust controller on every spring at the ends of its margin, beside the bounds of what is possible.
+//! The robust controller on every spring at the ends of its margin, compared with the bounds of what is possible.
 
 use model::{Amplifier, Approach, Compensation, Feedback, Margin, Settings};
 use simulation::experiment::{Experiment, max_fixed_point_error};

@@ -36,10 +36,15 @@ pub fn emulator() -> Result<()> {
     program(QEMU)
 }
 
-/// Installs GCC for the MCU and CMake with apt-get unless they start. Returns CMake's program: that of the Python package's virtual
-/// environment if it is there.
+/// Installs GCC for the MCU and CMake with apt-get unless they start. Returns CMake's program.
 pub fn c_tools() -> Result<PathBuf> {
     program(ARM_GCC)?;
+    cmake()
+}
+
+/// Installs CMake with apt-get unless it starts. Returns its program: that of the Python package's virtual environment if it is
+/// there.
+pub fn cmake() -> Result<PathBuf> {
     let installed = shell::target_directory()?.join("python-venv/bin/cmake");
     if installed.exists() {
         return Ok(installed);
