@@ -10,7 +10,8 @@ use std::fmt::Write;
 use simulation::control_loop::CONTROLLERS;
 
 use crate::unit::{Kind, Unit};
-use crate::variables::{Form, Role, Variable, variables};
+use crate::variable::{Form, Role, Variable};
+use crate::variables::variables;
 
 /// End of the experiment that an importer proposes, in s.
 const STOP_S: f64 = 10.0;

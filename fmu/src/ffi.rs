@@ -12,7 +12,7 @@ use simulation::bad_input;
 use crate::description::Version;
 use crate::instance::{Instance, Log, State};
 use crate::unit::Unit;
-use crate::variables::Form;
+use crate::variable::Form;
 
 /// A status of a call, with the numbers of both standards.
 pub(crate) type Status = c_int;

@@ -12,7 +12,7 @@ use crate::ffi::{
     DISCARD, ERROR, OK, Status, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
 };
 use crate::instance::Log;
-use crate::variables::Form;
+use crate::variable::Form;
 
 /// `fmi2CoSimulation`.
 const CO_SIMULATION: c_int = 1;

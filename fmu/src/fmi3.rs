@@ -12,7 +12,7 @@ use crate::ffi::{
     ERROR, OK, Status, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
 };
 use crate::instance::Log;
-use crate::variables::Form;
+use crate::variable::Form;
 
 type Logger = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
 type IntermediateUpdate = extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut bool, *mut f64);

@@ -6,7 +6,8 @@ use simulation::bad_input::number;
 
 use crate::machine::Machine;
 use crate::unit::Unit;
-use crate::variables::{Form, Role, Variable, variables};
+use crate::variable::{Form, Role, Variable};
+use crate::variables::variables;
 
 /// Largest distance of a time from a tick, in ticks: importers add up steps, whose rounding errors add up too.
 const TOLERANCE: f64 = 1e-3;

@@ -7,7 +7,7 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`mod@unit`] | a kind of unit, its spring and its settings, and their files in `resources` |
-//! | [`variables`] | the variables of a unit: names, units, ranges, start values |
+//! | [`variable`], [`variables`] | a variable; the variables of a unit: names, units, ranges, start values |
 //! | [`description`] | `modelDescription.xml` for both versions |
 //! | `machine` | values of the variables in, ticks, values out |
 //! | `instance` | one instance: what may be called when, time, messages, saved states |
@@ -23,6 +23,7 @@ mod fmi3;
 mod instance;
 mod machine;
 pub mod unit;
+pub mod variable;
 pub mod variables;
 
 pub use description::Version;

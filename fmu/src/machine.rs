@@ -8,7 +8,8 @@ use simulation::control_loop::{ControlLoop, Controller, SpringAlone};
 use simulation::plant_file::{PlantFile, Reading};
 
 use crate::unit::Unit;
-use crate::variables::{Output, Role, Variable};
+use crate::variable::{Output, Role, Variable};
+use crate::variables::variables;
 
 /// Controller and spring of an instance, with their states.
 #[derive(Clone, Debug)]
@@ -17,6 +18,18 @@ pub(crate) struct Machine {
     spring: Option<SpringAlone>,
     reading: Reading,
     rate_hz: f64,
+}
+
+impl Unit {
+    /// Checks that the tick can run the unit with its start values.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the first value out of its range, and the range.
+    pub fn check(&self) -> Result<()> {
+        let variables = variables(self);
+        let values: Vec<f64> = variables.iter().map(|variable| variable.start).collect();
+        Machine::new(self, &variables, &values).map(drop)
+    }
 }
 
 impl Machine {

@@ -9,9 +9,6 @@ use simulation::bounded_file::read_text;
 use simulation::control_loop::{Controller, Options};
 use simulation::plant_file::{self, PlantFile};
 
-use crate::machine::Machine;
-use crate::variables::variables;
-
 /// File with the kind and the settings of a unit, in its `resources`.
 pub const SETTINGS: &str = "unit.toml";
 /// File with the spring of a unit, in its `resources`: a copy of the plant file.
@@ -81,16 +78,6 @@ struct File {
 }
 
 impl Unit {
-    /// Checks that the tick can run the unit with its start values.
-    ///
-    /// # Errors
-    /// [`BadInput`] with the first value out of its range, and the range.
-    pub fn check(&self) -> Result<()> {
-        let variables = variables(self);
-        let values: Vec<f64> = variables.iter().map(|variable| variable.start).collect();
-        Machine::new(self, &variables, &values).map(drop)
-    }
-
     /// Text of the file [`SETTINGS`].
     ///
     /// # Errors
