@@ -1,7 +1,7 @@
 //! The functions of FMI 2.0 for co-simulation, by the names and with the arguments of `fmi2FunctionTypes.h`.
 #![allow(non_snake_case, reason = "the names of the standard")]
 
-use std::ffi::{CString, c_char, c_int, c_void};
+use std::ffi::{c_char, c_int, c_void};
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
@@ -9,7 +9,8 @@ use simulation::bad_input;
 
 use crate::description::{ERRORS, Version};
 use crate::ffi::{
-    DISCARD, ERROR, OK, Status, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
+    DISCARD, ERROR, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set,
+    text, unsupported,
 };
 use crate::instance::Log;
 use crate::variable::Form;
@@ -35,14 +36,13 @@ struct Callbacks {
 
 /// The importer's logger as a function of a message.
 fn log(callbacks: *const Callbacks, name: *const c_char) -> Log {
-    let name = CString::new(text(name).unwrap_or_default()).unwrap_or_default();
+    let name = c_text(text(name).unwrap_or_default());
     // SAFETY: the importer passes its functions, or null.
     let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return Box::new(|_| {}) };
     let (logger, environment) = (callbacks.logger, callbacks.environment);
     Box::new(move |message| {
         // The message is a format of `printf`.
-        let message = CString::new(message.replace('%', "%%").replace('\0', " ")).unwrap_or_default();
-        let category = CString::new(ERRORS).unwrap_or_default();
+        let (message, category) = (c_text(&message.replace('%', "%%")), c_text(ERRORS));
         if let Some(logger) = logger {
             // SAFETY: the importer's logger stays as long as its instance; the texts live as long as the call.
             unsafe { logger(environment, name.as_ptr(), ERROR, category.as_ptr(), message.as_ptr()) }
@@ -232,11 +232,6 @@ exported! {
     fn fmi2GetBooleanStatus(_instance: *mut c_void, _kind: c_int, _value: *mut c_int) -> Status { DISCARD }
 
     fn fmi2GetStringStatus(_instance: *mut c_void, _kind: c_int, _value: *mut *const c_char) -> Status { DISCARD }
-}
-
-/// The status of a function that the description does not promise.
-fn unsupported(instance: *mut c_void, name: &str) -> Status {
-    call(instance, |_| bad_input!("{name} is called: expected what modelDescription.xml says that the unit can"))
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ pub fn variables(unit: &Unit) -> Vec<Variable> {
         all.extend(settings(options));
         all.extend(
             numbers("model", Role::Model, &unit.plant)
+                .into_iter()
                 .filter(|it| !matches!(it.role, Role::Model(number) if number.is_of_reading())),
         );
     } else {
@@ -42,7 +43,7 @@ fn rate(options: &Options) -> Variable {
         .at(options.rate_hz)
 }
 
-fn settings(options: &Options) -> impl Iterator<Item = Variable> {
+fn settings(options: &Options) -> [Variable; 9] {
     let setting = |name, setting, unit, description| Variable::new(name, Role::Setting(setting), unit, description);
     let controllers = CONTROLLERS.len() as f64;
     [
@@ -85,11 +86,10 @@ fn settings(options: &Options) -> impl Iterator<Item = Variable> {
         .within(0.0, 1.0)
         .at(options.approach_s.unwrap_or(0.0)),
     ]
-    .into_iter()
 }
 
 /// The numbers that a plant file has, below `part`.
-fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> impl Iterator<Item = Variable> {
+fn numbers(part: &str, role: fn(Number) -> Role, plant: &PlantFile) -> Vec<Variable> {
     let mut plant = plant.clone();
     let share = if plant.extended().plain().is_some() { 0.9 } else { 10.0 };
     let reading = reading_unit(&plant).to_owned();
@@ -117,8 +117,7 @@ fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> i
         .chain(one("leakage.tau_s", Number::LeakageTau))
         .chain(one("reading.gain", Number::ReadingGain))
         .chain(one("reading.zero", Number::ReadingZero));
-    let all: Vec<Variable> = all
-        .filter(|(_, number)| is_free(number))
+    all.filter(|(_, number)| is_free(number))
         .filter_map(|(name, number)| {
             let start = *number.place(&mut plant)?;
             let (unit, range, description) = about(number, share);
@@ -133,8 +132,7 @@ fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> i
                 None => variable,
             })
         })
-        .collect();
-    all.into_iter()
+        .collect()
 }
 
 /// Unit, range and description of a number; `share` is the largest instantaneous share.
