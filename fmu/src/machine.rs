@@ -105,12 +105,21 @@ impl Machine {
                 });
             }
         }
+        self.put_outputs(last.as_ref(), stiffness, variables, values);
+        Ok(())
+    }
+
+    /// Puts the outputs of the parts at rest at 0 V into their places in `values`.
+    pub(crate) fn rest(&self, variables: &[Variable], values: &mut [f64]) {
+        self.put_outputs(None, ScaledStiffness::default(), variables, values);
+    }
+
+    fn put_outputs(&self, tick: Option<&Tick>, stiffness: ScaledStiffness, variables: &[Variable], values: &mut [f64]) {
         for (variable, value) in variables.iter().zip(values) {
             if let Role::Output(output) = variable.role {
-                *value = self.output(output, last.as_ref(), stiffness);
+                *value = self.output(output, tick, stiffness);
             }
         }
-        Ok(())
     }
 
     fn output(&self, output: Output, tick: Option<&Tick>, stiffness: ScaledStiffness) -> f64 {
