@@ -12,13 +12,15 @@ use vsj_tick::settings::{All, Sensor, Spring};
 use crate::output::files::Files;
 
 /// Header of the library, and the example.
-const EXAMPLE: [(&str, &str); 6] = [
+const EXAMPLE: [(&str, &str); 8] = [
     ("vsj_tick.h", include_str!("../../../../capi/include/vsj_tick.h")),
     ("main.c", include_str!("../../../../capi/example/main.c")),
     ("CMakeLists.txt", include_str!("../../../../capi/example/CMakeLists.txt")),
     ("arm-none-eabi.cmake", include_str!("../../../../capi/example/arm-none-eabi.cmake")),
     ("mps2-an386.c", include_str!("../../../../capi/example/mps2-an386.c")),
     ("mps2-an386.ld", include_str!("../../../../capi/example/mps2-an386.ld")),
+    ("semihosting.c", include_str!("../../../../capi/example/semihosting.c")),
+    ("semihosting.h", include_str!("../../../../capi/example/semihosting.h")),
 ];
 
 /// The answer of `vsj export c --json`.
