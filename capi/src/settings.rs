@@ -132,7 +132,7 @@ impl All {
             slew_v_per_s: slew_v_per_s.unwrap_or(0.0),
             dac_bits,
             spring: Spring::new(&settings.plant),
-            sensor: Sensor::default(),
+            sensor: settings.feedback.map(Sensor::from).unwrap_or_default(),
             ..Self::paper()
         };
         match settings.compensation {
@@ -143,12 +143,6 @@ impl All {
             Compensation::TimeOptimal(approach) => (all.controller, all.approach_s) = (FAST, time_constant_s(approach)),
             // The header has no such controller: the settings will be refused.
             Compensation::Robust(_) => all.controller = u32::MAX,
-        }
-        if let Some(feedback) = &settings.feedback {
-            let [noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s] =
-                feedback.values();
-            all.sensor =
-                Sensor { noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s };
         }
         all
     }
@@ -198,6 +192,14 @@ const fn time_constant_s(_: model::Approach) -> f64 {
 fn time_optimal(_: f64) -> Result<Compensation, OutOfRange> {
     let (value, highest) = (f64::from(FAST), f64::from(PAPER));
     Err(OutOfRange { field: "controller", value, lowest: 0.0, highest, unit: "in a library without time-optimal" })
+}
+
+impl From<Feedback> for Sensor {
+    fn from(feedback: Feedback) -> Self {
+        let [noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s] =
+            feedback.values();
+        Self { noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, lowest_v, highest_v, fade_s }
+    }
 }
 
 impl Sensor {

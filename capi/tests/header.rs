@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 use std::mem::{offset_of, size_of};
 use std::process::Command;
 
-use vsj_tick::functions::{self, CONFIG_BYTES, Refused, STATE_BYTES, Text};
+use vsj_tick::functions::{self, Refused, Text};
 use vsj_tick::settings::{self, All, Sensor, Spring};
+use vsj_tick::slot::{CONFIG_BYTES, STATE_BYTES};
 use vsj_tick::tick::{TickInput, TickOutput};
 
 const HEADER: &str = include_str!("../include/vsj_tick.h");
