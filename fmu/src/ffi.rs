@@ -9,10 +9,10 @@ use std::slice;
 use anyhow::{Context, Result};
 use simulation::bad_input;
 
-use crate::description::Version;
 use crate::instance::{Instance, Log, State};
 use crate::unit::Unit;
 use crate::variable::Form;
+use crate::version::Version;
 
 /// A status of a call, with the numbers of both standards.
 pub(crate) type Status = c_int;

@@ -5,12 +5,13 @@
 use std::ffi::{c_char, c_int, c_void};
 use std::path::PathBuf;
 
-use crate::description::{ERRORS, Version};
+use crate::description::ERRORS;
 use crate::ffi::{
     self, ERROR, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
 };
 use crate::instance::Log;
 use crate::variable::Form;
+use crate::version::Version;
 
 type Logger = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
 type IntermediateUpdate = extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut bool, *mut f64);
