@@ -61,7 +61,9 @@ fn every_function_is_declared_with_its_arguments() {
 
 /// One assertion of C about a structure for each of its fields.
 macro_rules! structure {
-    ($text:ident, $c:literal, $rust:ty, $($field:ident),*) => {
+    ($text:ident, $c:literal, $rust:ident, $($field:ident),*) => {
+        // A forgotten field is an error of the compiler.
+        let _ = |$rust { $($field: _),* }: $rust| ();
         let _ = writeln!($text, "_Static_assert(sizeof({}) == {}, \"{}\");", $c, size_of::<$rust>(), $c);
         $(let _ = writeln!(
             $text,
