@@ -7,7 +7,7 @@ use anyhow::Result;
 use model::{ExtendedPlant, Settings};
 use serde::Serialize;
 use simulation::bad_input::one_line;
-use vsj_tick::settings::{All, Sensor, Spring};
+use vsj_tick::settings::{All, FAST, NONE, PAPER, Sensor, Spring};
 
 use crate::output::files::Files;
 
@@ -94,7 +94,12 @@ fn header(all: &All, name: &str, not_simulated: &[String]) -> String {
     number("kp", kp);
     number("ki", ki);
     number("approach_s", approach_s);
-    let controller = ["VSJ_NONE", "VSJ_PAPER", "VSJ_FAST"].get(*controller as usize).unwrap_or(&"VSJ_NONE");
+    let controller = match *controller {
+        NONE => "VSJ_NONE".to_owned(),
+        PAPER => "VSJ_PAPER".to_owned(),
+        FAST => "VSJ_FAST".to_owned(),
+        other => other.to_string(),
+    };
     let _ = write!(text, "    .dac_bits = {dac_bits},\n    .controller = {controller},\n");
     text += &spring_text(spring);
     text += &sensor_text(sensor);
