@@ -5,7 +5,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`settings`] | the settings as C has them, and their conversion |
+//! | [`settings`], `conversion` | the settings as C has them, and their conversion |
 //! | [`controller`] | configuration and state for both kinds of springs |
 //! | [`tick`] | input and output of a tick |
 //! | [`slot`] | memory of the caller for a configuration or a state |
@@ -17,6 +17,7 @@
 extern crate std;
 
 pub mod controller;
+mod conversion;
 pub mod functions;
 pub mod settings;
 pub mod slot;
