@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
-use crate::shell;
+use crate::{python, shell};
 
 /// The emulator: program and package in Debian and Ubuntu.
 const QEMU: [&str; 2] = ["qemu-system-arm"; 2];
@@ -45,7 +45,7 @@ pub fn c_tools() -> Result<PathBuf> {
 /// Installs CMake with apt-get unless it starts. Returns its program: that of the Python package's virtual environment if it is
 /// there.
 pub fn cmake() -> Result<PathBuf> {
-    let installed = shell::target_directory()?.join("python-venv/bin/cmake");
+    let installed = python::folder(&shell::target_directory()?, "python").join("bin/cmake");
     if installed.exists() {
         return Ok(installed);
     }
