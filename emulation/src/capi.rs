@@ -22,7 +22,8 @@ const CASES: [(&str, Controller); 2] = [("paper", Controller::Paper), ("docs/pla
 /// Builds and runs the example for each case.
 pub(crate) fn run() -> Result<()> {
     setup::emulator()?;
-    let cmake = setup::c_tools()?;
+    setup::arm_gcc()?;
+    let cmake = setup::cmake()?;
     let vsj = build::vsj()?;
     let (library, library_of_mcu) = (build::c_library(false)?, build::c_library(true)?);
     for (plant, controller) in CASES {

@@ -1,4 +1,4 @@
-//! The firmware's isolation bank after its control tick, in closed loop with a spring that changes while it runs.
+//! The firmware's isolation bank and its control tick, in closed loop with a spring that changes while it runs.
 //!
 //! `cargo xtask story --isolation` compares the emulated image with the same code.
 
