@@ -7,7 +7,7 @@
 #include <stdio.h>
 static void print(const char *line) { puts(line); }
 #else
-void print(const char *line); /* of the board */
+#include "semihosting.h"
 #endif
 
 enum { TICKS = 10000, TICKS_A_TARGET = 50 };

@@ -1,33 +1,12 @@
-/* Start-up code for the MPS2 board with image AN386, a Cortex-M4 that QEMU emulates, and a line of text by semihosting. */
-#include <stdint.h>
+/* Start-up code for the MPS2 board with image AN386, a Cortex-M4 that QEMU emulates. */
+#include "semihosting.h"
 
 extern uint32_t data_start, data_end, data_stored, bss_start, bss_end, stack_top;
 
 int main(void);
 void reset(void);
 
-/* A request to the emulator. */
-static uint32_t semihosting(uint32_t number, const void *argument) {
-    register uint32_t r0 __asm__("r0") = number;
-    register const void *r1 __asm__("r1") = argument;
-    __asm__ volatile("bkpt 0xab" : "+r"(r0) : "r"(r1) : "memory");
-    return r0;
-}
-
-/* Ends the emulator with this exit code. */
-static void leave(uint32_t code) {
-    const uint32_t block[2] = {0x20026, code};
-    semihosting(0x20, block);
-    for (;;) {
-    }
-}
-
 static void fault(void) { leave(2); }
-
-void print(const char *line) {
-    semihosting(0x04, line);
-    semihosting(0x04, "\n");
-}
 
 void reset(void) {
     /* The floating-point unit, in which doubles are passed. */

@@ -1,12 +1,13 @@
-//! The functions that C calls. A null pointer is an error, never a fault; every structure that is passed may have any bits.
+//! The functions that C calls. A null pointer is an error, never a fault, and so is a configuration or a state without its mark; every
+//! other structure may have any bits.
 
 use core::ffi::c_char;
-use core::mem::MaybeUninit;
 
-use model::{OutOfRange, Volts, units::Signal};
+use model::{OutOfRange, Output, Volts, units::Signal};
 
 use crate::controller::{AnyConfig, AnyState};
 use crate::settings::All;
+use crate::slot::{ConfigSlot, StateSlot};
 use crate::tick::{TickInput, TickOutput};
 
 /// `vsj_status`.
@@ -21,54 +22,6 @@ pub const NULL: Status = 2;
 pub const NOT_CONFIGURED: Status = 3;
 /// `VSJ_NOT_STARTED`: [`vsj_start`] has not succeeded on this state, or with the other kind of spring.
 pub const NOT_STARTED: Status = 4;
-
-/// Marks memory with a value in it.
-const CONFIGURED: u32 = 0x7673_6a43;
-const STARTED: u32 = 0x7673_6a53;
-
-/// Bytes of `vsj_config`, at least those of [`ConfigSlot`].
-pub const CONFIG_BYTES: usize = 1024;
-/// Bytes of `vsj_state`, at least those of [`StateSlot`].
-pub const STATE_BYTES: usize = 512;
-const _: () = assert!(size_of::<ConfigSlot>() <= CONFIG_BYTES && align_of::<ConfigSlot>() <= 8);
-const _: () = assert!(size_of::<StateSlot>() <= STATE_BYTES && align_of::<StateSlot>() <= 8);
-
-/// Memory for a value, and whether there is one.
-#[repr(C)]
-#[derive(Debug)]
-pub struct Slot<T> {
-    mark: u32,
-    value: MaybeUninit<T>,
-}
-
-/// `vsj_config`.
-pub type ConfigSlot = Slot<AnyConfig>;
-/// `vsj_state`.
-pub type StateSlot = Slot<AnyState>;
-
-impl<T> Default for Slot<T> {
-    /// Memory without a value.
-    fn default() -> Self {
-        Self { mark: 0, value: MaybeUninit::uninit() }
-    }
-}
-
-impl<T> Slot<T> {
-    fn put(&mut self, mark: u32, value: T) {
-        self.value.write(value);
-        self.mark = mark;
-    }
-
-    fn get(&mut self, mark: u32) -> Option<&mut T> {
-        // SAFETY: only `put` writes this mark, after the value.
-        (self.mark == mark).then(|| unsafe { self.value.assume_init_mut() })
-    }
-
-    fn read(&self, mark: u32) -> Option<&T> {
-        // SAFETY: only `put` writes this mark, after the value.
-        (self.mark == mark).then(|| unsafe { self.value.assume_init_ref() })
-    }
-}
 
 /// `vsj_error`: the setting that was refused. The texts end with 0.
 #[repr(C)]
@@ -121,6 +74,23 @@ macro_rules! expect {
     };
 }
 
+/// Advances a state by a tick of either kind.
+#[inline(always)]
+fn advance(
+    config: Option<&ConfigSlot>,
+    state: Option<&mut StateSlot>,
+    input: Option<&TickInput>,
+    output: Option<&mut TickOutput>,
+    tick: impl FnOnce(&AnyConfig, &mut AnyState, &TickInput) -> Option<Output>,
+) -> Status {
+    let (config, state) = (expect!(config, NULL), expect!(state, NULL));
+    let (input, output) = (expect!(input, NULL), expect!(output, NULL));
+    let config = expect!(config.get(), NOT_CONFIGURED);
+    let state = expect!(state.get_mut(), NOT_STARTED);
+    *output = expect!(tick(config, state, input), NOT_STARTED).into();
+    OK
+}
+
 exported! {
     /// Puts the report's settings into `settings`.
     fn vsj_paper(settings: Option<&mut All>) -> Status {
@@ -137,11 +107,11 @@ exported! {
         let (config, settings) = (expect!(config, NULL), expect!(settings, NULL));
         match AnyConfig::new(settings) {
             Ok(any) => {
-                config.put(CONFIGURED, any);
+                config.put(any);
                 OK
             }
             Err(refused) => {
-                config.mark = 0;
+                config.clear();
                 if let Some(error) = error {
                     *error = refused.into();
                 }
@@ -153,8 +123,8 @@ exported! {
     /// Puts a spring at rest at 0 V into `state`.
     fn vsj_start(config: Option<&ConfigSlot>, state: Option<&mut StateSlot>) -> Status {
         let (config, state) = (expect!(config, NULL), expect!(state, NULL));
-        let config = expect!(config.read(CONFIGURED), NOT_CONFIGURED);
-        state.put(STARTED, config.start());
+        let config = expect!(config.get(), NOT_CONFIGURED);
+        state.put(config.start());
         OK
     }
 
@@ -165,13 +135,7 @@ exported! {
         input: Option<&TickInput>,
         output: Option<&mut TickOutput>,
     ) -> Status {
-        let (config, state) = (expect!(config, NULL), expect!(state, NULL));
-        let (input, place) = (expect!(input, NULL), expect!(output, NULL));
-        let config = expect!(config.read(CONFIGURED), NOT_CONFIGURED);
-        let state = expect!(state.get(STARTED), NOT_STARTED);
-        let output = expect!(config.tick(state, input.input()), NOT_STARTED);
-        *place = output.into();
-        OK
+        advance(config, state, input, output, |config, state, input| config.tick(state, input.input()))
     }
 
     /// One tick with the amplifier off.
@@ -181,20 +145,14 @@ exported! {
         input: Option<&TickInput>,
         output: Option<&mut TickOutput>,
     ) -> Status {
-        let (config, state) = (expect!(config, NULL), expect!(state, NULL));
-        let (input, place) = (expect!(input, NULL), expect!(output, NULL));
-        let config = expect!(config.read(CONFIGURED), NOT_CONFIGURED);
-        let state = expect!(state.get(STARTED), NOT_STARTED);
-        let output = expect!(config.off(state, input.measured()), NOT_STARTED);
-        *place = output.into();
-        OK
+        advance(config, state, input, output, |config, state, input| config.off(state, input.measured()))
     }
 
     /// Makes `config` take over a running state without moving the voltage.
     fn vsj_transfer(config: Option<&ConfigSlot>, state: Option<&mut StateSlot>, target: i32) -> Status {
         let (config, state) = (expect!(config, NULL), expect!(state, NULL));
-        let config = expect!(config.read(CONFIGURED), NOT_CONFIGURED);
-        let state = expect!(state.get(STARTED), NOT_STARTED);
+        let config = expect!(config.get(), NOT_CONFIGURED);
+        let state = expect!(state.get_mut(), NOT_STARTED);
         expect!(config.transfer(state, Volts(Signal::from_bits(target))), NOT_STARTED);
         OK
     }
@@ -205,7 +163,7 @@ exported! {
         lowest: Option<&mut i32>,
         highest: Option<&mut i32>,
     ) -> Status {
-        let config = expect!(expect!(config, NULL).read(CONFIGURED), NOT_CONFIGURED);
+        let config = expect!(expect!(config, NULL).get(), NOT_CONFIGURED);
         let (lowest, highest) = (expect!(lowest, NULL), expect!(highest, NULL));
         let range = config.range();
         (*lowest, *highest) = (range.0.0.to_bits(), range.1.0.to_bits());
@@ -241,7 +199,7 @@ exported! {
         let (settings, line) = (expect!(settings, NULL), expect!(line, NULL));
         match AnyConfig::new(settings) {
             Ok(_) => {
-                *line = [0; 200];
+                *line = text("");
                 OK
             }
             Err(error) => {

@@ -5,9 +5,10 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`settings`] | the settings as C has them, and their conversion |
+//! | [`settings`], `conversion` | the settings as C has them, and their conversion |
 //! | [`controller`] | configuration and state for both kinds of springs |
 //! | [`tick`] | input and output of a tick |
+//! | [`slot`] | memory of the caller for a configuration or a state |
 //! | [`functions`] | the functions that C calls |
 #![no_std]
 
@@ -16,8 +17,10 @@
 extern crate std;
 
 pub mod controller;
+mod conversion;
 pub mod functions;
 pub mod settings;
+pub mod slot;
 pub mod tick;
 
 /// Never called, as the test of the linked example shows: no function of this library can panic.

@@ -2,10 +2,11 @@
 
 use model::{Amplifier, Feedback, Input, Reading, ScaledStiffness, Settings, State, Volts};
 use vsj_tick::functions::{
-    ConfigSlot, NOT_CONFIGURED, NOT_STARTED, NULL, OK, OUT_OF_RANGE, Refused, StateSlot, Text, vsj_configure,
-    vsj_explain, vsj_from_volts, vsj_off, vsj_paper, vsj_range, vsj_start, vsj_tick, vsj_to_volts, vsj_transfer,
+    NOT_CONFIGURED, NOT_STARTED, NULL, OK, OUT_OF_RANGE, Refused, Text, vsj_configure, vsj_explain, vsj_from_volts,
+    vsj_off, vsj_paper, vsj_range, vsj_start, vsj_tick, vsj_to_volts, vsj_transfer,
 };
-use vsj_tick::settings::{All, Sensor};
+use vsj_tick::settings::All;
+use vsj_tick::slot::{ConfigSlot, StateSlot};
 use vsj_tick::tick::{TickInput, TickOutput};
 
 fn configured(settings: &All) -> ConfigSlot {
@@ -34,17 +35,7 @@ fn steps(volts: f64) -> i32 {
 
 #[test]
 fn ticks_with_a_sensor_off_and_after_a_transfer_are_those_of_the_model() {
-    let sensor = Sensor {
-        noise_v: 1.0,
-        model_uncertainty: 1.0,
-        fastest_s: 0.1,
-        interval_s: 1e-3,
-        oldest_s: 0.01,
-        lowest_v: -50.0,
-        highest_v: 1000.0,
-        fade_s: 2.0,
-    };
-    let all = All { sensor, slew_v_per_s: 5000.0, ..All::paper() };
+    let all = All { sensor: Feedback::TYPICAL.into(), slew_v_per_s: 5000.0, ..All::paper() };
     let (config, rust) = (configured(&all), {
         let amplifier = Amplifier { slew_v_per_s: Some(5000.0), ..Amplifier::PAPER };
         Settings { feedback: Some(Feedback::TYPICAL), amplifier, ..Settings::PAPER }

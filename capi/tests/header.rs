@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 use std::mem::{offset_of, size_of};
 use std::process::Command;
 
-use vsj_tick::functions::{self, CONFIG_BYTES, Refused, STATE_BYTES, Text};
+use vsj_tick::functions::{self, Refused, Text};
 use vsj_tick::settings::{self, All, Sensor, Spring};
+use vsj_tick::slot::{CONFIG_BYTES, STATE_BYTES};
 use vsj_tick::tick::{TickInput, TickOutput};
 
 const HEADER: &str = include_str!("../include/vsj_tick.h");
@@ -60,7 +61,9 @@ fn every_function_is_declared_with_its_arguments() {
 
 /// One assertion of C about a structure for each of its fields.
 macro_rules! structure {
-    ($text:ident, $c:literal, $rust:ty, $($field:ident),*) => {
+    ($text:ident, $c:literal, $rust:ident, $($field:ident),*) => {
+        // A forgotten field is an error of the compiler.
+        let _ = |$rust { $($field: _),* }: $rust| ();
         let _ = writeln!($text, "_Static_assert(sizeof({}) == {}, \"{}\");", $c, size_of::<$rust>(), $c);
         $(let _ = writeln!(
             $text,

@@ -511,6 +511,8 @@ public:
 
     /// Asks for telemetry at a rate in Hz, 0 for none; `samples` returns it.
     void stream(double rate_hz) {
+        if (rate_hz != 0 && !(rate_hz >= 0.02 && rate_hz <= 10'000))
+            throw Error(port_.name() + ": a rate of " + std::to_string(rate_hz) + " Hz; expected 0.02 to 10000");
         const Lock lock(mutex_);
         double ticks = 0;
         if (rate_hz != 0) ticks = std::clamp(std::round(status_.rate_hz / rate_hz), 1.0, 65535.0);
@@ -545,7 +547,7 @@ public:
         return all;
     }
 
-    /// Records to a CSV file for `vsj diagnose`; returns the number of rows.
+    /// Records to a new CSV file for `vsj diagnose`; returns the number of rows. An error while recording removes it.
     std::size_t record(const std::string& path, double rate_hz, Clock::duration length) {
         std::FILE* file = std::fopen(path.c_str(), "wx");
         if (file == nullptr) throw Error(path + ": cannot be created: " + std::strerror(errno));
@@ -554,6 +556,7 @@ public:
             rows = watch(rate_hz, length);
         } catch (...) {
             std::fclose(file);
+            std::remove(path.c_str());
             throw;
         }
         const bool has_sensor = std::any_of(rows.begin(), rows.end(), [](auto& row) { return row.measured_v.has_value(); });
@@ -565,7 +568,12 @@ public:
             const auto reading = has_sensor ? row.measured_v : row.estimate_v;
             reading ? std::fprintf(file, "%.6f\n", *reading) : std::fprintf(file, "-\n");
         }
-        if (std::fclose(file) != 0) throw Error(path + ": cannot be written: " + std::strerror(errno));
+        const bool is_whole = std::ferror(file) == 0;
+        if (std::fclose(file) != 0 || !is_whole) {
+            const int error = errno;
+            std::remove(path.c_str());
+            throw Error(path + ": cannot be written: " + std::strerror(error));
+        }
         return rows.size();
     }
 

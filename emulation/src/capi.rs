@@ -8,25 +8,22 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use host_sim::qemu;
-use model::units::Signal;
-use model::{Input, Volts};
 use simulation::control_loop::{ControlLoop, Controller, Options};
 use simulation::plant_file;
+use test_bench::blocks;
+use test_bench::digest::Digest;
 use xtask::{build, setup, shell};
 
 use crate::binary::audit;
-use test_bench::digest::Digest;
 
 /// The plain spring and one with every block, each with another controller.
 const CASES: [(&str, Controller); 2] = [("paper", Controller::Paper), ("docs/plant.toml", Controller::Fast)];
-/// Ticks of the example, and ticks with the same target.
-const TICKS: u32 = 10_000;
-const TICKS_A_TARGET: u32 = 50;
 
 /// Builds and runs the example for each case.
 pub(crate) fn run() -> Result<()> {
     setup::emulator()?;
-    let cmake = setup::c_tools()?;
+    setup::arm_gcc()?;
+    let cmake = setup::cmake()?;
     let vsj = build::vsj()?;
     let (library, library_of_mcu) = (build::c_library(false)?, build::c_library(true)?);
     for (plant, controller) in CASES {
@@ -70,22 +67,12 @@ fn built(cmake: &Path, folder: &Path, name: &str, library: &Path, options: &[&st
     Ok(build.join("example"))
 }
 
-/// The digest of the example's ticks in Rust.
+/// The digest in Rust of the example's ticks, whose inputs are those of [`blocks::inputs`].
 fn in_rust(plant: &str, controller: Controller) -> Result<u64> {
     let path = shell::root().join(plant).display().to_string();
     let file = plant_file::load(if plant == "paper" { plant } else { &path })?;
     let mut control = ControlLoop::new(&file, &Options { controller, ..Options::PAPER })?;
-    let (mut random, mut target) = (1u32, 0);
-    let inputs = (0..TICKS).map(|tick| {
-        if tick.is_multiple_of(TICKS_A_TARGET) {
-            random ^= random << 13;
-            random ^= random >> 17;
-            random ^= random << 5;
-            target = (random >> 3) as i32;
-        }
-        Input { target: Volts(Signal::from_bits(target)), ..Input::default() }
-    });
     let mut digest = Digest::default();
-    control.run(inputs, |output| digest.add_output(&output));
+    control.run(blocks::inputs(), |output| digest.add_output(&output));
     Ok(digest.value())
 }

@@ -1,7 +1,7 @@
 //! `cargo xtask clients`: the clients of the link in C++ and Python command the emulated firmware.
 //!
-//! In: the image, a C++ compiler with CMake, and the virtual environment of `cargo xtask python`, in which the package is
-//! installed. Out: one line on stdout for each client.
+//! In: the image and the virtual environment of `cargo xtask python`, in which the package is installed. Out: one line on stdout for
+//! each client.
 
 use std::path::Path;
 use std::process::Command;
@@ -22,19 +22,20 @@ const CPP: &str = "clients/cpp";
 /// Builds the image and the C++ programs, and lets each client command a board of its own.
 pub(crate) fn run() -> Result<()> {
     setup::emulator()?;
+    setup::cxx()?;
+    let cmake = setup::cmake()?;
     let elf = build::image(Board::Mps2, Opt::S)?;
     let target = shell::target_directory()?;
-    cpp(&elf, &target)?;
+    cpp(&cmake, &elf, &target)?;
     python(&elf, &target)
 }
 
 /// Compiles the header with CMake, and runs its tests: every frame of the protocol, then the board.
-fn cpp(elf: &Path, target: &Path) -> Result<()> {
+fn cpp(cmake: &Path, elf: &Path, target: &Path) -> Result<()> {
     let built = target.join("clients-cpp");
     let source = shell::root().join(CPP);
-    shell::run(shell::command("cmake").arg("-S").arg(&source).arg("-B").arg(&built).arg("-DCMAKE_BUILD_TYPE=Debug"))
-        .context("cmake and a C++ compiler are needed (Debian, Ubuntu: apt-get install cmake g++)")?;
-    shell::run(shell::command("cmake").arg("--build").arg(&built).args(["--parallel", "2"]))?;
+    shell::run(shell::command(cmake).arg("-S").arg(&source).arg("-B").arg(&built).arg("-DCMAKE_BUILD_TYPE=Debug"))?;
+    shell::run(shell::command(cmake).arg("--build").arg(&built).args(["--parallel", "2"]))?;
     shell::run(shell::command(built.join("frames")).arg(source.join("golden")))?;
     let folder = tempfile::tempdir()?;
     on_board(elf, "cpp", |port| {
@@ -48,10 +49,11 @@ fn cpp(elf: &Path, target: &Path) -> Result<()> {
 fn python(elf: &Path, target: &Path) -> Result<()> {
     let python = target.join("python-venv/bin/python");
     ensure!(python.exists(), "{} is missing: run cargo xtask python", python.display());
+    let vsj = build::vsj()?;
     on_board(elf, "python", |port| {
         let mut command = shell::command(&python);
         command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests/test_link.py"]);
-        command.env("VSJ", target.join("release/vsj")).env("VSJ_BOARD", port);
+        command.env("VSJ", &vsj).env("VSJ_BOARD", port);
         command
     })
 }

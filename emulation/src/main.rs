@@ -80,8 +80,8 @@ Examples:
     /// Let the clients in C++ and Python command the emulated firmware
     ///
     /// Compiles the header clients/cpp/vsj_link.hpp with CMake, checks every frame of the protocol, and lets its client and that of
-    /// the Python package, which `cargo xtask python` has installed, arm, set, watch, record and disarm a board each. A part of
-    /// `test`.
+    /// the Python package, which `cargo xtask python` has installed, arm, set, watch, record and disarm a board each. Installs
+    /// CMake and a C++ compiler with apt-get unless they are there. A part of `test`.
     Clients,
     /// End-to-end demonstration: run, diagnose, extend, run again
     ///

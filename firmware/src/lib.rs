@@ -11,7 +11,7 @@
 //! | --- | --- |
 //! | [`board`] | Traits that a board implements. |
 //! | [`control`] | One control tick: supervisor, model, supervisor. |
-//! | [`isolation`] | Fault isolation beside the control tick. |
+//! | [`isolation`] | Fault isolation after each control tick. |
 //! | [`mailbox`] | Hand-over of commands to the control tick; drops commands that a fault has made obsolete. |
 //! | [`capture`] | The fast capture: every tick in a row of RAM. |
 //! | [`clock_test`] | Test of the processor's clock at the start: the plausible range. |

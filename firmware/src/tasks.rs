@@ -33,7 +33,8 @@ impl Timing {
     }
 }
 
-/// Runs control ticks, and after each of them the isolation bank, until `source` ends. Returns the numbers of executed and of missed ticks.
+/// Runs control ticks, and after each of them the isolation bank, until `source` ends. Returns the numbers of executed and of
+/// missed ticks.
 pub async fn control<B: Board>(
     board: &mut B,
     control: &mut Control,

@@ -1,7 +1,7 @@
 //! Pointers of the C interface, which an importer promises to be valid, as references and slices; and errors as its status.
 
 use std::any::Any;
-use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::slice;
@@ -9,10 +9,10 @@ use std::slice;
 use anyhow::{Context, Result};
 use simulation::bad_input;
 
-use crate::description::Version;
 use crate::instance::{Instance, Log, State};
 use crate::unit::Unit;
-use crate::variables::Form;
+use crate::variable::Form;
+use crate::version::Version;
 
 /// A status of a call, with the numbers of both standards.
 pub(crate) type Status = c_int;
@@ -157,6 +157,16 @@ pub(crate) fn free_state(place: *mut *mut c_void) -> Status {
         *state = std::ptr::null_mut();
     }
     OK
+}
+
+/// A text for the importer, with blanks in place of zeros.
+pub(crate) fn c_text(text: &str) -> CString {
+    CString::new(text.replace('\0', " ")).unwrap_or_default()
+}
+
+/// The status of a function that the description does not promise.
+pub(crate) fn unsupported(instance: *mut c_void, name: &str) -> Status {
+    call(instance, |_| bad_input!("{name} is called: expected what modelDescription.xml says that the unit can"))
 }
 
 /// A text of the importer.

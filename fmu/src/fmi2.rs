@@ -1,18 +1,19 @@
 //! The functions of FMI 2.0 for co-simulation, by the names and with the arguments of `fmi2FunctionTypes.h`.
 #![allow(non_snake_case, reason = "the names of the standard")]
 
-use std::ffi::{CString, c_char, c_int, c_void};
-use std::path::PathBuf;
+use std::ffi::{c_char, c_int, c_void};
 
-use anyhow::{Context, Result};
 use simulation::bad_input;
 
-use crate::description::{ERRORS, Version};
+use crate::description::ERRORS;
 use crate::ffi::{
-    DISCARD, ERROR, OK, Status, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
+    DISCARD, ERROR, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set,
+    text, unsupported,
 };
 use crate::instance::Log;
-use crate::variables::Form;
+use crate::uri::path;
+use crate::variable::Form;
+use crate::version::Version;
 
 /// `fmi2CoSimulation`.
 const CO_SIMULATION: c_int = 1;
@@ -35,43 +36,18 @@ struct Callbacks {
 
 /// The importer's logger as a function of a message.
 fn log(callbacks: *const Callbacks, name: *const c_char) -> Log {
-    let name = CString::new(text(name).unwrap_or_default()).unwrap_or_default();
+    let name = c_text(text(name).unwrap_or_default());
     // SAFETY: the importer passes its functions, or null.
     let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return Box::new(|_| {}) };
     let (logger, environment) = (callbacks.logger, callbacks.environment);
     Box::new(move |message| {
         // The message is a format of `printf`.
-        let message = CString::new(message.replace('%', "%%").replace('\0', " ")).unwrap_or_default();
-        let category = CString::new(ERRORS).unwrap_or_default();
+        let (message, category) = (c_text(&message.replace('%', "%%")), c_text(ERRORS));
         if let Some(logger) = logger {
             // SAFETY: the importer's logger stays as long as its instance; the texts live as long as the call.
             unsafe { logger(environment, name.as_ptr(), ERROR, category.as_ptr(), message.as_ptr()) }
         }
     })
-}
-
-/// The path of a URI with the scheme `file`.
-fn path(uri: &str) -> Result<PathBuf> {
-    let rest = uri.strip_prefix("file:").with_context(|| format!("{uri}: expected a URI that begins with file:"))?;
-    let rest = rest.strip_prefix("//").map_or(rest, |rest| rest.strip_prefix("localhost").unwrap_or(rest));
-    let (mut bytes, mut letters) = (Vec::new(), rest.bytes());
-    while let Some(byte) = letters.next() {
-        let digits = [letters.clone().next(), letters.clone().nth(1)];
-        let code = match digits {
-            [Some(high), Some(low)] if byte == b'%' => {
-                std::str::from_utf8(&[high, low]).ok().and_then(|digits| u8::from_str_radix(digits, 16).ok())
-            }
-            _ => None,
-        };
-        bytes.push(code.unwrap_or(byte));
-        if code.is_some() {
-            letters.nth(1);
-        }
-    }
-    let path = String::from_utf8(bytes)?;
-    // The letter of a drive stands behind a slash.
-    let drive = path.strip_prefix('/').filter(|rest| rest.as_bytes().get(1) == Some(&b':'));
-    Ok(PathBuf::from(drive.unwrap_or(&path)))
 }
 
 exported! {
@@ -232,27 +208,4 @@ exported! {
     fn fmi2GetBooleanStatus(_instance: *mut c_void, _kind: c_int, _value: *mut c_int) -> Status { DISCARD }
 
     fn fmi2GetStringStatus(_instance: *mut c_void, _kind: c_int, _value: *mut *const c_char) -> Status { DISCARD }
-}
-
-/// The status of a function that the description does not promise.
-fn unsupported(instance: *mut c_void, name: &str) -> Status {
-    call(instance, |_| bad_input!("{name} is called: expected what modelDescription.xml says that the unit can"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_uri_becomes_a_path() {
-        for (uri, expected) in [
-            ("file:///tmp/a%20b/%c3%bc/resources", "/tmp/a b/\u{fc}/resources"),
-            ("file:/tmp/x", "/tmp/x"),
-            ("file://localhost/tmp/100%", "/tmp/100%"),
-            ("file:///C:/Users/x", "C:/Users/x"),
-        ] {
-            assert_eq!(path(uri).unwrap(), PathBuf::from(expected), "{uri}");
-        }
-        assert!(path("/tmp/x").is_err());
-    }
 }

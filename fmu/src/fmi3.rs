@@ -2,17 +2,16 @@
 //! for model exchange and scheduled execution, for clocks and for types of variables that no unit has is an error.
 #![allow(non_snake_case, reason = "the names of the standard")]
 
-use std::ffi::{CString, c_char, c_int, c_void};
+use std::ffi::{c_char, c_int, c_void};
 use std::path::PathBuf;
 
-use simulation::bad_input;
-
-use crate::description::{ERRORS, Version};
+use crate::description::ERRORS;
 use crate::ffi::{
-    ERROR, OK, Status, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
+    self, ERROR, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
 };
 use crate::instance::Log;
-use crate::variables::Form;
+use crate::variable::Form;
+use crate::version::Version;
 
 type Logger = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
 type IntermediateUpdate = extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut bool, *mut f64);
@@ -20,8 +19,7 @@ type IntermediateUpdate = extern "C" fn(*mut c_void, f64, bool, bool, bool, bool
 /// The importer's logger as a function of a message.
 fn log(logger: Option<Logger>, environment: *mut c_void) -> Log {
     Box::new(move |message| {
-        let message = CString::new(message.replace('\0', " ")).unwrap_or_default();
-        let category = CString::new(ERRORS).unwrap_or_default();
+        let (message, category) = (c_text(message), c_text(ERRORS));
         if let Some(logger) = logger {
             // SAFETY: the importer's logger stays as long as its instance; the texts live as long as the call.
             unsafe { logger(environment, ERROR, category.as_ptr(), message.as_ptr()) }
@@ -164,7 +162,7 @@ accessed! {
 macro_rules! unsupported {
     ($($name:ident($($argument:ident: $type:ty),* $(,)?);)*) => { exported! {$(
         fn $name(instance: *mut c_void, $($argument: $type),*) -> Status {
-            call(instance, |_| bad_input!("{} is called: expected what modelDescription.xml says that the unit can", stringify!($name)))
+            ffi::unsupported(instance, stringify!($name))
         }
     )*} };
 }

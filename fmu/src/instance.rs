@@ -6,7 +6,8 @@ use simulation::bad_input::number;
 
 use crate::machine::Machine;
 use crate::unit::Unit;
-use crate::variables::{Form, Role, Variable, variables};
+use crate::variable::{Form, Role, Variable};
+use crate::variables::variables;
 
 /// Largest distance of a time from a tick, in ticks: importers add up steps, whose rounding errors add up too.
 const TOLERANCE: f64 = 1e-3;
@@ -62,6 +63,7 @@ impl Instance {
     /// Ends the initialization: the parameters are checked, spring and controller are at rest at 0 V.
     pub(crate) fn initialize(&mut self) -> Result<()> {
         let machine = Machine::new(&self.unit, &self.variables, &self.state.values)?;
+        machine.rest(&self.variables, &mut self.state.values);
         self.state.running = Some(Running { machine, ticks: 0 });
         Ok(())
     }
@@ -160,5 +162,24 @@ impl Instance {
 impl State {
     fn new(variables: &[Variable]) -> Self {
         Self { values: variables.iter().map(|variable| variable.start).collect(), start_s: 0.0, running: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::unit::Kind;
+    use simulation::control_loop::Options;
+    use simulation::plant_file;
+
+    #[test]
+    fn outputs_after_the_initialization_follow_the_parameters() {
+        let plant = plant_file::parse("plant.toml", include_str!("../../docs/plant.toml")).expect("the example");
+        let mut instance = Instance::new(Unit { kind: Kind::Spring, plant, options: Options::PAPER }, Box::new(|_| ()));
+        let place = |name: &str| variables(&instance.unit).iter().position(|it| it.name == name).expect("it exists");
+        let (zero, reading) = (place("spring.reading.zero") as u32, place("reading") as u32);
+        instance.set(zero, &[Form::Real], 12.5).expect("a parameter");
+        instance.initialize().expect("parameters in their ranges");
+        assert_eq!(instance.get(reading, &[Form::Real]).expect("an output"), 12.5);
     }
 }

@@ -7,12 +7,13 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`mod@unit`] | a kind of unit, its spring and its settings, and their files in `resources` |
-//! | [`variables`] | the variables of a unit: names, units, ranges, start values |
-//! | [`description`] | `modelDescription.xml` for both versions |
+//! | [`variable`], [`variables`] | a variable; the variables of a unit: names, units, ranges, start values |
+//! | [`description`], `parts` | `modelDescription.xml` for both versions |
 //! | `machine` | values of the variables in, ticks, values out |
 //! | `instance` | one instance: what may be called when, time, messages, saved states |
 //! | `ffi` | pointers of the C interface |
 //! | `fmi2`, `fmi3` | the functions that an importer calls |
+//! | `uri` | folders as URIs |
 //!
 //! Errors have the text of the command's errors.
 
@@ -22,8 +23,12 @@ mod fmi2;
 mod fmi3;
 mod instance;
 mod machine;
+mod parts;
 pub mod unit;
+mod uri;
+pub mod variable;
 pub mod variables;
+mod version;
 
-pub use description::Version;
 pub use unit::{Kind, Unit};
+pub use version::Version;

@@ -8,7 +8,8 @@ use simulation::control_loop::{ControlLoop, Controller, SpringAlone};
 use simulation::plant_file::{PlantFile, Reading};
 
 use crate::unit::Unit;
-use crate::variables::{Output, Role, Variable};
+use crate::variable::{Output, Role, Variable};
+use crate::variables::variables;
 
 /// Controller and spring of an instance, with their states.
 #[derive(Clone, Debug)]
@@ -17,6 +18,18 @@ pub(crate) struct Machine {
     spring: Option<SpringAlone>,
     reading: Reading,
     rate_hz: f64,
+}
+
+impl Unit {
+    /// Checks that the tick can run the unit with its start values.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the first value out of its range, and the range.
+    pub fn check(&self) -> Result<()> {
+        let variables = variables(self);
+        let values: Vec<f64> = variables.iter().map(|variable| variable.start).collect();
+        Machine::new(self, &variables, &values).map(drop)
+    }
 }
 
 impl Machine {
@@ -92,12 +105,21 @@ impl Machine {
                 });
             }
         }
+        self.put_outputs(last.as_ref(), stiffness, variables, values);
+        Ok(())
+    }
+
+    /// Puts the outputs of the parts at rest at 0 V into their places in `values`.
+    pub(crate) fn rest(&self, variables: &[Variable], values: &mut [f64]) {
+        self.put_outputs(None, ScaledStiffness::default(), variables, values);
+    }
+
+    fn put_outputs(&self, tick: Option<&Tick>, stiffness: ScaledStiffness, variables: &[Variable], values: &mut [f64]) {
         for (variable, value) in variables.iter().zip(values) {
             if let Role::Output(output) = variable.role {
-                *value = self.output(output, last.as_ref(), stiffness);
+                *value = self.output(output, tick, stiffness);
             }
         }
-        Ok(())
     }
 
     fn output(&self, output: Output, tick: Option<&Tick>, stiffness: ScaledStiffness) -> f64 {

@@ -6,11 +6,8 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use simulation::bad_input::BadInput;
 use simulation::bounded_file::read_text;
-use simulation::control_loop::{Controller, Options};
+use simulation::control_loop::Options;
 use simulation::plant_file::{self, PlantFile};
-
-use crate::machine::Machine;
-use crate::variables::variables;
 
 /// File with the kind and the settings of a unit, in its `resources`.
 pub const SETTINGS: &str = "unit.toml";
@@ -64,44 +61,21 @@ pub struct Unit {
     pub options: Options,
 }
 
-/// The options as `unit.toml` has them.
+/// The content of `unit.toml`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     kind: Kind,
-    controller: String,
-    limit_v: f64,
-    min_v: f64,
-    slew_v_per_s: Option<f64>,
-    dac_bits: u32,
-    kp: f64,
-    ki: f64,
-    approach_s: Option<f64>,
-    rate_hz: f64,
+    options: Options,
 }
 
 impl Unit {
-    /// Checks that the tick can run the unit with its start values.
-    ///
-    /// # Errors
-    /// [`BadInput`] with the first value out of its range, and the range.
-    pub fn check(&self) -> Result<()> {
-        let variables = variables(self);
-        let values: Vec<f64> = variables.iter().map(|variable| variable.start).collect();
-        Machine::new(self, &variables, &values).map(drop)
-    }
-
     /// Text of the file [`SETTINGS`].
     ///
     /// # Errors
     /// None that is known: every field is a number or a word.
     pub fn settings_file(&self) -> Result<String> {
-        let Options { controller, limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, feedback: _ } =
-            self.options;
-        let controller = controller.name().to_owned();
-        let file =
-            File { kind: self.kind, controller, limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz };
-        Ok(toml::to_string(&file)?)
+        Ok(toml::to_string(&File { kind: self.kind, options: self.options })?)
     }
 
     /// Reads a unit from its `resources`.
@@ -111,22 +85,38 @@ impl Unit {
     pub fn read(resources: &Path) -> Result<Self> {
         let settings = resources.join(SETTINGS);
         let text = read_text(&settings, 1, "the settings of a unit")?;
-        let file: File = toml::from_str(&text)
+        let File { kind, options } = toml::from_str(&text)
             .map_err(|error| BadInput(format!("{}: {}", settings.display(), error.message())))
             .context("the unit is damaged")?;
-        let options = Options {
-            controller: Controller::by_name(&file.controller)?,
-            limit_v: file.limit_v,
-            min_v: file.min_v,
-            slew_v_per_s: file.slew_v_per_s,
-            dac_bits: file.dac_bits,
-            kp: file.kp,
-            ki: file.ki,
-            approach_s: file.approach_s,
-            rate_hz: file.rate_hz,
-            feedback: None,
-        };
         let plant = plant_file::load(&resources.join(PLANT).to_string_lossy())?;
-        Ok(Self { kind: file.kind, plant, options })
+        Ok(Self { kind, plant, options })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use simulation::control_loop::Controller;
+
+    #[test]
+    fn a_unit_is_read_from_its_files_as_it_was_written() {
+        let options =
+            Options { controller: Controller::Fast, approach_s: Some(0.1), limit_v: 0.1 + 600.0, ..Options::PAPER };
+        let unit = Unit { kind: Kind::Both, plant: plant_file::load("paper").expect("the report's spring"), options };
+        let folder = std::env::temp_dir().join(format!("vsj-unit-{}", std::process::id()));
+        let (_, plant) = plant_file::load_with_text("paper").expect("the report's spring");
+        std::fs::create_dir_all(&folder).expect("a folder");
+        std::fs::write(folder.join(PLANT), plant).expect("a file");
+        let text = unit.settings_file().expect("TOML");
+        std::fs::write(folder.join(SETTINGS), &text).expect("a file");
+        let read = Unit::read(&folder).expect("a unit");
+        assert_eq!((read.kind, read.plant, read.options), (unit.kind, unit.plant, unit.options));
+        std::fs::write(folder.join(SETTINGS), text.replace("fast", "slow")).expect("a file");
+        let error = Unit::read(&folder).expect_err("no controller");
+        assert!(
+            error.is::<BadInput>() && format!("{error:#}").contains("expected one of `none`, `paper`, `fast`"),
+            "{error:#}"
+        );
+        std::fs::remove_dir_all(&folder).expect("it is there");
     }
 }

@@ -3,192 +3,16 @@
 //! Parameters are the options of the command and the numbers of the plant file, by their names there: `spring.` is the simulated
 //! spring, `model.` the controller's model of it.
 
-use simulation::control_loop::{CONTROLLERS, Controller, Options};
+use simulation::control_loop::{CONTROLLERS, Options};
 use simulation::plant_file::PlantFile;
 
 use crate::unit::Unit;
+use crate::variable::{Form, Number, Output, Role, Setting, Variable};
 
 /// Slew limit, in V/s, that stands for none: at every rate a tick is long enough for any change.
 const NO_SLEW_LIMIT: f64 = 1e9;
 /// Largest magnitude of a voltage that the tick accepts, in V.
 const LARGEST_V: f64 = 2000.0;
-
-/// A scalar variable.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Variable {
-    /// Name, in the structured naming convention.
-    pub name: String,
-    /// One sentence.
-    pub description: String,
-    /// What it is in the unit.
-    pub role: Role,
-    /// Data type.
-    pub form: Form,
-    /// Name of the unit of measurement; empty if it has none.
-    pub unit: String,
-    /// Lowest value, if there is one.
-    pub lowest: Option<f64>,
-    /// Highest value, if there is one.
-    pub highest: Option<f64>,
-    /// Value of a new instance.
-    pub start: f64,
-}
-
-/// Data type of a variable. Its value is kept as a double in any case, which holds each exactly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    /// A double.
-    Real,
-    /// An integer of 32 bits.
-    Integer,
-    /// An enumeration of the names of [`CONTROLLERS`], beginning with 1.
-    Controller,
-}
-
-/// What a variable is in the unit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// Time, in s.
-    Time,
-    /// A setting of the controller.
-    Setting(Setting),
-    /// A number of the controller's model.
-    Model(Number),
-    /// A number of the simulated spring.
-    Spring(Number),
-    /// The input.
-    Input,
-    /// An output.
-    Output(Output),
-}
-
-impl Role {
-    /// True for what is set before the first step only.
-    pub const fn is_parameter(self) -> bool {
-        matches!(self, Self::Setting(_) | Self::Model(_) | Self::Spring(_))
-    }
-}
-
-/// A setting of the controller: a field of [`Options`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each is a field of `Options`")]
-pub enum Setting {
-    RateHz,
-    Controller,
-    LimitV,
-    MinV,
-    SlewVPerS,
-    DacBits,
-    Kp,
-    Ki,
-    ApproachS,
-}
-
-impl Setting {
-    /// Puts a value into the options.
-    pub fn put(self, options: &mut Options, value: f64) {
-        match self {
-            Self::RateHz => options.rate_hz = value,
-            // The instance accepts numbers of controllers only.
-            Self::Controller => options.controller = Controller::ALL[(value as usize).clamp(1, 3) - 1],
-            Self::LimitV => options.limit_v = value,
-            Self::MinV => options.min_v = value,
-            Self::SlewVPerS => options.slew_v_per_s = Some(value),
-            Self::DacBits => options.dac_bits = value as u32,
-            Self::Kp => options.kp = value,
-            Self::Ki => options.ki = value,
-            Self::ApproachS => options.approach_s = Some(value),
-        }
-    }
-}
-
-/// A number of a plant file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each is a key of a plant file, with its index in a list")]
-pub enum Number {
-    Share,
-    Tau(usize),
-    Weight(usize),
-    TauHigh,
-    TauHighAt,
-    Direct,
-    Threshold(usize),
-    PlayWeight(usize),
-    LawVoltage(usize),
-    LawStiffness(usize),
-    LeakageShare,
-    LeakageTau,
-    ReadingGain,
-    ReadingZero,
-}
-
-impl Number {
-    /// The number's place in a plant file; `None` if the file has none.
-    pub fn place(self, plant: &mut PlantFile) -> Option<&mut f64> {
-        let relaxation = &mut plant.relaxation;
-        match self {
-            Self::Share => Some(&mut relaxation.share),
-            Self::Tau(index) => relaxation.tau_s.get_mut(index),
-            Self::Weight(index) => relaxation.weights.get_mut(index),
-            Self::TauHigh => relaxation.tau_high_s.as_mut(),
-            Self::TauHighAt => relaxation.tau_high_at_v.as_mut(),
-            Self::Direct => plant.memory.as_mut().map(|memory| &mut memory.direct),
-            Self::Threshold(index) => plant.memory.as_mut()?.thresholds_v.get_mut(index),
-            Self::PlayWeight(index) => plant.memory.as_mut()?.weights.get_mut(index),
-            Self::LawVoltage(index) => plant.law.as_mut()?.voltage_v.get_mut(index),
-            Self::LawStiffness(index) => plant.law.as_mut()?.stiffness.get_mut(index),
-            Self::LeakageShare => plant.leakage.as_mut().map(|leakage| &mut leakage.share),
-            Self::LeakageTau => plant.leakage.as_mut().map(|leakage| &mut leakage.tau_s),
-            Self::ReadingGain => plant.reading.as_mut().map(|reading| &mut reading.gain),
-            Self::ReadingZero => plant.reading.as_mut().map(|reading| &mut reading.zero),
-        }
-    }
-
-    /// True for a number that only turns the stiffness into a reading.
-    const fn is_of_reading(self) -> bool {
-        matches!(self, Self::ReadingGain | Self::ReadingZero)
-    }
-}
-
-/// An output.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Output {
-    /// Voltage of the DAC's code, in V.
-    Applied,
-    /// Code of the DAC.
-    Code,
-    /// Stiffness that the controller estimates, in V.
-    Estimate,
-    /// Limits that acted, as bits.
-    Limits,
-    /// Stiffness of the simulated spring, in V.
-    Stiffness,
-    /// Reading of the simulated spring, in the plant file's unit.
-    Reading,
-}
-
-impl Variable {
-    fn new(name: &str, role: Role, unit: &str, description: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            description: description.to_owned(),
-            role,
-            form: Form::Real,
-            unit: unit.to_owned(),
-            lowest: None,
-            highest: None,
-            start: 0.0,
-        }
-    }
-
-    fn within(self, lowest: f64, highest: f64) -> Self {
-        Self { lowest: Some(lowest), highest: Some(highest), ..self }
-    }
-
-    fn at(self, start: f64) -> Self {
-        Self { start, ..self }
-    }
-}
 
 /// The variables of a unit, in the order of their value references.
 pub fn variables(unit: &Unit) -> Vec<Variable> {
@@ -198,6 +22,7 @@ pub fn variables(unit: &Unit) -> Vec<Variable> {
         all.extend(settings(options));
         all.extend(
             numbers("model", Role::Model, &unit.plant)
+                .into_iter()
                 .filter(|it| !matches!(it.role, Role::Model(number) if number.is_of_reading())),
         );
     } else {
@@ -218,7 +43,7 @@ fn rate(options: &Options) -> Variable {
         .at(options.rate_hz)
 }
 
-fn settings(options: &Options) -> impl Iterator<Item = Variable> {
+fn settings(options: &Options) -> [Variable; 9] {
     let setting = |name, setting, unit, description| Variable::new(name, Role::Setting(setting), unit, description);
     let controllers = CONTROLLERS.len() as f64;
     [
@@ -261,11 +86,10 @@ fn settings(options: &Options) -> impl Iterator<Item = Variable> {
         .within(0.0, 1.0)
         .at(options.approach_s.unwrap_or(0.0)),
     ]
-    .into_iter()
 }
 
 /// The numbers that a plant file has, below `part`.
-fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> impl Iterator<Item = Variable> {
+fn numbers(part: &str, role: fn(Number) -> Role, plant: &PlantFile) -> Vec<Variable> {
     let mut plant = plant.clone();
     let share = if plant.extended().plain().is_some() { 0.9 } else { 10.0 };
     let reading = reading_unit(&plant).to_owned();
@@ -293,8 +117,7 @@ fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> i
         .chain(one("leakage.tau_s", Number::LeakageTau))
         .chain(one("reading.gain", Number::ReadingGain))
         .chain(one("reading.zero", Number::ReadingZero));
-    let all: Vec<Variable> = all
-        .filter(|(_, number)| is_free(number))
+    all.filter(|(_, number)| is_free(number))
         .filter_map(|(name, number)| {
             let start = *number.place(&mut plant)?;
             let (unit, range, description) = about(number, share);
@@ -309,8 +132,7 @@ fn numbers(part: &'static str, role: fn(Number) -> Role, plant: &PlantFile) -> i
                 None => variable,
             })
         })
-        .collect();
-    all.into_iter()
+        .collect()
 }
 
 /// Unit, range and description of a number; `share` is the largest instantaneous share.

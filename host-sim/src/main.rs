@@ -125,6 +125,7 @@ mod tests {
             ("vsj link", "'vsj link' requires a subcommand but one was not provided [subcommands: status,"),
             ("vsj link", "; Usage: vsj link [OPTIONS] <PORT> <COMMAND>"),
             ("vsj diagnose", "not provided: <DATA.csv>...; see `--help`"),
+            ("vsj stair --overshoot-percent 5", "not provided: --known <KEY=PERCENT>; see `--help`"),
         ] {
             let said = one_line(&Cli::try_parse_from(line.split(' ')).err().expect("something is missing"));
             assert!(said.contains(missing) && !said.contains('\n'), "{line}: {said}");

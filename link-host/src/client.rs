@@ -4,19 +4,14 @@
 //! once, however often it arrives. Telemetry that arrives meanwhile is kept in order.
 
 use std::collections::VecDeque;
-use std::fmt;
-use std::io;
 use std::time::{Duration, Instant, SystemTime};
 
-use link::block::PART;
-use link::capture::{Capture, Captured, Row};
-use link::isolation::Isolation;
 use link::{
-    Block, BlockId, Blocks, FaultReport, Frame, IsolationReport, Nonce, Packet, Part, Reason, Receiver, Reply, Request,
-    Sequence, Status, Telemetry, Unreadable, WireModel, WireSettings,
+    FaultReport, Frame, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry, Unreadable,
 };
 
-use crate::Port;
+use crate::failure::Failure;
+use crate::port::Port;
 
 /// How long to wait for an answer, and how often to repeat a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,71 +36,6 @@ pub fn heartbeat(status: &Status) -> Duration {
     let limit_s = f64::from(status.silence_limit_ticks) / f64::from(status.rate_hz.max(1));
     Duration::from_secs_f64((limit_s / 5.0).clamp(0.01, 1.0))
 }
-
-/// Why a request failed.
-#[derive(Debug)]
-pub enum Failure {
-    /// The MCU rejected the request.
-    Refused(Reason),
-    /// The MCU uses another version of the protocol.
-    Version(u8),
-    /// A valid answer that does not belong to the request.
-    Unexpected(Box<Reply>),
-    /// No valid answer arrived.
-    NoAnswer {
-        /// Number of times that the request was sent.
-        tries: u32,
-        /// Number of bytes that arrived nevertheless.
-        bytes: u64,
-    },
-    /// The MCU has taken a model or settings, but after its restart it does not run them.
-    NotRun {
-        /// `model` or `settings`.
-        what: &'static str,
-        /// What was sent, with the number that it runs as.
-        sent: BlockId,
-        /// What runs and what is stored after the restart.
-        blocks: Blocks,
-    },
-    /// The MCU's settings are of a format that this program does not know.
-    UnknownSettings,
-    /// The port failed.
-    Port(io::Error),
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Refused(reason) => write!(f, "refused: {reason}"),
-            Self::Version(version) => write!(f, "{}", Reason::BadVersion(*version)),
-            Self::Unexpected(reply) => write!(f, "unexpected answer: {reply:?}"),
-            Self::NoAnswer { tries, bytes: 0 } => {
-                write!(f, "no answer to {tries} requests; is the MCU running on this port?")
-            }
-            Self::NoAnswer { tries, bytes } => {
-                write!(f, "no valid answer to {tries} requests, but {bytes} bytes; is the baud rate right?")
-            }
-            Self::NotRun {
-                what,
-                sent: BlockId { format, length, checksum, .. },
-                blocks: Blocks { active, stored },
-            } => {
-                write!(
-                    f,
-                    "the MCU has restarted and does not run what was sent as {what} (format {format}, {length} bytes, CRC \
-                     {checksum:08x}): it runs {active}, and has stored {stored}"
-                )
-            }
-            Self::UnknownSettings => f.write_str("the MCU's settings are of a format that this program does not know"),
-            Self::Port(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-                f.write_str("the other side closed the connection")
-            }
-            Self::Port(error) => write!(f, "the port failed: {error}"),
-        }
-    }
-}
-
-impl std::error::Error for Failure {}
 
 /// A connection to an MCU.
 pub struct Client {
@@ -176,173 +106,10 @@ impl Client {
         self.port.name()
     }
 
-    /// Requests the status.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn status(&mut self) -> Result<Status, Failure> {
-        status(self.ask(Request::Status)?)
-    }
-
     /// Faults that the MCU has reported since the last call. The MCU repeats each report until the next request tells it
     /// that this program has heard of it.
     pub fn reports(&mut self) -> Vec<FaultReport> {
         std::mem::take(&mut self.reports)
-    }
-
-    /// Sends a request that is answered with an acknowledgement; returns the state and target in it.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn order(&mut self, request: Request) -> Result<(link::State, link::WireVolts), Failure> {
-        match self.ask(request)? {
-            Reply::Ack { state, target } => Ok((state, target)),
-            other => Err(Failure::Unexpected(Box::new(other))),
-        }
-    }
-
-    /// The model that runs now, and the one stored for the next start.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn models(&mut self) -> Result<Blocks, Failure> {
-        match self.ask(Request::Model)? {
-            Reply::Model(models) => Ok(models),
-            other => Err(Failure::Unexpected(Box::new(other))),
-        }
-    }
-
-    /// Sends a model to be checked and stored, restarts the MCU, connects again, and checks that it runs this model.
-    ///
-    /// # Errors
-    /// [`Failure`]; if the model is rejected, the old one stays. [`Failure::NotRun`] if another one runs.
-    pub fn install(&mut self, model: &WireModel) -> Result<Blocks, Failure> {
-        // An oversized payload is not sent; the MCU then rejects the model as incomplete.
-        self.send(Block::Model, &model.payload().unwrap_or_default())
-    }
-
-    /// The settings that run now, and those stored for the next start.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn settings(&mut self) -> Result<Blocks, Failure> {
-        match self.ask(Request::Settings)? {
-            Reply::Settings(blocks) => Ok(blocks),
-            other => Err(Failure::Unexpected(Box::new(other))),
-        }
-    }
-
-    /// Reads the settings that run, or those that are built into the MCU's image.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn read_settings(&mut self, built_in: bool) -> Result<WireSettings, Failure> {
-        let mut payload = Vec::new();
-        for number in 0.. {
-            match self.ask(Request::ReadSettings { built_in, number })? {
-                Reply::SettingsPart(Part { number: of, length, bytes }) if of == number => {
-                    payload.extend(bytes);
-                    if payload.len() >= usize::from(length) {
-                        payload.truncate(usize::from(length));
-                        break;
-                    }
-                }
-                other => return Err(Failure::Unexpected(Box::new(other))),
-            }
-        }
-        WireSettings::read(&payload).ok_or(Failure::UnknownSettings)
-    }
-
-    /// Sends settings to be checked and stored, restarts the MCU, connects again, and checks that it runs them: by their
-    /// identity, and value by value.
-    ///
-    /// # Errors
-    /// [`Failure`]; if the settings are rejected, the old ones stay. [`Failure::NotRun`] if others run.
-    pub fn install_settings(&mut self, settings: &WireSettings) -> Result<Blocks, Failure> {
-        let payload = settings.payload().unwrap_or_default();
-        let blocks = self.send(Block::Settings, &payload)?;
-        let running = self.read_settings(false)?;
-        if running.payload().is_none_or(|running| running != payload) {
-            let sent = BlockId::of(blocks.active.number, &payload);
-            return Err(Failure::NotRun { what: "settings", sent, blocks });
-        }
-        Ok(blocks)
-    }
-
-    /// What the isolation bank says; `None` if the MCU's program does not know the request.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn isolation(&mut self, request: Isolation) -> Result<Option<IsolationReport>, Failure> {
-        match self.ask(Request::Isolation(request)) {
-            Ok(Reply::Isolation(report)) => Ok(Some(report)),
-            Ok(other) => Err(Failure::Unexpected(Box::new(other))),
-            Err(Failure::Refused(Reason::UnknownRequest)) => Ok(None),
-            Err(failure) => Err(failure),
-        }
-    }
-
-    /// How far the fast capture is, and for how many rows the MCU has room.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn capture_state(&mut self) -> Result<Captured, Failure> {
-        self.ask_capture(Capture::State)
-    }
-
-    /// Starts a fast capture of this number of ticks.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn capture(&mut self, rows: u32) -> Result<Captured, Failure> {
-        self.ask_capture(Capture::Start { rows })
-    }
-
-    fn ask_capture(&mut self, request: Capture) -> Result<Captured, Failure> {
-        match self.ask(Request::Capture(request))? {
-            Reply::Captured(captured) => Ok(captured),
-            other => Err(Failure::Unexpected(Box::new(other))),
-        }
-    }
-
-    /// Reads rows of the fast capture, from number `first` on; none if it has not come that far. A frame that is damaged
-    /// is asked for again.
-    ///
-    /// # Errors
-    /// [`Failure`]
-    pub fn rows(&mut self, first: u32) -> Result<Vec<Row>, Failure> {
-        match self.ask(Request::Capture(Capture::Read { first }))? {
-            Reply::Rows(rows) if rows.first == first => Ok(rows.iter().collect()),
-            other => Err(Failure::Unexpected(Box::new(other))),
-        }
-    }
-
-    /// Sends a block, restarts the MCU, connects again, and checks that it runs the block.
-    fn send(&mut self, block: Block, payload: &[u8]) -> Result<Blocks, Failure> {
-        for (number, part) in (0..).zip(payload.chunks(PART)) {
-            let mut bytes = [0; PART];
-            bytes[..part.len()].copy_from_slice(part);
-            self.order(match block {
-                Block::Model => Request::ModelPart { number, bytes },
-                Block::Settings => Request::SettingsPart { number, bytes },
-            })?;
-        }
-        let (length, checksum) = (payload.len() as u16, link::frame::checksum(payload));
-        self.order(match block {
-            Block::Model => Request::ModelEnd { length, checksum },
-            Block::Settings => Request::SettingsEnd { length, checksum },
-        })?;
-        self.order(Request::Restart)?;
-        self.begin()?;
-        let (what, blocks) = match block {
-            Block::Model => ("model", self.models()?),
-            Block::Settings => ("settings", self.settings()?),
-        };
-        let sent = BlockId::of(blocks.active.number, payload);
-        if blocks.active == BlockId::default() || blocks.active != sent {
-            return Err(Failure::NotRun { what, sent, blocks });
-        }
-        Ok(blocks)
     }
 
     /// Waits for `wait` and returns all telemetry received.
@@ -357,7 +124,7 @@ impl Client {
     }
 
     /// Asks for a new session; the next request begins it.
-    fn begin(&mut self) -> Result<(), Failure> {
+    pub(crate) fn begin(&mut self) -> Result<(), Failure> {
         self.session = Nonce::NONE;
         status(self.exchange(Request::Hello)?)?;
         self.requests = 0;
@@ -366,7 +133,7 @@ impl Client {
 
     /// Sends a request of the session, after what it needs: a new session when the numbers run out, and the word that the
     /// reported faults were heard.
-    fn ask(&mut self, request: Request) -> Result<Reply, Failure> {
+    pub(crate) fn ask(&mut self, request: Request) -> Result<Reply, Failure> {
         if self.requests >= MOST_REQUESTS {
             self.begin()?;
             if self.every_ticks > 0 {
@@ -446,25 +213,31 @@ fn answer(packet: &Packet<'_>, reply: Result<Reply, u8>) -> Answer {
     Answer { sequence: packet.sequence, session: packet.session(), reply }
 }
 
-fn status(reply: Reply) -> Result<Status, Failure> {
+/// The status in a reply.
+pub(crate) fn status(reply: Reply) -> Result<Status, Failure> {
     match reply {
         Reply::Status(status) => Ok(status),
-        other => Err(Failure::Unexpected(Box::new(other))),
+        other => Err(Failure::unexpected(other)),
     }
 }
 
-#[cfg(test)]
+// The MCU of the test is at a unix socket.
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use link::{About, Server, Step, View};
+    use link::block::PART;
+    use link::session::Counters;
+    use link::{About, Part, Server, Step, View};
     use model::Spring;
     use model::stiffness::{Cantilever, YoungsModulus};
     use model::supervisor::{Faults, State};
     use std::io::{Read, Write};
     use std::os::unix::net::UnixListener;
+    use std::thread::JoinHandle;
 
-    /// A disarmed MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange.
-    fn mcu(listener: UnixListener) -> link::session::Counters {
+    /// A disarmed MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange. The
+    /// settings have no end.
+    fn mcu(listener: UnixListener) -> Counters {
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
         let mut server = Server::new(spring, About { silence_limit_ticks: 1000, rate_hz: 1000, ..About::default() });
         let mut sample = Telemetry::default();
@@ -478,22 +251,41 @@ mod tests {
             sample.tick += 1;
             let view = View { sample, state: State::Disarmed, standing: Faults::NONE, refusal: None, overruns: 0 };
             for byte in &bytes[..count] {
-                if let Some(Step::Send(answer)) = server.on_byte(*byte, &view) {
-                    stream.write_all(answer).unwrap();
+                match server.on_byte(*byte, &view) {
+                    Some(Step::Send(answer)) => stream.write_all(answer).unwrap(),
+                    Some(Step::ReadSettings { number, .. }) => {
+                        let part = Part { number, length: u16::MAX, bytes: [0; PART] };
+                        stream.write_all(server.settings_part(part)).unwrap();
+                    }
+                    _ => {}
                 }
             }
             stream.write_all(server.telemetry(&view).unwrap_or_default()).unwrap();
         }
     }
 
-    #[test]
-    fn a_client_whose_numbers_run_out_begins_another_session_and_keeps_its_telemetry() {
+    /// A client of an MCU, and its thread.
+    fn connected() -> (Client, JoinHandle<Counters>) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mcu");
         let listener = UnixListener::bind(&path).unwrap();
         let thread = std::thread::spawn(move || mcu(listener));
         let port = Port::open(&format!("unix:{}", path.display()), 115_200, Duration::from_secs(1)).unwrap();
-        let (mut client, _) = Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap();
+        (Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap().0, thread)
+    }
+
+    #[test]
+    fn settings_with_more_parts_than_there_are_numbers_are_of_an_unknown_format() {
+        let (mut client, thread) = connected();
+        let failure = client.read_settings(true).unwrap_err();
+        assert!(matches!(failure, Failure::UnknownSettings), "{failure}");
+        drop(client);
+        thread.join().unwrap();
+    }
+
+    #[test]
+    fn a_client_whose_numbers_run_out_begins_another_session_and_keeps_its_telemetry() {
+        let (mut client, thread) = connected();
         let first = client.session;
         client.order(Request::Stream { every_ticks: 1 }).unwrap();
         client.requests = MOST_REQUESTS;

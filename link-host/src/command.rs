@@ -4,7 +4,8 @@ use anyhow::{Context, Result};
 use link::{Desired, Fault, Reason, Request, State, WireVolts};
 use simulation::bad_input;
 
-use crate::client::{Client, Failure};
+use crate::client::Client;
+use crate::failure::Failure;
 
 impl Client {
     /// Sends a request that is answered with an acknowledgement. A stiffness out of reach is bad input; any other error is a

@@ -10,10 +10,13 @@
 
 mod client;
 mod command;
+mod failure;
 mod port;
 mod report;
+mod requests;
 
-pub use client::{Client, Failure, Patience, heartbeat};
+pub use client::{Client, Patience, heartbeat};
 pub use command::fault;
+pub use failure::Failure;
 pub use port::Port;
 pub use report::{IsolationRow, Row, StatusReport};

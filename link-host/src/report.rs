@@ -84,7 +84,7 @@ pub struct StatusReport {
     pub protocol: u8,
     /// Version and git revision of the firmware.
     pub firmware: String,
-    /// Name of the controller: `paper` or `fast`.
+    /// Name of the controller: `none`, `paper`, `fast` or `robust`.
     pub controller: &'static str,
     /// Ticks per second, in Hz.
     pub rate_hz: u32,

@@ -17,7 +17,7 @@
 
 use crate::amplifier::{self, Amplifier, Limits};
 use crate::error::OutOfRange;
-use crate::estimator::{self, Estimator, Model, Plant};
+use crate::estimator::{self, Estimator, Invertible, Model, Plant};
 use crate::feedback::{self, Feedback, Observed, Reading, Sensor};
 use crate::pre_compensator::{self, Gains, ProportionalIntegral};
 use crate::robust::{self, Aim, Margin, Robust};
@@ -115,24 +115,21 @@ impl<P: Model> Validated<'_, Settings<P>> {
     pub fn quantize(self) -> Config<P::Config> {
         let (settings, sample_time) = (self.settings(), self.sample_time());
         let plant = self.part(&settings.plant);
-        let estimator = P::quantize(plant);
-        let step_gain = settings.plant.largest_step_gain(sample_time);
         let step_v = settings.amplifier.slew_per_tick_v(sample_time);
         let resolution_v = settings.amplifier.volts_per_code();
         let pre_compensator = match &settings.compensation {
             Compensation::None => PreCompensator::None,
             Compensation::ProportionalIntegral(gains) => {
+                let step_gain = settings.plant.largest_step_gain(sample_time);
                 PreCompensator::ProportionalIntegral(self.part(gains).quantize(&step_gain))
             }
             Compensation::TimeOptimal(approach) => {
-                let inverse = P::inverse(plant, &estimator, resolution_v);
-                let slew = step_v.map(|step_v| (settings.plant.smallest_step_gain(sample_time), step_v));
-                PreCompensator::TimeOptimal(self.part(approach).quantize(inverse, &step_gain, slew))
+                PreCompensator::TimeOptimal(self.part(approach).quantize(&Invertible::new(plant, resolution_v), step_v))
             }
             Compensation::Robust(margin) => self.robust(margin, step_v),
         };
         Config {
-            estimator,
+            estimator: P::quantize(plant),
             pre_compensator,
             amplifier: self.part(&settings.amplifier).quantize(),
             feedback: settings.feedback.as_ref().map(|feedback| self.part(feedback).quantize()),

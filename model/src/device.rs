@@ -100,10 +100,7 @@ impl Settings {
         if !trip_on_cause.is_empty() {
             match self.isolation(control.plant, control.amplifier.max_v) {
                 Some(bank) => bank.validate(sample_time).map(drop)?,
-                None => {
-                    let count = trip_on_cause.iter().count() as f64;
-                    OutOfRange::check("trip_on_cause", count, 0.0..=0.0, "causes without a sensor")?;
-                }
+                None => trip_on_cause.check_none("causes without a sensor")?,
             }
         }
         // A monitor with a wider tolerance could agree with anything.

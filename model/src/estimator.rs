@@ -77,7 +77,7 @@ pub trait Model: Validate + Copy {
 }
 
 /// A quantized spring with what a pre-compensator needs to invert it.
-#[cfg_attr(not(feature = "robust"), allow(dead_code, reason = "only the robust pre-compensator needs it"))]
+#[cfg_attr(not(feature = "robust"), allow(dead_code, reason = "only the robust pre-compensator needs all of it"))]
 #[derive(Clone, Copy, Debug)]
 pub struct Invertible<E: Estimator> {
     pub(crate) estimator: E,

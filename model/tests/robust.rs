@@ -1,5 +1,6 @@
-//! The robust pre-compensator: settings out of range, and changes of configuration and sensor without a jump of the voltage. Built with
-//! overflow checks: a wrap panics. What it reaches is in `simulation/tests/robust.rs`; random settings are in `time_optimal/range.rs`.
+//! The robust pre-compensator: settings out of range, and changes of configuration and sensor without a jump of the voltage.
+//! Built with overflow checks: a wrap panics. What it reaches is in `simulation/tests/robust.rs`; random settings are in
+//! `time_optimal/range.rs`.
 
 use model::{
     Amplifier, Compensation, Config, Feedback, Input, Margin, Output, Reading, ScaledStiffness, Settings, State, Volts,

@@ -17,8 +17,9 @@ use simulation::{BadInput, bad_input, plant_file};
 use crate::analysis::Plant;
 use crate::error::link_exception;
 
-/// Longest time for which a call holds the connection: the heartbeat and the interpreter's signals wait so long.
-const TURN: Duration = Duration::from_millis(20);
+/// Time for which one call waits for telemetry and holds the connection. Heartbeats, calls of other threads and the interpreter's
+/// signals have their turn between two calls.
+const TURN: Duration = Duration::from_millis(5);
 
 /// A connection, shared with the thread of its heartbeats.
 struct Connection {
@@ -110,7 +111,7 @@ fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) {
         if let Some(connection) = lock(connection).as_mut() {
             let _ = connection.beat();
         }
-        thread::park_timeout(TURN / 4);
+        thread::park_timeout(TURN);
     }
 }
 
@@ -175,43 +176,32 @@ impl Port {
         self.with(py, |it| it.order(Request::Acknowledge(link_host::fault(fault)?)))
     }
 
-    /// Asks for telemetry at a rate in Hz, 0 for none; returns the MCU's ticks per second.
-    fn stream(&self, py: Python<'_>, rate_hz: f64) -> PyResult<u32> {
+    /// Asks for telemetry at a rate in Hz, 0 for none.
+    fn stream(&self, py: Python<'_>, rate_hz: f64) -> PyResult<()> {
         self.with(py, |it| {
-            let ticks_hz = it.status.rate_hz;
             let every_ticks = match rate_hz {
                 0.0 => 0,
                 rate if (0.02..=10_000.0).contains(&rate) => {
-                    (f64::from(ticks_hz) / rate).round().clamp(1.0, f64::from(u16::MAX)) as u16
+                    (f64::from(it.status.rate_hz) / rate).round().clamp(1.0, f64::from(u16::MAX)) as u16
                 }
                 rate => bad_input!("rate_hz {rate}: expected 0.02 to 10000"),
             };
             // Samples of an earlier stream may have come after its end.
             let name = it.name();
             it.client.samples(Duration::ZERO).with_context(|| name)?.for_each(drop);
-            it.order(Request::Stream { every_ticks })?;
-            Ok(ticks_hz)
+            it.order(Request::Stream { every_ticks }).map(drop)
         })
     }
 
-    /// Telemetry that arrives within `wait_s`, as a JSON array. Ctrl-C is noticed within milliseconds.
-    fn samples(&self, py: Python<'_>, wait_s: f64) -> PyResult<String> {
-        let wait = Duration::try_from_secs_f64(wait_s).unwrap_or_default();
-        let (start, mut rows) = (Instant::now(), Vec::new());
-        loop {
-            let turn = wait.saturating_sub(start.elapsed()).min(TURN);
-            self.with(py, |it| {
-                it.beat()?;
-                let (name, rate_hz) = (it.name(), it.status.rate_hz);
-                let samples = it.client.samples(turn).with_context(|| name)?;
-                rows.extend(samples.map(|sample| Row::new(&sample, rate_hz)));
-                Ok(())
-            })?;
-            if start.elapsed() >= wait {
-                return serde_json::to_string(&rows).map_err(|error| link_exception(error.into()));
-            }
-            py.check_signals()?;
-        }
+    /// Telemetry that arrives within a few milliseconds, as a JSON array.
+    fn samples(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |it| {
+            it.beat()?;
+            let (name, rate_hz) = (it.name(), it.status.rate_hz);
+            let samples = it.client.samples(TURN).with_context(|| name)?;
+            let rows: Vec<Row> = samples.map(|sample| Row::new(&sample, rate_hz)).collect();
+            Ok(serde_json::to_string(&rows)?)
+        })
     }
 
     fn models(&self, py: Python<'_>, plant: Option<Plant>) -> PyResult<String> {

@@ -293,7 +293,7 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
         it.mkdir(parents=True)
     (folder / "a/b.csv").write_text("no")
     (tmp_path / "bad.toml").write_text("[relaxation]\nshare = 7\n")
-    listed = {"names.csv": "name\nx\n", "dates.csv": "record,time\nx.csv,yesterday\n", "twice.csv": "record\nx.csv\nx.csv\n", "gap.csv": "record,spring\n,s\n"}
+    listed = {"names.csv": "name\nx\n", "dates.csv": "record,time\nx.csv,yesterday\n", "twice.csv": "record\nx.csv\nx.csv\n", "gap.csv": "record,spring\n,s\n", "double.csv": "record,spring,spring\nx.csv,a,b\n"}
     for name, text in listed.items():
         (tmp_path / name).write_text(text)
     for words, part in (
@@ -303,6 +303,9 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
         ([tmp_path / "dates.csv"], "row 1, column time: yesterday; expected a date"),
         ([tmp_path / "twice.csv"], "x.csv is listed twice"),
         ([tmp_path / "gap.csv"], "row 1, column record: empty"),
+        ([tmp_path / "double.csv"], "columns record, spring, spring; expected record"),
+        ([folder, "--wait", "inf"], "inf: expected a number"),
+        (["--cost", "10", "--price", "inf"], "inf: expected a number"),
         ([folder, "--plant", "no.toml"], "--plant no.toml: cannot be read"),
         ([folder, "--plant", tmp_path / "bad.toml"], "bad.toml"),
         ([folder, "--columns", "no.toml"], "--columns no.toml: cannot be read"),
@@ -321,6 +324,47 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
         assert code == 2 and line.startswith("vsj.fleet: ") and part in line, (words, line)
     assert fleet.main([str(folder), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1", "--wait", "1"]) == 1
     assert "no scheduler answers within 1 s" in capsys.readouterr().err
+
+
+def test_a_damaged_or_foreign_file_of_results_is_named(copied, tmp_path, engine, capsys):
+    out = tmp_path / "out"
+    assert fleet.main([str(copied), "--out", str(out), "--scheduler", engine, "--effort", "quick"]) == 0
+    part, foreign = parts(out)[0], out / "parts/x.parquet"
+    pandas.DataFrame({"a": [1]}).to_parquet(foreign)
+
+    def refused(words, name):
+        capsys.readouterr()
+        assert fleet.main([*map(str, words), "--out", str(out)]) == 2
+        [line] = capsys.readouterr().err.strip().splitlines()
+        assert line.startswith(f"vsj.fleet: {name}: cannot be read as results: "), line
+
+    refused([copied, "--scheduler", engine], foreign)
+    foreign.unlink()
+    part.write_bytes(part.read_bytes()[:300])
+    refused([copied, "--scheduler", engine], part)
+    (out / store.TABLE).write_bytes(b"PAR1")
+    refused(["--cost", 10], out / store.TABLE)
+
+
+@pytest.mark.parametrize("place", [".", "out/fleet"])
+def test_results_in_the_folder_of_the_records_are_no_records(copied, engine, monkeypatch, capsys, place):
+    monkeypatch.chdir(copied)
+    for counts in ((0, 4), (4, 0)):
+        assert fleet.main([".", "--out", place, "--scheduler", engine, "--effort", "quick", "--json"]) == 0
+        answer = json.loads(capsys.readouterr().out)
+        assert (answer["finished_before"], answer["finished_now"]) == counts
+
+
+def test_a_plant_of_the_manifest_is_not_the_file_of_the_same_name_that_the_option_names(copied, tmp_path, engine, monkeypatch, capsys):
+    for folder, tau_s in ((tmp_path, 5.5), (copied, 11.0)):
+        (folder / "plant.toml").write_text(f"schema = 1\n[relaxation]\nshare = 0.09\ntau_s = {tau_s}\n")
+    record = sorted(copied.glob("s1/*.csv"))[0].relative_to(copied)
+    (copied / "list.csv").write_text(f"record,plant\n{record},plant.toml\n")
+    monkeypatch.chdir(tmp_path)
+    words = [str(copied / "list.csv"), "--out", str(tmp_path / "out"), "--scheduler", engine]
+    assert fleet.main([*words, "--plant", "plant.toml"]) == 2
+    assert "plant.toml is another file than --plant plant.toml" in capsys.readouterr().err
+    assert fleet.main([*words, "--effort", "quick"]) == 0
 
 
 def test_without_its_packages_the_command_says_what_to_install():

@@ -52,6 +52,9 @@ def test_a_schedule_is_recorded_from_its_first_row_on(board):
         assert list(frame.columns) == ["time_s", "voltage_v", "estimate"]
         assert frame.time_s[0] == 0 and frame.time_s.diff().max() < 0.015
         assert frame.voltage_v.max() > 200 and frame.voltage_v.iloc[-1] < 200
+        # The last row is the end, not a target.
+        link.record(schedule=[(0, 150), (0.1, 300)])
+        assert link.status()["sample"]["target_v"] == 150
         with pytest.raises(vsj.BadInput, match="the controller's own estimate"):
             vsj.identify(frame)
 
@@ -64,6 +67,15 @@ def test_errors_of_requests_have_the_words_of_the_command(board, command):
                 link.set(value, unit)
         with pytest.raises(vsj.BadInput, match="expected V, Pa or N/m"):
             link.set(1, "mm")
+        for options, words in (
+            ({}, "neither seconds nor a schedule"),
+            ({"seconds": float("nan")}, "seconds nan: expected a positive number"),
+            ({"schedule": [(0, 1), (0, 2)]}, "times that do not increase"),
+            ({"schedule": [(0, 1), (1, float("nan"))]}, "not finite"),
+            ({"schedule": [0, 1, 2]}, r"schedule: shape \(3,\)"),
+        ):
+            with pytest.raises(vsj.BadInput, match=words):
+                link.record(**options)
         with pytest.raises(vsj.BadInput) as raised:
             link.acknowledge("nonsense")
         assert str(raised.value) == command.error("link", "unix:none", "acknowledge", "nonsense")

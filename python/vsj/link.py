@@ -1,15 +1,16 @@
 """A running microcontroller over its serial link."""
 
 import json
+import math
 import os
 import time
 from dataclasses import dataclass
-from typing import Any, Dict, Iterator, List, Optional, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple, Union
+
+import numpy as np
 
 from . import _vsj
 from .analysis import named_plant
-
-_TURN_S = 0.005
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ class Link:
         seconds : float, optional
             Length; default: without end.
         """
-        for samples in self._turns(rate_hz, seconds, lambda: None):
+        for samples in self._turns(rate_hz, seconds, lambda elapsed_s: None):
             yield from samples
 
     def record(self, seconds: Optional[float] = None, rate_hz: float = 100.0, schedule: Any = None) -> Any:
@@ -153,8 +154,9 @@ class Link:
             Length in s; default: that of the schedule.
         rate_hz : float
             Rows per second; 115 200 bit/s suffice for about 250.
-        schedule : sequence of (time_s, voltage_v) or array of shape (n, 2), optional
-            Targets that an armed MCU is commanded, each held until the next; times in s, increasing.
+        schedule : sequence of (time_s, voltage_v), array of shape (n, 2) or frame of a :class:`Plan`, optional
+            Targets that an armed MCU is commanded, each held until the next; times in s, increasing. The time of the last row is the
+            end, unless ``seconds`` is longer.
 
         Returns
         -------
@@ -164,24 +166,22 @@ class Link:
         """
         import pandas
 
+        waiting = _steps(schedule)
+        if seconds is None:
+            if not waiting:
+                raise _vsj.BadInput("record: neither seconds nor a schedule; expected one of them")
+            seconds = waiting[0][0]
         has_sensor = self.status()["sample"]["measured_v"] is not None
-        steps = [(float(at), float(volts)) for at, volts in (schedule if schedule is not None else [])]
-        if any(after[0] <= before[0] for before, after in zip(steps, steps[1:])):
-            raise _vsj.BadInput("schedule: times that do not increase; expected increasing times in s")
-        if seconds is None and not steps:
-            raise _vsj.BadInput("record: neither seconds nor a schedule; expected one of them")
-        begin, waiting = time.monotonic(), steps[::-1]
-        length = seconds if seconds is not None else steps[-1][0] - steps[0][0]
 
-        def command() -> None:
+        def command(elapsed_s: float) -> None:
             due = None
-            while waiting and time.monotonic() - begin >= waiting[-1][0] - steps[0][0]:
+            while waiting and elapsed_s >= waiting[-1][0]:
                 due = waiting.pop()[1]
             if due is not None:
                 self.set(due)
 
         rows: List[Sample] = []
-        for samples in self._turns(rate_hz, length, command):
+        for samples in self._turns(rate_hz, seconds, command):
             rows += samples
             if rows and samples and samples[-1].tick < rows[0].tick:
                 raise _vsj.LinkError("the MCU restarted during the recording")
@@ -220,13 +220,31 @@ class Link:
         blocks, text = self._port.settings(None if file is None else os.fspath(file))
         return {**json.loads(blocks), "toml": text}
 
-    def _turns(self, rate_hz: float, seconds: Optional[float], command: Any) -> Iterator[List[Sample]]:
-        """Samples in short turns, each after ``command``."""
+    def _turns(self, rate_hz: float, seconds: Optional[float], command: Callable[[float], None]) -> Iterator[List[Sample]]:
+        """Samples in short turns, each after ``command``, which gets the time since the first turn in s."""
+        length_s = math.inf if seconds is None else float(seconds)
+        if not length_s > 0:
+            raise _vsj.BadInput(f"seconds {length_s:g}: expected a positive number of seconds")
         self._port.stream(float(rate_hz))
         begin = time.monotonic()
         try:
-            while seconds is None or time.monotonic() - begin < seconds:
-                command()
-                yield [Sample._of(row) for row in json.loads(self._port.samples(_TURN_S))]
+            while (elapsed_s := time.monotonic() - begin) < length_s:
+                command(elapsed_s)
+                yield [Sample._of(row) for row in json.loads(self._port.samples())]
         finally:
             self._port.stream(0.0)
+
+
+def _steps(schedule: Any) -> List[Tuple[float, float]]:
+    """The rows of a schedule, the last first, with times since its first row."""
+    if schedule is None:
+        return []
+    rows = np.asarray(schedule, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) == 0:
+        raise _vsj.BadInput(f"schedule: shape {rows.shape}; expected (n, 2), one row or more, with time in s and voltage in V")
+    times, voltages = rows.T
+    if not np.isfinite(rows).all():
+        raise _vsj.BadInput("schedule: a number that is not finite; expected times in s and voltages in V")
+    if not (np.diff(times) > 0).all():
+        raise _vsj.BadInput("schedule: times that do not increase; expected increasing times in s")
+    return list(zip((times - times[0]).tolist(), voltages.tolist()))[::-1]

@@ -16,8 +16,8 @@ def courses(records, models, unit, axes=None):
     above.set_ylabel(f"reading{bracket}")
     below.set_ylabel(f"residual{bracket}")
     below.set_xlabel("time (s)")
-    above.legend(fontsize="small")
-    below.legend(fontsize="small")
+    above.legend(fontsize="small", loc="upper left")
+    below.legend(fontsize="small", loc="upper left")
     return figure
 
 
@@ -39,7 +39,7 @@ def run(ticks, axes=None):
     above.set_ylabel("stiffness (V)")
     below.set_ylabel("voltage (V)")
     below.set_xlabel("time (s)")
-    above.legend(fontsize="small")
+    above.legend(fontsize="small", loc="upper left")
     return figure
 
 

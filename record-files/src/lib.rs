@@ -44,7 +44,10 @@ impl Container {
 
     /// Name of the format.
     pub fn name(self) -> &'static str {
-        ["MCAP", "Parquet"][self as usize]
+        match self {
+            Self::Mcap => "MCAP",
+            Self::Parquet => "Parquet",
+        }
     }
 
     /// The container whose files start with these bytes.
@@ -54,7 +57,10 @@ impl Container {
     }
 
     fn magic(self) -> &'static [u8] {
-        if self == Self::Mcap { mcap::MAGIC } else { b"PAR1" }
+        match self {
+            Self::Mcap => mcap::MAGIC,
+            Self::Parquet => b"PAR1",
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use model::{
     Amplifier, Approach, Compensation, Config, ExtendedPlant, Feedback, Gains, Input, OutOfRange, Output, SampleTime,
     ScaledStiffness, Settings, State, Validate, Volts,
 };
+use serde::{Deserialize, Serialize};
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
@@ -20,7 +21,8 @@ use crate::plant_file::PlantFile;
 pub const CONTROLLERS: [&str; 3] = ["none", "paper", "fast"];
 
 /// Choice of the pre-compensator, by the names of the command's option `--controller`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Controller {
     /// No controller: the target is the voltage.
     None,
@@ -52,7 +54,8 @@ impl Controller {
 }
 
 /// The settings of a controller around a plant file's spring, by the names of the command's options.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Options {
     /// The pre-compensator.
     pub controller: Controller,
@@ -72,7 +75,8 @@ pub struct Options {
     pub approach_s: Option<f64>,
     /// Ticks per second, in Hz.
     pub rate_hz: f64,
-    /// A stiffness sensor; `None` if there is none.
+    /// A stiffness sensor; `None` if there is none. Not in a file.
+    #[serde(skip)]
     pub feedback: Option<Feedback>,
 }
 

@@ -1,4 +1,4 @@
-//! The robust controller on every spring at the ends of its margin, beside the bounds of what is possible.
+//! The robust controller on every spring at the ends of its margin, compared with the shortest possible times.
 
 use model::{Amplifier, Approach, Compensation, Feedback, Margin, Settings};
 use simulation::experiment::{Experiment, max_fixed_point_error};
@@ -71,7 +71,7 @@ fn without_a_sensor_every_spring_is_within_a_tenth_of_the_bound() {
     }
 }
 
-/// A sensor with a noise of 1 V. A step that takes longer is as fast as that spring can be. With all parameters off at once the readings
+/// A sensor with a noise of 1 V. A step that takes longer is as fast as that spring can be. With errors of all parameters the readings
 /// of the first milliseconds are clipped, and the overshoot may be 2.5 %.
 #[test]
 fn with_a_sensor_every_spring_within_10_percent_takes_0_6_s_or_the_shortest_time() {

@@ -3,20 +3,14 @@
 #![no_std]
 #![no_main]
 
-use cortex_m::peripheral::Peripherals;
 use defmt_semihosting as _;
-use firmware::hang_guard;
 use test_bench::isolation::run;
-use test_bench::mps2::instructions::Counter;
-use test_bench::mps2::registers::CLOCK_HZ;
+use test_bench::mps2::instructions::{Counter, start_clock};
 use test_bench::mps2::semihosting;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    if let Some(mut core) = Peripherals::take() {
-        // Starts SysTick for the counter; without ticks the guard itself is inactive.
-        hang_guard::start(&mut core.SYST, CLOCK_HZ);
-    }
+    start_clock();
     let mut counter = Counter::begin();
     let Ok(outcome) = run(&mut counter) else { semihosting::exit(1) };
     let counted = counter.instructions();

@@ -11,20 +11,18 @@
 use core::hint::black_box;
 use core::time::Duration;
 
-use cortex_m::peripheral::Peripherals;
 use defmt_semihosting as _;
 use discrete_pid::pid::{PidConfigBuilder, PidController};
 use discrete_pid::time::Micros;
 use dsp_process::SplitProcess;
 use firmware::control::Stopwatch;
-use firmware::hang_guard;
 use idsp::Build;
 use idsp::iir::{Biquad, BiquadClamp, DirectForm1, pid::Builder};
 use model::units::Signal;
 use model::{Config, Gains, Input, Output, Plant, Settings, State, Volts};
-use test_bench::mps2::instructions::Counter;
-use test_bench::mps2::registers::CLOCK_HZ;
+use test_bench::mps2::instructions::{Counter, start_clock};
 use test_bench::mps2::semihosting;
+use test_bench::xorshift::Xorshift;
 
 const SETTINGS: Settings = Settings::PAPER;
 const GAINS: Gains = Gains::PAPER;
@@ -35,8 +33,8 @@ const MAX_V: f64 = SETTINGS.amplifier.max_v;
 const JUMPING: u32 = 10_000;
 /// Number of all ticks; those at 300 V suffice to settle.
 const TICKS: u32 = 40_000;
-/// Final target, in V.
-const END_V: i32 = 300;
+/// Final target: 300 V.
+const END: Volts = Volts(Signal::const_from_int(300));
 
 /// A controller with its spring.
 trait Contender {
@@ -47,10 +45,7 @@ trait Contender {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    if let Some(mut core) = Peripherals::take() {
-        // Starts SysTick for the counter; without ticks the guard itself is inactive.
-        hang_guard::start(&mut core.SYST, CLOCK_HZ);
-    }
+    start_clock();
     let Ok(config) = SETTINGS.validate().map(|settings| settings.quantize()) else { semihosting::exit(1) };
     race("tick", &mut WholeTick { config, state: State::default() });
     race("tick_f64", &mut F64 { spring: Spring::default(), integral: 0.0, voltage: 0.0 });
@@ -62,20 +57,15 @@ fn main() -> ! {
 
 fn race(name: &'static str, contender: &mut dyn Contender) {
     let mut counter = Counter::begin();
-    let mut bits: u32 = 1;
-    let mut target = 0;
+    let (mut numbers, mut target) = (Xorshift::new(1), Volts::ZERO);
     let mut volts = 0.0;
     for tick in 0..TICKS {
         if tick >= JUMPING {
-            target = END_V << 20;
+            target = END;
         } else if tick % 50 == 0 {
-            // Xorshift generator of Marsaglia; 0 to 511 V.
-            bits ^= bits << 13;
-            bits ^= bits >> 17;
-            bits ^= bits << 5;
-            target = (bits >> 3) as i32;
+            target = numbers.target();
         }
-        volts = contender.tick(Volts(Signal::from_bits(target)), &mut counter);
+        volts = contender.tick(target, &mut counter);
     }
     let counted = counter.instructions();
     let end_mv = (volts * 1000.0) as i32;

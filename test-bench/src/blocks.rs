@@ -4,13 +4,15 @@
 use firmware::control::{Stopwatch, whole_tick};
 use model::estimator::{Estimator, Model};
 use model::extended::{Law, Leakage, Memory, Relaxation};
-use model::units::Signal;
 use model::{Approach, Compensation, ExtendedPlant, Gains, Input, Margin, OutOfRange, Plant, Settings, State, Volts};
 
 use crate::digest::Digest;
+use crate::xorshift::Xorshift;
 
-/// Number of ticks of a run. The target changes every 50 ticks.
-pub const TICKS: u32 = 10_000;
+/// Number of ticks of a run.
+const TICKS: u32 = 10_000;
+/// Number of ticks with the same target.
+const TICKS_A_TARGET: u32 = 50;
 
 /// The controllers with their names.
 pub const CONTROLLERS: [(&str, Compensation); 4] = [
@@ -62,6 +64,17 @@ const fn lags(count: usize, time_constant_high_s: Option<f64>) -> Relaxation<'st
     Relaxation { share, time_constants_s, weights, time_constant_high_s }
 }
 
+/// The inputs of a run: random targets.
+pub fn inputs() -> impl Iterator<Item = Input> {
+    let (mut numbers, mut target) = (Xorshift::new(1), Volts::ZERO);
+    (0..TICKS).map(move |tick| {
+        if tick.is_multiple_of(TICKS_A_TARGET) {
+            target = numbers.target();
+        }
+        Input { target, ..Input::default() }
+    })
+}
+
 /// Executes one run and returns the digest of its codes and estimates.
 ///
 /// # Errors
@@ -83,16 +96,7 @@ pub fn run(
 fn ticks<P: Model>(settings: &Settings<P>, stopwatch: &mut impl Stopwatch) -> Result<u64, OutOfRange> {
     let (config, mut state) = (settings.validate()?.quantize(), State::<<P::Config as Estimator>::State>::default());
     let mut digest = Digest::default();
-    let (mut bits, mut target) = (1u32, 0);
-    for tick in 0..TICKS {
-        if tick.is_multiple_of(50) {
-            // Xorshift generator of Marsaglia; 0 to 511 V.
-            bits ^= bits << 13;
-            bits ^= bits >> 17;
-            bits ^= bits << 5;
-            target = (bits >> 3) as i32;
-        }
-        let input = Input { target: Volts(Signal::from_bits(target)), ..Input::default() };
+    for input in inputs() {
         stopwatch.start();
         let output = whole_tick(&config, &mut state, input);
         stopwatch.stop();

@@ -1,4 +1,4 @@
-//! A run of the isolation bank beside the controller, on the host and on the target, for counting instructions and comparing results
+//! A run of the isolation bank with the controller, on the host and on the target, for counting instructions and comparing results
 //! bit for bit.
 
 use firmware::control::{Stopwatch, whole_tick};
@@ -7,9 +7,10 @@ use model::units::Signal;
 use model::{Input, OutOfRange, SampleTime, ScaledStiffness, Settings, State, Validate, Volts};
 
 use crate::digest::Digest;
+use crate::xorshift::{Xorshift, volts};
 
 /// Number of ticks of the run. The target changes every 2500 ticks.
-pub const TICKS: u32 = 60_000;
+const TICKS: u32 = 60_000;
 /// Tick at which the spring becomes an eighth stiffer.
 const FAULT: u32 = 20_000;
 
@@ -36,19 +37,16 @@ pub fn run(stopwatch: &mut impl Stopwatch) -> Result<Outcome, OutOfRange> {
     let bank = isolation::Settings::PAPER.validate(SampleTime::from_rate(Settings::PAPER.rate_hz)?)?.quantize();
     let (mut state, mut watching) = (State::default(), isolation::State::default());
     let mut digest = Digest::default();
-    let (mut bits, mut target) = (1u32, Volts::ZERO);
+    let (mut numbers, mut target) = (Xorshift::new(1), Volts::ZERO);
     for tick in 0..TICKS {
-        // Xorshift generator of Marsaglia.
-        bits ^= bits << 13;
-        bits ^= bits >> 17;
-        bits ^= bits << 5;
+        let drawn = numbers.draw();
         if tick.is_multiple_of(2500) {
-            target = Volts(Signal::from_bits((bits >> 3) as i32));
+            target = volts(drawn);
         }
         let output = whole_tick(&config, &mut state, Input { target, ..Input::default() });
         let stiffness = output.stiffness.0.to_bits();
         // Uniform noise of about 1 V.
-        let noise = (bits & 0x3f_ffff) as i32 - 0x1f_ffff;
+        let noise = (drawn & 0x3f_ffff) as i32 - 0x1f_ffff;
         let fault = if tick < FAULT { 0 } else { stiffness >> 3 };
         let reading = ScaledStiffness(Signal::from_bits(stiffness + fault + noise));
         stopwatch.start();

@@ -7,9 +7,10 @@
 //! | --- | --- |
 //! | `blocks` | Runs of the tick with each kind of spring and each controller, for counting instructions (feature `robust`). |
 //! | [`digest`] | Checksum of a whole run. |
-//! | [`isolation`] | A run of the isolation bank beside the controller, for counting instructions. |
+//! | [`isolation`] | A run of the isolation bank with the controller, for counting instructions. |
 //! | [`script`] | Commands and injected faults of every run. |
 //! | [`simulation`] | Execution of a script on a host, without a board. |
+//! | [`xorshift`] | Random numbers that are the same on every machine. |
 //! | `mps2` | The emulated board. |
 //! | `player` | Execution of a script on the emulated board. |
 //!
@@ -26,6 +27,7 @@ pub mod digest;
 pub mod isolation;
 pub mod script;
 pub mod simulation;
+pub mod xorshift;
 
 #[cfg(feature = "mps2-an386")]
 pub mod mps2;

@@ -21,6 +21,8 @@ use firmware::settings::with_sensor;
 use link::Command;
 use model::{Settings, Volts, supervisor};
 
+use crate::xorshift::Xorshift;
+
 /// Number of ticks of the stair, 70 s.
 pub const STAIR_TICKS: u32 = 70_000;
 /// Number of ticks of an `up-down` run, 95 s.
@@ -151,7 +153,7 @@ impl Script {
     /// The random run with this seed.
     pub const fn random(seed: u32) -> Self {
         // The generator never leaves the state zero.
-        Self::Random(Random { bits: if seed == 0 { 1 } else { seed }, open_until: 0, silent_until: 0 })
+        Self::Random(Random { numbers: Xorshift::new(seed), open_until: 0, silent_until: 0 })
     }
 
     /// The script with this name, see the table of this module; `None` if there is none.
@@ -261,10 +263,10 @@ fn aftermath(tick: u32) -> Option<supervisor::Command> {
     }
 }
 
-/// State of a random run, with a xorshift generator (Marsaglia, 13-17-5).
+/// State of a random run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Random {
-    bits: u32,
+    numbers: Xorshift,
     open_until: u32,
     silent_until: u32,
 }
@@ -272,7 +274,7 @@ pub struct Random {
 impl Random {
     fn step(&mut self, tick: u32) -> Step {
         // Both numbers are drawn in every tick, so that the sequence does not depend on their use.
-        let (event, value) = (self.draw() >> 16, self.draw());
+        let (event, value) = (self.numbers.draw() >> 16, self.numbers.draw());
         let mut arming = None;
         let mut target = None;
         match event {
@@ -290,13 +292,6 @@ impl Random {
             interlock_closed: tick >= self.open_until,
             fault: None,
         }
-    }
-
-    fn draw(&mut self) -> u32 {
-        self.bits ^= self.bits << 13;
-        self.bits ^= self.bits >> 17;
-        self.bits ^= self.bits << 5;
-        self.bits
     }
 }
 

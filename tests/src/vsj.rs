@@ -6,11 +6,14 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-/// The command `vsj`, to be run in this package's folder. Built at the first call, because cargo does not build
-/// binaries of other packages for a test.
+/// The command `vsj`, to be run in this package's folder: the file that the variable `VSJ` names. Without it the command is built at the
+/// first call, because cargo does not build binaries of other packages for a test.
 pub fn vsj() -> Command {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
     let program = BUILT.get_or_init(|| {
+        if let Some(built) = std::env::var_os("VSJ") {
+            return built.into();
+        }
         // The test is TARGET/PROFILE/deps/NAME.
         let test = std::env::current_exe().expect("a test has a path");
         let target = test.ancestors().nth(3).expect("a test is below the target folder");

@@ -1,4 +1,4 @@
-//! The firmware's isolation bank beside its control tick, in closed loop with a spring that changes while it runs.
+//! The firmware's isolation bank and its control tick, in closed loop with a spring that changes while it runs.
 //!
 //! `cargo xtask story --isolation` compares the emulated image with the same code.
 
@@ -134,10 +134,10 @@ fn what_is_said_of_a_change_is_what_vsj_isolate_says_of_the_record() {
         assert!(said.iter().all(|event| event.verdict != "named" || event.cause == Some(cause.name())), "{said:?}");
         let since_tick = named.tick - 128 * named.report.since_blocks;
         assert!((change.tick() - 200..change.tick() + 600).contains(&since_tick), "{cause:?} since {since_tick}");
-        let told = run.terms.describe(&named.report, u64::from(named.tick), u64::from(since_tick));
+        let described = run.terms.describe(&named.report, u64::from(named.tick), u64::from(since_tick));
         if change == Change::Gain {
-            assert!((told.size - 0.1).abs() < 0.01 && told.half_width < 0.01, "{told:?}");
-            assert!(told.explained > 0.95, "{told:?}");
+            assert!((described.size - 0.1).abs() < 0.01 && described.half_width < 0.01, "{described:?}");
+            assert!(described.explained > 0.95, "{described:?}");
         }
         assert_eq!(run.states.len(), 1, "armed throughout: {:?}", run.states);
     }

@@ -172,6 +172,16 @@ fn a_log_is_written_as_mcap_and_parquet_with_the_numbers_of_its_lines() {
 }
 
 #[test]
+fn a_log_of_which_no_line_can_be_read_replaces_no_file() {
+    let folder = folder("rzcobs", &[0xff, 0x12, 0x34, 0]);
+    fs::write(folder.path().join("log.mcap"), "an older one").expect("a file");
+    let output = run(&folder, &["fw.elf", "log.bin", "--out", "log.mcap"]);
+    assert_eq!(code(&output), 2);
+    assert!(!text(&output.stdout).contains("wrote"), "{}", text(&output.stdout));
+    assert_eq!(fs::read_to_string(folder.path().join("log.mcap")).expect("the file"), "an older one");
+}
+
+#[test]
 fn damage_in_the_middle_loses_only_the_damaged_frames() {
     let mut frames = frames("rzcobs");
     frames[3] = vec![0xff, 0x12, 0x34, 0];

@@ -78,9 +78,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         find_bench(&shell::metadata()?)?;
     }
     let python = python::environment(&target, "bench", "xtask/bench/requirements.txt")?;
-    if wants(Part::ClosedLoop) {
-        package::install(&python, &target)?;
-    }
     let closed_loop = if wants(Part::ClosedLoop) { Some(closed_loop(&python, &target)?) } else { None };
     let records = if wants(Part::Records) { Some(bench_records::measure(&python, &target)?) } else { None };
     if args.json {
@@ -97,6 +94,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// The table of the closed loop.
 fn closed_loop(python: &Path, target: &Path) -> Result<Vec<Row>> {
+    package::install(python, target)?;
     shell::run(cargo_bench().arg("--no-run"))?;
     let mut rounds = Vec::new();
     for round in 1..=ROUNDS {

@@ -1,5 +1,6 @@
 //! Builds the MCU's images with cargo and keeps each under a name of its own.
 
+use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -68,8 +69,11 @@ impl Board {
     }
 }
 
-/// Builds the program `vsj`. Returns its path.
+/// Returns the path of the program `vsj`: the one that the variable `VSJ` names, else one that is built.
 pub fn vsj() -> Result<PathBuf> {
+    if let Some(built) = env::var_os("VSJ") {
+        return Ok(built.into());
+    }
     shell::run(shell::cargo().args(["build", "--quiet", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
     Ok(shell::target_directory()?.join("release/vsj"))
 }

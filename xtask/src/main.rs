@@ -191,9 +191,8 @@ Examples:
     /// Pack a release: vsj, images, documents, licences, checksums
     ///
     /// Into a folder and an archive in target/releases/: `vsj` for this machine with manual pages and completions, the libraries for
-    /// FMI and C, the images of
-    /// both boards for each controller and amplifier with their bills of materials, the manual, the page for a browser, the changes of
-    /// this version, the licences of all dependencies, SHA256SUMS.
+    /// FMI and C, the images of both boards for each controller and amplifier with their bills of materials, the manual, the page for a
+    /// browser, the changes of this version, the licences of all dependencies, SHA256SUMS.
     #[command(
         verbatim_doc_comment,
         after_help = "\

@@ -4,7 +4,7 @@ use std::env;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use xtask::{python, shell};
+use xtask::{build, python, shell};
 
 /// Folder of the package, a workspace of its own, and the packages that its tests need.
 const FOLDER: &str = "./python";
@@ -16,10 +16,10 @@ pub(crate) fn run() -> Result<()> {
     shell::run(shell::cargo().args(["fmt", "--manifest-path", "python/Cargo.toml", "--check"]))?;
     let target = shell::target_directory()?;
     let python = python::environment(&target, "python", REQUIREMENTS)?;
-    shell::run(shell::cargo().args(["build", "--release", "-p", "host-sim", "--bin", "vsj"]))?;
+    let vsj = build::vsj()?;
     install(&python, &target)?;
     let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
-    shell::run(shell::command(&python).args(tests).env("VSJ", target.join("release/vsj")))
+    shell::run(shell::command(&python).args(tests).env("VSJ", vsj))
 }
 
 /// Installs the package in the virtual environment of an interpreter, which has maturin.

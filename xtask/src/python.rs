@@ -5,13 +5,18 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::shell;
+use crate::{files, shell};
+
+/// The folder of the virtual environment of a command, whether or not it exists.
+pub fn folder(target: &Path, command: &str) -> PathBuf {
+    target.join(format!("{command}-venv"))
+}
 
 /// The Python interpreter of a virtual environment under `target` that has the packages of `requirements`, a file
 /// relative to the root of the workspace. Creates the environment, named after `command`, or renews it when the file
 /// has changed.
 pub fn environment(target: &Path, command: &str, requirements: &str) -> Result<PathBuf> {
-    let venv = target.join(format!("{command}-venv"));
+    let venv = folder(target, command);
     let python = venv.join("bin/python");
     let path = shell::root().join(requirements);
     let installed = venv.join("requirements.txt");
@@ -26,6 +31,6 @@ pub fn environment(target: &Path, command: &str, requirements: &str) -> Result<P
     // Most modules are never imported: each is compiled when it is.
     shell::run(shell::command(&python).args(["-m", "pip", "install", "--quiet", "--no-compile", "-r"]).arg(&path))?;
     // Written last: its presence shows that the installation succeeded.
-    fs::write(&installed, wanted).with_context(|| format!("cannot write {}", installed.display()))?;
+    files::write(&installed, wanted)?;
     Ok(python)
 }

@@ -5,9 +5,11 @@ use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::panic::resume_unwind;
 use std::process::Command;
+use std::slice;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use xtask::shell;
@@ -61,7 +63,8 @@ impl Step {
             Program::Xtask => shell::command(built("xtask")?),
             Program::Emulation => shell::command(built("emulation")?),
         };
-        command.args(self.args).envs(self.env);
+        // What a step starts is what was built before, and not built again for speed.
+        command.args(self.args).env("VSJ", built("vsj")?).envs(self.env);
         Ok(command)
     }
 
@@ -80,32 +83,50 @@ impl Step {
     }
 }
 
-/// Runs steps one after the other, of which the first builds the emulation, and others beside them. After the first that fails no other
-/// is begun.
-pub(crate) fn run_beside(steps: &[Step], beside: &[Step], progress: &Progress) -> Result<()> {
-    let (built, failed) = (AtomicBool::new(false), AtomicBool::new(false));
-    let run_all = |steps: &[Step], run: fn(&Step) -> Result<()>, builds: bool| {
-        for step in steps {
-            while matches!(step.program, Program::Emulation)
-                && !built.load(Ordering::Relaxed)
-                && !failed.load(Ordering::Relaxed)
-            {
-                thread::sleep(Duration::from_millis(200));
+/// What is run in two lanes: `build`, then `host`; beside them `beside`, then `built`, which starts what `build` has built.
+pub(crate) struct Lanes {
+    pub(crate) build: Step,
+    pub(crate) host: &'static [Step],
+    pub(crate) beside: &'static [Step],
+    pub(crate) built: &'static [Step],
+}
+
+impl Lanes {
+    /// Number of steps.
+    pub(crate) const fn count(&self) -> usize {
+        1 + self.host.len() + self.beside.len() + self.built.len()
+    }
+
+    /// Runs every step. After the first that fails no other is begun.
+    pub(crate) fn run(&self, progress: &Progress) -> Result<()> {
+        let failed = AtomicBool::new(false);
+        let each = |steps: &[Step], run: fn(&Step) -> Result<()>| {
+            for step in steps {
+                if failed.load(Ordering::Relaxed) {
+                    break;
+                }
+                progress.begin(step.name);
+                run(step).inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
             }
-            if failed.load(Ordering::Relaxed) {
-                break;
-            }
-            progress.begin(step.name);
-            run(step).inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
-            built.fetch_or(builds, Ordering::Relaxed);
-        }
-        Ok(())
-    };
-    thread::scope(|scope| {
-        let other = scope.spawn(|| run_all(beside, Step::run_beside, false));
-        let own = run_all(steps, Step::run, true);
-        own.and(other.join().unwrap_or_else(|panic| resume_unwind(panic)))
-    })
+            Ok(())
+        };
+        let each = &each;
+        let (built, wait) = mpsc::channel();
+        // Its end without a message says that the build has failed.
+        let host = move || {
+            each(slice::from_ref(&self.build), Step::run)?;
+            let _ = built.send(());
+            each(self.host, Step::run)
+        };
+        let beside = move || {
+            each(self.beside, Step::run_beside)?;
+            if wait.recv().is_ok() { each(self.built, Step::run_beside) } else { Ok(()) }
+        };
+        thread::scope(|scope| {
+            let beside = scope.spawn(beside);
+            host().and(beside.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        })
+    }
 }
 
 /// The steps for `--help`: name and command line of each.

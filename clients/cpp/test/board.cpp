@@ -48,7 +48,8 @@ int main(int argc, char** argv) {
         expect(samples.back().target_v == 300.0 && samples.back().applied_v > 300.0, "an overshooting voltage");
         expect(contains(error_of([&] { link.set(5000); }), "out of range: expected 0 to 700"), "a bound");
         expect(link.model().active.number == 0 && link.settings().active.number == 0, "what is built in");
-        expect(link.record(file, 100, std::chrono::milliseconds(300)) > 20, "rows of a recording");
+        expect(contains(error_of([&] { link.record(file, -1, patience); }), "expected 0.02 to 10000"), "a rate refused");
+        expect(link.record(file, 100, std::chrono::milliseconds(300)) > 20, "rows of a recording, after an error without a file");
         expect(contains(error_of([&] { link.record(file, 100, patience); }), "cannot be created"), "an existing file kept");
     }
     vsj::Link link(port, 115'200, patience);

@@ -90,7 +90,7 @@ pub(super) fn run(
     })
 }
 
-/// A spring with this gain.
+/// The effect of a spring with this gain.
 fn stiffer(gain: f64) -> Effect {
     Effect { cause: Cause::GainError, form: 0, full_size: vec![gain], neutral: vec![1.0], size: 1.0 }
 }

@@ -123,8 +123,8 @@ fn each<T: Send>(
     effects.par_iter().map(one).collect()
 }
 
-/// The step of `cargo xtask test`: three effects, whose summary must be the approved one, and a sensor that falls
-/// silent, and the isolation bank.
+/// The step of `cargo xtask test`: three effects, whose summary must be the approved one, a sensor that falls silent, and the
+/// isolation bank.
 fn check() -> Result<()> {
     let begin = Instant::now();
     let demonstration = Demonstration::new(Controller::Paper)?;
@@ -137,6 +137,6 @@ fn check() -> Result<()> {
     eprintln!("a sensor in the loop that falls silent, in {:.0} s", begin.elapsed().as_secs_f64());
     let begin = Instant::now();
     isolation::check(&stage)?;
-    eprintln!("the isolation bank beside the loop, in {:.0} s", begin.elapsed().as_secs_f64());
+    eprintln!("the isolation bank in the loop, in {:.0} s", begin.elapsed().as_secs_f64());
     Ok(())
 }

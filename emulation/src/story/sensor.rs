@@ -85,6 +85,7 @@ pub(super) fn check(stage: &Stage) -> Result<()> {
     Ok(())
 }
 
+/// Script of the pass with a sensor.
 pub(super) fn sensing(stage: &Stage) -> String {
     format!("{} sensor", stage.run)
 }

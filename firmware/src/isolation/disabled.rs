@@ -27,7 +27,7 @@ impl Terms {
     }
 }
 
-/// What has changed; without the feature `isolation` it has no values.
+/// A change of what the bank says; without the feature `isolation` it has no values.
 #[derive(Clone, Copy, Debug)]
 pub enum News {}
 

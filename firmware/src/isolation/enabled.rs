@@ -38,12 +38,10 @@ impl Terms {
     /// # Errors
     /// [`OutOfRange`] names `trip_on_cause`, of which no cause is allowed.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        if self.bank.is_ok() || self.trip_on_cause.is_empty() {
-            return Ok(());
+        match self.bank {
+            Ok(_) => Ok(()),
+            Err(_) => self.trip_on_cause.check_none("causes, since no isolation bank runs"),
         }
-        let value = self.trip_on_cause.iter().count() as f64;
-        let unit = "causes, since no isolation bank runs";
-        Err(OutOfRange { field: "trip_on_cause", value, lowest: 0.0, highest: 0.0, unit })
     }
 
     /// Returns `report` in SI units for the host, at `tick`; `since_tick` is the tick after which the fault has been there.
@@ -59,7 +57,7 @@ impl Terms {
     }
 }
 
-/// What has changed in what the bank says.
+/// A change of what the bank says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct News {
     /// What it says now.
@@ -70,7 +68,7 @@ pub struct News {
     pub before: Verdict,
 }
 
-/// What a reading is compared with.
+/// Voltage and model of one tick, with which the reading of the next tick is compared.
 #[derive(Clone, Copy, Debug)]
 struct Moment {
     applied: Volts,
@@ -79,14 +77,14 @@ struct Moment {
     enabled: bool,
 }
 
-/// The bank beside a controller.
+/// The bank of one controller, with its state.
 #[derive(Debug)]
 pub struct Isolation {
     config: Option<isolation::Config>,
     trip_on_cause: Causes,
     last: Option<Moment>,
     /// Verdict, age and number of decisions of the last news.
-    told: (Verdict, u32, u32),
+    reported: (Verdict, u32, u32),
     state: isolation::State,
 }
 
@@ -96,7 +94,7 @@ impl Isolation {
         config: None,
         trip_on_cause: Causes::NONE,
         last: None,
-        told: (Verdict::Quiet, 0, 0),
+        reported: (Verdict::Quiet, 0, 0),
         state: isolation::State::NEW,
     };
 
@@ -136,10 +134,10 @@ impl Isolation {
             config.tick(&mut self.state, last.applied, last.model, reading);
         }
         let says = (self.state.verdict(), self.state.since_blocks(), self.state.decisions());
-        if says == self.told {
+        if says == self.reported {
             return None;
         }
-        let (before, ..) = core::mem::replace(&mut self.told, says);
+        let (before, ..) = core::mem::replace(&mut self.reported, says);
         let report = self.state.report();
         Some(News { report, since_ticks: report.since_blocks.saturating_mul(config.block_ticks()), before })
     }

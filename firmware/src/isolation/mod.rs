@@ -1,4 +1,4 @@
-//! Fault isolation beside the control tick: the bank of [`model::isolation`] with the readings of the stiffness sensor.
+//! Fault isolation after each control tick: the bank of [`model::isolation`] with the readings of the stiffness sensor.
 //!
 //! After the output of each tick is written, [`Isolation::tick`] gives the bank the voltage and the model of the tick before and the
 //! reading that belongs to them. What the bank says goes into the log and to the host; it changes no voltage, unless the setting

@@ -132,13 +132,11 @@ fn decode(mut source: Box<dyn Read>, formats: Formats, arguments: &Arguments, mu
         printer.item(item);
     }
     let verdict = verdict(arguments, &summary);
-    if let Some(file) = file {
-        file.finish()?;
-    }
+    // Without a line there is nothing that could replace an existing file.
+    let file = file.filter(|_| summary.lines > 0);
+    let wrote = file.map(LogFile::finish).transpose()?.map(|path| wrote(&[path]));
     printer.end(encoding, summary)?;
-    if let Some(path) = &arguments.out {
-        print(&wrote(std::slice::from_ref(path)))?;
-    }
+    print(&wrote.unwrap_or_default())?;
     let name = name(&arguments.file);
     match broken {
         Some(error) => {

@@ -60,7 +60,7 @@ pub(super) struct Known {
     #[arg(long, value_name = "KEY=PERCENT", allow_hyphen_values = true)]
     known: Vec<ErrorOf>,
     /// Overshoot that the robust controller may cause, in percent of the step, 0 to 20
-    #[arg(long, default_value_t = 2.0, value_name = "PERCENT", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 2.0, value_name = "PERCENT", allow_negative_numbers = true, requires = "known")]
     overshoot_percent: f64,
 }
 

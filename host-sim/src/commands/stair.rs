@@ -8,11 +8,12 @@ use super::spring_error::Known;
 use anyhow::Result;
 use clap::{Args, Parser};
 use host_sim::output::file::write_whole;
-use host_sim::output::files::{Files, write_csv, write_sheet};
+use host_sim::output::files::Files;
 use host_sim::output::terminal::{json, print, remark, wrote};
+use host_sim::output::ticks::Ticks;
 use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
-use model::Compensation;
+use model::{Compensation, Margin};
 use paper::stair::request::{Answer, Request, Target};
 use record_files::Container;
 use simulation::bad_input;
@@ -77,18 +78,23 @@ impl Arguments {
     }
 
     /// The experiment on a plant file's spring.
-    fn request<'a>(&self, plant: &'a PlantFile, target: Target<'a>) -> Result<Request<'a>> {
-        let options = self.control.options();
+    fn request<'a>(
+        &self,
+        options: Options,
+        margin: Option<Margin>,
+        plant: &'a PlantFile,
+        target: Target<'a>,
+    ) -> Request<'a> {
         // The loop without a controller is run beside one with the report's.
         let compared = match options.controller {
             Controller::None => Controller::Paper,
             controller => controller,
         };
-        let compensation = match self.known.margin()? {
+        let compensation = match margin {
             Some(margin) => Compensation::Robust(margin),
             None => Options { controller: compared, ..options }.compensation(),
         };
-        Ok(Request {
+        Request {
             plant,
             paper: self.control.plant == "paper",
             target,
@@ -96,31 +102,28 @@ impl Arguments {
             controlled: options.controller != Controller::None,
             amplifier: options.amplifier(),
             rate_hz: options.rate_hz,
-        })
+        }
     }
 
     /// Rejects options that would be ignored.
-    fn check(&self) -> Result<()> {
+    fn check(&self, options: &Options, margin: Option<Margin>) -> Result<()> {
         let no_file = ["stair", "step"].contains(&self.input.as_str());
         for (option, given) in [("--between", self.between.is_some()), ("--column", self.column.is_some())] {
             if given && no_file {
                 bad_input!("{option} has no effect with --input {}: expected --input FILE.csv", self.input);
             }
         }
-        let options = self.control.options();
-        if self.known.margin()?.is_some() && options.controller != Controller::Paper {
+        if margin.is_some() && options.controller != Controller::Paper {
             bad_input!("--known has a controller of its own: expected no --controller");
         }
         options.check()
     }
 
     /// Number of ticks between two rows of the CSV.
-    fn stride(&self) -> Result<usize> {
+    fn stride(&self, rate_hz: f64) -> Result<usize> {
         match self.every {
             None => Ok(1),
-            Some(every) if every.is_finite() && every > 0.0 => {
-                Ok((every * self.control.options().rate_hz).round().max(1.0) as usize)
-            }
+            Some(every) if every.is_finite() && every > 0.0 => Ok((every * rate_hz).round().max(1.0) as usize),
             Some(every) => bad_input!("--every {}: expected a positive number of seconds", number(every)),
         }
     }
@@ -128,13 +131,14 @@ impl Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    arguments.check()?;
+    let (options, margin) = (arguments.control.options(), arguments.known.margin()?);
+    arguments.check(&options, margin)?;
     let file = plant_file::load(&arguments.control.plant)?;
     let left_out = file.left_out();
     if !left_out.is_empty() {
         remark(&format!("{}: not simulated: {}", arguments.control.plant, left_out.join(", ")));
     }
-    let stride = arguments.stride()?;
+    let stride = arguments.stride(options.rate_hz)?;
     let record = match arguments.input.as_str() {
         "stair" | "step" => None,
         file => Some(Record::open(Path::new(file), arguments.column.as_deref().unwrap_or(MEASURED))?),
@@ -145,7 +149,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         None => Target::Step,
     };
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
-    let request = arguments.request(&file, target)?;
+    let request = arguments.request(options, margin, &file, target);
     request.check().map_err(|error| named(error, SETTINGS))?;
     let answer = request.run(|done, all| {
         bar.set_length(all as u64);
@@ -153,22 +157,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     })?;
     bar.finish_and_clear();
     let paths = match &arguments.out {
-        Some(folder) => write(folder, &answer, arguments.control.options().controller != Controller::None, stride)?,
+        Some(path) => write(path, &answer, options.controller != Controller::None, stride)?,
         None => Vec::new(),
     };
     print(&if arguments.json { json(&answer.report)? } else { stair::text(&answer.report) + &wrote(&paths) })
 }
 
-fn write(folder: &Path, answer: &Answer, controlled: bool, stride: usize) -> Result<Vec<PathBuf>> {
+/// Writes the rows to `path` if it is the name of an MCAP or Parquet file, otherwise rows and plots to this folder.
+fn write(path: &Path, answer: &Answer, controlled: bool, stride: usize) -> Result<Vec<PathBuf>> {
     let Answer { experiment, run, report } = answer;
     let samples = if controlled { &run.with } else { &run.without };
-    let spring = paper_spring()?;
-    if let Some(container) = Container::of(folder) {
-        write_whole(folder, |out| write_sheet(out, container, experiment, run, samples, &spring, stride))?;
-        return Ok(vec![folder.to_owned()]);
+    let ticks = Ticks { experiment, run, samples, spring: &paper_spring()?, stride };
+    if let Some(container) = Container::of(path) {
+        write_whole(path, |out| ticks.write_container(container, out))?;
+        return Ok(vec![path.to_owned()]);
     }
-    let mut files = Files::new(folder)?;
-    files.add("stair.csv", |out| write_csv(out, experiment, run, samples, &spring, stride))?;
+    let mut files = Files::new(path)?;
+    files.add("stair.csv", |out| ticks.write_csv(out))?;
     for (name, svg) in [
         ("stiffness.svg", plots::stiffness(experiment, run, report)),
         ("voltage.svg", plots::voltage(experiment, run, samples)),

@@ -34,7 +34,7 @@ pub use decoder::{Decoder, Item};
 pub use event::{Boot, Done, Event};
 pub use formats::{Encoding, Formats, silence_the_decoder};
 pub use line::{Level, Line};
-pub use summary::{Fault, LimitLines, Summary};
+pub use summary::{Cause, Fault, LimitLines, Summary};
 pub use text::{
     CSV_HEADER, TABLE_HEADER, csv_row, more_damage_csv_row, more_damage_table_row, summary_text, table_row,
 };

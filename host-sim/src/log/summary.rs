@@ -307,7 +307,6 @@ mod tests {
         summary
     }
 
-    /// 2^32 ticks of 1 ms are 49.7 days.
     #[test]
     fn named_causes_are_counted_and_so_are_the_names_that_have_gone() {
         let isolation = |verdict: &str, cause: Option<&str>| {
@@ -324,6 +323,7 @@ mod tests {
         assert_eq!(summary.causes, [Cause { cause: "gain-error".into(), named: 2, withdrawn: 1 }]);
     }
 
+    /// 2^32 ticks of 1 ms are 49.7 days.
     #[test]
     fn a_wrapped_tick_is_not_a_restart() {
         const WRAP: u64 = 1 << 32;

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::fmt::{Display, Write};
 
 use model::Limits;
+use simulation::bad_input::one_line;
 
-use crate::log::summary::Cause;
-use crate::log::{Event, Item, Line, Summary};
+use crate::log::{Cause, Event, Item, Line, Summary};
 
 /// Header of the table.
 pub const TABLE_HEADER: &str = "    time [s]  level  message";
@@ -169,15 +169,6 @@ fn optional<T: Display>(value: Option<T>, unit: &str) -> String {
 
 fn seconds(us: u64) -> String {
     format!("{}.{:06}", us / 1_000_000, us % 1_000_000)
-}
-
-/// Escapes control characters, which in a damaged frame could control the terminal.
-fn one_line(text: &str) -> Cow<'_, str> {
-    if !text.contains(char::is_control) {
-        return Cow::Borrowed(text);
-    }
-    let escaped = text.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() });
-    Cow::Owned(escaped.collect())
 }
 
 fn quoted(text: &str) -> Cow<'_, str> {

@@ -11,12 +11,9 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use model::Spring;
-use record_files::{Cell, Column, Container, Sheet, Writer};
+use simulation::bad_input;
 
 use crate::signals::{TemporaryFolder, uninterrupted};
-use simulation::bad_input;
-use simulation::experiment::{Experiment, Run, Sample};
 
 /// Files that are written to a temporary folder and moved to their places when all are complete.
 pub struct Files {
@@ -156,104 +153,4 @@ fn swap(stage: &Path, folder: &Path) -> io::Result<()> {
 #[cfg(not(target_os = "linux"))]
 fn swap(_: &Path, _: &Path) -> io::Result<()> {
     Err(io::ErrorKind::Unsupported.into())
-}
-
-/// Writes the run as CSV, one row every `stride` ticks.
-///
-/// # Errors
-/// If `out` cannot be written.
-pub fn write_csv<P>(
-    out: &mut dyn Write,
-    experiment: &Experiment<P>,
-    run: &Run,
-    samples: &[Sample],
-    spring: &Spring,
-    stride: usize,
-) -> std::io::Result<()> {
-    writeln!(
-        out,
-        "# {} at {} Hz, fixed point; stiffness in volts of equivalent static voltage",
-        experiment.name, run.rate_hz
-    )?;
-    writeln!(out, "time_s,target_v,applied_v,dac_code,stiffness,youngs_modulus_pa")?;
-    for Row { time_s, target_v, applied_v, code, stiffness, youngs_modulus_pa } in
-        rows(experiment, run, samples, spring, stride)
-    {
-        writeln!(out, "{time_s},{target_v:.6},{applied_v:.6},{code},{stiffness:.6},{youngs_modulus_pa:.1}")?;
-    }
-    Ok(())
-}
-
-/// Writes the run as an MCAP or Parquet file, one row every `stride` ticks, with the columns of the CSV.
-///
-/// # Errors
-/// If `out` cannot be written.
-pub fn write_sheet<P>(
-    out: impl Write + Send,
-    container: Container,
-    experiment: &Experiment<P>,
-    run: &Run,
-    samples: &[Sample],
-    spring: &Spring,
-    stride: usize,
-) -> Result<()> {
-    let columns = [
-        Column::number("time_s", "s"),
-        Column::number("target_v", "V"),
-        Column::number("applied_v", "V"),
-        Column::whole("dac_code"),
-        Column::number("stiffness", "V"),
-        Column::number("youngs_modulus_pa", "Pa"),
-    ];
-    let source = format!(
-        "{} at {} Hz, fixed point; stiffness in volts of equivalent static voltage",
-        experiment.name, run.rate_hz
-    );
-    let sheet = Sheet { name: "stair", source: &source, columns: &columns };
-    let mut writer = Writer::new(container, &sheet, out)?;
-    for row in rows(experiment, run, samples, spring, stride) {
-        let cells = [
-            Cell::Number(row.time_s),
-            Cell::Number(row.target_v),
-            Cell::Number(row.applied_v),
-            Cell::Whole(row.code.into()),
-            Cell::Number(row.stiffness),
-            Cell::Number(row.youngs_modulus_pa),
-        ];
-        writer.row((row.time_s.max(0.0) * 1e9).round() as u64, &cells)?;
-    }
-    writer.finish()
-}
-
-/// A row of a run.
-struct Row {
-    time_s: f64,
-    target_v: f64,
-    applied_v: f64,
-    code: u16,
-    stiffness: f64,
-    youngs_modulus_pa: f64,
-}
-
-/// The rows of a run, one every `stride` ticks.
-fn rows<P>(
-    experiment: &Experiment<P>,
-    run: &Run,
-    samples: &[Sample],
-    spring: &Spring,
-    stride: usize,
-) -> impl Iterator<Item = Row> {
-    let mut reader = experiment.schedule.reader();
-    samples.iter().enumerate().step_by(stride).map(move |(tick, sample)| {
-        let time = run.time_s(tick);
-        Row {
-            // Nine decimals hide floating-point errors of decimal times.
-            time_s: (time * 1e9).round() / 1e9,
-            target_v: reader.at(time),
-            applied_v: sample.applied.to_f64(),
-            code: sample.code.0,
-            stiffness: sample.stiffness.to_f64(),
-            youngs_modulus_pa: spring.estimate_pa(sample.stiffness),
-        }
-    })
 }

@@ -61,13 +61,14 @@ impl LogFile {
         self.writer.row(self.time_ns, &cells).with_context(|| format!("{} cannot be written", self.path.display()))
     }
 
-    /// Writes the end of the file and gives it its name.
+    /// Writes the end of the file and gives it its name; returns its path.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn finish(self) -> Result<()> {
+    pub fn finish(self) -> Result<PathBuf> {
         self.writer.finish().with_context(|| format!("{} cannot be written", self.path.display()))?;
-        self.file.finish()
+        self.file.finish()?;
+        Ok(self.path)
     }
 }
 

@@ -7,6 +7,7 @@
 //! | [`beam`], [`bound`], [`compare`], [`diagnosis`], [`dynamics`], [`identify`], [`isolate`], [`joint`], [`log`], [`plan`], [`reproduce`], [`stair`], [`tune`] | the answer of the subcommand of that name |
 //! | [`export`] | spring and controller for other programs |
 //! | [`log_file`] | the decoded log as MCAP or Parquet |
+//! | [`ticks`] | the ticks of a run as CSV, MCAP or Parquet |
 //! | [`recording`] | telemetry as CSV, MCAP or Parquet while it arrives |
 //! | [`udp`] | telemetry as datagrams for PlotJuggler |
 //! | [`figure`], [`plots`] | plots as SVG |
@@ -38,5 +39,6 @@ pub mod screen;
 pub mod stair;
 mod step_response;
 pub mod terminal;
+pub mod ticks;
 pub mod tune;
 pub mod udp;

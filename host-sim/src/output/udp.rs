@@ -13,7 +13,7 @@ use simulation::bad_input;
 
 use crate::link::Row;
 
-/// Where PlotJuggler listens unless told otherwise.
+/// Default address of PlotJuggler's UDP server.
 pub const PLOT_JUGGLER: &str = "127.0.0.1:9870";
 
 /// Sends samples to one receiver.

@@ -90,17 +90,17 @@ impl Recorder {
         Some(Progress { file: name(path), rows: summary.rows, lost: summary.lost })
     }
 
-    /// Closes the recording; returns what it contains, as a sentence.
-    pub(super) fn close(&mut self) -> Option<String> {
-        let (path, mut recording) = self.current.take()?;
-        let finished = recording.finish();
+    /// Closes the recording; returns what it contains, as a sentence, or `None` if none runs.
+    ///
+    /// # Errors
+    /// If the end of the file cannot be written.
+    pub(super) fn close(&mut self) -> Result<Option<String>> {
+        let Some((path, mut recording)) = self.current.take() else { return Ok(None) };
+        recording.finish()?;
         let summary = recording.summary();
         let (path, seconds) = (path.display(), summary.seconds);
-        if let Err(error) = finished {
-            return Some(format!("{error:#}"));
-        }
         let kind = if summary.stiffness == "estimate" { " (estimates, no measurement)" } else { "" };
-        Some(format!("wrote {path}: {} rows{kind}, {seconds} s, {} lost", summary.rows, summary.lost))
+        Ok(Some(format!("wrote {path}: {} rows{kind}, {seconds} s, {} lost", summary.rows, summary.lost)))
     }
 }
 
@@ -128,13 +128,23 @@ mod tests {
             recorder.begin(&status(), EVERY).unwrap();
             recorder.add(&Telemetry { tick: 1, ..Telemetry::default() }).unwrap();
             assert_eq!(recorder.progress().unwrap(), Progress { file: name.into(), rows: 1, lost: 0 });
-            assert!(
-                recorder.close().unwrap().contains(&format!("{name}: 1 rows (estimates, no measurement), 0 s, 0 lost"))
-            );
+            let wrote = recorder.close().unwrap().unwrap();
+            assert!(wrote.contains(&format!("{name}: 1 rows (estimates, no measurement), 0 s, 0 lost")), "{wrote}");
         }
         assert_eq!(std::fs::read_to_string(folder.path().join("out-2.csv")).unwrap(), "kept");
         let error = Recorder::new(Names { first, force: false, is_given: true }).begin(&status(), EVERY).unwrap_err();
         assert!(error.to_string().contains("already exists"), "{error}");
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_completed_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = folder.path().join("out.parquet");
+        let mut recorder = Recorder::new(Names { first: first.clone(), force: false, is_given: true });
+        recorder.begin(&status(), EVERY).unwrap();
+        std::fs::create_dir(&first).unwrap();
+        let error = recorder.close().unwrap_err();
+        assert!(format!("{error:#}").contains("out.parquet cannot be written: "), "{error:#}");
     }
 
     #[test]

@@ -122,8 +122,9 @@ impl<'a> Worker<'a> {
             self.say(Event::Lost(failure.to_string()));
             connected = self.reconnect();
         }
-        if let Some(wrote) = self.recorder.close() {
-            self.outcome.wrote.push(wrote);
+        match self.recorder.close() {
+            Ok(wrote) => self.outcome.wrote.extend(wrote),
+            Err(error) => self.outcome.failures.push(format!("{error:#}")),
         }
         self.outcome
     }
@@ -209,8 +210,7 @@ impl<'a> Worker<'a> {
         self.state = last.state;
         for sample in &samples {
             if let Err(error) = self.recorder.add(sample) {
-                self.fail(format!("{error:#}"));
-                self.outcome.failures.push(format!("{error:#}"));
+                self.recording_failed(&error);
                 self.say(Event::Recording(None));
             }
         }
@@ -275,13 +275,23 @@ impl<'a> Worker<'a> {
     }
 
     fn toggle_recording(&mut self) {
-        if let Some(wrote) = self.recorder.close() {
-            self.say(Event::Done(wrote.clone()));
-            self.outcome.wrote.push(wrote);
+        if self.recorder.runs() {
+            match self.recorder.close() {
+                Ok(wrote) => {
+                    wrote.iter().for_each(|wrote| self.say(Event::Done(wrote.clone())));
+                    self.outcome.wrote.extend(wrote);
+                }
+                Err(error) => self.recording_failed(&error),
+            }
         } else if let Err(error) = self.recorder.begin(&self.status, self.every) {
             self.fail(format!("{error:#}"));
         }
         self.say(Event::Recording(self.recorder.progress()));
+    }
+
+    fn recording_failed(&mut self, error: &anyhow::Error) {
+        self.fail(format!("{error:#}"));
+        self.outcome.failures.push(format!("{error:#}"));
     }
 
     fn toggle_playing(&mut self) {

@@ -214,3 +214,8 @@ pub const fn block_ticks(rate_hz: f64) -> u32 {
     }
     ticks
 }
+
+/// Returns the length of a block, in s.
+pub const fn block_s(rate_hz: f64) -> f64 {
+    block_ticks(rate_hz) as f64 / rate_hz
+}

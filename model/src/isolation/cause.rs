@@ -1,5 +1,7 @@
 //! The causes that the bank distinguishes, by their codes.
 
+use crate::error::OutOfRange;
+
 /// A fault that explains the difference between the readings and the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
@@ -34,7 +36,7 @@ pub enum Cause {
     Drift,
     /// The readings stop at a bound; size: 1.
     SensorSaturation,
-    /// The readings do not change.
+    /// The readings do not change; size: 1.
     StuckSensor,
 }
 
@@ -131,6 +133,14 @@ impl Causes {
     /// Returns true if the set has no cause.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
+    }
+
+    /// Checks that the set, which is the setting `trip_on_cause`, is empty; `causes` says in the error which ones cannot be in it.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with the number of causes.
+    pub fn check_none(self, causes: &'static str) -> Result<(), OutOfRange> {
+        OutOfRange::check_count("trip_on_cause", self.iter().count(), 0..=0, causes)
     }
 
     /// Returns the causes of the set, in the order of their numbers.

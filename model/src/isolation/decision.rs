@@ -42,13 +42,14 @@ enum Stage {
     Conclude,
 }
 
-/// A size as a fraction: `numerator / denominator * 2^exponent`, in units of [`super::Settings::unit`].
+/// A size as a fraction: `numerator / denominator * 2^exponent`, in units of [`super::Settings::unit`]; there is none if the denominator
+/// is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Size {
     pub(super) numerator: i32,
     pub(super) denominator: i32,
     pub(super) exponent: i8,
-    /// Scale of the principal vector: the information is `denominator * 2^(2 scale)`.
+    /// Scale of the principal vector: the information is `denominator * 2^(2 scale)`, with 20 fraction bits.
     pub(super) scale: u8,
 }
 

@@ -254,7 +254,7 @@ impl State {
         whitened: [0; SLOTS],
         tests: sequential::Tests::NEW,
         products: products::Products::NEW,
-        mode: products::Mode { fresh: true, ..products::Mode::NEW },
+        mode: products::Mode::NEW,
         decision: decision::Decision::NEW,
         working: false,
         alarmed: false,
@@ -402,7 +402,7 @@ impl State {
         self.alarmed = false;
         self.tests = sequential::Tests::NEW;
         self.decision.reset();
-        self.mode = products::Mode { fresh: true, ..products::Mode::NEW };
+        self.mode = products::Mode::NEW;
         self.restart();
     }
 
@@ -427,10 +427,8 @@ impl State {
 
     /// Returns what the bank says, in the numbers of the tick.
     pub fn report(&self) -> Report {
-        let decision::Size { numerator, denominator, exponent, scale } = self.decision.size;
-        let (verdict, since_blocks) = (self.verdict(), self.since_blocks());
-        let (none, left) = self.decision.energies;
-        Report { verdict, since_blocks, numerator, denominator, exponent, scale, none, left }
+        let decision::Decision { size, energies, .. } = self.decision;
+        Report { verdict: self.verdict(), since_blocks: self.since_blocks(), size, energies }
     }
 }
 

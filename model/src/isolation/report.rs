@@ -1,5 +1,6 @@
 //! What the bank says: in the numbers of the tick, and in SI units.
 
+use super::decision::Size;
 use super::{Cause, Settings, Verdict};
 
 /// What the bank says, in the numbers of the tick: the same bits on every machine.
@@ -9,17 +10,11 @@ pub struct Report {
     pub verdict: Verdict,
     /// Number of blocks since the fault began: since the last restart of the sums; 0 without an alarm.
     pub since_blocks: u32,
-    /// The size of the verdict's cause at the last decision is `numerator / denominator * 2^exponent`, in units of [`Settings::unit`].
-    pub(super) numerator: i32,
-    /// Zero without a size.
-    pub(super) denominator: i32,
-    pub(super) exponent: i8,
-    /// The information of the size is `denominator * 2^(2 scale)`, with 20 fraction bits.
-    pub(super) scale: u8,
-    /// Energy of the innovations without a cause at the last decision, in variances with 20 fraction bits.
-    pub(super) none: i64,
-    /// What of it the best cause leaves.
-    pub(super) left: i64,
+    /// Size of the verdict's cause at the last decision.
+    pub(super) size: Size,
+    /// Energy of the innovations without a cause at the last decision, and what the best cause leaves of it, in variances with 20
+    /// fraction bits.
+    pub(super) energies: (i64, i64),
 }
 
 /// The cause that explains most, in SI units.
@@ -46,17 +41,19 @@ impl Report {
     /// Returns the energy of the innovations that no cause explains and what the best cause leaves, in variances, at the last
     /// decision. Floating point: not for the tick, nor are the next two.
     pub fn energies(&self) -> (f64, f64) {
-        (self.none as f64 / 1_048_576.0, self.left as f64 / 1_048_576.0)
+        let (none, left) = self.energies;
+        (none as f64 / 1_048_576.0, left as f64 / 1_048_576.0)
     }
 
     /// Returns the size of the verdict's cause in units of [`Settings::unit`] and its standard deviation, at the last decision.
     pub fn size(&self) -> (f64, f64) {
-        if self.denominator <= 0 {
+        let Size { numerator, denominator, exponent, scale } = self.size;
+        if denominator <= 0 {
             return (0.0, 0.0);
         }
-        let denominator = f64::from(self.denominator);
-        let size = f64::from(self.numerator) / denominator * power_of_two(self.exponent.into());
-        let information = denominator * power_of_two(2 * i32::from(self.scale) - 20);
+        let denominator = f64::from(denominator);
+        let size = f64::from(numerator) / denominator * power_of_two(exponent.into());
+        let information = denominator * power_of_two(2 * i32::from(scale) - 20);
         (size, 1.0 / libm::sqrt(information))
     }
 

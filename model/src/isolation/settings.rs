@@ -36,13 +36,11 @@ impl Settings {
         alarm_nats: 20.0,
         margin_nats: 10.0,
     };
-}
 
-impl Settings {
     /// Returns the factor from the coefficient of a cause's principal vector to its size in the unit of [`Cause`], for ticks of
     /// `rate_hz`.
     pub fn unit(&self, cause: Cause, rate_hz: f64) -> f64 {
-        let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
+        let block_s = bank::block_s(rate_hz);
         match cause {
             Cause::Hysteresis | Cause::StaticNonlinearity | Cause::AmplifierLimit => self.range_v,
             Cause::AmplifierSlew => block_s / self.range_v,

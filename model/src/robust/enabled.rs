@@ -108,11 +108,9 @@ impl Validated<'_, Margin> {
     /// Quantizes the law for the quick spring. `step_v` is the amplifier's largest change in a tick, in V, if the slew is limited.
     pub(crate) fn quantize<E: Estimator>(self, quick: Invertible<E>, step_v: Option<f64>) -> Robust<E> {
         let Margin { gain, overshoot, .. } = *self.settings();
-        let Invertible { estimator, inverse, largest, smallest } = quick;
-        let slew = step_v.map(|step_v| (smallest, step_v));
         Robust {
-            quick: estimator,
-            law: self.part(&Approach::DEAD_BEAT).quantize(inverse, &largest, slew),
+            law: self.part(&Approach::DEAD_BEAT).quantize(&quick, step_v),
+            quick: quick.estimator,
             gain: Weight::new(gain),
             of_gain: Weight::new(1.0 / (1.0 + gain)),
             part: Weight::new(2.0 * overshoot / (overshoot + MISSING)),

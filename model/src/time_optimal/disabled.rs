@@ -4,7 +4,7 @@ use core::convert::Infallible;
 use core::marker::PhantomData;
 
 use crate::error::OutOfRange;
-use crate::estimator::{Estimator, StepGain};
+use crate::estimator::{Estimator, Invertible};
 use crate::units::{SampleTime, Volts};
 use crate::validated::{Validate, Validated};
 
@@ -42,7 +42,7 @@ impl Validate for Approach {
 }
 
 impl Validated<'_, Approach> {
-    pub(crate) fn quantize<I>(self, _: I, _: &StepGain, _: Option<(StepGain, f64)>) -> TimeOptimal<I> {
+    pub(crate) fn quantize<E: Estimator>(self, _: &Invertible<E>, _: Option<f64>) -> TimeOptimal<E::Inverse> {
         match *self.settings() {}
     }
 }

@@ -11,7 +11,7 @@ and the EWMA of Q (Roberts, Technometrics 1, 1959) has the exact limits of a kno
 
     z[n] = (1 - 0.2) z[n-1] + 0.2 Q[n],    |z[n]| <= 2.962 sqrt( 0.2 / 1.8 (1 - 0.8^(2n)) ),
 
-which one value in 500 of an unchanged process leaves (Lucas, Saccucci, Technometrics 32, 1990). Three rules beside it:
+which one value in 500 of an unchanged process leaves (Lucas, Saccucci, Technometrics 32, 1990). Three further rules:
 
 - A value whose abs(Q) is above 3 is learnt as one of 3, and a value while z is outside not at all (Hawkins, Olwell, Cumulative Sum
   Charts, 1998, chapter 7).
@@ -41,8 +41,6 @@ class Change:
 
     first: int
     """The first value after the change."""
-    signal: int
-    """The value at which z left the limits."""
     last: int
     """The last value at which z is outside."""
     before: float
@@ -132,4 +130,4 @@ def _change(values, signal, last):
     left = np.cumsum(values)[:signal]
     right = values.sum() - left
     first = int(np.argmax(left**2 / count + right**2 / (len(values) - count))) + 1
-    return Change(first, signal, last, float(values[:first].mean()), float(values[first:].mean()))
+    return Change(first, last, float(values[:first].mean()), float(values[first:].mean()))

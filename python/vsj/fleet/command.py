@@ -47,9 +47,10 @@ def main(arguments=None):
 
 
 def _diagnose(wanted):
-    folder, table = records.listed(wanted.records)
+    out = records.absolute(wanted.out)
+    folder, table = records.listed(wanted.records, store.addresses(out))
     settings, plants = _settings(wanted, table, folder)
-    table, out = _with_plants(table, wanted.plant), records.absolute(wanted.out)
+    table = _with_plants(table, wanted.plant)
     outcome, count = run.Outcome(len(table)), len(table)
     try:
         with tqdm(total=count, unit="record", disable=None, desc="diagnosed", smoothing=0.05) as bar:
@@ -89,11 +90,16 @@ def _settings(wanted, table, folder):
     """The settings, and the text of each plant by its name."""
     options = {name: getattr(wanted, name) for name in ("time", "voltage", "reading", "column", "separator", "decimal", "sort", "input")}
     columns = _text(wanted.columns, "--columns") if wanted.columns else None
-    plants = {wanted.plant: None if wanted.plant in NAMED_PLANTS else _text(wanted.plant, "--plant")}
+    plants = dict.fromkeys(NAMED_PLANTS)
+    if wanted.plant not in plants:
+        plants[wanted.plant] = _text(wanted.plant, "--plant")
     for name in table["plant"].unique().to_pylist():
-        if name is not None and name not in plants:
-            where = name if "://" in name or name.startswith("/") else f"{folder}/{name}"
-            plants[name] = None if name in NAMED_PLANTS else _text(where, f"{wanted.records}, column plant")
+        if name is None or name in NAMED_PLANTS:
+            continue
+        where = name if "://" in name or name.startswith("/") else f"{folder}/{name}"
+        text = _text(where, f"{wanted.records}, column plant:")
+        if plants.setdefault(name, text) != text:
+            raise BadInput(f"{wanted.records}, column plant: {name} is another file than --plant {name}; expected different names")
     for name, text in plants.items():
         if text is not None:
             # Refused here, not in the row of every record.
@@ -168,14 +174,14 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"vsj.fleet: {message}\n")
 
 
-def _number(kind, low, high=float("inf")):
+def _number(kind, low, high=sys.float_info.max):
     def parse(text):
         try:
             value = kind(text)
         except ValueError:
             value = None
         if value is None or not low <= value <= high:
-            bound = f"{low:g} or more" if high == float("inf") else f"{low:g} to {high:g}"
+            bound = f"{low:g} or more" if high == sys.float_info.max else f"{low:g} to {high:g}"
             raise argparse.ArgumentTypeError(f"{text}: expected a number, {bound}")
         return value
 
@@ -195,7 +201,7 @@ def _parser():
     add("--out", default="out/fleet", metavar="DIR", help="folder or URL of the results; default: out/fleet")
     add("--scheduler", default="local", metavar="ADDRESS", help="local, slurm, or the address of a Dask scheduler, tcp://HOST:8786; default: local")
     add("--workers", type=_number(int, 1), metavar="N", help="processes (local) or jobs (slurm); default: one for each core, or one job")
-    add("--wait", type=_number(float, 1), default=600, metavar="S", help="longest time until the first worker is there, in s; default: 600")
+    add("--wait", type=_number(float, 1, 1_000_000), default=600, metavar="S", help="longest time until the first worker is there, in s; default: 600")
     add("--batch", type=_number(int, 1, 100_000), default=16, metavar="N", help="records in one task, and in one file of the state; default: 16")
     add("--json", action="store_true", help="print the summary as one JSON object")
     add("--version", action="version", version=f"vsj {__version__}")
@@ -214,7 +220,7 @@ def _parser():
     add("--input", choices=("hold", "linear", "stair"), help="the voltage between the rows; default: hold")
     paper = parser.add_argument_group("cost of a larger fleet, computed from the results in --out")
     add = paper.add_argument
-    add("--cost", type=_number(int, 1), metavar="RECORDS", help="compute time and price of so many records; diagnose nothing")
+    add("--cost", type=_number(int, 1), metavar="RECORDS", help="compute time and price of this number of records; diagnose nothing")
     add("--cores", type=_number(int, 1), default=100, metavar="N", help="cores; default: 100")
     add("--price", type=_number(float, 0), default=0.04, metavar="X", help="price of a core for an hour, in any currency; default: 0.04")
     return parser

@@ -113,22 +113,21 @@ def estimate(it, count, cores, price, batch):
     bottleneck = max(limits, key=limits.get)
     end_s = 2 * tasks * GET_S / store.READERS
     time_s = limits[bottleneck] + batch * it.seconds + end_s
-    useful = max(1, int(batch * it.seconds / it.task_s))
     return Estimate(
-        count,
-        cores,
-        price,
-        batch,
-        cpu_s,
-        limits,
-        bottleneck,
-        end_s,
-        time_s,
-        time_s / 3600 * cores * price,
-        useful,
-        count * it.record_bytes,
-        2 * count * it.row_bytes,
-        count * _CLIENT_BYTES,
+        records=count,
+        cores=cores,
+        price=price,
+        batch=batch,
+        cpu_s=cpu_s,
+        limits=limits,
+        bottleneck=bottleneck,
+        end_s=end_s,
+        time_s=time_s,
+        cost=time_s / 3600 * cores * price,
+        useful_cores=max(1, int(batch * it.seconds / it.task_s)),
+        read_bytes=count * it.record_bytes,
+        written_bytes=2 * count * it.row_bytes,
+        memory_bytes=count * _CLIENT_BYTES,
     )
 
 

@@ -24,7 +24,7 @@ _HEIGHT = 375
 _POINTS = 200
 """Most values that are drawn: the last ones."""
 _GAP = 5.0
-"""A line ends where two records are apart by more than so many times the median."""
+"""A line ends where two records are apart by more than this many times the median interval."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,6 +7,7 @@ record, in the order spring, time, record.
 import datetime
 import posixpath
 import re
+from contextlib import contextmanager
 
 import fsspec
 import pyarrow as pa
@@ -46,16 +47,27 @@ def absolute(url):
     return fs.unstrip_protocol(path)
 
 
-def listed(url):
+@contextmanager
+def readable(name, expected):
+    """A block that reads a file; if its content is damaged or another than ``expected``, raises BadInput with its name."""
+    try:
+        yield
+    except BadInput:
+        raise
+    except (OSError, ValueError, pa.ArrowException) as error:
+        raise BadInput(f"{name}: cannot be read as {expected}: {str(error).splitlines()[0]}") from error
+
+
+def listed(url, results=()):
     """The records in a folder or a manifest, and the address of the folder that their names are relative to.
 
-    Raises BadInput if there is none, or the manifest's columns are not as expected.
+    Files of the folder whose addresses begin with one of ``results`` are no records. Raises BadInput if there is none, or the manifest's columns are not as expected.
     """
     fs, path = filesystem(url)
     if fs.isfile(path):
         folder, table = posixpath.dirname(path), _manifest(fs, path, url)
     elif fs.isdir(path):
-        folder, table = path, _folder(fs, path)
+        folder, table = path, _folder(fs, path, results)
     else:
         raise BadInput(f"{url}: not found; expected a folder of records, or a manifest")
     if table.num_rows == 0:
@@ -90,9 +102,11 @@ def time_of(text):
         return None
 
 
-def _folder(fs, path):
-    """Records at ``SPRING/DATE.csv``; a spring's name may have several parts, and a record beside no other is its own spring."""
-    names = sorted(name for name in fs.find(path) if name.endswith(ENDINGS))
+def _folder(fs, path, results):
+    """Records at ``SPRING/DATE.csv``; a spring's name may have several parts, and a record in no folder is its own spring."""
+    names = sorted(
+        name for name in fs.find(path) if name.endswith(ENDINGS) and not fs.unstrip_protocol(name).startswith(tuple(results))
+    )
     relative = [posixpath.relpath(name, path) for name in names]
     stems = [posixpath.splitext(posixpath.basename(name))[0] for name in relative]
     springs = [posixpath.dirname(name) or stem for name, stem in zip(relative, stems)]
@@ -102,19 +116,17 @@ def _folder(fs, path):
 
 def _manifest(fs, path, url):
     """The records that a CSV or Parquet file lists: ``record``, and optionally ``spring``, ``time`` and ``plant``."""
-    try:
-        with fs.open(path, "rb") as file:
-            if path.endswith(".parquet"):
-                table = parquet.read_table(file)
-            else:
-                texts = csv.ConvertOptions(
-                    column_types={it.name: pa.string() for it in SCHEMA}, strings_can_be_null=True, null_values=[""]
-                )
-                table = csv.read_csv(file, convert_options=texts)
-    except (OSError, pa.ArrowException) as error:
-        raise BadInput(f"{url}: cannot be read as a manifest: {str(error).splitlines()[0]}") from error
-    if "record" not in table.column_names:
-        raise BadInput(f"{url}: columns {', '.join(table.column_names)}; expected record, and optionally spring, time, plant")
+    with readable(url, "a manifest"), fs.open(path, "rb") as file:
+        if path.endswith(".parquet"):
+            table = parquet.read_table(file)
+        else:
+            texts = csv.ConvertOptions(
+                column_types={it.name: pa.string() for it in SCHEMA}, strings_can_be_null=True, null_values=[""]
+            )
+            table = csv.read_csv(file, convert_options=texts)
+    names = table.column_names
+    if "record" not in names or any(names.count(it.name) > 1 for it in SCHEMA):
+        raise BadInput(f"{url}: columns {', '.join(names)}; expected record, and optionally spring, time, plant, each once")
     given = {it.name: table[it.name] for it in SCHEMA if it.name in table.column_names}
     records = [str(it) if it is not None else None for it in given["record"].to_pylist()]
     for row, record in enumerate(records):

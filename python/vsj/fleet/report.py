@@ -84,7 +84,6 @@ class Spring:
 
     name: str
     records: int
-    first: Moment
     last: Moment
     verdict: Optional[str]
     """The last record's; ``None`` if that has no diagnosis."""

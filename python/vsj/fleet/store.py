@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 import pyarrow as pa
 from pyarrow import parquet
 
-from .records import filesystem
+from .records import filesystem, readable
 
 QUANTITY = pa.struct(
     [("name", pa.string()), ("value", pa.float64()), ("low", pa.float64()), ("high", pa.float64()), ("unit", pa.string())]
@@ -47,11 +47,19 @@ SCHEMA = pa.schema(
 )
 """Columns of the results, one row for each record; see docs/fleet.md."""
 
+_NAMES = pa.schema([SCHEMA.field(name) for name in ("record", "key", "status")])
+"""What says that a record is finished."""
+
 TABLE = "diagnoses.parquet"
 _PARTS = "parts"
 _ROWS_AT_ONCE = 1000
 READERS = 32
 """Parts that are read at a time: on an object store most of the time is waiting."""
+
+
+def addresses(out):
+    """Beginnings of the addresses of the Parquet files in the folder of results ``out``."""
+    return f"{out}/{TABLE}", f"{out}/{_PARTS}/"
 
 
 def write_part(out, rows):
@@ -70,22 +78,24 @@ def write_text(out, name, text):
 def finished(out):
     """The rows in the parts: ``record``, ``key`` and ``status`` of each, the ``part`` that has it, and its ``row`` there.
 
-    Parts with other content, such as those of other programs, raise an error that names the file.
+    Parts that are damaged or have other content, such as those of other programs, raise BadInput with the name of the file.
     """
     fs, path = filesystem(out)
+    # Workers have written there since this program has listed it.
+    fs.invalidate_cache()
     folder = posixpath.join(path, _PARTS)
     parts = sorted(it for it in fs.find(folder) if it.endswith(".parquet")) if fs.isdir(folder) else []
 
     def names(part):
-        with fs.open(part, "rb") as file:
-            table = parquet.read_table(file, columns=["record", "key", "status"])
+        with readable(part, "results"), fs.open(part, "rb") as file:
+            table = parquet.read_table(file, columns=_NAMES.names).cast(_NAMES)
         columns = [pa.array([part] * len(table)).dictionary_encode(), pa.array(range(len(table)), pa.int32())]
         return table.append_column("part", columns[0]).append_column("row", columns[1])
 
     with ThreadPoolExecutor(READERS) as pool:
         tables = list(pool.map(names, parts))
     if not tables:
-        return pa.table({name: [] for name in ("record", "key", "status", "part", "row")})
+        return pa.table({name: [] for name in (*_NAMES.names, "part", "row")})
     return pa.concat_tables(tables).unify_dictionaries()
 
 
@@ -120,7 +130,8 @@ def write_table(out, records, key_of):
 def rows(out):
     """The rows of the table of results as dictionaries, in its order, a thousand in memory at a time."""
     fs, path = filesystem(out)
-    with fs.open(posixpath.join(path, TABLE), "rb") as file:
+    table = posixpath.join(path, TABLE)
+    with readable(table, "results"), fs.open(table, "rb") as file:
         for batch in parquet.ParquetFile(file).iter_batches(_ROWS_AT_ONCE):
             yield from batch.to_pylist()
 

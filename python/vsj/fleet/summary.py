@@ -19,7 +19,7 @@ _CHARTS = 24
 _PROBLEMS = 100
 """Most records without a diagnosis that are named."""
 _IMPRECISE = 5.0
-"""A value whose interval is wider than so many times the median of its series says nothing about a change."""
+"""A value whose interval is wider than this many times the median of its series says nothing about a change."""
 
 
 def summary(rows):
@@ -38,21 +38,20 @@ def summary(rows):
         drifting, tried, values = _drifts(name, group)
         charts, compared = charts + tried, compared + values
         series = sorted(series + drifting, key=lambda it: (not it.drift.stands, -it.drift.strength))[:_CHARTS]
-        moments = [_moment(row) for row in group]
-        springs.append(
-            Spring(name, len(group), moments[0], moments[-1], group[-1]["verdict"], present, [it.drift for it in drifting])
-        )
+        drifts = [it.drift for it in drifting]
+        springs.append(Spring(name, len(group), _moment(group[-1]), group[-1]["verdict"], present, drifts))
         for it in present:
             causes.setdefault(it.cause, []).append(it)
+    fleet_causes = (_fleet_cause(cause, where) for cause, where in causes.items())
     return Summary(
-        sorted(springs, key=lambda it: it.strength, reverse=True),
-        dict(status),
-        dict(verdicts),
-        sorted((_fleet_cause(cause, where) for cause, where in causes.items()), key=lambda it: (-it.springs, -it.records)),
-        series,
-        problems,
-        charts,
-        compared,
+        springs=sorted(springs, key=lambda it: it.strength, reverse=True),
+        status=dict(status),
+        verdicts=dict(verdicts),
+        causes=sorted(fleet_causes, key=lambda it: (-it.springs, -it.records)),
+        series=series,
+        problems=problems,
+        charts=charts,
+        compared=compared,
     )
 
 
@@ -116,16 +115,16 @@ def _drifts(name, group):
         if change is None:
             continue
         drift = Drift(
-            name,
-            parameter,
-            unit,
-            moments[change.first - 1],
-            moments[change.first],
-            moments[change.last],
-            change.last == len(values) - 1,
-            change.before,
-            change.after,
-            float(np.std(values[: change.first], ddof=min(1, change.first - 1))),
+            spring=name,
+            parameter=parameter,
+            unit=unit,
+            after_record=moments[change.first - 1],
+            by_record=moments[change.first],
+            until=moments[change.last],
+            stands=change.last == len(values) - 1,
+            before=change.before,
+            after=change.after,
+            scatter=float(np.std(values[: change.first], ddof=min(1, change.first - 1))),
         )
         drifting.append(Series(drift, moments, values, low, high, found, int(np.sum(~precise))))
     return drifting, charts, compared

@@ -11,12 +11,11 @@ import posixpath
 import tempfile
 import time
 
-import pyarrow
 from pyarrow import parquet
 
 from .. import BadInput, __version__, _vsj
 from ..records import given
-from .records import filesystem
+from .records import filesystem, readable
 from .store import write_part
 
 DIAGNOSED, REFUSED, FAILED = "diagnosed", "refused", "failed"
@@ -161,9 +160,7 @@ def _columns(path):
     """The columns of a Parquet file; ``None`` for a text file, which the library reads itself."""
     if not path.endswith(".parquet"):
         return None
-    try:
+    with readable(path, "Parquet"):
         table = parquet.read_table(path)
-    except (OSError, pyarrow.ArrowException) as error:
-        raise BadInput(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from error
     [(_, columns)] = given({name: table[name].to_numpy() for name in table.column_names}, {})
     return columns

@@ -59,14 +59,14 @@ impl Event {
     /// What `report` says at `time_s` of a bank with these settings and ticks of `rate_hz`.
     pub fn new(report: &Report, time_s: f64, settings: &Settings, rate_hz: f64) -> Self {
         let finding = report.finding(settings, rate_hz);
-        let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
         let size = |Finding { cause, size, half_width, .. }| Size::around(size, half_width, cause);
         Self {
             time_s,
             verdict: report.verdict.name(),
             cause: finding.map(|finding| finding.cause.name()),
             other: finding.and_then(|finding| finding.other).map(Cause::name),
-            since_s: (report.verdict != Verdict::Quiet).then(|| time_s - f64::from(report.since_blocks) * block_s),
+            since_s: (report.verdict != Verdict::Quiet)
+                .then(|| time_s - f64::from(report.since_blocks) * bank::block_s(rate_hz)),
             size: finding.map(size),
             explained: finding.map(|finding| finding.explained),
         }
@@ -113,8 +113,7 @@ pub struct Trace {
 }
 
 /// Standard deviation of the readings' noise, in V, if it is white, from the median of the magnitudes of their second
-/// differences; `None` for fewer
-/// than 10 readings.
+/// differences; `None` for fewer than 10 readings.
 pub fn noise_v(record: &Record) -> Option<f64> {
     let readings: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
     let mut bent: Vec<f64> = readings.windows(3).map(|at| (at[0] - 2.0 * at[1] + at[2]).abs()).collect();
@@ -132,7 +131,7 @@ pub fn run(record: &Record, mut settings: Settings) -> Result<Trace> {
     let refused = |error: OutOfRange| BadInput(error.to_string());
     let [first, .., last] = &record.rows[..] else { bad_input!("{}: expected at least 2 rows", record.name) };
     settings.interval_s = (last.time_s - first.time_s) / (record.rows.len() - 1) as f64;
-    let rate_hz = if settings.interval_s > 0.064 { 100.0 } else { 1000.0 };
+    let rate_hz = if settings.interval_s > 0.5 * bank::block_s(1000.0) { 100.0 } else { 1000.0 };
     if settings.interval_s > 0.6 {
         bad_input!("{}: rows {:.3} s apart; expected at most 0.6 s", record.name, settings.interval_s);
     }
@@ -140,7 +139,6 @@ pub fn run(record: &Record, mut settings: Settings) -> Result<Trace> {
     settings.interval_s = settings.interval_s.max(sample_time.seconds());
     let config = settings.validate(sample_time).map_err(refused)?.quantize();
     let plant = settings.plant.validate(sample_time).map_err(refused)?.quantize();
-    let block_s = f64::from(bank::block_ticks(rate_hz)) / rate_hz;
     let (mut spring, mut state) = (Default::default(), State::default());
     let event = |state: &State, time_s: f64| Event::new(&state.report(), time_s, &settings, rate_hz);
     let mut trace = vec![event(&state, first.time_s)];
@@ -163,5 +161,6 @@ pub fn run(record: &Record, mut settings: Settings) -> Result<Trace> {
         }
     }
     let last = event(&state, last.time_s);
-    Ok(Trace { schema: 1, rows: record.rows.len(), rate_hz, block_s, noise_v: settings.noise_v, last, trace })
+    let (rows, block_s) = (record.rows.len(), bank::block_s(rate_hz));
+    Ok(Trace { schema: 1, rows, rate_hz, block_s, noise_v: settings.noise_v, last, trace })
 }

@@ -101,7 +101,8 @@ impl ColumnNames {
         };
         if has_estimates(&found[Role::Reading as usize]) {
             bad_input!(
-                "{}: column `{ESTIMATE}` is the controller's own estimate, recorded without a sensor, and follows its                  model whatever the spring does; expected a column of readings",
+                "{}: column `{ESTIMATE}` is the controller's own estimate, recorded without a sensor, and follows its model \
+                 whatever the spring does; expected a column of readings",
                 table.header_place()
             );
         }
@@ -329,7 +330,11 @@ mod tests {
             ("time_s,pump_v,level_v\n", "--time time_s:s --voltage one of pump_v:V, level_v:V"),
             ("T,U,x_mm\n", "--time T --voltage U --reading x_mm:mm"),
             ("time_s,voltage_v,strain\n", "no column `stiffness`"),
-            ("time_s,voltage_v,estimate\n", "r, line 1: column `estimate` is the controller's own estimate"),
+            (
+                "time_s,voltage_v,estimate\n",
+                "r, line 1: column `estimate` is the controller's own estimate, recorded without a sensor, and follows its model \
+                 whatever the spring does; expected a column of readings",
+            ),
             ("time_s,volts,stiffness\n", "no column `voltage_v`"),
         ] {
             let error = found(header, &none).unwrap_err();

@@ -4,9 +4,11 @@
 //! on an instruction is longer than a count, so that the number of instructions is exact; below, it is rounded to
 //! 40 ns / 2^N instructions. The scale is measured at the start with a thousand `nop` instructions.
 
+use cortex_m::peripheral::Peripherals;
 use firmware::control::Stopwatch;
+use firmware::hang_guard;
 
-use super::registers::{SYSTICK_RELOAD, SYSTICK_VALUE};
+use super::registers::{CLOCK_HZ, SYSTICK_RELOAD, SYSTICK_VALUE};
 
 /// Number of `nop` instructions that determine the scale.
 const KNOWN: u32 = 1000;
@@ -33,6 +35,13 @@ pub struct Counter {
     max: u32,
     sum: u64,
     ticks: u32,
+}
+
+/// Starts SysTick in a program without control task. Without ticks the hang guard, which runs on it, is inactive.
+pub fn start_clock() {
+    if let Some(mut core) = Peripherals::take() {
+        hang_guard::start(&mut core.SYST, CLOCK_HZ);
+    }
 }
 
 impl Counter {

@@ -1,16 +1,13 @@
 //! Time between false alarms: counted at low thresholds, computed by importance sampling at the bank's own.
 
-use model::isolation::{self, Verdict, bank, thresholds};
-use model::{
-    Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
-};
+use model::isolation::{Verdict, bank, thresholds};
+use model::{OutOfRange, Volts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::run::RATE_HZ;
-use crate::ground_truth::{Live, Noise};
+use super::watched::Watched;
 
 /// Alarms of springs without a fault.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,30 +24,19 @@ pub struct Alarms {
 /// The model rejects the settings.
 pub fn count(percent: f64, nats: f64, seeds: std::ops::Range<u64>) -> Result<Alarms, OutOfRange> {
     const TICKS: u32 = 500_000;
-    let noise = Noise::white(percent);
-    let feedback = Feedback { noise_v: noise.sigma_v, ..Feedback::TYPICAL };
-    let config: Config = Settings { feedback: Some(feedback), ..Settings::PAPER }.validate()?.quantize();
-    let settings = isolation::Settings { noise_v: noise.sigma_v, alarm_nats: nats, ..isolation::Settings::PAPER };
-    let watching = settings.validate(SampleTime::from_rate(RATE_HZ)?)?.quantize();
     let one = |seed: u64| {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut live = Live::new(&[], noise, seed, 500.0, TICKS as usize);
-        let (mut state, mut bank) = (State::default(), isolation::State::default());
-        let (mut measured, mut target, mut until, mut alarms) = (None, Volts::ZERO, 0, 0);
+        let mut watched = Watched::new(percent, nats, seed, TICKS)?;
+        let (mut target, mut until, mut alarms) = (Volts::ZERO, 0, 0);
         for tick in 0..TICKS {
             if tick == until {
                 target = Volts::new(100.0 * f64::from(random.random_range(0..=5u32)))?;
                 until += random.random_range(3000..15_000);
             }
-            let output = config.tick(&mut state, Input { target, measured });
-            let model = ScaledStiffness(output.stiffness.0 - state.correction().0);
-            let (_, reading) = live.hold(output.applied.to_f64(), 1.0 / RATE_HZ);
-            let value = ScaledStiffness(Volts::new(reading.read)?.0);
-            measured = Reading::fresh(value);
-            watching.tick(&mut bank, output.applied, model, Some(value));
-            if bank.verdict() != Verdict::Quiet {
+            watched.tick(target)?;
+            if watched.verdict() != Verdict::Quiet {
                 alarms += 1;
-                bank.acknowledge();
+                watched.acknowledge();
             }
         }
         Ok(Alarms { ticks: u64::from(TICKS), alarms })

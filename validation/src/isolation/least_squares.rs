@@ -16,7 +16,11 @@ pub struct Thresholds(pub [f64; 3]);
 /// State of the estimation.
 #[derive(Clone, Debug)]
 pub(super) struct LeastSquares {
+    block: u32,
     block_s: f64,
+    /// Ticks in the present block, and its sums of voltages and readings.
+    ticks: u32,
+    sums: (f64, f64),
     lambda: f64,
     covariance: [[f64; PARAMETERS]; PARAMETERS],
     coefficients: [f64; PARAMETERS],
@@ -27,10 +31,15 @@ pub(super) struct LeastSquares {
 }
 
 impl LeastSquares {
-    pub(super) fn new(block_s: f64) -> Self {
+    /// An estimation over blocks of `block` ticks, at `rate_hz` ticks per second.
+    pub(super) fn new(block: u32, rate_hz: f64) -> Self {
+        let block_s = f64::from(block) / rate_hz;
         let covariance = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e4 } else { 0.0 }));
         Self {
+            block,
             block_s,
+            ticks: 0,
+            sums: (0.0, 0.0),
             lambda: 1.0 - block_s / 60.0,
             covariance,
             coefficients: [0.0; PARAMETERS],
@@ -40,8 +49,21 @@ impl LeastSquares {
         }
     }
 
+    /// Takes voltage and reading of a tick, in V. Returns true if it ends a block.
+    pub(super) fn tick(&mut self, voltage: f64, reading: f64) -> bool {
+        self.sums = (self.sums.0 + voltage, self.sums.1 + reading);
+        self.ticks += 1;
+        let is_end = self.ticks == self.block;
+        if is_end {
+            let mean = f64::from(self.block).recip();
+            self.update(self.sums.0 * mean, self.sums.1 * mean);
+            (self.ticks, self.sums) = (0, (0.0, 0.0));
+        }
+        is_end
+    }
+
     /// Takes the means of a block, in V.
-    pub(super) fn update(&mut self, voltage: f64, reading: f64) {
+    fn update(&mut self, voltage: f64, reading: f64) {
         let rc = 1.0 / (std::f64::consts::TAU * 0.05);
         let alpha = rc / (rc + self.block_s);
         let mut high_pass = [0.0; 2];

@@ -1,7 +1,7 @@
 //! Fault isolation in the tick: how soon and how rightly the bank of `model::isolation` names faults that begin while it runs.
 //!
-//! In: seeds. Out: Markdown tables over all faults, sizes and noises, beside the limit of any detector and beside recursive least
-//! squares. The springs are those of [`crate::ground_truth`], which share no code with the bank.
+//! In: seeds. Out: Markdown tables over all faults, sizes and noises, compared with the limit of any detector and with recursive
+//! least squares. The springs are those of [`crate::ground_truth`], which share no code with the bank.
 
 mod false_alarms;
 mod fault;
@@ -9,6 +9,7 @@ mod least_squares;
 mod page;
 mod run;
 mod tables;
+mod watched;
 
 pub use false_alarms::{Alarms, count, predicted_per_block};
 pub use fault::{Fault, SIZES};

@@ -6,7 +6,8 @@ use anyhow::{Result, anyhow};
 use model::isolation::{Settings, bank};
 use rayon::prelude::*;
 
-use super::run::{RATE_HZ, RUN_S};
+use super::run::RUN_S;
+use super::watched::RATE_HZ;
 use super::{Fault, NOISES, SIZES, Thresholds, count, predicted_per_block, rows, run, summary, table};
 
 /// First seed of the runs from which the rival's bands are found; no table has it.
@@ -46,7 +47,7 @@ fn thresholds(percent: f64) -> Result<Thresholds, model::OutOfRange> {
 
 fn false_alarms(first_seed: u64) -> Result<String> {
     let mut text = "### False alarms\n\n".to_owned();
-    let block_s = f64::from(bank::block_ticks(RATE_HZ)) / RATE_HZ;
+    let block_s = bank::block_s(RATE_HZ);
     let mut lines = Vec::new();
     for (nats, seeds) in [(8.0, 8), (10.0, 24), (Settings::PAPER.alarm_nats, 30)] {
         let counted = count(NOISES[0], nats, first_seed..first_seed + seeds).map_err(|error| anyhow!("{error}"))?;

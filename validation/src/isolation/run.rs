@@ -1,18 +1,14 @@
 //! One run: the controller with its sensor moves a spring between random levels, and a fault begins.
 
-use model::isolation::{self, Verdict, bank};
-use model::{
-    Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
-};
+use model::isolation::{Settings, Verdict, bank};
+use model::{OutOfRange, Volts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::fault::Fault;
 use super::least_squares::{LeastSquares, Thresholds};
-use crate::ground_truth::{Live, Noise};
+use super::watched::{RATE_HZ, Tick, Watched};
 
-/// Ticks per second.
-pub(super) const RATE_HZ: f64 = 1000.0;
 /// Length of a run, in s.
 pub(super) const RUN_S: f64 = 180.0;
 /// Time for which the rival may settle, in s; no fault begins before.
@@ -88,17 +84,10 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
     let effect = fault.effect(&mut random, size);
     let onset_s = random.random_range(SETTLED_S..2.0 * SETTLED_S);
     let targets = targets(&mut random);
-    let noise = Noise::white(percent);
-    let feedback = Feedback { noise_v: noise.sigma_v, ..Feedback::TYPICAL };
-    let config: Config = Settings { feedback: Some(feedback), ..Settings::PAPER }.validate()?.quantize();
-    let mut state = State::default();
-    let bank_settings = isolation::Settings { noise_v: noise.sigma_v, ..isolation::Settings::PAPER };
-    let watching = bank_settings.validate(SampleTime::from_rate(RATE_HZ)?)?.quantize();
-    let mut bank = isolation::State::default();
-    let block = bank::block_ticks(RATE_HZ);
-    let mut rival = LeastSquares::new(f64::from(block) / RATE_HZ);
     let ticks = (RUN_S * RATE_HZ) as u32;
-    let mut live = Live::new(&[], noise, seed, 500.0, ticks as usize);
+    let alarm_nats = Settings::PAPER.alarm_nats;
+    let mut watched = Watched::new(percent, alarm_nats, seed, ticks)?;
+    let mut rival = LeastSquares::new(bank::block_ticks(RATE_HZ), RATE_HZ);
     let mut outcome = Outcome {
         alarm_s: None,
         limit_s: None,
@@ -109,53 +98,37 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
         rival_right: false,
         deviations: [0.0; 3],
     };
-    let (mut begun, mut at, mut nats, mut sums) = (false, 0, 0.0, (0.0, 0.0));
-    let (mut measured, mut last_read) = (None, 0.0);
+    let (mut begun, mut at, mut nats) = (false, 0, 0.0);
     for tick in 0..ticks {
         let now_s = f64::from(tick) / RATE_HZ;
         if now_s >= onset_s && !begun {
             begun = true;
-            live.change(effect.as_slice(), 500.0);
+            watched.change(effect.as_slice());
+            watched.stuck = fault == Fault::Stuck;
         }
         while targets[at].0 < now_s {
             at += 1;
         }
-        let output = config.tick(&mut state, Input { target: Volts::new(targets[at].1)?, measured });
-        let model = ScaledStiffness(output.stiffness.0 - state.correction().0);
-        let (_, reading) = live.hold(output.applied.to_f64(), 1.0 / RATE_HZ);
-        let mut read = reading.read;
-        if begun && fault == Fault::Stuck {
-            read = last_read;
-        }
-        let expected = if fault == Fault::Stuck { read } else { reading.expected };
-        last_read = read;
-        let value = ScaledStiffness(Volts::new(read.clamp(-2000.0, 2000.0))?.0);
-        measured = Reading::fresh(value);
-        watching.tick(&mut bank, output.applied, model, Some(value));
-        sums = (sums.0 + output.applied.to_f64(), sums.1 + read);
-        if (tick + 1) % block == 0 {
-            let mean = f64::from(block).recip();
-            rival.update(sums.0 * mean, sums.1 * mean);
-            sums = (0.0, 0.0);
-            if now_s > SETTLED_S {
-                let off = rival.deviations();
-                outcome.deviations = std::array::from_fn(|i| outcome.deviations[i].max(off[i].abs()));
-            }
+        let Tick { applied, model, read, expected } = watched.tick(Volts::new(targets[at].1)?)?;
+        let ends_block = rival.tick(applied, read);
+        if ends_block && now_s > SETTLED_S {
+            let off = rival.deviations();
+            outcome.deviations = std::array::from_fn(|i| outcome.deviations[i].max(off[i].abs()));
         }
         let since_s = now_s - onset_s;
         if begun {
-            nats += 0.5 * ((expected - model.to_f64()) / noise.sigma_v).powi(2);
-            if outcome.limit_s.is_none() && nats >= bank_settings.alarm_nats {
+            nats += 0.5 * ((expected - model) / watched.noise_v).powi(2);
+            if outcome.limit_s.is_none() && nats >= alarm_nats {
                 outcome.limit_s = Some(since_s);
             }
             if outcome.rival_s.is_none()
-                && (tick + 1) % block == 0
+                && ends_block
                 && let Some(name) = rival.fault(thresholds)
             {
                 (outcome.rival_s, outcome.rival_right) = (Some(since_s), name == fault.name());
             }
         }
-        let verdict = bank.verdict();
+        let verdict = watched.verdict();
         if verdict != Verdict::Quiet && outcome.alarm_s.is_none() {
             outcome.alarm_s = Some(since_s);
         }
@@ -163,7 +136,7 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
             outcome.first = Some((since_s, says(verdict, fault) == Says::Right));
         }
     }
-    let verdict = bank.verdict();
+    let verdict = watched.verdict();
     outcome.last = says(verdict, fault);
     outcome.one_of_two = matches!(verdict, Verdict::Ambiguous(a, b) if [a.name(), b.name()].contains(&fault.name()));
     Ok(outcome)

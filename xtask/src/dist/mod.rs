@@ -1,8 +1,9 @@
 //! `cargo xtask dist`: the files of a release.
 //!
 //! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the library
-//! that `vsj export fmu` packs, the C library with its header for this host and for a Cortex-M4, the images of both boards for each controller and amplifier, the manual, the page for a browser, this version's changes, the
-//! licences of all dependencies, and the SHA-256 of every file.
+//! that `vsj export fmu` packs, the C library with its header for this host and for a Cortex-M4, the images of both boards for each
+//! controller and amplifier, the manual, the page for a browser, this version's changes, the licences of all dependencies, and the
+//! SHA-256 of every file.
 
 mod licences;
 

@@ -10,12 +10,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
-use crate::shell;
+use crate::{python, shell};
 
 /// The emulator: program and package in Debian and Ubuntu.
 const QEMU: [&str; 2] = ["qemu-system-arm"; 2];
 /// C for the MCU: GCC, without a C library.
 const ARM_GCC: [&str; 2] = ["arm-none-eabi-gcc", "gcc-arm-none-eabi"];
+/// C++ for this machine.
+const CXX: [&str; 2] = ["c++", "g++"];
 const CMAKE: [&str; 2] = ["cmake"; 2];
 /// A browser for the tests of the page.
 const CHROMIUM: [&str; 2] = ["chromium"; 2];
@@ -36,11 +38,19 @@ pub fn emulator() -> Result<()> {
     program(QEMU)
 }
 
-/// Installs GCC for the MCU and CMake with apt-get unless they start. Returns CMake's program: that of the Python package's virtual
-/// environment if it is there.
-pub fn c_tools() -> Result<PathBuf> {
-    program(ARM_GCC)?;
-    let installed = shell::target_directory()?.join("python-venv/bin/cmake");
+/// Installs GCC for the MCU with apt-get unless it starts.
+pub fn arm_gcc() -> Result<()> {
+    program(ARM_GCC)
+}
+
+/// Installs a C++ compiler with apt-get unless one starts.
+pub fn cxx() -> Result<()> {
+    program(CXX)
+}
+
+/// Installs CMake with apt-get unless it starts. Returns its program: that of the Python package's virtual environment if it is there.
+pub fn cmake() -> Result<PathBuf> {
+    let installed = python::folder(&shell::target_directory()?, "python").join("bin/cmake");
     if installed.exists() {
         return Ok(installed);
     }

@@ -140,16 +140,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         _ => None,
     };
     let keep = keep.transpose()?;
-    if let Command::Record(arguments) = &arguments.command {
-        arguments.check()?;
+    match &arguments.command {
+        Command::Record(arguments) => arguments.check()?,
+        Command::Capture(arguments) => arguments.check()?,
+        Command::Watch(arguments) => arguments.check()?,
+        _ => (),
     }
-    if let Command::Capture(arguments) = &arguments.command {
-        arguments.check()?;
-    }
-    if let Command::Watch(arguments) = &arguments.command {
-        arguments.check()?;
-    }
-
     let model = match &arguments.command {
         Command::Model(arguments) => arguments.read()?,
         _ => None,
@@ -158,7 +154,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Settings(arguments) => arguments.read()?,
         _ => None,
     };
-
     let port = Port::open(&arguments.port, baud, timeout)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
     let mut session = Session { client, status, json };

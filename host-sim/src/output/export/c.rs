@@ -7,18 +7,20 @@ use anyhow::Result;
 use model::{ExtendedPlant, Settings};
 use serde::Serialize;
 use simulation::bad_input::one_line;
-use vsj_tick::settings::{All, Sensor, Spring};
+use vsj_tick::settings::{All, FAST, NONE, PAPER, Sensor, Spring};
 
 use crate::output::files::Files;
 
 /// Header of the library, and the example.
-const EXAMPLE: [(&str, &str); 6] = [
+const EXAMPLE: [(&str, &str); 8] = [
     ("vsj_tick.h", include_str!("../../../../capi/include/vsj_tick.h")),
     ("main.c", include_str!("../../../../capi/example/main.c")),
     ("CMakeLists.txt", include_str!("../../../../capi/example/CMakeLists.txt")),
     ("arm-none-eabi.cmake", include_str!("../../../../capi/example/arm-none-eabi.cmake")),
     ("mps2-an386.c", include_str!("../../../../capi/example/mps2-an386.c")),
     ("mps2-an386.ld", include_str!("../../../../capi/example/mps2-an386.ld")),
+    ("semihosting.c", include_str!("../../../../capi/example/semihosting.c")),
+    ("semihosting.h", include_str!("../../../../capi/example/semihosting.h")),
 ];
 
 /// The answer of `vsj export c --json`.
@@ -92,7 +94,12 @@ fn header(all: &All, name: &str, not_simulated: &[String]) -> String {
     number("kp", kp);
     number("ki", ki);
     number("approach_s", approach_s);
-    let controller = ["VSJ_NONE", "VSJ_PAPER", "VSJ_FAST"].get(*controller as usize).unwrap_or(&"VSJ_NONE");
+    let controller = match *controller {
+        NONE => "VSJ_NONE".to_owned(),
+        PAPER => "VSJ_PAPER".to_owned(),
+        FAST => "VSJ_FAST".to_owned(),
+        other => other.to_string(),
+    };
     let _ = write!(text, "    .dac_bits = {dac_bits},\n    .controller = {controller},\n");
     text += &spring_text(spring);
     text += &sensor_text(sensor);

@@ -4,7 +4,8 @@
 //! Parquet file cannot be read before its end is written: it has its name only then.
 
 use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
+use std::mem;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -18,27 +19,27 @@ use crate::output::file::WholeFile;
 const CHUNK_S: f64 = 1.0;
 
 /// A file that takes rows.
-pub(super) enum Sink {
-    /// Each row is written in one piece.
-    Csv {
-        path: PathBuf,
-        file: File,
-        /// Number of bytes up to the end of the last complete row.
-        complete: u64,
-    },
+pub(super) struct Sink {
+    path: PathBuf,
+    file: Format,
+}
+
+enum Format {
+    Csv(Csv),
     /// Rows are messages at the time of day.
     Mcap {
-        path: PathBuf,
-        writer: Option<Writer<File>>,
+        writer: Writer<File>,
         /// Time of day of the first row, in ns since 1970.
         start_ns: Option<u64>,
         /// Time of the last chunk, in s of the recording.
         chunk_s: f64,
     },
     Parquet {
-        path: PathBuf,
-        writer: Option<(WholeFile, Writer<BufWriter<File>>)>,
+        writer: Writer<BufWriter<File>>,
+        file: WholeFile,
     },
+    /// The end of the file is written.
+    Finished,
 }
 
 impl Sink {
@@ -47,82 +48,87 @@ impl Sink {
     pub(super) fn create(path: &Path, replace: bool, reading: &'static str, source: &str) -> Result<Self> {
         let columns = [Column::number("time_s", "s"), Column::number("voltage_v", "V"), Column::number(reading, "V")];
         let sheet = Sheet { name: "record", source, columns: &columns };
-        let path = path.to_owned();
         let unwritable = || format!("{} cannot be written", path.display());
-        match Container::of(&path) {
+        let file = match Container::of(path) {
             None => {
-                let mut sink = Self::Csv { file: create(&path, replace)?, path, complete: 0 };
-                sink.put(&format!("# {source}\ntime_s,voltage_v,{reading}\n"))?;
-                Ok(sink)
+                let mut csv = Csv { file: create(path, replace)?, complete: 0 };
+                csv.put(&format!("# {source}\ntime_s,voltage_v,{reading}\n")).with_context(unwritable)?;
+                Format::Csv(csv)
             }
             Some(container @ Container::Mcap) => {
-                let mut writer = Writer::new(container, &sheet, create(&path, replace)?).with_context(unwritable)?;
+                let mut writer = Writer::new(container, &sheet, create(path, replace)?).with_context(unwritable)?;
                 writer.flush().with_context(unwritable)?;
-                Ok(Self::Mcap { path, writer: Some(writer), start_ns: None, chunk_s: 0.0 })
+                Format::Mcap { writer, start_ns: None, chunk_s: 0.0 }
             }
             Some(container @ Container::Parquet) => {
-                let (file, out) = WholeFile::create(&path, replace)?;
-                let writer = Writer::new(container, &sheet, out).with_context(unwritable)?;
-                Ok(Self::Parquet { path, writer: Some((file, writer)) })
+                let (file, out) = WholeFile::create(path, replace)?;
+                Format::Parquet { writer: Writer::new(container, &sheet, out).with_context(unwritable)?, file }
             }
-        }
+        };
+        Ok(Self { path: path.to_owned(), file })
     }
 
-    /// Writes a row.
+    /// Writes a row; without effect after the end.
     pub(super) fn row(&mut self, time_s: f64, voltage_v: f64, reading: Option<f64>) -> Result<()> {
-        let cells = [Cell::Number(time_s), Cell::Number(voltage_v), reading.into()];
-        match self {
-            Self::Csv { .. } => {
-                let reading = reading.map_or("-".into(), |reading| format!("{reading:.6}"));
-                self.put(&format!("{time_s},{voltage_v:.6},{reading}\n"))
-            }
-            Self::Mcap { writer, start_ns, chunk_s, path } => {
-                let Some(writer) = writer else { return Ok(()) };
-                let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
-                let start_ns = *start_ns.get_or_insert_with(now);
-                let mut add = || -> Result<()> {
-                    writer.row(start_ns + (time_s * 1e9).round() as u64, &cells)?;
-                    if time_s - *chunk_s >= CHUNK_S {
-                        *chunk_s = time_s;
-                        writer.flush()?;
-                    }
-                    Ok(())
-                };
-                add().with_context(|| format!("{} cannot be written", path.display()))
-            }
-            Self::Parquet { writer, path } => {
-                let Some((_, writer)) = writer else { return Ok(()) };
-                writer.row(0, &cells).with_context(|| format!("{} cannot be written", path.display()))
-            }
-        }
+        let written = self.file.row(time_s, voltage_v, reading);
+        written.with_context(|| format!("{} cannot be written", self.path.display()))
     }
 
     /// Writes the end of the file; without effect a second time.
     pub(super) fn finish(&mut self) -> Result<()> {
+        let finished = match mem::replace(&mut self.file, Format::Finished) {
+            Format::Csv(_) | Format::Finished => Ok(()),
+            Format::Mcap { writer, .. } => writer.finish(),
+            Format::Parquet { writer, file } => match writer.finish() {
+                Ok(()) => return file.finish(),
+                error => error,
+            },
+        };
+        finished.with_context(|| format!("{} cannot be written", self.path.display()))
+    }
+}
+
+impl Format {
+    fn row(&mut self, time_s: f64, voltage_v: f64, reading: Option<f64>) -> Result<()> {
+        let cells = [Cell::Number(time_s), Cell::Number(voltage_v), reading.into()];
         match self {
-            Self::Csv { .. } => Ok(()),
-            Self::Mcap { writer, path, .. } => {
-                let finished = writer.take().map_or(Ok(()), Writer::finish);
-                finished.with_context(|| format!("{} cannot be written", path.display()))
+            Self::Csv(csv) => {
+                let reading = reading.map_or("-".into(), |reading| format!("{reading:.6}"));
+                Ok(csv.put(&format!("{time_s},{voltage_v:.6},{reading}\n"))?)
             }
-            Self::Parquet { writer, path } => {
-                let Some((file, writer)) = writer.take() else { return Ok(()) };
-                writer.finish().with_context(|| format!("{} cannot be written", path.display()))?;
-                file.finish()
+            Self::Mcap { writer, start_ns, chunk_s } => {
+                let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
+                let start_ns = *start_ns.get_or_insert_with(now);
+                writer.row(start_ns + (time_s * 1e9).round() as u64, &cells)?;
+                if time_s - *chunk_s >= CHUNK_S {
+                    *chunk_s = time_s;
+                    writer.flush()?;
+                }
+                Ok(())
             }
+            Self::Parquet { writer, .. } => writer.row(0, &cells),
+            Self::Finished => Ok(()),
         }
     }
+}
 
-    fn put(&mut self, text: &str) -> Result<()> {
-        let Self::Csv { path, file, complete } = self else { return Ok(()) };
-        let written = file.write_all(text.as_bytes());
+/// A CSV file. Each row is written in one piece.
+struct Csv {
+    file: File,
+    /// Number of bytes up to the end of the last complete row.
+    complete: u64,
+}
+
+impl Csv {
+    fn put(&mut self, text: &str) -> io::Result<()> {
+        let written = self.file.write_all(text.as_bytes());
         if written.is_err() {
             // Remove an incomplete row; if that fails too, the first error is reported.
-            let _ = file.set_len(*complete);
-            let _ = file.seek(SeekFrom::Start(*complete));
+            let _ = self.file.set_len(self.complete);
+            let _ = self.file.seek(SeekFrom::Start(self.complete));
+            return written;
         }
-        written.with_context(|| format!("{} cannot be written", path.display()))?;
-        *complete += text.len() as u64;
+        self.complete += text.len() as u64;
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ mod braking;
 use self::braking::Braking;
 use crate::coefficient::{Rate, Weight, saturated, upper, widened};
 use crate::error::OutOfRange;
-use crate::estimator::{Estimator, Prediction, StepGain};
+use crate::estimator::{Estimator, Invertible, Prediction};
 use crate::units::{Accumulator, SampleTime, Volts};
 use crate::validated::{Validate, Validated};
 
@@ -79,13 +79,13 @@ pub struct State {
 }
 
 impl Validated<'_, Approach> {
-    /// Quantizes the law for a spring with this inverse and largest step gain. `slew` is the spring's smallest step
-    /// gain and the amplifier's largest change in a tick, in V, if the slew is limited.
-    pub(crate) fn quantize<I>(self, inverse: I, spring: &StepGain, slew: Option<(StepGain, f64)>) -> TimeOptimal<I> {
+    /// Quantizes the law for a spring. `step_v` is the amplifier's largest change in a tick, in V, if the slew is limited.
+    pub(crate) fn quantize<E: Estimator>(self, spring: &Invertible<E>, step_v: Option<f64>) -> TimeOptimal<E::Inverse> {
         let (time_constant, sample_time) = (self.settings().time_constant_s, self.sample_time());
+        let Invertible { inverse, largest, smallest, .. } = *spring;
         let approach = if time_constant > 0.0 { sample_time.lag_fraction(time_constant) } else { 1.0 };
-        let braking = slew.map(|(smallest, step_v)| Braking::new(&smallest, step_v));
-        let feedthrough = spring.feedthrough / (spring.feedthrough + spring.in_one_tick).max(1e-9);
+        let braking = step_v.map(|step_v| Braking::new(&smallest, step_v));
+        let feedthrough = largest.feedthrough / (largest.feedthrough + largest.in_one_tick).max(1e-9);
         let rounding = Weight::new((1.0 - approach) * feedthrough);
         let offset_decay = Rate::new(sample_time.lag_fraction(OFFSET_DECAY_S));
         TimeOptimal { inverse, approach: Weight::new(approach), rounding, offset_decay, braking }
