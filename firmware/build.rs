@@ -11,9 +11,11 @@ fn main() {
     if env::var_os("CARGO_FEATURE_NUCLEO_G474RE").is_none() {
         return;
     }
-    // memory.x of the workspace includes the board's flash.x.
+    // memory.x of the workspace includes the board's flash.x and the controller's stack.x.
     let package = env::var("CARGO_MANIFEST_DIR").unwrap();
-    for (folder, script) in [(format!("{package}/.."), "memory.x"), (package, "flash.x")] {
+    let stack = if env::var_os("CARGO_FEATURE_ROBUST").is_some() { "robust" } else { "usual" };
+    let stack = format!("{package}/../stack/{stack}");
+    for (folder, script) in [(format!("{package}/.."), "memory.x"), (stack, "stack.x"), (package, "flash.x")] {
         println!("cargo:rustc-link-search={folder}");
         println!("cargo:rerun-if-changed={folder}/{script}");
     }

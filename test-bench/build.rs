@@ -7,9 +7,12 @@ fn main() {
     if env::var_os("CARGO_FEATURE_MPS2_AN386").is_none() {
         return;
     }
-    // memory.x of the workspace includes the board's flash.x.
+    // memory.x of the workspace includes the board's flash.x and the controller's stack.x.
     let package = env::var("CARGO_MANIFEST_DIR").unwrap();
-    for (folder, scripts) in [(format!("{package}/.."), &["memory.x"][..]), (package, &["flash.x", "device.x"])] {
+    let stack = if env::var_os("CARGO_FEATURE_ROBUST").is_some() { "robust" } else { "usual" };
+    let stack = format!("{package}/../stack/{stack}");
+    let root = format!("{package}/..");
+    for (folder, scripts) in [(root, &["memory.x"][..]), (stack, &["stack.x"]), (package, &["flash.x", "device.x"])] {
         println!("cargo:rustc-link-search={folder}");
         for script in scripts {
             println!("cargo:rerun-if-changed={folder}/{script}");

@@ -264,7 +264,7 @@ struct Status {
     std::array<std::uint8_t, 3> firmware{};
     /// Git revision of the firmware, 0 if it is not known.
     std::uint32_t revision = 0;
-    /// 0 none, 1 the paper's, 2 the fast one.
+    /// 0 none, 1 the paper's, 2 the fast one, 3 the robust one.
     std::uint8_t controller = 0;
     /// Ticks per second, in Hz.
     std::uint32_t rate_hz = 0;

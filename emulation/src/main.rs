@@ -121,7 +121,8 @@ Examples:
 Examples:
   cargo xtask boot
   cargo xtask boot --controller fast                   the image of the time-optimal controller
-  cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V")]
+  cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V
+  cargo xtask boot --controller robust                 for a spring known to within errors")]
     Boot(Variant),
     /// Build the C library's example, run it here and under QEMU
     ///

@@ -15,15 +15,17 @@ pub(crate) const fn settings(variant: Variant) -> Settings {
     match variant.controller {
         Controller::Paper => settings::paper(amplifier),
         Controller::Fast => settings::fast(amplifier),
+        Controller::Robust => settings::robust(amplifier),
     }
 }
 
 /// The number of instructions that a control tick with voltage may need, at least and at most, supervisor included. The
-/// ends are 5 % beyond those that were measured: 321 to 353 and 409 to 440, with an amplifier of 700 V and of 1000 V.
+/// ends are 5 % beyond those that were measured: 321 to 353, 409 to 440 and 493 to 541, with an amplifier of 700 V and of 1000 V.
 pub(crate) const fn instructions(variant: Variant) -> RangeInclusive<u64> {
     match variant.controller {
         Controller::Paper => 305..=370,
         Controller::Fast => 390..=462,
+        Controller::Robust => 468..=568,
     }
 }
 
@@ -50,7 +52,7 @@ mod tests {
         };
         let variant = Variant::of(Controller::Paper);
         let all: Vec<_> = [variant].into_iter().chain(variant.others()).collect();
-        assert_eq!(all.len(), 4);
+        assert_eq!(all.len(), 6);
         for one in all {
             for other in one.others() {
                 assert_ne!(codes(one), codes(other), "{one:?}, {other:?}");

@@ -5,7 +5,11 @@ use model::device::{self, Watchdogs};
 use model::isolation::Causes;
 use model::{Amplifier, Feedback, Settings, supervisor};
 #[cfg(feature = "fast")]
-use model::{Approach, Compensation};
+use model::Approach;
+#[cfg(any(feature = "fast", feature = "robust"))]
+use model::Compensation;
+#[cfg(feature = "robust")]
+use model::Margin;
 
 /// Rate of the control tick that is built in, in Hz.
 pub const RATE_HZ: u32 = 1000;
@@ -29,13 +33,19 @@ pub const SETTINGS: Settings = paper(AMPLIFIER);
 /// The time-optimal controller with this image's amplifier, without a sensor.
 #[cfg(feature = "fast")]
 pub const FAST: Settings = fast(AMPLIFIER);
+/// The robust controller with this image's amplifier, without a sensor.
+#[cfg(feature = "robust")]
+pub const ROBUST: Settings = robust(AMPLIFIER);
 
 /// Settings of a run that the host commands, unless others are stored.
-#[cfg(not(feature = "fast"))]
+#[cfg(not(any(feature = "fast", feature = "robust")))]
 pub const FLASHED: Settings = with_sensor(SETTINGS);
 /// Settings of a run that the host commands, unless others are stored.
-#[cfg(feature = "fast")]
+#[cfg(all(feature = "fast", not(feature = "robust")))]
 pub const FLASHED: Settings = with_sensor(FAST);
+/// Settings of a run that the host commands, unless others are stored.
+#[cfg(feature = "robust")]
+pub const FLASHED: Settings = with_sensor(ROBUST);
 /// Correction by the stiffness sensor; it has no effect on a board without one.
 #[cfg(not(feature = "feedback"))]
 const SENSOR: Option<Feedback> = None;
@@ -64,6 +74,12 @@ pub const fn paper(amplifier: Amplifier) -> Settings {
 #[cfg(feature = "fast")]
 pub const fn fast(amplifier: Amplifier) -> Settings {
     Settings { compensation: Compensation::TimeOptimal(Approach::DEAD_BEAT), ..paper(amplifier) }
+}
+
+/// The robust controller with `amplifier`, without a sensor.
+#[cfg(feature = "robust")]
+pub const fn robust(amplifier: Amplifier) -> Settings {
+    Settings { compensation: Compensation::Robust(Margin::TYPICAL), ..paper(amplifier) }
 }
 
 /// `settings` with the correction by the stiffness sensor if the feature `feedback` is enabled.

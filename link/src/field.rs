@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Field(pub u8);
 
 /// Names in the order of their codes. The order is part of the protocol: new names are appended.
-const NAMES: [&str; 45] = [
+const NAMES: [&str; 49] = [
     "memory.direct",
     "memory.thresholds_v",
     "memory.weights",
@@ -56,6 +56,10 @@ const NAMES: [&str; 45] = [
     "trip_on_cause",
     "range_v",
     "plant.time_constant_s",
+    "margin.time_constant",
+    "margin.share",
+    "margin.gain",
+    "margin.overshoot",
 ];
 
 impl Field {

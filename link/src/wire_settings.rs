@@ -6,20 +6,22 @@
 use heapless::Vec;
 use model::device::{self, Watchdogs};
 use model::isolation::Causes;
-use model::{Amplifier, Approach, Compensation, Feedback, Gains, Settings, supervisor};
+use model::{Amplifier, Approach, Compensation, Feedback, Gains, Margin, Settings, supervisor};
 use serde::{Deserialize, Serialize};
 
 use crate::block::{self, PART};
 use crate::field::Field;
 use crate::reply::Controller;
 
-/// Newest version of the payload's format: the first one, and `trip_on_cause` behind it. A payload has the oldest version that holds
-/// its settings, so that programs which know no newer one go on reading what they can run.
-pub const FORMAT: u8 = 2;
+/// Newest version of the payload's format: the second one, and `margin` behind it. A payload has the oldest version that holds its
+/// settings, so that programs which know no newer one go on reading what they can run.
+pub const FORMAT: u8 = 3;
 /// First version of the payload's format.
 const FIRST: u8 = 1;
+/// Second version of the payload's format: the first one, and `trip_on_cause` behind it.
+const SECOND: u8 = 2;
 /// Largest number of parts of a payload.
-pub const MOST_PARTS: u8 = 7;
+pub const MOST_PARTS: u8 = 8;
 /// Length of the longest payload, in bytes.
 pub const MOST_BYTES: usize = PART * MOST_PARTS as usize;
 
@@ -70,6 +72,10 @@ pub struct WireSettings {
     /// Causes that are a fault once the isolation bank has named them, as [`Causes::bits`]; 0 in a payload of the first version.
     #[serde(skip)]
     pub trip_on_cause: u16,
+    /// Margin of the robust controller, as [`Margin::values`]; `None` for another controller, and in a payload of an earlier version
+    /// than the third.
+    #[serde(skip)]
+    pub margin: Option<[f64; 4]>,
 }
 
 impl WireSettings {
@@ -77,10 +83,11 @@ impl WireSettings {
     pub fn new(settings: &device::Settings) -> Self {
         let device::Settings { control, supervision, watchdogs, trip_on_cause } = settings;
         let Settings { compensation, amplifier, feedback, .. } = control;
-        let (gains, approach_s) = match compensation {
-            Compensation::None | Compensation::Robust(_) => (Gains::PAPER, 0.0),
-            Compensation::ProportionalIntegral(gains) => (*gains, 0.0),
-            Compensation::TimeOptimal(approach) => (Gains::PAPER, approach.time_constant_s()),
+        let (gains, approach_s, margin) = match compensation {
+            Compensation::None => (Gains::PAPER, 0.0, None),
+            Compensation::ProportionalIntegral(gains) => (*gains, 0.0, None),
+            Compensation::TimeOptimal(approach) => (Gains::PAPER, approach.time_constant_s(), None),
+            Compensation::Robust(margin) => (Gains::PAPER, 0.0, Some(margin.values())),
         };
         Self {
             rate_hz: settings.rate_hz(),
@@ -103,6 +110,7 @@ impl WireSettings {
             discharge_time_s: supervision.discharge_time_s,
             watchdogs_ms: [watchdogs.hang_ms, watchdogs.stall_ms, watchdogs.reset_ms],
             trip_on_cause: trip_on_cause.bits(),
+            margin,
         }
     }
 
@@ -120,8 +128,10 @@ impl WireSettings {
             Controller::Fast => {
                 Compensation::TimeOptimal(Approach::new(self.approach_s).ok_or(Field::named("controller"))?)
             }
-            // Its margin is not among these settings.
-            Controller::Robust => return Err(Field::named("controller")),
+            Controller::Robust => {
+                let margin = self.margin.and_then(Margin::from_values);
+                Compensation::Robust(margin.ok_or(Field::named("controller"))?)
+            }
         };
         let feedback = match self.sensor {
             None => None,
@@ -161,21 +171,37 @@ impl WireSettings {
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the longest.
     #[inline(never)]
     pub fn payload(&self) -> Option<Payload> {
-        if self.trip_on_cause == 0 {
-            block::write(FIRST, self)
-        } else {
-            block::write(FORMAT, &(self, self.trip_on_cause))
-        }
+        let (format, behind) = match (self.margin, self.trip_on_cause) {
+            (None, 0) => (FIRST, Behind::Nothing),
+            (None, trip_on_cause) => (SECOND, Behind::Trip(trip_on_cause)),
+            (Some(margin), trip_on_cause) => (FORMAT, Behind::Margin(trip_on_cause, margin)),
+        };
+        block::write(format, &(self, behind))
     }
 
     /// Deserialises a payload. `None` for a newer format and for bytes that are not exactly one set of settings.
     #[inline(never)]
     pub fn read(payload: &[u8]) -> Option<Self> {
-        block::read(FIRST, payload).or_else(|| {
-            let (settings, trip_on_cause) = block::read::<(Self, u16)>(FORMAT, payload)?;
-            Some(Self { trip_on_cause, ..settings })
-        })
+        let (format, bytes) = payload.split_first()?;
+        let (mut settings, mut bytes) = postcard::take_from_bytes::<Self>(bytes).ok()?;
+        if *format >= SECOND {
+            (settings.trip_on_cause, bytes) = postcard::take_from_bytes(bytes).ok()?;
+        }
+        if *format == FORMAT {
+            let (margin, rest) = postcard::take_from_bytes(bytes).ok()?;
+            (settings.margin, bytes) = (Some(margin), rest);
+        }
+        ((FIRST..=FORMAT).contains(format) && bytes.is_empty()).then_some(settings)
     }
+}
+
+/// What a payload has behind the settings of the first format.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Behind {
+    Nothing,
+    Trip(u16),
+    Margin(u16, [f64; 4]),
 }
 
 #[cfg(test)]
@@ -192,7 +218,9 @@ mod tests {
             watchdogs_ms: [most; 3],
             slew_v_per_s: Some(1.5),
             sensor: Some([2.5; 8]),
+            controller: Controller::Robust,
             trip_on_cause: u16::MAX,
+            margin: Some([0.25; 4]),
             ..WireSettings::new(&BUILT_IN)
         }
     }
@@ -200,7 +228,7 @@ mod tests {
     #[test]
     fn the_longest_settings_fit_and_survive_a_round_trip() {
         let payload = longest().payload().unwrap();
-        assert_eq!((payload.len(), WireSettings::read(&payload)), (208, Some(longest())));
+        assert_eq!((payload.len(), WireSettings::read(&payload)), (240, Some(longest())));
         assert!(payload.len() <= MOST_BYTES);
     }
 
@@ -233,6 +261,27 @@ mod tests {
     }
 
     #[test]
+    fn only_the_robust_controller_needs_a_payload_of_the_newest_format() {
+        let margin = [0.05, 0.125, 0.0, 0.02];
+        let robust = WireSettings { controller: Controller::Robust, ..WireSettings::new(&BUILT_IN) };
+        let without = robust.payload().unwrap();
+        for trip_on_cause in [0, 0x8001] {
+            let with = WireSettings { trip_on_cause, margin: Some(margin), ..robust };
+            let payload = with.payload().unwrap();
+            assert_eq!((payload[0], WireSettings::read(&payload)), (3, Some(with)));
+            let (settings, tail) = payload[1..].split_at(without.len() - 1);
+            assert_eq!(*settings, without[1..], "the newer format has the first one in it");
+            let (trip, numbers) = tail.split_at(tail.len() - 32);
+            assert_eq!(trip, if trip_on_cause == 0 { &[0][..] } else { &[0x81, 0x80, 0x02] });
+            assert!(numbers.chunks(8).map(|bytes| f64::from_le_bytes(*bytes.first_chunk().unwrap())).eq(margin));
+            let compensation = with.over(&BUILT_IN).map(|settings| settings.control.compensation);
+            assert_eq!(compensation, Ok(Compensation::Robust(Margin::from_values(margin).unwrap())));
+        }
+        assert_eq!((without[0], WireSettings::read(&without)), (1, Some(robust)));
+        assert_eq!(robust.over(&BUILT_IN), Err(Field::named("controller")), "without a margin, as before");
+    }
+
+    #[test]
     fn settings_that_were_sent_are_those_that_were_meant() {
         assert_eq!(WireSettings::new(&BUILT_IN).over(&BUILT_IN), Ok(BUILT_IN));
         let gains = Gains { proportional: 3.0, integral_per_s: 0.5 };
@@ -259,9 +308,10 @@ mod tests {
         let meant = device::Settings { control, supervision, watchdogs, trip_on_cause };
         let payload = WireSettings::new(&meant).payload().unwrap();
         assert_eq!(WireSettings::read(&payload).unwrap().over(&BUILT_IN), Ok(meant));
-        let none = Settings { compensation: Compensation::None, ..control };
-        let meant = device::Settings { control: none, ..meant };
-        assert_eq!(WireSettings::new(&meant).over(&BUILT_IN), Ok(meant));
+        for compensation in [Compensation::None, Compensation::Robust(Margin::TYPICAL)] {
+            let meant = device::Settings { control: Settings { compensation, ..control }, ..meant };
+            assert_eq!(WireSettings::new(&meant).over(&BUILT_IN), Ok(meant));
+        }
     }
 
     /// What the settings leave out is the board's.

@@ -138,11 +138,19 @@ fn replies() {
             Reply::Refused(Reason::BadSettings { field: Field::named("hang_ms"), lowest: 0.0, highest: 1.0 }),
             "0114270000000000000000000000000000f03f",
         ),
+        (
+            Reply::Refused(Reason::BadSettings { field: Field::named("margin.share"), lowest: 0.0, highest: 0.25 }),
+            "01142e0000000000000000000000000000d03f",
+        ),
         (Reply::Refused(Reason::NotBuiltIn(Field::named("controller"))), "011512"),
         (Reply::Refused(Reason::TooManyRows { most: 300 }), "0116ac02"),
         (
             Reply::Status(status),
             "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f0903040a0b0c0d0e0f1011",
+        ),
+        (
+            Reply::Status(Status { firmware: Firmware { controller: Controller::Robust, ..status.firmware }, ..status }),
+            "02010203f8acd1910103e807f4030a0c040105f0a20401808080ac02010400ff1f0903040a0b0c0d0e0f1011",
         ),
         (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f090304"),
         (

@@ -126,10 +126,7 @@ impl<P: Model> Validated<'_, Settings<P>> {
             Compensation::TimeOptimal(approach) => {
                 PreCompensator::TimeOptimal(self.part(approach).quantize(&Invertible::new(plant, resolution_v), step_v))
             }
-            Compensation::Robust(margin) => {
-                let quick = P::differing(plant, margin.factors(), resolution_v);
-                PreCompensator::Robust(self.part(margin).quantize(quick, step_v))
-            }
+            Compensation::Robust(margin) => self.robust(margin, step_v),
         };
         Config {
             estimator: P::quantize(plant),
@@ -137,6 +134,14 @@ impl<P: Model> Validated<'_, Settings<P>> {
             amplifier: self.part(&settings.amplifier).quantize(),
             feedback: settings.feedback.as_ref().map(|feedback| self.part(feedback).quantize()),
         }
+    }
+
+    /// Quantizes the robust law. Not inlined: its second spring would be on the stack of every start.
+    #[inline(never)]
+    fn robust(&self, margin: &Margin, step_v: Option<f64>) -> PreCompensator<P::Config> {
+        let settings = self.settings();
+        let quick = P::differing(self.part(&settings.plant), margin.factors(), settings.amplifier.volts_per_code());
+        PreCompensator::Robust(self.part(margin).quantize(quick, step_v))
     }
 }
 

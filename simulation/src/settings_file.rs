@@ -44,6 +44,9 @@ pub struct SettingsFile {
     /// Approach of the controller `fast`.
     #[serde(default)]
     pub approach: Approach,
+    /// Margin of the controller `robust`.
+    #[serde(default)]
+    pub margin: Margin,
     /// Range and slew rate of the amplifier.
     #[serde(default)]
     pub amplifier: Amplifier,
@@ -101,6 +104,19 @@ table! {
     Approach {
         /// Time constant of the last part of the way, in s.
         tau_s: f64,
+    }
+}
+table! {
+    /// How well the robust pre-compensator knows the spring, and what it may overshoot; all without a unit.
+    Margin {
+        /// Largest relative error of the time constants, both ways.
+        time_constant: f64,
+        /// Largest relative error of the instantaneous share, both ways.
+        share: f64,
+        /// Largest relative error of the gain, both ways.
+        gain: f64,
+        /// Overshoot that is allowed on any spring within the errors, as a part of the step.
+        overshoot: f64,
     }
 }
 table! {
@@ -184,6 +200,7 @@ impl From<&WireSettings> for SettingsFile {
     /// A file with every value.
     fn from(wire: &WireSettings) -> Self {
         let [hang_ms, stall_ms, reset_ms] = wire.watchdogs_ms;
+        let [time_constant, share, gain, overshoot] = wire.margin.unwrap_or(model::Margin::TYPICAL.values()).map(Some);
         let mut sensor = Sensor { enabled: Some(wire.sensor.is_some()), ..Sensor::default() };
         for (value, key) in wire.sensor.unwrap_or_default().into_iter().zip(sensor.values_mut()) {
             *key = wire.sensor.map(|_| value);
@@ -199,6 +216,7 @@ impl From<&WireSettings> for SettingsFile {
             }),
             gains: Gains { proportional: Some(wire.proportional), integral_per_s: Some(wire.integral_per_s) },
             approach: Approach { tau_s: Some(wire.approach_s) },
+            margin: Margin { time_constant, share, gain, overshoot },
             amplifier: Amplifier {
                 full_scale_v: Some(wire.full_scale_v),
                 min_v: Some(wire.min_v),
@@ -243,20 +261,33 @@ impl Sensor {
     }
 }
 
+impl Margin {
+    /// The margin: the values of the file, else the built-in ones, else the typical ones.
+    fn over(&self, built_in: Option<[f64; 4]>) -> [f64; 4] {
+        let Self { time_constant, share, gain, overshoot } = *self;
+        let mut values = built_in.unwrap_or(model::Margin::TYPICAL.values());
+        for (value, key) in values.iter_mut().zip([time_constant, share, gain, overshoot]) {
+            *value = key.unwrap_or(*value);
+        }
+        values
+    }
+}
+
 impl SettingsFile {
     /// The settings to be sent: those of the file over the built-in ones.
     pub fn over(&self, built_in: &WireSettings) -> WireSettings {
-        let Self { gains, approach, amplifier, sensor, supervision, watchdogs, isolation, .. } = self;
+        let Self { gains, approach, margin, amplifier, sensor, supervision, watchdogs, isolation, .. } = self;
         let [hang_ms, stall_ms, reset_ms] = built_in.watchdogs_ms;
+        let controller = match self.controller {
+            None => built_in.controller,
+            Some(Name::None) => Controller::None,
+            Some(Name::Paper) => Controller::Paper,
+            Some(Name::Fast) => Controller::Fast,
+            Some(Name::Robust) => Controller::Robust,
+        };
         WireSettings {
             rate_hz: self.rate_hz.unwrap_or(built_in.rate_hz),
-            controller: match self.controller {
-                None => built_in.controller,
-                Some(Name::None) => Controller::None,
-                Some(Name::Paper) => Controller::Paper,
-                Some(Name::Fast) => Controller::Fast,
-                Some(Name::Robust) => Controller::Robust,
-            },
+            controller,
             proportional: gains.proportional.unwrap_or(built_in.proportional),
             integral_per_s: gains.integral_per_s.unwrap_or(built_in.integral_per_s),
             approach_s: approach.tau_s.unwrap_or(built_in.approach_s),
@@ -279,6 +310,7 @@ impl SettingsFile {
                 watchdogs.reset_ms.unwrap_or(reset_ms),
             ],
             trip_on_cause: isolation.trip_on_cause.map_or(built_in.trip_on_cause, |trips| trips.0.bits()),
+            margin: (controller == Controller::Robust).then(|| margin.over(built_in.margin)),
         }
     }
 
@@ -316,8 +348,8 @@ impl Source {
         let file: SettingsFile = toml::from_str(text).map_err(|error| {
             let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
             BadInput(format!(
-                "{}: {what}; expected schema, rate_hz, controller, and [gains], [approach], [amplifier], [sensor], [supervision], \
-                 [watchdogs], [isolation]; pins, converters, monitor scales and baud rate need another image",
+                "{}: {what}; expected schema, rate_hz, controller, and [gains], [approach], [margin], [amplifier], [sensor], \
+                 [supervision], [watchdogs], [isolation]; pins, converters, monitor scales and baud rate need another image",
                 place::line_and_column(name, text, at)
             ))
         })?;
@@ -363,6 +395,7 @@ fn key(field: &str) -> String {
         "proportional_gain" => return "gains.proportional".into(),
         "integral_gain_per_s" => return "gains.integral_per_s".into(),
         "approach_s" => return "approach.tau_s".into(),
+        _ if field.starts_with("margin.") => return field.into(),
         "full_scale_v" | "min_v" | "max_v" | "slew_v_per_s" => "amplifier",
         "hang_ms" | "stall_ms" | "reset_ms" => "watchdogs",
         "range_v" => return "amplifier.max_v".into(),
@@ -407,12 +440,26 @@ mod tests {
     }
 
     #[test]
+    fn a_margin_is_that_of_the_robust_controller_alone() {
+        let margin = |text| over(text).unwrap().margin;
+        assert_eq!(margin("schema = 1\ncontroller = \"robust\""), Some([0.05, 0.05, 0.0, 0.02]));
+        let share = "schema = 1\ncontroller = \"robust\"\n[margin]\nshare = 0.1";
+        assert_eq!(margin(share), Some([0.05, 0.1, 0.0, 0.02]));
+        assert_eq!(margin("schema = 1\n[margin]\nshare = 0.1"), None, "the controller is `paper`");
+        let robust = WireSettings { controller: Controller::Robust, margin: Some([0.2; 4]), ..built_in() };
+        let over = |text| Source::parse("s.toml", text).unwrap().over(&robust).unwrap().margin;
+        assert_eq!(over("schema = 1\n[margin]\nshare = 0.1"), Some([0.2, 0.1, 0.2, 0.2]));
+        assert_eq!(over("schema = 1\ncontroller = \"fast\""), None);
+    }
+
+    #[test]
     fn every_value_reads_the_same_after_it_was_written() {
         let values = [2.0, 3.0, 0.5, 2e-3, 0.02, -20.0, 700.0, 4.0];
         for wire in [
             built_in(),
             WireSettings { controller: Controller::Fast, approach_s: 0.25, slew_v_per_s: Some(1e4), ..built_in() },
             WireSettings { sensor: Some(values), controller: Controller::None, ..built_in() },
+            WireSettings { controller: Controller::Robust, margin: Some([0.1, 0.05, 0.01, 0.03]), ..built_in() },
             WireSettings { sensor: Some(values), trip_on_cause: 0x8001, ..built_in() },
         ] {
             let text = SettingsFile::from(&wire).to_toml().unwrap();
@@ -450,6 +497,15 @@ mod tests {
                 "schema = 1\n[isolation]\ntrip_on_cause = [\"gain\"]",
                 "s.toml, line 3, column 17: invalid value: string \"gain\", expected \"off\" or a list of gain-error, ",
             ),
+            (
+                "schema = 1\ncontroller = \"robust\"\n[margin]\nshare = 0.3",
+                "s.toml, line 4, column 9: margin.share = 0.3 is not allowed: expected 0 to 0.25 of the model's",
+            ),
+            (
+                "schema = 1\ncontroller = \"robust\"\n[margin]\novershoot = 0.5",
+                "s.toml, line 4, column 13: margin.overshoot = 0.5 is not allowed: expected 0 to 0.2 of a step",
+            ),
+            ("schema = 1\n[margin]\ntau = 0.1", "s.toml, line 3, column 1: unknown field `tau`"),
             ("schema = 1\n[pins]\ndac = 4", "s.toml, line 2, column 2: unknown field `pins`"),
             ("schema = 1\ncontroller = 7", "s.toml, line 2, column 14:"),
             ("schema = 1\nrate_hz = -5", "s.toml, line 2, column 11:"),

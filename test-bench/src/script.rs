@@ -5,13 +5,16 @@
 //! | `stair` | The source report's stair: 70 s, from 20 s on a rise of 100 V in 0.1 s every 10 s. |
 //! | `up-down` | 95 s: steps of 100 V every 10 s, up to 500 V and down to 100 V, with a simulated spring at the board's amplifier port. |
 //! | `up-down fast` | `up-down` with the time-optimal controller (feature `fast`). |
-//! | `up-down sensor`, `up-down fast sensor` | These runs with the spring's readings in the loop (feature `feedback`). |
+//! | `up-down robust` | `up-down` with the controller for a spring that is known to within errors (feature `robust`). |
+//! | `up-down sensor`, `up-down fast sensor`, `up-down robust sensor` | These runs with the spring's readings in the loop (feature `feedback`). |
 //! | `random SEED` | 100 000 ticks with random arming, disarming, targets, interlock openings and silences of the host. |
 //! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `two-faults`, `silence`, `unguarded` | Drills: one injected fault each (`two-faults`: two), see [`FaultInjection`]. |
 //! | (after a reset by a fault) | The output must stay disabled until the fault is acknowledged. |
 
 #[cfg(feature = "fast")]
 use firmware::settings::FAST;
+#[cfg(feature = "robust")]
+use firmware::settings::ROBUST;
 use firmware::settings::SETTINGS;
 #[cfg(feature = "feedback")]
 use firmware::settings::with_sensor;
@@ -36,10 +39,14 @@ pub static CONTROLLERS: &[Controller] = &[
     Controller { run: "up-down", settings: &SETTINGS },
     #[cfg(feature = "fast")]
     Controller { run: "up-down fast", settings: &FAST },
+    #[cfg(feature = "robust")]
+    Controller { run: "up-down robust", settings: &ROBUST },
     #[cfg(feature = "feedback")]
     Controller { run: "up-down sensor", settings: &const { with_sensor(SETTINGS) } },
     #[cfg(all(feature = "fast", feature = "feedback"))]
     Controller { run: "up-down fast sensor", settings: &const { with_sensor(FAST) } },
+    #[cfg(all(feature = "robust", feature = "feedback"))]
+    Controller { run: "up-down robust sensor", settings: &const { with_sensor(ROBUST) } },
 ];
 
 /// Controller of an `up-down` run.
@@ -297,6 +304,7 @@ mod tests {
         assert_eq!(Script::parse("stair"), Some(Script::Stair));
         assert_eq!(Script::parse("up-down"), Some(Script::UpDown(&CONTROLLERS[0])));
         assert_eq!(Script::parse("up-down fast").is_some(), cfg!(feature = "fast"));
+        assert_eq!(Script::parse("up-down robust").is_some(), cfg!(feature = "robust"));
         assert_eq!(Script::parse("up-down sensor").is_some(), cfg!(feature = "feedback"));
         assert_eq!(Script::parse("random 7"), Some(Script::random(7)));
         assert_eq!(Script::parse("stall\n"), Some(Script::Drill(FaultInjection::Stall)));

@@ -98,7 +98,8 @@ enum Command {
 Examples:
   cargo xtask flash
   cargo xtask flash --controller fast                  as fast as the amplifier allows
-  cargo xtask flash --controller fast --limit-v 1000   with an amplifier of 1000 V"
+  cargo xtask flash --controller fast --limit-v 1000   with an amplifier of 1000 V
+  cargo xtask flash --controller robust                for a spring known to within errors"
     )]
     Flash(Variant),
     /// Flash, RAM and worst stack of each image

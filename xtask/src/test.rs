@@ -12,7 +12,7 @@ const FIRST: &[Step] = &[Step::new("format", &["fmt", "--all", "--check"])];
 /// other features and be built again. Without a board the firmware's library is an ordinary one.
 ///
 /// Each image is linted for its board alone, with and without the optional features, because an image with a feature hides what is left
-/// out without it. Of the four images `boot` runs the first and the one that differs from it in everything.
+/// out without it. Of the six images `boot` runs the first and one that differs from it in everything.
 const LANES: Lanes = Lanes {
     build: Step::new("build", &["build", "--quiet", "--workspace", "--lib", "--bins", "--tests", "--examples"]),
     host: &[
@@ -22,9 +22,9 @@ const LANES: Lanes = Lanes {
     ],
     beside: &[
         Step::new("lint nucleo", &lint("-pfirmware", "nucleo-g474re")),
-        Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,isolation,kilovolt")),
+        Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,robust,isolation,kilovolt")),
         Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
-        Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,robust,isolation,kilovolt")),
+        Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,robust,isolation,kilovolt")),
         Step::xtask("prove", &["prove", "--ticks", "1000000"]),
     ],
     built: &[

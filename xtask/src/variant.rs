@@ -7,17 +7,20 @@ pub enum Controller {
     Paper,
     /// The time-optimal one, in an image of its own
     Fast,
+    /// The one for a spring that is known to within errors, in an image of its own
+    Robust,
 }
 
 impl Controller {
     /// Every controller.
-    pub const ALL: [Self; 2] = [Self::Paper, Self::Fast];
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Fast, Self::Robust];
 
     /// Features of the package `firmware` that the controller needs.
     pub const fn features(self) -> &'static [&'static str] {
         match self {
             Self::Paper => &[],
             Self::Fast => &["fast"],
+            Self::Robust => &["robust"],
         }
     }
 }
@@ -58,11 +61,13 @@ pub struct Variant {
 
 impl Variant {
     /// Every variant.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 6] = [
         Self::of(Controller::Paper),
         Self { controller: Controller::Paper, limit_v: Limit::Kilovolt },
         Self::of(Controller::Fast),
         Self { controller: Controller::Fast, limit_v: Limit::Kilovolt },
+        Self::of(Controller::Robust),
+        Self { controller: Controller::Robust, limit_v: Limit::Kilovolt },
     ];
 
     /// The variant with this controller and the report's amplifier of 700 V.
@@ -98,6 +103,7 @@ mod tests {
             ("--limit-v 700", &[]),
             ("--controller fast", &["fast"]),
             ("--controller fast --limit-v 1000", &["fast", "kilovolt"]),
+            ("--limit-v 1000 --controller robust", &["robust", "kilovolt"]),
         ] {
             assert_eq!(parse(line).unwrap().features(), features, "{line}");
         }
@@ -109,6 +115,6 @@ mod tests {
     fn every_controller_has_a_variant_for_every_amplifier() {
         let each = |controller| Limit::ALL.map(|limit_v| Variant { controller, limit_v });
         assert!(Controller::ALL.into_iter().flat_map(each).eq(Variant::ALL));
-        assert_eq!(Variant::ALL[1].others().count(), 3);
+        assert_eq!(Variant::ALL[1].others().count(), 5);
     }
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use xtask::build::{self, Board, Opt};
 use xtask::segments;
-use xtask::variant::Variant;
+use xtask::variant::{Controller, Variant};
 
 use super::{elf, stack};
 
@@ -17,6 +17,9 @@ const MOST_FLASH: u32 = 128 << 10;
 const MOST_RAM: u32 = 16 << 10;
 /// The same for an image with the isolation bank.
 const MOST_RAM_ISOLATION: u32 = 24 << 10;
+
+/// Further bytes of RAM for the robust controller: a second spring, and the stack on which it is built.
+const MORE_RAM_ROBUST: u32 = 4 << 10;
 
 /// Features of an image with the isolation bank.
 pub(crate) const ISOLATION: &[&str] = &["isolation"];
@@ -72,7 +75,8 @@ pub(crate) fn measure(variant: Variant, features: &[&str], board: Board) -> Resu
     let top = elf::symbol(&bytes, "_stack_start")?;
     Ok(Size {
         board,
-        most_ram: if features.contains(&"isolation") { MOST_RAM_ISOLATION } else { MOST_RAM },
+        most_ram: if features.contains(&"isolation") { MOST_RAM_ISOLATION } else { MOST_RAM }
+            + if variant.controller == Controller::Robust { MORE_RAM_ROBUST } else { 0 },
         flash: segments::flash(&bytes)?.bytes.len() as u32,
         statics: elf::ram(&bytes)?,
         stack: top - bottom,

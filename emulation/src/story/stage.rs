@@ -86,6 +86,7 @@ impl Stage {
         let run = match controller {
             Controller::Paper => "up-down",
             Controller::Fast => "up-down fast",
+            Controller::Robust => "up-down robust",
         };
         let features = [&["story"], controller.features(), features].concat();
         let elf = build::image_with(&features[1..], Board::Mps2, Opt::S)?;

@@ -96,6 +96,26 @@ fn settings_that_cannot_run_change_nothing_and_the_error_says_why() {
     assert_eq!(json(port, &["settings"])["settings"], before["settings"]);
 }
 
+#[test]
+fn the_robust_controller_runs_with_the_margin_of_a_file() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let folder = tempfile::tempdir().unwrap();
+    let port = &mcu.port;
+    let robust = file(&folder, "robust.toml", "schema = 1\ncontroller = \"robust\"\n[margin]\nshare = 0.1\n");
+    let shown = good(port, &["settings", &robust]);
+    assert!(shown.starts_with("# runs    number 1, format 3, "), "{shown}");
+    for line in ["controller = \"robust\"", "time_constant = 0.05", "share = 0.1", "gain = 0.0", "overshoot = 0.02"] {
+        assert!(shown.lines().any(|shown| shown == line), "{line}: {shown}");
+    }
+    assert_eq!(json(port, &["status"])["controller"], "robust");
+
+    let wide = file(&folder, "wide.toml", "schema = 1\ncontroller = \"robust\"\n[margin]\ngain = 0.5\n");
+    let text = bad(2, port, &["settings", &wide]);
+    assert!(text.contains("wide.toml, line 4, column 8: margin.gain = 0.5 is not allowed: expected 0 to 0.25"), "{text}");
+    let shown = good(port, &["settings", "--default"]);
+    assert!(shown.starts_with("# runs    number 2, format 1, ") && shown.contains("controller = \"paper\""), "{shown}");
+}
+
 /// The model that is stored decides which gains can run.
 #[test]
 fn settings_that_the_stored_model_cannot_run_with_are_refused_by_the_mcu() {

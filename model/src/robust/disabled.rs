@@ -32,6 +32,16 @@ impl<S> Default for State<S> {
 }
 
 impl Margin {
+    /// Returns `None`: without the feature `robust` there is no robust pre-compensator.
+    pub const fn from_values(_values: [f64; 4]) -> Option<Self> {
+        None
+    }
+
+    /// Returns the settings in the order of their fields; without the feature `robust` it is never called.
+    pub const fn values(&self) -> [f64; 4] {
+        match *self {}
+    }
+
     pub(crate) fn factors(&self) -> (f64, f64) {
         match *self {}
     }

@@ -43,6 +43,23 @@ pub struct Margin {
 }
 
 impl Margin {
+    /// Time constants and share are known to within 5 %; the gain is exact, which no controller without a sensor can correct; 2 % of
+    /// overshoot are allowed.
+    pub const TYPICAL: Self = Self { time_constant: 0.05, share: 0.05, gain: 0.0, overshoot: 0.02 };
+
+    /// Returns the settings with these values, in the order of the fields, to be validated. `None` where the crate is built
+    /// without the feature `robust`.
+    pub const fn from_values(values: [f64; 4]) -> Option<Self> {
+        let [time_constant, share, gain, overshoot] = values;
+        Some(Self { time_constant, share, gain, overshoot })
+    }
+
+    /// Returns the settings in the order of their fields.
+    pub const fn values(&self) -> [f64; 4] {
+        let Self { time_constant, share, gain, overshoot } = *self;
+        [time_constant, share, gain, overshoot]
+    }
+
     /// Returns the factors of the quick spring's time constants and share.
     pub(crate) fn factors(&self) -> (f64, f64) {
         (1.0 - self.time_constant, 1.0 + self.share)
