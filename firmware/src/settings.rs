@@ -1,15 +1,15 @@
 //! Settings that are built into an image: spring, controller, amplifier, supervision and timing. A block of settings in flash
 //! replaces those of [`link::WireSettings`], see [`crate::start`]; the others need another image.
 
-use model::device::{self, Watchdogs};
-use model::isolation::Causes;
-use model::{Amplifier, Feedback, Settings, supervisor};
 #[cfg(feature = "fast")]
 use model::Approach;
 #[cfg(any(feature = "fast", feature = "robust"))]
 use model::Compensation;
 #[cfg(feature = "robust")]
 use model::Margin;
+use model::device::{self, Watchdogs};
+use model::isolation::Causes;
+use model::{Amplifier, Feedback, Settings, supervisor};
 
 /// Rate of the control tick that is built in, in Hz.
 pub const RATE_HZ: u32 = 1000;

@@ -149,7 +149,10 @@ fn replies() {
             "02010203f8acd1910102e807f4030a0c040105f0a20401808080ac02010400ff1f0903040a0b0c0d0e0f1011",
         ),
         (
-            Reply::Status(Status { firmware: Firmware { controller: Controller::Robust, ..status.firmware }, ..status }),
+            Reply::Status(Status {
+                firmware: Firmware { controller: Controller::Robust, ..status.firmware },
+                ..status
+            }),
             "02010203f8acd1910103e807f4030a0c040105f0a20401808080ac02010400ff1f0903040a0b0c0d0e0f1011",
         ),
         (Reply::Telemetry(sample), "03f0a20401808080ac02010400ff1f090304"),

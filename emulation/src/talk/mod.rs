@@ -46,16 +46,16 @@ pub(crate) fn command() -> Result<()> {
     Ok(())
 }
 
-/// Attempts to talk to a board that misses no tick. Its clock follows the host's, and a busy machine delays it.
+/// Attempts to talk to a board that is never late. Its clock follows the host's, and a busy machine delays it.
 const ATTEMPTS: u32 = 3;
 
-/// The board has missed ticks. If it does so in each attempt, that is the image's fault.
+/// The board was late. If it is so in each attempt, that is the image's fault.
 #[derive(Debug)]
 struct Delayed;
 
 impl fmt::Display for Delayed {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("ticks were missed")
+        f.write_str("ticks were missed, or a task its watchdog")
     }
 }
 
@@ -110,14 +110,15 @@ fn attempt(elf: &Path) -> Result<String> {
     Ok(format!("{said}; {} ticks on the wire, {driven} with voltage, {missed} missed", run.dac.len()))
 }
 
-/// Whether the board says that it has missed ticks.
+/// Whether the board says that it has missed ticks, or a task its watchdog.
 fn delayed(name: &str) -> bool {
     let status = || {
         let mut line = Line::open(name)?;
         line.greet()?;
         line.status()
     };
-    status().is_ok_and(|status| status.overruns > 0)
+    let late = [Fault::from(model::supervisor::Fault::Overrun), model::supervisor::Fault::Watchdog.into()];
+    status().is_ok_and(|status| status.overruns > 0 || late.contains(&status.fault))
 }
 
 /// The number of writes with voltage on the DAC's wire. An error unless the wire begins and ends with zero and the

@@ -111,7 +111,10 @@ fn the_robust_controller_runs_with_the_margin_of_a_file() {
 
     let wide = file(&folder, "wide.toml", "schema = 1\ncontroller = \"robust\"\n[margin]\ngain = 0.5\n");
     let text = bad(2, port, &["settings", &wide]);
-    assert!(text.contains("wide.toml, line 4, column 8: margin.gain = 0.5 is not allowed: expected 0 to 0.25"), "{text}");
+    assert!(
+        text.contains("wide.toml, line 4, column 8: margin.gain = 0.5 is not allowed: expected 0 to 0.25"),
+        "{text}"
+    );
     let shown = good(port, &["settings", "--default"]);
     assert!(shown.starts_with("# runs    number 2, format 1, ") && shown.contains("controller = \"paper\""), "{shown}");
 }
