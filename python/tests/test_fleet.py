@@ -124,6 +124,22 @@ def test_ctrl_c_and_a_killed_worker_cost_no_record_and_double_none(folder, tmp_p
     assert drift["after"]["time"].startswith("2026-02-12") and drift["by"]["time"].startswith("2026-05-30")
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_ends_the_run_also_where_python_drops_the_exception(copied, tmp_path, engine, monkeypatch, capsys):
+    class Dropped:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def interrupted(client, table, settings, plants, folder, out, batch_size, on_progress):
+        Dropped()
+        on_progress(run.Outcome(len(table)))
+        pytest.fail("the run goes on")
+
+    monkeypatch.setattr(run, "run", interrupted)
+    assert fleet.main([str(copied), "--out", str(tmp_path / "out"), "--scheduler", engine]) == 130
+    assert "interrupted; at least 0 of 4 records are finished" in capsys.readouterr().err
+
+
 def test_after_a_killed_scheduler_the_next_run_goes_on(folder, tmp_path, engine, capsys):
     file, out = tmp_path / "scheduler.json", tmp_path / "out"
     start = lambda *words: subprocess.Popen([sys.executable, "-m", *words, "--scheduler-file", file], stderr=subprocess.DEVNULL)

@@ -53,11 +53,13 @@ def _diagnose(wanted):
     table = _with_plants(table, wanted.plant)
     outcome, count = run.Outcome(len(table)), len(table)
     try:
-        with tqdm(total=count, unit="record", disable=None, desc="diagnosed", smoothing=0.05) as bar:
+        with run.interrupts() as interrupts, tqdm(total=count, unit="record", disable=None, desc="diagnosed", smoothing=0.05) as bar:
 
             def show(now):
                 nonlocal outcome
                 outcome = now
+                if interrupts:
+                    raise KeyboardInterrupt
                 bar.update(now.new + now.before - bar.n)
                 bar.set_postfix(refused=now.refused, failed=int(now.failed.sum()), refresh=False)
 

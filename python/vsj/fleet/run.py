@@ -4,7 +4,10 @@ A batch whose worker dies is given to another by Dask, three times. Then its rec
 again has a row that says so. If the scheduler is lost, the run ends; the next one goes on with what is not finished.
 """
 
+import signal
+import threading
 from concurrent.futures import CancelledError
+from contextlib import contextmanager
 
 import numpy as np
 from distributed import KilledWorker, as_completed
@@ -44,6 +47,26 @@ class Outcome:
     def key(self, index):
         """The key of a record's row, ``None`` for a failed one."""
         return self.keys[index].decode() or None
+
+
+@contextmanager
+def interrupts():
+    """A list with an entry for each Ctrl-C: Python drops a KeyboardInterrupt that is raised in a destructor, such as that of a future."""
+    noted = []
+
+    def note(*_):
+        noted.append(True)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        # Only there a signal arrives.
+        yield noted
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield noted
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def run(client, records, settings, plants, folder, out, batch_size, on_progress):
