@@ -45,8 +45,7 @@ mod tests {
             let config = settings(variant).validate().unwrap().quantize();
             let (lowest, highest) = config.range();
             let mut state = model::State::default();
-            // From a higher one on, `fast` and `robust` are at 700 V for the whole second.
-            let target = model::Volts::new(100.0).unwrap();
+            let target = model::Volts::new(200.0).unwrap();
             assert!(lowest < target && target < highest);
             let tick = |_| config.tick(&mut state, model::Input { target, measured: None }).code.0;
             // The amplifier of 700 V is at its limit for the first 1.3 s.
