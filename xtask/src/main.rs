@@ -130,7 +130,7 @@ Examples:
     )]
     Bench(bench::Args),
     /// Install the Python package in a virtual environment and run its tests
-    Python,
+    Python(package::Args),
     /// Build the documents as a book, with a page for each command
     ///
     /// Into target/manual/book; prints the path of its first page. Installs mdbook under the target directory unless it is
@@ -278,7 +278,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Image(args) => image::run(args),
         Bench(args) => bench::run(&args),
         Fuzz(args) => fuzz::run(&args),
-        Python => package::run(),
+        Python(args) => package::run(&args),
         Manual => manual::run(),
         Page(args) => page::run(&args),
         Prove(args) => prove::run(&args),

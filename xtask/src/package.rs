@@ -10,16 +10,36 @@ use xtask::{build, python, shell};
 const FOLDER: &str = "./python";
 const REQUIREMENTS: &str = "python/requirements.txt";
 
-/// Builds the package and the command, installs the package in a virtual environment under the target directory, and runs the
-/// tests there, which compare it with the command.
-pub(crate) fn run() -> Result<()> {
-    shell::run(shell::cargo().args(["fmt", "--manifest-path", "python/Cargo.toml", "--check"]))?;
+/// Options of `cargo xtask python`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// One part alone
+    #[arg(long, value_enum, value_name = "PART")]
+    only: Option<Part>,
+}
+
+/// A part of the command.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Build the package and install it
+    Install,
+    /// Run the tests of the installed package
+    Test,
+}
+
+/// Installs the package in a virtual environment under the target directory, and runs its tests there, which compare it with `vsj`.
+pub(crate) fn run(args: &Args) -> Result<()> {
     let target = shell::target_directory()?;
     let python = python::environment(&target, "python", REQUIREMENTS)?;
-    let vsj = build::vsj()?;
-    install(&python, &target)?;
-    let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
-    shell::run(shell::command(&python).args(tests).env("VSJ", vsj))
+    if args.only != Some(Part::Test) {
+        shell::run(shell::cargo().args(["fmt", "--manifest-path", "python/Cargo.toml", "--check"]))?;
+        install(&python, &target)?;
+    }
+    if args.only != Some(Part::Install) {
+        let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
+        shell::run(shell::command(&python).args(tests).env("VSJ", build::vsj()?))?;
+    }
+    Ok(())
 }
 
 /// Installs the package in the virtual environment of an interpreter, which has maturin.

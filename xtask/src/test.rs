@@ -26,9 +26,10 @@ const LANES: Lanes = Lanes {
         Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
         Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,robust,isolation,kilovolt")),
         Step::xtask("prove", &["prove", "--ticks", "1000000"]),
+        Step::xtask("package", &["python", "--only", "install"]),
     ],
     built: &[
-        Step::xtask("python", &["python"]),
+        Step::xtask("python", &["python", "--only", "test"]),
         Step::emulation("firmware", &["proof"]),
         Step::emulation("boot", &["boot"]),
         Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
