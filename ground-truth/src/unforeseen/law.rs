@@ -14,7 +14,7 @@ use crate::schedule::{Kind, Sampling, Schedule};
 use crate::sensor::Readings;
 
 /// Integration steps per row.
-pub(super) const STEPS: usize = 60;
+pub(crate) const STEPS: usize = 60;
 /// Number of rows of a record.
 const ROWS: usize = 2401;
 
@@ -47,7 +47,7 @@ pub struct Law {
 }
 
 /// The paper's spring, read as it is: the values of a law that it does not state itself.
-pub(super) const PLAIN: Law = Law {
+pub(crate) const PLAIN: Law = Law {
     name: "",
     first: &[],
     also: &[],
@@ -79,6 +79,8 @@ pub struct Draw {
     pub every_s: f64,
     /// Largest voltage, in V.
     pub full_v: f64,
+    /// Largest stiffness of the paper's spring in this record, in V.
+    pub top_v: f64,
 }
 
 impl Draw {
@@ -117,7 +119,7 @@ impl Law {
     }
 
     /// The same record with the effect at another size and another number of integration steps per row.
-    pub(super) fn at(&self, seed: u64, size: f64, steps: usize) -> (LabelledRecord, Record) {
+    pub(crate) fn at(&self, seed: u64, size: f64, steps: usize) -> (LabelledRecord, Record) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let schedule = self.schedule(&mut random);
         let noise = Noise::white(0.2);
@@ -125,7 +127,9 @@ impl Law {
         of_noise.set_stream(1);
         let rows = noise.draw(&mut of_noise, ROWS);
         let (duration_s, every_s, full_v) = (schedule.duration_s(), schedule.every_s(), schedule.full_v());
-        let mut draw = Draw { random, size, duration_s, every_s, full_v };
+        // The paper's spring is exact in a single step per row.
+        let top_v = Chain::of(paper()).stiffness(&schedule, 1).into_iter().fold(0.0, f64::max);
+        let mut draw = Draw { random, size, duration_s, every_s, full_v, top_v };
         let mut chain = (self.build)(&mut draw);
         let expected = chain.stiffness(&schedule, steps);
         let noisy = expected.iter().zip(&rows).map(|(y, noise)| y + noise);

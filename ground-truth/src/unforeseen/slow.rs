@@ -83,7 +83,7 @@ fn softening(draw: &mut Draw) -> Chain {
 }
 
 /// A stage that does not depend on the state: reading from response in V and time in s.
-fn of_time(f: impl Fn(f64, f64) -> f64 + 'static) -> Stage {
+pub(crate) fn of_time(f: impl Fn(f64, f64) -> f64 + 'static) -> Stage {
     Box::new(move |y, now| f(y, now.t))
 }
 

@@ -15,9 +15,10 @@ use validation::campaign::diagnosis::{self, diagnose};
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
+use validation::campaign::unforeseen::Edition;
 use validation::campaign::{
     answer_table, criteria, equation, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps,
-    tables, unforeseen,
+    tables,
 };
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
@@ -60,8 +61,8 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
-    /// unforeseen, equation), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each of two sets
-    /// (plan), in total (nulls, triples), or times 55 (thresholds) or 455 (reliability)
+    /// unforeseen, unseen, equation), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each
+    /// of two sets (plan), in total (nulls, triples), or times 55 (thresholds) or 455 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -192,6 +193,8 @@ enum Part {
     OutOfModel,
     /// Laws from the literature that nobody looked at while the diagnosis was made: 3 records of each
     Unforeseen,
+    /// A second edition of unforeseen, whose author had not read the diagnosis: 3 records of each of its laws
+    Unseen,
     /// One effect in a spring of any time constant, share, full scale and unit: 20 records of each cause
     Scales,
     /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 8 records of each cause
@@ -364,7 +367,8 @@ impl Cli {
                 let figure = Some(("reliability.svg", reliability::figure(&sets)));
                 Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(sets), figure })
             }
-            Part::Unforeseen => self.answers(part, &["law"], &unforeseen::cases(first, self.count(3))),
+            Part::Unforeseen => self.answers(part, &["law"], &Edition::First.cases(first, self.count(3))),
+            Part::Unseen => self.answers(part, &["law"], &Edition::Second.cases(first, self.count(3))),
             Part::Small => self.sensitivities(part, &[0.2]),
             Part::Noise => self.sensitivities(part, &[0.1, 0.2, 0.5, 1.0]),
             Part::OutOfModel => {
@@ -506,7 +510,8 @@ impl Cli {
         let answers = answer::run(cases, &diagnosis::answer, &bar);
         bar.finish_and_clear();
         let markdown = match part {
-            Part::Unforeseen => unforeseen::page(&answers),
+            Part::Unforeseen => Edition::First.page(&answers),
+            Part::Unseen => Edition::Second.page(&answers),
             _ => format!("{}\n{}", answer_table::legend(), answer_table::page(heads[0], &heads[1..], &answers)),
         };
         let wrong = answer_table::wrong(&answers);

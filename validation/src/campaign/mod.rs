@@ -21,7 +21,7 @@
 //! | [`scales`] | single effects in springs of any size, in any unit |
 //! | [`plants`] | single effects in springs of several time constants, other schedules and noise |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
-//! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made |
+//! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made, in two editions |
 //! | [`reliability`] | stated probabilities compared with frequencies, over all sets |
 //! | [`plan`] | minutes of the next experiment until the diagnosis is right, by schedule |
 //! | [`equation`], [`equation_blocks`] | equations of records that nothing explains, compared with other tools |
