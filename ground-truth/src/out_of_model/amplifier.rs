@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use rand::RngExt;
 
 use super::chain::{Chain, Lag, Stage};
-use super::form::{Draw, Form};
+use super::draw::Draw;
+use super::form::Form;
 use crate::cause::Cause;
 
 /// Forms of delay, amplifier limit and amplifier slew.

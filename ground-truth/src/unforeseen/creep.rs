@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Lag, Spectrum, paper};
+use crate::out_of_model::draw::Draw;
 use crate::physics::{FULL_V, SHARE, TAU_S};
 
 /// Laws of relaxation, creep and leakage.

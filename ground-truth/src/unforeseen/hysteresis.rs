@@ -1,7 +1,8 @@
 //! Hysteresis of the voltage by other laws, before the relaxation.
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::Chain;
+use crate::out_of_model::draw::Draw;
 use crate::physics::FULL_V;
 
 /// Laws of hysteresis.

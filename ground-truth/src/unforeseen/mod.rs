@@ -1,4 +1,4 @@
-//! Laws from the literature that nobody looked at while the diagnosis was made: a test set of its own, beside
+//! Laws from the literature that nobody looked at while the diagnosis was made: a second test set besides
 //! [`out_of_model`](super::out_of_model).
 //!
 //! In: a law and a seed. Out: a record with that law in it, as simulated and as written. Each law states which cause codes are true
@@ -44,10 +44,11 @@ pub(crate) mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::law::{Draw, STEPS};
     use super::*;
     use crate::Schedule;
     use crate::out_of_model::chain::Chain;
+    use crate::out_of_model::draw::Draw;
+    use crate::out_of_model::form::STEPS;
     use crate::spring::Spring;
 
     /// A random source of laws of the given size for a record of 2000 rows in 200 s up to 500 V.

@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Lag, Now, Stage};
+use crate::out_of_model::draw::Draw;
 
 /// Laws of the sensor's dynamics.
 pub const LAWS: [Law; 7] = [
@@ -85,19 +86,19 @@ pub(crate) fn filtered(draw: &Draw, mut f: impl FnMut(f64, Now) -> f64 + 'static
 }
 
 fn one_lag(draw: &mut Draw) -> Chain {
-    let (tau_s, mut z) = (log_between(draw, 0.3, 3.0), Lag::default());
+    let (tau_s, mut z) = (draw.log_between(0.3, 3.0), Lag::default());
     filtered(draw, move |y, now| z.follow(y, tau_s, now.dt))
 }
 
 fn two_lags(draw: &mut Draw) -> Chain {
-    let slow_s = log_between(draw, 0.4, 2.0);
+    let slow_s = draw.log_between(0.4, 2.0);
     let fast_s = slow_s * draw.between(0.2, 0.7);
     let (mut first, mut second) = (Lag::default(), Lag::default());
     filtered(draw, move |y, now| second.follow(first.follow(y, fast_s, now.dt), slow_s, now.dt))
 }
 
 fn lag_and_delay(draw: &mut Draw) -> Chain {
-    let (tau_s, late_s) = (log_between(draw, 0.3, 2.0), (draw.every_s * draw.between(2.0, 6.0)).max(0.2));
+    let (tau_s, late_s) = (draw.log_between(0.3, 2.0), (draw.every_s * draw.between(2.0, 6.0)).max(0.2));
     let (mut z, mut past) = (Lag::default(), Past::default());
     filtered(draw, move |y, now| {
         past.push(now.t, z.follow(y, tau_s, now.dt));
@@ -153,11 +154,6 @@ fn peak_detector(draw: &mut Draw) -> Chain {
         let tau_s = if y > z.at { attack_s } else { decay_s };
         z.follow(y, tau_s, now.dt)
     })
-}
-
-/// A random number between `low` and `high`, even in its logarithm.
-pub(crate) fn log_between(draw: &mut Draw, low: f64, high: f64) -> f64 {
-    draw.between(low.ln(), high.ln()).exp()
 }
 
 /// Mode p'' = omega^2 (y - p) - 2 zeta omega p' - friction(p'), of the frequency `hertz` in Hz, as its distance from the response.

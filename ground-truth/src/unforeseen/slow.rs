@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::law::{Clock, Draw, Law, PLAIN};
+use super::law::{Clock, Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Stage, paper};
+use crate::out_of_model::draw::Draw;
 
 /// Laws of slow changes and of time stamps.
 pub const LAWS: [Law; 7] = [

@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use crate::out_of_model::chain::Chain;
+use crate::out_of_model::draw::Draw;
 use crate::physics::FULL_V;
 use crate::unforeseen::hysteresis::mixed;
-use crate::unforeseen::law::{Draw, Law, PLAIN};
+use crate::unforeseen::law::{Law, PLAIN};
 use crate::unforeseen::sensor::filtered;
 
 use super::readings::sensor;

@@ -5,9 +5,10 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use crate::out_of_model::amplifier::delayed;
 use crate::out_of_model::chain::{Chain, Lag, Now, Spectrum, paper};
+use crate::out_of_model::draw::Draw;
 use crate::physics::FULL_V;
-use crate::unforeseen::law::{Draw, Law, PLAIN};
-use crate::unforeseen::sensor::{Past, filtered, log_between, mode};
+use crate::unforeseen::law::{Law, PLAIN};
+use crate::unforeseen::sensor::{Past, filtered, mode};
 
 use super::readings::sensor;
 
@@ -187,12 +188,12 @@ fn diffusion(t: f64) -> Spectrum {
 }
 
 fn thermowell(draw: &mut Draw) -> Chain {
-    let mut layer = diffusion(log_between(draw, 1.0, 6.0));
+    let mut layer = diffusion(draw.log_between(1.0, 6.0));
     filtered(draw, move |y, now| layer.follow(y, now.dt))
 }
 
 fn tanks(draw: &mut Draw) -> Chain {
-    let (tau_s, mut tanks) = (log_between(draw, 0.15, 0.6), [Lag::default(); 4]);
+    let (tau_s, mut tanks) = (draw.log_between(0.15, 0.6), [Lag::default(); 4]);
     filtered(draw, move |y, now| tanks.iter_mut().fold(y, |y, tank| tank.follow(y, tau_s, now.dt)))
 }
 
@@ -202,7 +203,7 @@ fn probe(draw: &mut Draw) -> Chain {
 }
 
 fn butterworth(draw: &mut Draw) -> Chain {
-    let mut filter = mode(log_between(draw, 0.15, 0.6), FRAC_1_SQRT_2, |_| 0.0);
+    let mut filter = mode(draw.log_between(0.15, 0.6), FRAC_1_SQRT_2, |_| 0.0);
     filtered(draw, move |y, now| y + filter(y, now))
 }
 

@@ -73,7 +73,7 @@ mod tests {
     fn every_law_adds_at_least_the_variance_of_the_noise() {
         for (_, law) in all() {
             for seed in 100..104 {
-                let [with, none] = [1.0, 0.0].map(|size| law.at(seed, size, unforeseen::law::STEPS).0);
+                let [with, none] = [1.0, 0.0].map(|size| law.at(seed, size, out_of_model::form::STEPS).0);
                 let off = with.readings.read.iter().zip(&none.readings.read).map(|(a, b)| (a - b).powi(2));
                 let rms = (off.sum::<f64>() / with.readings.read.len() as f64).sqrt();
                 assert!(rms > with.noise.sigma_v, "{law:?}, seed {seed}: {rms} V");

@@ -6,8 +6,8 @@ use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::out_of_model::chain::{Chain, Now};
-use crate::unforeseen::law::{Draw, Law, PLAIN};
-use crate::unforeseen::sensor::log_between;
+use crate::out_of_model::draw::Draw;
+use crate::unforeseen::law::{Law, PLAIN};
 
 /// Laws of the readings.
 pub const LAWS: [Law; 10] = [
@@ -131,7 +131,7 @@ fn delta_modulator(draw: &mut Draw) -> Chain {
 /// A random frequency, in Hz: 0.3 Hz to 0.3 of the sampling rate.
 fn frequency(draw: &mut Draw) -> f64 {
     let fastest = (0.3 / draw.every_s).max(0.6);
-    log_between(draw, 0.3, fastest)
+    draw.log_between(0.3, fastest)
 }
 
 fn wandering_phase(draw: &mut Draw) -> Chain {

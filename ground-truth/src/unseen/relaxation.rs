@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 
 use crate::out_of_model::chain::{Chain, Lag, Spectrum, paper};
+use crate::out_of_model::draw::Draw;
 use crate::physics::{FULL_V, TAU_S};
 use crate::unforeseen::creep::{filling, relaxing};
-use crate::unforeseen::law::{Draw, Law, PLAIN};
+use crate::unforeseen::law::{Law, PLAIN};
 use crate::unforeseen::sensor::filtered;
 
 /// Laws of relaxation, creep and leakage.

@@ -3,8 +3,9 @@
 use rand::RngExt;
 
 use crate::out_of_model::chain::{Chain, paper};
+use crate::out_of_model::draw::Draw;
 use crate::out_of_model::drift_resonance::brownian;
-use crate::unforeseen::law::{Draw, Law, PLAIN};
+use crate::unforeseen::law::{Law, PLAIN};
 use crate::unforeseen::slow::of_time;
 
 /// Laws of changes over the record.
