@@ -20,7 +20,7 @@ use crate::schedule::{Change, Schedule};
 pub enum StartsFrom {
     /// Settled at the old target.
     Settled,
-    /// As the loop has left it.
+    /// The state that the loop has reached when the target changes.
     Reached,
 }
 
