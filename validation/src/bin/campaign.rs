@@ -271,11 +271,13 @@ fn positive(text: &str) -> Result<f64, String> {
 /// Result of a part.
 struct Done {
     part: Part,
+    /// Text of the page.
     markdown: String,
+    /// List of the records that are not diagnosed correctly, one line each, which is printed and not written.
     wrong: String,
     criteria: Vec<Criterion>,
     json: Value,
-    /// Name and text of an SVG file beside the page.
+    /// Name and text of an SVG file next to the page.
     figure: Option<(&'static str, String)>,
 }
 
@@ -365,7 +367,7 @@ impl Cli {
                 }
                 let markdown = reliability::page(&sets);
                 let figure = Some(("reliability.svg", reliability::figure(&sets)));
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(sets), figure })
+                Ok(Done { figure, ..Done::new(part, markdown, json!(sets)) })
             }
             Part::Unforeseen => self.answers(part, &["law"], &Edition::First.cases(first, self.count(3))),
             Part::Unseen => self.answers(part, &["law"], &Edition::Second.cases(first, self.count(3))),
@@ -382,7 +384,7 @@ impl Cli {
                 let answers = out_of_model::run(&jobs, &diagnose, &bar)?;
                 bar.finish_and_clear();
                 let (markdown, wrong) = (out_of_model::page(&forms, &answers), out_of_model::wrong(&forms, &answers));
-                Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!(answers), figure: None })
+                Ok(Done { wrong, ..Done::new(part, markdown, json!(answers)) })
             }
             Part::Scales => {
                 let jobs = scales::jobs(first, self.count(20));
@@ -390,14 +392,7 @@ impl Cli {
                 let outcomes = scales::run(&jobs, &bar);
                 bar.finish_and_clear();
                 let (markdown, wrong) = (tables::named("cause", &jobs, &outcomes), tables::wrong(&jobs, &outcomes));
-                Ok(Done {
-                    part,
-                    markdown,
-                    wrong,
-                    criteria: Vec::new(),
-                    json: json!({"records": outcomes}),
-                    figure: None,
-                })
+                Ok(Done { wrong, ..Done::new(part, markdown, json!({"records": outcomes})) })
             }
             Part::Equation => {
                 let cases = equation::cases(first, self.count(1));
@@ -405,19 +400,19 @@ impl Cli {
                 let rows = equation::run(&cases, true, &bar)?;
                 bar.finish_and_clear();
                 let markdown = equation::page(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
+                Ok(Done::new(part, markdown, json!(rows)))
             }
             Part::Rivals => {
                 let bar = bar("rivals", rivals::RECORDS)?;
                 let rows = rivals::run(first, &bar)?;
                 bar.finish_and_clear();
                 let markdown = rivals::table(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
+                Ok(Done::new(part, markdown, json!(rows)))
             }
             Part::Instruments => {
                 let rows = measured("instruments", &real::twins(first), true)?;
                 let markdown = real::table(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
+                Ok(Done::new(part, markdown, json!(rows)))
             }
             Part::Plan => {
                 let cases = plan::cases(&ground_truth::out_of_model::all(), first, self.count(30));
@@ -425,8 +420,7 @@ impl Cli {
                 let outcomes = plan::run(&cases, &bar)?;
                 bar.finish_and_clear();
                 let markdown = plan::page(&outcomes);
-                let json = json!(outcomes);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None })
+                Ok(Done::new(part, markdown, json!(outcomes)))
             }
             #[cfg(not(feature = "sensitivity"))]
             Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),
@@ -439,8 +433,7 @@ impl Cli {
                 let (as_set, rows) = thresholds::run(&cases, diagnosis::vary, &diagnose, &bar)?;
                 bar.finish_and_clear();
                 let markdown = thresholds::page(&cases, &as_set, &rows);
-                let json = json!({"as_set": as_set, "thresholds": rows});
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None })
+                Ok(Done::new(part, markdown, json!({"as_set": as_set, "thresholds": rows})))
             }
         }
     }
@@ -501,7 +494,7 @@ impl Cli {
         let wrong = tables::wrong(jobs, &outcomes);
         let criteria = criteria(&outcomes);
         let json = json!({"aims": criteria, "records": outcomes});
-        Ok(Done { part, markdown, wrong, criteria, json, figure: None })
+        Ok(Done { wrong, criteria, ..Done::new(part, markdown, json) })
     }
 
     /// Diagnoses cases and grades the answers; `heads` are those of the tables' first columns.
@@ -515,7 +508,7 @@ impl Cli {
             _ => format!("{}\n{}", answer_table::legend(), answer_table::page(heads[0], &heads[1..], &answers)),
         };
         let wrong = answer_table::wrong(&answers);
-        Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!({"records": answers}), figure: None })
+        Ok(Done { wrong, ..Done::new(part, markdown, json!({"records": answers})) })
     }
 
     fn sensitivities(&self, part: Part, levels: &[f64]) -> Result<Done> {
@@ -531,11 +524,16 @@ impl Cli {
         let markdown = if small { tables::sensitivity(&found) } else { tables::noise(&found) };
         let criteria = if small { criteria::small(&found) } else { Vec::new() };
         let json = json!({"aims": criteria, "climbs": found});
-        Ok(Done { part, markdown, wrong: String::new(), criteria, json, figure: None })
+        Ok(Done { criteria, ..Done::new(part, markdown, json) })
     }
 }
 
 impl Done {
+    /// A page without anything else.
+    fn new(part: Part, markdown: String, json: Value) -> Self {
+        Self { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None }
+    }
+
     fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let path = folder.join(format!("{}.md", self.part.name()));

@@ -5,7 +5,7 @@
 //!
 //! | module | contents |
 //! | --- | --- |
-//! | [`statistics`] | a normal quantile and sample quantiles |
+//! | [`statistics`] | normal and sample quantiles, an interval of a frequency, sums |
 //! | [`diagnosis`], [`real`] | the only modules that call `identify` |
 //! | [`cramer_rao`] | lower bound of a parameter's error |
 //! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
