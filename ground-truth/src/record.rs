@@ -84,7 +84,7 @@ impl LabelledRecord {
         self.with_relaxation(share, [Further::default(); 2])
     }
 
-    /// As [`with_share`](Self::with_share), and with further lags.
+    /// The same record with another instantaneous share, see [`with_share`](Self::with_share), and with further lags.
     pub fn with_relaxation(&self, share: f64, further: [Further; 2]) -> Self {
         let own = Spring { further, ..Spring::with(&self.effects) };
         let spring = if own.share == SHARE { Spring { share, ..own } } else { own };

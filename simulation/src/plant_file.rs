@@ -303,7 +303,7 @@ impl PlantFile {
         let of_modes = |of: fn(&Mode) -> f64| self.modes.iter().map(of).collect::<Vec<f64>>();
         let of_leakage = |of: fn(&Leakage) -> f64| leakage.map(of).into_iter().collect::<Vec<f64>>();
         for (field, values, lowest, highest, unit) in [
-            ("relaxation.share", vec![*share], 0.0, 1.0, ""),
+            ("relaxation.share", vec![*share], -ANY, ANY, ""),
             ("relaxation.tau_s", tau_s.clone(), POSITIVE, ANY, "s"),
             ("relaxation.weights", weights.clone(), -ANY, ANY, ""),
             ("relaxation.tau_high_s", some(tau_high_s), POSITIVE, ANY, "s"),

@@ -92,7 +92,7 @@ impl Draw {
         self.size * self.between(low, high)
     }
 
-    /// As [`sized`](Self::sized), with random sign.
+    /// A random number between `low` and `high` times the size of the effect, with random sign.
     pub fn signed(&mut self, low: f64, high: f64) -> f64 {
         self.sign() * self.sized(low, high)
     }
