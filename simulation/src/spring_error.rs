@@ -46,11 +46,11 @@ impl Parameter {
 /// Relative differences of the spring's parameters from the model's, above -1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SpringError {
-    /// Relative difference of the instantaneous share.
+    /// Error of the instantaneous share.
     pub share: f64,
-    /// Relative difference of all time constants.
+    /// Error of all time constants.
     pub time_constant: f64,
-    /// Relative difference of the gain of the whole response.
+    /// Error of the gain of the whole response.
     pub gain: f64,
 }
 

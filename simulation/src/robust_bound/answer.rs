@@ -56,11 +56,11 @@ pub struct Step {
 /// Largest relative errors, both ways; `None` if the time is too short even without errors.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Needed {
-    /// Largest relative error of the instantaneous share.
+    /// Largest error of the instantaneous share.
     pub share: Option<f64>,
-    /// Largest relative error of all time constants.
+    /// Largest error of all time constants.
     pub time_constant: Option<f64>,
-    /// Largest relative error of the gain of the whole response.
+    /// Largest error of the gain of the whole response.
     pub gain: Option<f64>,
 }
 
