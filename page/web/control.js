@@ -43,6 +43,7 @@ export class ControlPanel {
   /** The request that the settings make. */
   request() {
     const target = byId("target").value;
+    const percents = () => ({ tau: number("known-tau"), share: number("known-share"), gain: number("known-gain"), overshoot: number("overshoot") });
     return {
       plant: spring(),
       target: target === "drawn" ? this.#target.csv() : target,
@@ -53,6 +54,7 @@ export class ControlPanel {
       kp: number("kp"),
       ki: number("ki"),
       approach_s: number("approach"),
+      known: byId("controller").value === "robust" ? percents() : null,
       rate_hz: number("rate"),
     };
   }
@@ -69,6 +71,7 @@ export class ControlPanel {
     byId("hand").hidden = target !== "drawn";
     byId("gains").hidden = controller !== "paper";
     byId("braking").hidden = controller !== "fast";
+    byId("known").hidden = controller !== "robust";
     byId("record-settings").hidden = byId("effect").value === "";
     this.#target.highest = Number(byId("limit").value);
     this.#target.draw();
@@ -195,8 +198,12 @@ function command(request) {
   if (request.plant !== "paper") words.push("--plant", "plant.toml");
   words.push("--limit-v", request.limit_v);
   if (request.slew_v_per_s != null) words.push("--slew-v-per-s", request.slew_v_per_s);
-  if (request.controller !== "fast") words.push("--kp", request.kp, "--ki", request.ki);
+  if (["none", "paper"].includes(request.controller)) words.push("--kp", request.kp, "--ki", request.ki);
   if (request.controller === "fast" && request.approach_s) words.push("--approach-s", request.approach_s);
+  if (request.known) {
+    for (const key of ["tau", "share", "gain"]) words.push("--known", `${key}=${request.known[key]}`);
+    words.push("--overshoot-percent", request.known.overshoot);
+  }
   if (request.rate_hz !== 1000) words.push("--rate-hz", request.rate_hz);
   return [...words, "--json"].join(" ");
 }
