@@ -251,6 +251,26 @@ def test_a_state_is_saved_and_restored_and_reset_begins_anew(export, fmi):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+def test_an_importer_that_begins_twice_is_refused(export, fmi):
+    instance = Instance(str(export("paper") / f"vsj_spring.fmi{fmi}.fmu"))
+    instance.set("applied_v", 300.0)
+    instance.step()
+    begun = instance.get("stiffness_v")
+    calls = [instance.fmu.enterInitializationMode, instance.fmu.exitInitializationMode]
+    for call in calls if fmi == 3 else [lambda: instance.fmu.setupExperiment(startTime=0.0), *calls]:
+        with pytest.raises(FMICallException) as error:
+            call()
+        assert error.value.status == 3
+        assert " in the middle of a simulation: expected " in instance.messages[-1]
+    instance.step()
+    assert instance.get("stiffness_v") > begun > 0.0
+    instance.fmu.terminate()
+    with pytest.raises(FMICallException):
+        instance.step()
+    assert instance.messages[-1].startswith("a step after the end of the simulation: expected ")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
 def test_a_damaged_unit_is_refused_with_the_reason(export, tmp_path, fmi):
     path = export("paper") / f"vsj_spring.fmi{fmi}.fmu"
     for number, (text, reason) in enumerate((

@@ -162,7 +162,7 @@ mod margin {
 
 /// The error of the settings, with the option of the command that sets the field.
 fn refused(error: OutOfRange) -> anyhow::Error {
-    named(BadInput(error.to_string()).into(), SETTINGS)
+    named(BadInput::from(error).into(), SETTINGS)
 }
 
 /// A controller with its state.

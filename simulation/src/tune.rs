@@ -102,7 +102,7 @@ impl Specification<'_> {
     /// # Errors
     /// [`BadInput`] for settings that the tick rejects.
     fn run(&self, compensation: Compensation) -> Result<Run> {
-        let config = self.settings(compensation).validate().map_err(|error| BadInput(error.to_string()))?.quantize();
+        let config = self.settings(compensation).validate().map_err(BadInput::from)?.quantize();
         let schedule = Schedule::ideal_stair();
         let with = one_loop(&config, &schedule.at_ticks(self.rate_hz), |_| ())?;
         Ok(Run { start_s: schedule.start_s(), rate_hz: self.rate_hz, with, without: Vec::new() })

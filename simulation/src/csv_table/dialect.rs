@@ -161,9 +161,9 @@ pub(super) fn has_thousands_separators(text: &str) -> bool {
 
 /// The lines above a header.
 pub(super) struct Preamble {
-    /// Their length, in bytes.
+    /// Length of these lines, in bytes.
     pub(super) bytes: usize,
-    /// Their number.
+    /// Number of these lines.
     pub(super) lines: usize,
     /// The separator that a line `sep=;` names.
     pub(super) separator: Option<Separator>,

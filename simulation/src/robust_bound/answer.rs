@@ -56,11 +56,11 @@ pub struct Step {
 /// Largest relative errors, both ways; `None` if the time is too short even without errors.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Needed {
-    /// Of the instantaneous share.
+    /// Largest error of the instantaneous share.
     pub share: Option<f64>,
-    /// Of all time constants.
+    /// Largest error of all time constants.
     pub time_constant: Option<f64>,
-    /// Of the gain of the whole response.
+    /// Largest error of the gain of the whole response.
     pub gain: Option<f64>,
 }
 
@@ -85,8 +85,7 @@ fn steps() -> Vec<(f64, f64)> {
 pub fn answer(file: &PlantFile, question: &Question) -> Result<Answer> {
     let Question { allowed, spring_error, within_s } = *question;
     // The rate has no part in it.
-    let rejected = |error: model::OutOfRange| BadInput(error.to_string());
-    allowed.amplifier.validate(SampleTime::from_rate(1000.0).map_err(rejected)?).map_err(rejected)?;
+    allowed.amplifier.validate(SampleTime::from_rate(1000.0).map_err(BadInput::from)?).map_err(BadInput::from)?;
     let bound = RobustBound::new(file, allowed)?;
     let of = |&(from_v, to_v): &(f64, f64)| {
         let known_s = bound.shortest_s(from_v, to_v, &SpringError::default());

@@ -5,6 +5,7 @@
 //! Quantisation, outliers, saturation, the ends of a segment and the curve of a static nonlinearity have no such
 //! derivative and no bound here.
 
+use super::statistics::dot;
 use crate::ground_truth::{Cause, LabelledRecord};
 
 /// Median distance from the mean of a normal distribution, in standard deviations.
@@ -52,10 +53,6 @@ fn derivative(hidden: &LabelledRecord, index: usize, value: usize) -> Vec<f64> {
         LabelledRecord::new(hidden.schedule.clone(), effects, hidden.noise, hidden.seed).readings.expected
     };
     expected(change).iter().zip(expected(-change)).map(|(a, b)| (a - b) / (2.0 * change)).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

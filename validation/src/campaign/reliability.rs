@@ -36,7 +36,7 @@ pub fn sets(first: u64, count: usize) -> Vec<(&'static str, Vec<Case>)> {
             LAWS[0],
             out_of_model::jobs(&ground_truth::out_of_model::all(), first, count).into_iter().map(Case::from).collect(),
         ),
-        (LAWS[1], unforeseen::cases(first, count)),
+        (LAWS[1], unforeseen::Edition::First.cases(first, count)),
     ]
 }
 

@@ -19,10 +19,10 @@ use super::diagnosis::predict;
 use crate::ground_truth::record::Recipe;
 use crate::ground_truth::{Cause, LabelledRecord};
 
-/// Fraction of a record for identification.
-const LEARN: f64 = 0.6;
+/// Fraction of a record for identification; the rest is predicted.
+pub(super) const LEARN: f64 = 0.6;
 /// Largest error, relative to the floor, that counts as reaching the floor.
-const AT_FLOOR: f64 = 1.1;
+pub(super) const AT_FLOOR: f64 = 1.1;
 
 /// Results for one record.
 #[derive(Clone, Debug, Serialize)]
