@@ -71,7 +71,7 @@ impl Records {
         };
         let format = Format { columns, sort: self.sort, ..Format::default() };
         let input = self.input.parse()?;
-        let measured = format.read(Source::read(&self.name, file)?)?;
+        let measured = format.read(Source::read(&self.name, file))?;
         let remarks = remarks_on(std::slice::from_ref(&measured))?;
         Ok(Read { measured, input, remarks })
     }
