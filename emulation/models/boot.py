@@ -16,7 +16,7 @@ from board import BUTTON, FLASH, HZ, LSI, POWER_ON, RAM, Board
 
 FAULT_TICK = 300
 GUARD = 256  # Bytes at the end of the stack.
-STORE = [FLASH + 0x7E000 + page * 0x800 for page in range(4)]  # First word of each page, half written at a power cut.
+STORE = [FLASH + 0x7E000 + page * 0x800 for page in range(4)]  # First word of each page, the settings first.
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 
@@ -144,13 +144,13 @@ def flipped(board):
 
 def stored(board):
     """Settings are stored."""
-    board.uc.mem_write(STORE[2], STORED)
+    board.uc.mem_write(STORE[0], STORED)
 
 
 def faded(board):
     """A bit of the stored settings is wrong."""
     stored(board)
-    board.uc.mem_write(STORE[2] + 40, bytes([STORED[40] ^ 4]))
+    board.uc.mem_write(STORE[0] + 40, bytes([STORED[40] ^ 4]))
 
 
 def play(host, fault, until_us, torn=(), before=None, first=None, random_number=None):

@@ -17,8 +17,9 @@ use xtask::{build, setup, shell};
 use crate::binary::audit;
 use crate::qemu::emulator::{TIMEOUT, finish};
 
-/// The plain spring and one with every block, each with another controller.
-const CASES: [(&str, Controller); 2] = [("paper", Controller::Paper), ("docs/plant.toml", Controller::Fast)];
+/// The plain spring and one with every block, each with other controllers.
+const CASES: [(&str, Controller); 3] =
+    [("paper", Controller::Paper), ("docs/plant.toml", Controller::Fast), ("docs/plant.toml", Controller::Robust)];
 
 /// Builds and runs the example for each case.
 pub(crate) fn run() -> Result<()> {

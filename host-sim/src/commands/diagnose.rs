@@ -9,7 +9,7 @@ use clap::Args;
 use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, print_error, wrote};
+use host_sim::output::terminal::{json, print, print_error, remark, wrote};
 use host_sim::signals::on_ctrl_c;
 use identify::plant::base::Base;
 use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify};
@@ -151,6 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
     records.iter().try_for_each(|record| input.check(record))?;
     let options = arguments.options(&measured, &records, input, stop)?;
+    options.remark().iter().for_each(|text| remark(text));
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let mut diagnosis = with_progress(&records, &options, arguments.progress)?;

@@ -122,10 +122,11 @@ fn ending_with_us(command: &Command) -> Command {
     ending
 }
 
-/// The image: beside this program if it was shipped so, otherwise built from the sources.
+/// The image: that of the release which this program is in, otherwise built from the sources.
 fn image(say: impl Fn(&str)) -> Result<PathBuf> {
     let program = env::current_exe().and_then(fs::canonicalize).unwrap_or_default();
-    let shipped = program.with_file_name(format!("{BOARD}.elf"));
+    // Where a release has it.
+    let shipped = program.with_file_name("firmware").join(format!("{BOARD}.elf"));
     if shipped.is_file() {
         return Ok(shipped);
     }
