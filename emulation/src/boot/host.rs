@@ -5,7 +5,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::control::{Control, Sensors, Untimed};
-use firmware::settings::{BUILT_IN, SUPERVISION, WATCHDOG_MS};
+use firmware::settings::{SUPERVISION, WATCHDOG_MS, built_in};
 use firmware::store::{Memory, Page, Pages, Side, Store};
 use link::nonce::Nonces;
 use link::{
@@ -61,10 +61,11 @@ pub(super) fn hex(bytes: &[u8]) -> String {
 /// Time of the watchdog in the stored settings, in ms.
 pub(super) const STORED_RESET_MS: u32 = 2 * WATCHDOG_MS;
 
-/// A page of settings that differ from the built-in ones in the time of the watchdog.
-pub(super) fn stored_settings() -> Result<Vec<u8>> {
-    let [hang_ms, stall_ms, _] = WireSettings::new(&BUILT_IN).watchdogs_ms;
-    let settings = WireSettings { watchdogs_ms: [hang_ms, stall_ms, STORED_RESET_MS], ..WireSettings::new(&BUILT_IN) };
+/// A page of settings that differ from the built-in ones of `variant` in the time of the watchdog.
+pub(super) fn stored_settings(variant: Variant) -> Result<Vec<u8>> {
+    let built_in = WireSettings::new(&built_in(variant::settings(variant)));
+    let [hang_ms, stall_ms, _] = built_in.watchdogs_ms;
+    let settings = WireSettings { watchdogs_ms: [hang_ms, stall_ms, STORED_RESET_MS], ..built_in };
     let payload = settings.payload().context("settings without a payload")?;
     let mut store = Store::new(Memory::default());
     let refused = |reason: Reason| anyhow::anyhow!("{reason}");

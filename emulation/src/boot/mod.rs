@@ -72,7 +72,7 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
             .arg(host::frames(host::RANDOM).to_string())
             .arg(host::frames(!host::RANDOM).to_string())
             .arg(format!("{:#x}", host::RANDOM))
-            .arg(host::hex(&host::stored_settings()?)),
+            .arg(host::hex(&host::stored_settings(variant)?)),
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
