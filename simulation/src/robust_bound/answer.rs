@@ -56,11 +56,11 @@ pub struct Step {
 /// Largest relative errors, both ways; `None` if the time is too short even without errors.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Needed {
-    /// Largest error of the instantaneous share.
+    /// Largest relative error of the instantaneous share.
     pub share: Option<f64>,
-    /// Largest error of all time constants.
+    /// Largest relative error of all time constants.
     pub time_constant: Option<f64>,
-    /// Largest error of the gain of the whole response.
+    /// Largest relative error of the gain of the whole response.
     pub gain: Option<f64>,
 }
 
