@@ -24,6 +24,9 @@ const MORE_RAM_ROBUST: u32 = 4 << 10;
 /// Features of an image with the isolation bank.
 pub(crate) const ISOLATION: &[&str] = &["isolation"];
 
+/// Features of an image with the adaptation.
+pub(crate) const ADAPTATION: &[&str] = &["adaptation"];
+
 /// Options of `cargo xtask size`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -38,6 +41,9 @@ pub(crate) struct Args {
     /// Measure images with a sensor and the isolation bank; 24 KB of RAM are allowed
     #[arg(long)]
     isolation: bool,
+    /// Measure images with the adaptation as well; 24 KB of RAM are allowed
+    #[arg(long)]
+    adaptation: bool,
 }
 
 /// Sizes of one image, in bytes.
@@ -53,6 +59,7 @@ pub(crate) struct Size {
 /// Measures the image of each board and prints the table. An image above a bound is an error.
 pub(crate) fn run(args: &Args) -> Result<()> {
     let features: &[&str] = match args {
+        Args { adaptation: true, .. } => ADAPTATION,
         Args { isolation: true, .. } => ISOLATION,
         Args { feedback: true, .. } => &["feedback"],
         Args { .. } => &[],
@@ -75,8 +82,11 @@ pub(crate) fn measure(variant: Variant, features: &[&str], board: Board) -> Resu
     let top = elf::symbol(&bytes, "_stack_start")?;
     Ok(Size {
         board,
-        most_ram: if features.contains(&"isolation") { MOST_RAM_ISOLATION } else { MOST_RAM }
-            + if variant.controller == Controller::Robust { MORE_RAM_ROBUST } else { 0 },
+        most_ram: if features.iter().any(|feature| ISOLATION.contains(feature) || ADAPTATION.contains(feature)) {
+            MOST_RAM_ISOLATION
+        } else {
+            MOST_RAM
+        } + if variant.controller == Controller::Robust { MORE_RAM_ROBUST } else { 0 },
         flash: segments::flash(&bytes)?.bytes.len() as u32,
         statics: elf::ram(&bytes)?,
         stack: top - bottom,

@@ -35,7 +35,7 @@ mod watch;
 
 pub use state::{Phase, State};
 pub use variant::{Scale, Variant};
-pub use watch::{Observation, Watch};
+pub use watch::{Observation, Watch, settled_within};
 
 use crate::controller;
 use crate::error::OutOfRange;

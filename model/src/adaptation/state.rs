@@ -92,6 +92,16 @@ fn energy(report: &Report) -> f64 {
     (report.energies().0 / f64::from(blocks) - 1.0).max(0.0)
 }
 
+/// Returns true for the causes that are taken over.
+const fn is_adaptable(cause: Cause) -> bool {
+    matches!(cause, Cause::GainError | Cause::TimeConstant | Cause::InstantaneousShare)
+}
+
+/// Returns true if the sensor was trusted since the fault began.
+const fn trusted_throughout(seen: &Observation) -> bool {
+    seen.trusted_blocks >= seen.report.since_blocks
+}
+
 impl State {
     /// Returns the running parameters.
     pub const fn parameters(&self) -> Parameters {
@@ -172,7 +182,7 @@ impl State {
             }
         }
         match seen.report.verdict {
-            Verdict::Named(cause @ (Cause::GainError | Cause::TimeConstant | Cause::InstantaneousShare)) => {
+            Verdict::Named(cause) if is_adaptable(cause) => {
                 if seen.moved.to_f64() >= enough_v {
                     self.consider(settings, seen, cause, plant);
                 }
@@ -184,7 +194,11 @@ impl State {
                 let shrinks = |takeover: Takeover| energy(&seen.report) <= SHRINKS_ENERGY * takeover.energy;
                 self.suspect(!self.trial.is_some_and(shrinks));
             }
-            Verdict::Quiet | Verdict::Alarm | Verdict::Ambiguous(..) | Verdict::Named(_) => {}
+            // Readings that were not trusted may be what keeps it from naming one.
+            Verdict::Ambiguous(one, other) => {
+                self.anew = (is_adaptable(one) || is_adaptable(other)) && !trusted_throughout(seen);
+            }
+            Verdict::Quiet | Verdict::Alarm | Verdict::Named(_) => {}
         }
     }
 
@@ -196,8 +210,7 @@ impl State {
         if !(deviation > 0.0 && 1.96 * deviation <= settings.precision * unit) {
             return;
         }
-        if seen.trusted_blocks < seen.report.since_blocks {
-            // Readings that were not trusted are among those that have named the cause.
+        if !trusted_throughout(seen) {
             self.anew = true;
             return;
         }

@@ -75,6 +75,13 @@ impl Scale {
         ScaledStiffness(self.gain.times(stiffness.0))
     }
 
+    /// Returns the output of the loop as that of the spring.
+    #[inline(always)]
+    pub fn output(&self, output: controller::Output) -> controller::Output {
+        let target = Volts(self.outward(ScaledStiffness(output.target.0)).0);
+        controller::Output { target, stiffness: self.outward(output.stiffness), ..output }
+    }
+
     /// Returns the target and the reading as the loop sees them.
     #[inline(always)]
     pub fn input(&self, target: Volts, measured: Option<ScaledStiffness>) -> controller::Input {

@@ -4,7 +4,7 @@ use crate::amplifier::Limits;
 use crate::controller::Output;
 use crate::feedback::Sensor;
 use crate::isolation::{self, Report};
-use crate::units::{Signal, Volts};
+use crate::units::{Signal, Volts, signal};
 
 /// What bank, sensor and voltage have shown by the end of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +19,14 @@ pub struct Observation {
     pub trusted_blocks: u32,
     /// Whether the last proposal has been exchanged at the end of this block.
     pub exchanged: bool,
+}
+
+/// Part of the amplifier's range within which the estimate of a settled loop is from its target.
+const SETTLED: f64 = 0.01;
+
+/// Returns the largest distance of the estimate from the target in an exchange, in V, for a highest voltage in V.
+pub fn settled_within(range_v: f64) -> Volts {
+    Volts(signal(SETTLED * range_v))
 }
 
 /// Lowest and highest of some voltages.

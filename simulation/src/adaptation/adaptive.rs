@@ -1,12 +1,9 @@
 //! Controller, bank and adaptation in one loop, one tick at a time: what the MCU runs, in the same order.
 
-use model::adaptation::{Observation, Parameters, Settings, State, Variant, Watch};
+use model::adaptation::{Observation, Parameters, Settings, State, Variant, Watch, settled_within};
 use model::isolation::{self, bank};
 use model::units::Signal;
 use model::{OutOfRange, Output, SampleTime, ScaledStiffness, Validate, Volts, controller};
-
-/// Part of the range within which the estimate of a settled loop is from its target.
-const SETTLED: f64 = 0.01;
 
 /// Controller, bank and adaptation with their states.
 #[derive(Clone, Debug)]
@@ -53,7 +50,7 @@ impl Adaptive {
             adaptation: State::default(),
             proposed: None,
             target: Volts::ZERO,
-            tolerance: Volts::new(SETTLED * control.amplifier.max_v)?,
+            tolerance: settled_within(bank.range_v),
             exchanges: 0,
             last: None,
         })
@@ -63,13 +60,12 @@ impl Adaptive {
     pub fn tick(&mut self, target: Volts, measured: Option<ScaledStiffness>) -> Output {
         let Variant { control, bank, scale } = &self.variant;
         self.target = target;
-        let mut output = control.tick(&mut self.state, scale.input(target, measured));
+        let output = control.tick(&mut self.state, scale.input(target, measured));
         let model = ScaledStiffness(output.stiffness.0.saturating_sub(self.state.correction().0));
         if let Some((applied, model)) = self.last.replace((output.applied, model)) {
             bank.tick(&mut self.bank_state, applied, model, measured.map(|reading| scale.inward(reading)));
         }
-        output.stiffness = scale.outward(output.stiffness);
-        output.target = target;
+        let output = scale.output(output);
         if self.watch.tick(bank, &self.bank_state, &output, self.tolerance) {
             self.end_of_block();
         }
