@@ -52,41 +52,55 @@ pub struct Planner {
     terms: Terms,
     state: State,
     reported: Change,
+    /// What is to be exchanged at the end of the next block.
+    next: Option<Variant>,
 }
 
 impl Planner {
     /// A planner for the stored model.
     pub fn new(terms: Terms) -> Self {
         let reported = Change { phase: Phase::Watching, parameters: Parameters::STORED };
-        Self { terms, state: State::default(), reported }
+        Self { terms, state: State::default(), reported, next: None }
     }
 
-    /// Plans from what a block has shown: the variant for the end of the next block, and what has changed. Not inlined: its frame is
-    /// large.
-    #[inline(never)]
-    pub fn plan(&mut self, seen: &Observation) -> (Option<Variant>, Option<Change>) {
-        let Some(Stored { control, bank, settings }) = &self.terms.0 else { return (None, None) };
+    /// Plans from what a block has shown. Returns what has changed; [`Planner::next`] is the plan.
+    pub fn plan(&mut self, seen: &Observation) -> Option<Change> {
+        let Some(Stored { control, settings, .. }) = &self.terms.0 else { return None };
         let block_s = bank::block_s(control.rate_hz);
         let next = self.state.update(settings, seen, control.plant, control.amplifier.max_v, block_s);
         let now = Change { phase: self.state.phase(), parameters: self.state.parameters() };
         let change = (now != self.reported).then_some(now);
         self.reported = now;
-        // Parameters within the bounds have been checked at the start.
-        (next.and_then(|parameters| Variant::new(control, bank, &parameters).ok()), change)
+        self.next = None;
+        if let Some(parameters) = next {
+            self.build(&parameters);
+        }
+        change
+    }
+
+    /// Returns what is to be exchanged at the end of the next block.
+    pub const fn next(&self) -> Option<&Variant> {
+        self.next.as_ref()
+    }
+
+    /// Builds the next variant. Not inlined: its frame is large.
+    #[inline(never)]
+    fn build(&mut self, parameters: &Parameters) {
+        if let Some(Stored { control, bank, .. }) = &self.terms.0 {
+            // Parameters within the bounds have been checked at the start.
+            self.next = Variant::new(control, bank, parameters).ok();
+        }
     }
 }
 
 /// Planner and control task in one thread: what a host runs instead of two tasks.
 #[derive(Debug)]
-pub struct Alone {
-    planner: Planner,
-    next: Option<Variant>,
-}
+pub struct Alone(Planner);
 
 impl Alone {
     /// At the start.
     pub fn new(terms: Terms) -> Self {
-        Self { planner: Planner::new(terms), next: None }
+        Self(Planner::new(terms))
     }
 
     /// After a tick of the bank: exchanges at the end of a block what was planned at the end of the last one. Returns what has changed.
@@ -94,8 +108,6 @@ impl Alone {
         if !isolation.ends_block(tick) {
             return None;
         }
-        let (next, change) = self.planner.plan(&isolation.end_block(control, tick, self.next.as_ref()));
-        self.next = next;
-        change
+        self.0.plan(&isolation.end_block(control, tick, self.0.next()))
     }
 }

@@ -51,10 +51,10 @@ pub fn after_tick(control: &mut Control, isolation: &mut Isolation, tick: &Tick,
 /// Plans if a block has ended, and logs what has changed.
 pub fn serve(planner: &mut Planner) {
     let Some((seen, tick)) = SEEN.lock(Cell::take) else { return };
-    let (planned, change) = planner.plan(&seen);
+    let change = planner.plan(&seen);
     NEXT.lock(|next| {
         if let Ok(mut next) = next.try_borrow_mut() {
-            *next = planned;
+            *next = planner.next().copied();
         }
     });
     if let Some(change) = change {

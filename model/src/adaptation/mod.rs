@@ -83,9 +83,11 @@ impl Settings {
     /// [`OutOfRange`] names the field that does not allow it.
     pub fn check_for(&self, control: &controller::Settings, bank: &isolation::Settings) -> Result<(), OutOfRange> {
         let (low, high) = self.bounds();
-        let corners = [(low, low), (low, high), (high, low), (high, high)];
-        corners.iter().try_for_each(|(one, other)| {
-            Variant::new(control, bank, &Parameters { share: other.share, ..*one }).map(drop)
+        let sample_time = SampleTime::from_rate(control.rate_hz)?;
+        [(low, low), (low, high), (high, low), (high, high)].iter().try_for_each(|(one, other)| {
+            let plant = Parameters { share: other.share, ..*one }.applied_to(control.plant);
+            controller::Settings { plant, ..*control }.validate()?;
+            isolation::Settings { plant, ..*bank }.validate(sample_time).map(drop)
         })
     }
 

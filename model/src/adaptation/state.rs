@@ -7,7 +7,7 @@ use crate::isolation::{Cause, Report, Verdict, bank, thresholds};
 /// Blocks that the bank needs to name an error after an exchange: a round to the first decision, then those that have to agree, and one
 /// more.
 const TRIAL_BLOCKS: u32 = (thresholds::AGREED as u32 + 2) * bank::ROUND;
-/// Blocks after which a trial ends that was not quiet.
+/// Blocks after which a trial ends that was not quiet, and after which a bank that cannot tell a cause from another begins anew.
 const LONGEST_TRIAL_BLOCKS: u32 = 4 * TRIAL_BLOCKS;
 /// Time constants of the stored model after which a model that has moved has forgotten that it was another one.
 const SETTLING: f64 = 3.0;
@@ -194,9 +194,10 @@ impl State {
                 let shrinks = |takeover: Takeover| energy(&seen.report) <= SHRINKS_ENERGY * takeover.energy;
                 self.suspect(!self.trial.is_some_and(shrinks));
             }
-            // Readings that were not trusted may be what keeps it from naming one.
+            // What happened in the meantime, or readings that were not trusted, may be what keeps it from naming one.
             Verdict::Ambiguous(one, other) => {
-                self.anew = (is_adaptable(one) || is_adaptable(other)) && !trusted_throughout(seen);
+                let hopeless = !trusted_throughout(seen) || seen.report.since_blocks >= LONGEST_TRIAL_BLOCKS;
+                self.anew = (is_adaptable(one) || is_adaptable(other)) && hopeless;
             }
             Verdict::Quiet | Verdict::Alarm | Verdict::Named(_) => {}
         }

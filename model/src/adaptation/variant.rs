@@ -31,11 +31,9 @@ impl Variant {
         bank: &isolation::Settings,
         parameters: &Parameters,
     ) -> Result<Self, OutOfRange> {
-        let plant = parameters.applied_to(control.plant);
-        let sample_time = SampleTime::from_rate(control.rate_hz)?;
         Ok(Self {
-            control: controller::Settings { plant, ..*control }.validate()?.quantize(),
-            bank: isolation::Settings { plant, ..*bank }.validate(sample_time)?.quantize(),
+            control: quantized_control(control, parameters)?,
+            bank: quantized_bank(bank, control.rate_hz, parameters)?,
             scale: Scale::new(parameters.gain),
         })
     }
@@ -48,6 +46,26 @@ impl Variant {
         let target = Volts(self.scale.inward(ScaledStiffness(target.0)).0);
         self.control.take_over(state, target, stiffness);
     }
+}
+
+/// Returns the controller for other parameters. Not inlined, as the next: the frames of both are large, and only one is needed at a time.
+#[inline(never)]
+fn quantized_control(
+    control: &controller::Settings,
+    parameters: &Parameters,
+) -> Result<controller::Config, OutOfRange> {
+    Ok(controller::Settings { plant: parameters.applied_to(control.plant), ..*control }.validate()?.quantize())
+}
+
+/// Returns the bank for other parameters.
+#[inline(never)]
+fn quantized_bank(
+    bank: &isolation::Settings,
+    rate_hz: f64,
+    parameters: &Parameters,
+) -> Result<isolation::Config, OutOfRange> {
+    let bank = isolation::Settings { plant: parameters.applied_to(bank.plant), ..*bank };
+    Ok(bank.validate(SampleTime::from_rate(rate_hz)?)?.quantize())
 }
 
 /// Gain of the spring, which the loop does not know: it runs on stiffness divided by the gain. A gain of 1 changes no bit.
