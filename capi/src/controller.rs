@@ -9,18 +9,18 @@ use crate::settings::All;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(clippy::large_enum_variant, reason = "there is no heap")]
 pub enum AnyConfig {
-    /// Of a plain spring.
+    /// Configuration for a plain spring.
     Plain(Config),
-    /// Of an extended spring.
+    /// Configuration for an extended spring.
     Extended(Config<extended::Config>),
 }
 
 /// What changes from tick to tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnyState {
-    /// Of a plain spring.
+    /// State of a plain spring.
     Plain(State),
-    /// Of an extended spring.
+    /// State of an extended spring.
     Extended(State<extended::State>),
 }
 

@@ -106,7 +106,7 @@ pub struct Cause {
     pub name: &'static str,
     /// The fault behind it.
     pub fault: Option<Fault>,
-    /// That fault, and those of earlier that nobody has acknowledged.
+    /// That fault, and the earlier ones that nobody has acknowledged.
     pub standing: Faults,
 }
 

@@ -90,11 +90,20 @@ exported! {
         call(instance, |instance| instance.begin_at(start_s))
     }
 
-    fn fmi2EnterInitializationMode(instance: *mut c_void) -> Status { call(instance, |_| Ok(())) }
+    fn fmi2EnterInitializationMode(instance: *mut c_void) -> Status {
+        call(instance, |instance| instance.enter_initialization())
+    }
 
-    fn fmi2ExitInitializationMode(instance: *mut c_void) -> Status { call(instance, |instance| instance.initialize()) }
+    fn fmi2ExitInitializationMode(instance: *mut c_void) -> Status {
+        call(instance, |instance| instance.exit_initialization())
+    }
 
-    fn fmi2Terminate(instance: *mut c_void) -> Status { call(instance, |_| Ok(())) }
+    fn fmi2Terminate(instance: *mut c_void) -> Status {
+        call(instance, |instance| {
+            instance.terminate();
+            Ok(())
+        })
+    }
 
     fn fmi2Reset(instance: *mut c_void) -> Status {
         call(instance, |instance| {

@@ -90,12 +90,22 @@ exported! {
         _with_stop: bool,
         _stop_s: f64,
     ) -> Status {
-        call(instance, |instance| instance.begin_at(start_s))
+        call(instance, |instance| {
+            instance.begin_at(start_s)?;
+            instance.enter_initialization()
+        })
     }
 
-    fn fmi3ExitInitializationMode(instance: *mut c_void) -> Status { call(instance, |instance| instance.initialize()) }
+    fn fmi3ExitInitializationMode(instance: *mut c_void) -> Status {
+        call(instance, |instance| instance.exit_initialization())
+    }
 
-    fn fmi3Terminate(instance: *mut c_void) -> Status { call(instance, |_| Ok(())) }
+    fn fmi3Terminate(instance: *mut c_void) -> Status {
+        call(instance, |instance| {
+            instance.terminate();
+            Ok(())
+        })
+    }
 
     fn fmi3Reset(instance: *mut c_void) -> Status {
         call(instance, |instance| {

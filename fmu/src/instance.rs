@@ -1,6 +1,8 @@
 //! One instance of a unit: what may be called when, the time, messages, saved states.
 
-use anyhow::{Context, Result};
+use std::fmt;
+
+use anyhow::Result;
 use simulation::bad_input;
 use simulation::bad_input::number;
 
@@ -28,14 +30,27 @@ pub(crate) struct Instance {
 pub(crate) struct State {
     values: Vec<f64>,
     start_s: f64,
-    /// `None` until the initialization is over.
-    running: Option<Running>,
+    phase: Phase,
 }
 
+/// The phases of an instance, in their order; what an importer may call follows from them.
 #[derive(Clone, Debug)]
-struct Running {
-    machine: Machine,
-    ticks: u64,
+enum Phase {
+    Instantiated,
+    Initializing,
+    Stepping { machine: Box<Machine>, ticks: u64 },
+    Terminated,
+}
+
+impl fmt::Display for Phase {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        out.write_str(match self {
+            Self::Instantiated => "before the initialization",
+            Self::Initializing => "in the initialization",
+            Self::Stepping { .. } => "in the middle of a simulation",
+            Self::Terminated => "after the end of the simulation",
+        })
+    }
 }
 
 impl Instance {
@@ -52,6 +67,9 @@ impl Instance {
 
     /// Sets the time at which the simulation begins, in s.
     pub(crate) fn begin_at(&mut self, start_s: f64) -> Result<()> {
+        let Phase::Instantiated = self.state.phase else {
+            bad_input!("the start time is set {}: expected before the initialization", self.state.phase);
+        };
         if !start_s.is_finite() {
             bad_input!("startTime = {}: expected a finite number of seconds", number(start_s));
         }
@@ -60,12 +78,29 @@ impl Instance {
         Ok(())
     }
 
+    /// Begins the initialization.
+    pub(crate) fn enter_initialization(&mut self) -> Result<()> {
+        let Phase::Instantiated = self.state.phase else {
+            bad_input!("the initialization begins {}: expected once, or again after a reset", self.state.phase);
+        };
+        self.state.phase = Phase::Initializing;
+        Ok(())
+    }
+
     /// Ends the initialization: the parameters are checked, spring and controller are at rest at 0 V.
-    pub(crate) fn initialize(&mut self) -> Result<()> {
+    pub(crate) fn exit_initialization(&mut self) -> Result<()> {
+        let Phase::Initializing = self.state.phase else {
+            bad_input!("the initialization ends {}: expected in the initialization", self.state.phase);
+        };
         let machine = Machine::new(&self.unit, &self.variables, &self.state.values)?;
         machine.rest(&self.variables, &mut self.state.values);
-        self.state.running = Some(Running { machine, ticks: 0 });
+        self.state.phase = Phase::Stepping { machine: Box::new(machine), ticks: 0 };
         Ok(())
+    }
+
+    /// Ends the simulation; outputs can still be read.
+    pub(crate) fn terminate(&mut self) {
+        self.state.phase = Phase::Terminated;
     }
 
     /// Returns to what the instance was at first.
@@ -100,11 +135,10 @@ impl Instance {
         let Variable { name, role, form, lowest, highest, .. } = &self.variables[index];
         match role {
             Role::Input => {}
-            role if role.is_parameter() && self.state.running.is_none() => {}
             role if role.is_parameter() => {
-                bad_input!(
-                    "{name} is set in the middle of a simulation: expected before the end of the initialization"
-                );
+                let (Phase::Instantiated | Phase::Initializing) = self.state.phase else {
+                    bad_input!("{name} is set {}: expected before the end of the initialization", self.state.phase);
+                };
             }
             _ => bad_input!("{name} is set: expected an input or a parameter"),
         }
@@ -128,8 +162,10 @@ impl Instance {
 
     /// Runs the ticks from `from_s` until `step_s` later.
     pub(crate) fn step(&mut self, from_s: f64, step_s: f64) -> Result<()> {
-        let State { values, start_s, running } = &mut self.state;
-        let Running { machine, ticks } = running.as_mut().context("a step before the initialization has ended")?;
+        let State { values, start_s, phase } = &mut self.state;
+        let Phase::Stepping { machine, ticks } = phase else {
+            bad_input!("a step {phase}: expected between the initialization and the end of the simulation");
+        };
         let rate_hz = machine.rate_hz();
         let (now, end) = ((from_s - *start_s) * rate_hz, (from_s + step_s - *start_s) * rate_hz);
         let time_s = |ticks: u64| *start_s + ticks as f64 / rate_hz;
@@ -161,7 +197,11 @@ impl Instance {
 
 impl State {
     fn new(variables: &[Variable]) -> Self {
-        Self { values: variables.iter().map(|variable| variable.start).collect(), start_s: 0.0, running: None }
+        Self {
+            values: variables.iter().map(|variable| variable.start).collect(),
+            start_s: 0.0,
+            phase: Phase::Instantiated,
+        }
     }
 }
 
@@ -175,11 +215,47 @@ mod tests {
     #[test]
     fn outputs_after_the_initialization_follow_the_parameters() {
         let plant = plant_file::parse("plant.toml", include_str!("../../docs/plant.toml")).expect("the example");
-        let mut instance = Instance::new(Unit { kind: Kind::Spring, plant, options: Options::PAPER }, Box::new(|_| ()));
+        let mut instance = instance(plant);
         let place = |name: &str| variables(&instance.unit).iter().position(|it| it.name == name).expect("it exists");
         let (zero, reading) = (place("spring.reading.zero") as u32, place("reading") as u32);
         instance.set(zero, &[Form::Real], 12.5).expect("a parameter");
-        instance.initialize().expect("parameters in their ranges");
+        instance.enter_initialization().expect("an instance");
+        instance.exit_initialization().expect("parameters in their ranges");
         assert_eq!(instance.get(reading, &[Form::Real]).expect("an output"), 12.5);
+    }
+
+    #[test]
+    fn calls_out_of_their_order_are_refused_and_change_nothing() {
+        let mut instance = instance(plant_file::load("paper").expect("it is built in"));
+        let refused = |result: Result<()>, what: &str| {
+            let error = result.expect_err(what).to_string();
+            assert!(error.contains(what) && error.contains("expected"), "{error}");
+        };
+        refused(instance.step(0.0, 0.001), "a step before the initialization");
+        refused(instance.exit_initialization(), "ends before the initialization");
+        // FMI 2.0 has the importer set up at least once.
+        instance.begin_at(3.0).expect("an instance");
+        instance.begin_at(5.0).expect("an instance");
+        instance.enter_initialization().expect("an instance");
+        refused(instance.begin_at(0.0), "is set in the initialization");
+        refused(instance.enter_initialization(), "begins in the initialization");
+        instance.exit_initialization().expect("parameters in their ranges");
+        instance.step(5.0, 0.002).expect("two ticks");
+        for _ in 0..2 {
+            refused(instance.begin_at(0.0), "is set in the middle of a simulation");
+            refused(instance.exit_initialization(), "ends in the middle of a simulation");
+        }
+        let saved = instance.save();
+        instance.step(5.002, 0.001).expect("the clock goes on");
+        instance.terminate();
+        refused(instance.step(5.003, 0.001), "a step after the end");
+        instance.restore(&saved);
+        instance.step(5.002, 0.001).expect("the saved state");
+        instance.reset();
+        instance.begin_at(0.0).expect("an instance as at first");
+    }
+
+    fn instance(plant: plant_file::PlantFile) -> Instance {
+        Instance::new(Unit { kind: Kind::Spring, plant, options: Options::PAPER }, Box::new(|_| ()))
     }
 }

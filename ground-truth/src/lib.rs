@@ -22,6 +22,7 @@
 //! | [`export`] | the record as CSV, as JSON and as the host tools' record type |
 //! | [`out_of_model`] | other laws for the same causes, by a simulator of their own |
 //! | [`unforeseen`] | laws of a second such set, which nobody looked at while the diagnosis was made |
+//! | [`unseen`] | laws of a third one, its second edition |
 //! | [`other_plants`] | records of other instruments, in their own units |
 
 pub mod cause;
@@ -42,6 +43,7 @@ pub mod sensor;
 pub mod spring;
 pub mod truth;
 pub mod unforeseen;
+pub mod unseen;
 
 pub use cause::{Block, Cause};
 pub use effect::Effect;

@@ -2,7 +2,6 @@
 
 use std::ops::RangeInclusive;
 
-use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -10,7 +9,7 @@ use super::cause::Cause;
 use super::effect::Effect;
 use super::noise::Noise;
 use super::physics::{Further, SHARE};
-use super::schedule::{Kind, Sampling, Schedule};
+use super::schedule::Schedule;
 use super::sensor::Readings;
 use super::spring::Spring;
 
@@ -41,12 +40,8 @@ impl Recipe {
     /// Draws schedule, effect values and noise. Full scale is 500 V, in one record of five 700 V.
     pub fn draw(&self, seed: u64) -> LabelledRecord {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let sampling = Sampling::draw(&mut random, self.rows, self.uneven);
-        let full_v = if random.random_bool(0.2) { 700.0 } else { 500.0 };
-        let steps = self.causes.iter().any(|cause| cause.facts().needs_steps);
-        let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|&kind| !(steps && kind == Kind::Sweep)).collect();
-        let kind = *kinds.choose(&mut random).expect("at least three kinds are left");
-        let schedule = Schedule::draw(&mut random, kind, sampling, full_v);
+        let steps_only = self.causes.iter().any(|cause| cause.facts().needs_steps);
+        let schedule = Schedule::draw_any(&mut random, self.rows, self.uneven, steps_only);
         let mut draw = |&cause: &Cause| {
             let others: RangeInclusive<usize> = 1..=cause.facts().forms.len() - 1;
             let form = if self.other_forms && !others.is_empty() { random.random_range(others) } else { 0 };
@@ -79,12 +74,13 @@ impl LabelledRecord {
         Self::of(&spring, schedule, effects, noise, seed)
     }
 
-    /// The same schedule, effects and noise with a spring whose instantaneous share is `share`, 0 to 1, unless an effect sets it.
+    /// This record's schedule, effects and noise with a spring whose instantaneous share is `share`, 0 to 1, unless an effect sets
+    /// it.
     pub fn with_share(&self, share: f64) -> Self {
         self.with_relaxation(share, [Further::default(); 2])
     }
 
-    /// As [`with_share`](Self::with_share), and with further lags.
+    /// The same record with another instantaneous share, see [`with_share`](Self::with_share), and with further lags.
     pub fn with_relaxation(&self, share: f64, further: [Further; 2]) -> Self {
         let own = Spring { further, ..Spring::with(&self.effects) };
         let spring = if own.share == SHARE { Spring { share, ..own } } else { own };
@@ -104,7 +100,7 @@ impl LabelledRecord {
         Self { schedule, effects, noise, seed, readings }
     }
 
-    /// The same record with its effects at another size: same schedule, same noise.
+    /// This record's schedule and noise with its effects at another size, 0 for none to 1 for full size.
     pub fn at(&self, size: f64) -> Self {
         let effects = self.effects.iter().map(|effect| effect.at(size)).collect();
         Self::new(self.schedule.clone(), effects, self.noise, self.seed)

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use rand::RngExt;
+use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
 /// Times and commanded voltages; each voltage is held until the next time.
@@ -84,6 +85,15 @@ impl Schedule {
     /// Largest voltage, in V.
     pub fn full_v(&self) -> f64 {
         self.voltage_v.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// A random schedule of one of the kinds [`Kind::ALL`], but no sweep if `steps_only`; full scale is 500 V, in one of five 700 V.
+    pub fn draw_any(random: &mut ChaCha8Rng, rows: usize, uneven: bool, steps_only: bool) -> Self {
+        let sampling = Sampling::draw(random, rows, uneven);
+        let full_v = if random.random_bool(0.2) { 700.0 } else { 500.0 };
+        let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|&kind| !(steps_only && kind == Kind::Sweep)).collect();
+        let kind = *kinds.choose(random).expect("three kinds are left");
+        Self::draw(random, kind, sampling, full_v)
     }
 
     /// A random schedule between 0 V and `full_v`, in V.

@@ -9,6 +9,9 @@
 //! | [`qemu`] | the emulated board |
 //! | [`signals`] | what Ctrl-C and other signals do |
 
+/// Version and git revision, which the firmware's boot message carries too.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("GIT_REVISION"), ")");
+
 pub use link_host as link;
 pub mod log;
 pub mod output;

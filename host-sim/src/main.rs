@@ -17,7 +17,7 @@ use simulation::bad_input::BadInput;
 #[derive(Parser)]
 #[command(
     name = "vsj",
-    version = concat!(env!("CARGO_PKG_VERSION"), " (", env!("GIT_REVISION"), ")"),
+    version = host_sim::VERSION,
     after_help = "Exit codes: 0 success, 1 the command failed or stdout cannot be written, 2 bad arguments or bad input."
 )]
 struct Cli {

@@ -87,3 +87,7 @@ pub use wire_settings::WireSettings;
 
 /// Version of the protocol. Any change of a golden frame in `tests/golden.rs` requires a new number.
 pub const VERSION: u8 = 5;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

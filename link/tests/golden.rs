@@ -32,7 +32,7 @@ fn check_file(name: &str, frames: &str) {
         std::fs::write(&path, frames).unwrap();
     }
     let written = std::fs::read_to_string(&path).unwrap_or_default();
-    assert_eq!(written, frames, "{path} is out of date: GOLDEN=write cargo test -p link --test golden");
+    assert_eq!(written, frames, "{path} is out of date: GOLDEN=write cargo test -p vsj-link --test golden");
 }
 
 #[test]

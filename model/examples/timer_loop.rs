@@ -1,4 +1,4 @@
-//! The loop of a firmware's timer interrupt, run on a host: `cargo run -p model --example timer_loop` prints a short
+//! The loop of a firmware's timer interrupt, run on a host: `cargo run -p vsj-model --example timer_loop` prints a short
 //! trace.
 //!
 //! To use it in a firmware, copy [`Controller`] and [`Board`], implement `Board` for your pins, build the controller

@@ -1,5 +1,5 @@
 //! Runs random configurations of the plain tick and writes what they put out, for `model/proof/differential.py`:
-//! `cargo run --release -p model --example trace -- SEED CONFIGURATIONS TICKS` writes to stdout, for each configuration, a line with
+//! `cargo run --release -p vsj-model --example trace -- SEED CONFIGURATIONS TICKS` writes to stdout, for each configuration, a line with
 //! its numbers, and then for each tick the target, code, applied voltage, voltage before rounding, stiffness and limits as six
 //! little-endian numbers of 32 bits.
 

@@ -1,6 +1,6 @@
 """Compares the tick that `theorems.py` reasons about with the one that the MCU runs.
 
-Reads what `cargo run -p model --example trace` prints, from a file or a pipe: random configurations, each with its numbers and with
+Reads what `cargo run -p vsj-model --example trace` prints, from a file or a pipe: random configurations, each with its numbers and with
 what it puts out under random targets. Each output must be that of `tick.py`, each configuration must be as the theorems assume.
 
 Usage: differential.py TICKS_PER_CONFIGURATION < TRACE. Exit codes: 0 all agree, 1 something differs.
@@ -163,7 +163,7 @@ def main(ticks):
                 configurations += len(configs)
         if not line:
             break
-    assert configurations, "no configurations; expected those of `cargo run -p model --example trace`"
+    assert configurations, "no configurations; expected those of `cargo run -p vsj-model --example trace`"
     print(f"{compared} ticks of {configurations} random configurations agree, and are as the theorems assume")
 
 

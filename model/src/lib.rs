@@ -94,3 +94,7 @@ pub use stiffness::Spring;
 pub use time_optimal::Approach;
 pub use units::{DacCode, SampleTime, ScaledStiffness, Volts};
 pub use validated::{Validate, Validated};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

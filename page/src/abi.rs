@@ -4,12 +4,19 @@
 use std::panic;
 use std::sync::Once;
 
+use identify::Stop;
+
 use crate::request::answer;
 
 #[link(wasm_import_module = "page")]
 unsafe extern "C" {
     /// Receives how far a request is, as JSON.
     safe fn progress(text: *const u8, length: usize);
+    /// Returns another number than 0 if the worker has not looked for messages for a while.
+    safe fn due() -> i32;
+    /// Lets the worker look for messages, where the browser can suspend WebAssembly; returns another number than 0 if one asks for
+    /// the best answer so far.
+    safe fn look() -> i32;
     /// Receives the message of a panic, after which the module must not be called again.
     safe fn panicked(text: *const u8, length: usize);
 }
@@ -26,10 +33,10 @@ extern "C" fn page_free(bytes: *mut u8, length: usize) {
     drop(owned(bytes, length));
 }
 
-/// Answers a request, a JSON object, about a file, which may be empty. Frees both; returns the address of the answer in the upper
+/// Answers a request, a JSON object, about files, which may be empty. Frees both; returns the address of the answer in the upper
 /// half, its length in the lower.
 #[unsafe(no_mangle)]
-extern "C" fn page_call(request: *mut u8, request_length: usize, file: *mut u8, file_length: usize) -> u64 {
+extern "C" fn page_call(request: *mut u8, request_length: usize, files: *mut u8, files_length: usize) -> u64 {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         panic::set_hook(Box::new(|panic| {
@@ -37,8 +44,9 @@ extern "C" fn page_call(request: *mut u8, request_length: usize, file: *mut u8, 
             panicked(text.as_ptr(), text.len());
         }));
     });
-    let (request, file) = (owned(request, request_length), owned(file, file_length));
-    let answer = answer(&request, &file, &mut |text| progress(text.as_ptr(), text.len()));
+    let (request, files) = (owned(request, request_length), owned(files, files_length));
+    let stop = Stop::when(|| due() != 0 && look() != 0);
+    let answer = answer(&request, &files, &stop, &mut |text| progress(text.as_ptr(), text.len()));
     let length = answer.len() as u64;
     let bytes = Box::into_raw(answer.into_bytes().into_boxed_slice()).cast::<u8>();
     ((bytes as u64) << 32) | length

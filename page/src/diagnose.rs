@@ -1,4 +1,4 @@
-//! A record identified and diagnosed.
+//! Records of one spring identified and diagnosed.
 
 use anyhow::Result;
 use identify::nominal::Identified;
@@ -8,16 +8,17 @@ use serde::{Deserialize, Serialize};
 use simulation::bad_input;
 use simulation::csv_table::text::Source;
 use simulation::plant_file::{self, PlantFile};
-use simulation::record::{ColumnNames, Format, MeasuredRecord, remarks_on};
+use simulation::record::{ColumnNames, Format, MeasuredRecord, Record, remarks_on};
+use simulation::units::Units;
 
 use crate::curve::Curve;
 
-/// How the file is read and what it is compared with, by the names of the options of `vsj diagnose`. Empty texts are absent.
+/// How the files are read and what they are compared with, by the names of the options of `vsj diagnose`. Empty texts are absent.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Records {
-    /// Name of the file in messages.
-    pub name: String,
+    /// The files. Their bytes follow one another.
+    pub files: Vec<File>,
     /// Column of the time and its unit.
     #[serde(default)]
     pub time: String,
@@ -38,30 +39,51 @@ pub struct Records {
     pub effort: String,
 }
 
-/// An answer with what is drawn of it. Curves are over the time, in the record's unit.
+/// One of the files.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct File {
+    /// Name in messages.
+    pub name: String,
+    /// Size, in bytes.
+    pub length: usize,
+}
+
+/// An answer with what is drawn of it. Curves are over the time, in the records' unit.
 #[derive(Debug, Serialize)]
 pub struct Shown {
     /// The answer of the command's `--json`.
     json: String,
-    /// What the user should know about how the file was read, one line each.
+    /// What the user should know about how the files were read, one line each.
     remarks: Vec<String>,
     /// The spring that was found, as a plant file.
     plant: String,
     /// Units of time, voltage and reading.
     units: [String; 3],
-    /// The curves by name.
+    /// The curves of each record.
+    records: Vec<Drawn>,
+}
+
+/// The curves of a record by name.
+#[derive(Debug, Serialize)]
+struct Drawn {
+    name: String,
     curves: Vec<(&'static str, Curve)>,
 }
 
-/// A record that was read.
+/// A course over the rows of one record, with its name.
+type Course<'v> = (&'static str, &'v [f64]);
+
+/// The records that were read.
 struct Read {
-    measured: MeasuredRecord,
+    records: Vec<Record>,
+    units: Units,
     input: Input,
     remarks: Vec<String>,
 }
 
 impl Records {
-    fn read(&self, file: &[u8]) -> Result<Read> {
+    fn read(&self, mut bytes: &[u8]) -> Result<Read> {
         let given = |text: &String| (!text.is_empty()).then(|| text.clone());
         let columns = ColumnNames {
             time: given(&self.time),
@@ -71,72 +93,80 @@ impl Records {
         };
         let format = Format { columns, sort: self.sort, ..Format::default() };
         let input = self.input.parse()?;
-        let measured = format.read(Source::read(&self.name, file)?)?;
-        let remarks = remarks_on(std::slice::from_ref(&measured))?;
-        Ok(Read { measured, input, remarks })
+        let mut measured = Vec::new();
+        for File { name, length } in &self.files {
+            let Some((file, rest)) = bytes.split_at_checked(*length) else {
+                bad_input!("{name}: {} bytes; expected {length}", bytes.len());
+            };
+            measured.push(format.read(Source::read(name, file))?);
+            bytes = rest;
+        }
+        let Some(MeasuredRecord { units, .. }) = measured.first() else {
+            bad_input!("no record; expected one or more");
+        };
+        let (units, remarks) = (units.clone(), remarks_on(&measured)?);
+        let records = measured.into_iter().map(|measured| measured.record).collect();
+        Ok(Read { records, units, input, remarks })
     }
 }
 
 impl Read {
     fn identify(&self) -> Result<Identified> {
-        ::identify::identify(std::slice::from_ref(&self.measured.record), self.input, &self.measured.units)
+        ::identify::identify(&self.records, self.input, &self.units)
     }
 
-    /// The answer to be shown: the command's JSON, the spring, and curves over the times; `time_s` and `voltage_v` are in SI units,
-    /// the values of `more` in the reading's unit.
-    fn shown(
-        self,
-        json: String,
-        plant: &PlantFile,
-        time_s: &[f64],
-        voltage_v: &[f64],
-        more: &[(&'static str, Vec<f64>)],
-    ) -> Result<Shown> {
-        let units = &self.measured.units;
-        let curve = |values: &[f64], unit: f64| {
-            Curve::new(values.len(), |row| time_s[row] / units.time.si, |row| values[row] / unit)
-        };
-        let mut curves = vec![("voltage", curve(voltage_v, units.voltage.si))];
-        curves.extend(more.iter().map(|(name, values)| (*name, curve(values, 1.0))));
+    /// The answer to be shown: the command's JSON, the spring, and the curves of each record.
+    fn shown(self, json: String, plant: &PlantFile, records: Vec<Drawn>) -> Result<Shown> {
+        let names: Vec<&str> = self.records.iter().map(|record| record.name.as_str()).collect();
         Ok(Shown {
             json,
-            plant: format!(
-                "# Identified from {}\n{}",
-                self.measured.record.name.replace(['\n', '\r'], " "),
-                plant.to_toml()?
-            ),
-            units: [units.time.name.clone(), units.voltage.name.clone(), units.reading.clone()],
-            curves,
+            plant: format!("# Identified from {}\n{}", names.join(", ").replace(['\n', '\r'], " "), plant.to_toml()?),
+            units: [self.units.time.name, self.units.voltage.name, self.units.reading],
+            records,
             remarks: self.remarks,
         })
     }
 }
 
-/// Identifies the linear spring of a file.
+impl Drawn {
+    /// The curves of a record over its times; `time_s` and the course `voltage` are in SI units, others in the reading's unit.
+    fn new(name: &str, units: &Units, time_s: &[f64], courses: &[Course]) -> Self {
+        let curve = |(name, values): &Course| {
+            let unit = if *name == "voltage" { units.voltage.si } else { 1.0 };
+            (*name, Curve::new(values.len(), |row| time_s[row] / units.time.si, |row| values[row] / unit))
+        };
+        Self { name: name.to_owned(), curves: courses.iter().map(curve).collect() }
+    }
+}
+
+/// Identifies the linear spring of the files.
 ///
 /// # Errors
 /// [`simulation::BadInput`] with the file, line, column and what was expected.
-pub fn identify(records: &Records, file: &[u8]) -> Result<Shown> {
-    let read = records.read(file)?;
+pub fn identify(records: &Records, files: &[u8]) -> Result<Shown> {
+    let read = records.read(files)?;
     if read.input == Input::Stair {
         bad_input!("--input stair: expected hold or linear; the report's stair is for `vsj diagnose`");
     }
     let found = read.identify()?;
     let json = serde_json::to_string(&found.report)?;
-    let course = &found.records[0];
-    let model = less(&course.reading, &course.residual);
-    let more = [("reading", course.reading.clone()), ("model", model)];
-    read.shown(json, &found.plant, &course.time_s, &course.voltage_v, &more)
+    let drawn = found.records.iter().map(|course| {
+        let model = less(&course.reading, &course.residual);
+        let courses: [Course; 3] = [("voltage", &course.voltage_v), ("reading", &course.reading), ("model", &model)];
+        Drawn::new(&course.name, &read.units, &course.time_s, &courses)
+    });
+    let drawn = drawn.collect();
+    read.shown(json, &found.plant, drawn)
 }
 
-/// Diagnoses a file; `progress` receives the best causes so far.
+/// Diagnoses the files; `progress` receives the best causes so far. Once `stop` is requested, the answer is the best so far.
 ///
 /// # Errors
 /// [`simulation::BadInput`] with the file, line, column and what was expected.
-pub fn diagnose(records: &Records, file: &[u8], progress: &mut dyn FnMut(&str)) -> Result<Shown> {
+pub fn diagnose(records: &Records, files: &[u8], stop: &Stop, progress: &mut dyn FnMut(&str)) -> Result<Shown> {
     let effort: Effort = records.effort.parse()?;
-    let read = records.read(file)?;
-    read.input.check(&read.measured.record)?;
+    let mut read = records.read(files)?;
+    read.records.iter().try_for_each(|record| read.input.check(record))?;
     let (name, plant, linear) = match records.plant.as_str() {
         "identify" => {
             let found = read.identify()?;
@@ -147,23 +177,28 @@ pub fn diagnose(records: &Records, file: &[u8], progress: &mut dyn FnMut(&str)) 
     };
     let options = Options {
         plant: name.to_owned(),
-        units: read.measured.units.clone(),
+        units: read.units.clone(),
         input: read.input,
         base: Base::new(plant)?,
         effort,
         linear,
-        stop: Stop::default(),
+        stop: stop.clone(),
     };
-    let found = examine_several(std::slice::from_ref(&read.measured.record), &options, |causes| {
+    read.remarks.extend(options.remark());
+    let found = examine_several(&read.records, &options, |causes| {
         progress(&serde_json::json!({ "causes": causes }).to_string());
     })?;
     let Diagnosis { report, data, baseline, extended, plant, .. } = &found;
-    let more = [
-        ("reading", data.reading.clone()),
-        ("nominal", less(&data.reading, &baseline.residual)),
-        ("extended", less(&data.reading, &extended.residual)),
-    ];
-    read.shown(serde_json::to_string(report)?, plant, &data.time_s, &data.voltage_v, &more)
+    let (nominal, extended) = (less(&data.reading, &baseline.residual), less(&data.reading, &extended.residual));
+    let times: Vec<f64> = (0..data.rows()).map(|row| data.place(row).1).collect();
+    let drawn = data.rows_of_records().into_iter().zip(&read.records).map(|(rows, record)| {
+        let courses: [Course; 4] =
+            [("voltage", &data.voltage_v), ("reading", &data.reading), ("nominal", &nominal), ("extended", &extended)];
+        let courses = courses.map(|(name, values)| (name, &values[rows.clone()]));
+        Drawn::new(&record.name, &read.units, &times[rows], &courses)
+    });
+    let drawn = drawn.collect();
+    read.shown(serde_json::to_string(report)?, plant, drawn)
 }
 
 /// What a model predicts: the readings less its residual.

@@ -5,7 +5,8 @@
 //! | [`request`] | the requests by name, answered or refused with one line |
 //! | [`control`] | a target through the controller, as `vsj stair` runs it, with curves to draw |
 //! | [`hide`] | a record of a spring with a known effect |
-//! | [`diagnose`] | a record identified and diagnosed, as `vsj identify` and `vsj diagnose` do |
+//! | [`diagnose`] | records identified and diagnosed, as `vsj identify` and `vsj diagnose` do |
+//! | [`plan`] | the next experiment, as `vsj plan` computes it |
 //! | [`curve`] | curves thinned for a plot |
 //! | `abi` | the functions that the page's worker calls, on the target WebAssembly alone |
 //!
@@ -18,4 +19,5 @@ pub mod control;
 pub mod curve;
 pub mod diagnose;
 pub mod hide;
+pub mod plan;
 pub mod request;

@@ -1,6 +1,7 @@
 //! The requests by name.
 
 use anyhow::Result;
+use identify::Stop;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use simulation::bad_input;
@@ -8,6 +9,7 @@ use simulation::bad_input;
 use crate::control::{self, Control};
 use crate::diagnose::{self, Records};
 use crate::hide::{self, Hidden};
+use crate::plan::{self, Planned};
 
 /// A request, as JSON with the field `command`.
 #[derive(Deserialize)]
@@ -19,23 +21,25 @@ enum Request {
     Effects,
     /// Makes a record of a spring with an effect.
     Hide(Hidden),
-    /// Identifies the spring of the file.
+    /// Identifies the spring of the files.
     Identify(Records),
-    /// Diagnoses the file.
+    /// Diagnoses the files.
     Diagnose(Records),
+    /// Plans the experiment after a diagnosis, whose JSON is the file.
+    Plan(Planned),
 }
 
-/// Answers a request about a file, which may be empty. The answer is a JSON object with one field, `ok` or `error`; an error is the
-/// line that the command prints. `progress` receives JSON on the way.
-pub fn answer(request: &[u8], file: &[u8], progress: &mut dyn FnMut(&str)) -> String {
-    let answer = match of(request, file, progress) {
+/// Answers a request about files, which may be empty. The answer is a JSON object with one field, `ok` or `error`; an error is the
+/// line that the command prints. `progress` receives JSON on the way; `stop` ends a diagnosis early.
+pub fn answer(request: &[u8], files: &[u8], stop: &Stop, progress: &mut dyn FnMut(&str)) -> String {
+    let answer = match of(request, files, stop, progress) {
         Ok(answer) => json!({ "ok": answer }),
         Err(error) => json!({ "error": format!("{error:#}").replace(['\n', '\r'], " ") }),
     };
     answer.to_string()
 }
 
-fn of(request: &[u8], file: &[u8], progress: &mut dyn FnMut(&str)) -> Result<Value> {
+fn of(request: &[u8], files: &[u8], stop: &Stop, progress: &mut dyn FnMut(&str)) -> Result<Value> {
     let request = match serde_json::from_slice(request) {
         Ok(request) => request,
         Err(error) => bad_input!("request: {error}"),
@@ -44,8 +48,9 @@ fn of(request: &[u8], file: &[u8], progress: &mut dyn FnMut(&str)) -> Result<Val
         Request::Control(control) => value(&control::run(&control)?)?,
         Request::Effects => value(&hide::effects())?,
         Request::Hide(hidden) => value(&hide::record(&hidden)?)?,
-        Request::Identify(records) => value(&diagnose::identify(&records, file)?)?,
-        Request::Diagnose(records) => value(&diagnose::diagnose(&records, file, progress)?)?,
+        Request::Identify(records) => value(&diagnose::identify(&records, files)?)?,
+        Request::Diagnose(records) => value(&diagnose::diagnose(&records, files, stop, progress)?)?,
+        Request::Plan(planned) => value(&plan::plan(&planned, files)?)?,
     })
 }
 
@@ -60,7 +65,8 @@ mod tests {
     #[test]
     fn what_is_no_request_is_refused_in_one_line() {
         for request in ["", "{}", r#"{"command":"launch"}"#, r#"{"command":"control"}"#, "\u{0}"] {
-            let answer: Value = serde_json::from_str(&answer(request.as_bytes(), b"", &mut |_| ())).unwrap();
+            let answer: Value =
+                serde_json::from_str(&answer(request.as_bytes(), b"", &Stop::default(), &mut |_| ())).unwrap();
             let error = answer["error"].as_str().expect("an error");
             assert!(error.starts_with("request: ") && !error.contains('\n'), "{error}");
         }

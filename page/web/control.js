@@ -1,7 +1,7 @@
 // The control panel: a target through the controller, with stiffness, voltage and the bound.
 
 import { byId, decimals, digits, html, save, table } from "./dom.js";
-import { Cancelled, Engine } from "./engine.js";
+import { Engine } from "./engine.js";
 import { COLOUR, show } from "./plot.js";
 import { spring } from "./spring.js";
 import { Target } from "./target.js";
@@ -17,6 +17,7 @@ export class ControlPanel {
   #running = false;
   #again = false;
   #hidden;
+  #planned;
 
   constructor() {
     const form = byId("control");
@@ -40,26 +41,43 @@ export class ControlPanel {
     return this.#hidden;
   }
 
+  /** Simulates an experiment, the CSV of a plan, whose voltages are commanded as they are. */
+  simulate(csv) {
+    this.#planned = csv;
+    const planned = byId("target").querySelector("[value=planned]");
+    planned.hidden = planned.disabled = false;
+    byId("target").value = "planned";
+    byId("controller").value = "none";
+    return this.update();
+  }
+
   /** The request that the settings make. */
   request() {
     const target = byId("target").value;
+    const percents = () => ({ tau: number("known-tau"), share: number("known-share"), gain: number("known-gain"), overshoot: number("overshoot") });
+    const files = { drawn: this.#target.csv(), planned: this.#planned };
     return {
       plant: spring(),
-      target: target === "drawn" ? this.#target.csv() : target,
-      linear: byId("linear").checked,
+      target: files[target] ?? target,
+      linear: target === "drawn" && byId("linear").checked,
       controller: byId("controller").value,
       limit_v: number("limit"),
       slew_v_per_s: byId("slew").value === "" ? null : number("slew"),
       kp: number("kp"),
       ki: number("ki"),
       approach_s: number("approach"),
+      known: byId("controller").value === "robust" ? percents() : null,
       rate_hz: number("rate"),
     };
   }
 
   #later() {
+    document.body.dataset.control = "running";
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.update(), PAUSE_MS);
+    this.#timer = setTimeout(() => {
+      this.#timer = undefined;
+      this.update();
+    }, PAUSE_MS);
     this.#fields();
   }
 
@@ -69,6 +87,7 @@ export class ControlPanel {
     byId("hand").hidden = target !== "drawn";
     byId("gains").hidden = controller !== "paper";
     byId("braking").hidden = controller !== "fast";
+    byId("known").hidden = controller !== "robust";
     byId("record-settings").hidden = byId("effect").value === "";
     this.#target.highest = Number(byId("limit").value);
     this.#target.draw();
@@ -76,25 +95,30 @@ export class ControlPanel {
 
   /** Computes the settings; while that runs, further changes wait for its end. */
   async update() {
+    document.body.dataset.control = "running";
     this.#fields();
     if (this.#running) {
       this.#again = true;
       return;
     }
     this.#running = true;
+    let state = "done";
     try {
       const request = this.request();
       const run = await this.#engine.ask({ command: "control", ...request });
       this.#hidden = await this.#hide(request);
       this.#show(run, request);
     } catch (error) {
-      if (!(error instanceof Cancelled)) this.#refuse(error);
+      state = "refused";
+      this.#refuse(error);
     } finally {
       this.#running = false;
     }
     if (this.#again) {
       this.#again = false;
       this.update();
+    } else if (this.#timer === undefined) {
+      document.body.dataset.control = state;
     }
   }
 
@@ -109,7 +133,6 @@ export class ControlPanel {
   #refuse(error) {
     byId("control-error").textContent = error.message;
     byId("control-status").textContent = "";
-    document.body.dataset.control = "refused";
   }
 
   #show(run, request) {
@@ -141,9 +164,8 @@ export class ControlPanel {
     byId("steps").replaceChildren(...(answer.steps.length ? [steps(answer)] : []));
     byId("control-status").textContent = summary(answer, run.remarks);
     byId("truth").textContent = hidden ? truth(hidden) : "";
-    byId("diagnose-hidden").hidden = byId("save-record").hidden = !hidden;
+    byId("hidden-record").hidden = !hidden;
     byId("command").textContent = command(request);
-    document.body.dataset.control = "done";
   }
 }
 
@@ -189,14 +211,18 @@ function truth({ truth }) {
 /** The command that gives the same answer. */
 function command(request) {
   const words = ["vsj", "stair", "--controller", request.controller];
-  const drawn = request.target.includes("\n");
-  words.push("--input", drawn ? "target.csv" : request.target);
-  if (drawn && request.linear) words.push("--between", "linear");
+  const file = byId("target").value === "planned" ? "schedule.csv" : "target.csv";
+  words.push("--input", request.target.includes("\n") ? file : request.target);
+  if (request.linear) words.push("--between", "linear");
   if (request.plant !== "paper") words.push("--plant", "plant.toml");
   words.push("--limit-v", request.limit_v);
   if (request.slew_v_per_s != null) words.push("--slew-v-per-s", request.slew_v_per_s);
-  if (request.controller !== "fast") words.push("--kp", request.kp, "--ki", request.ki);
+  if (["none", "paper"].includes(request.controller)) words.push("--kp", request.kp, "--ki", request.ki);
   if (request.controller === "fast" && request.approach_s) words.push("--approach-s", request.approach_s);
+  if (request.known) {
+    for (const key of ["tau", "share", "gain"]) words.push("--known", `${key}=${request.known[key]}`);
+    words.push("--overshoot-percent", request.known.overshoot);
+  }
   if (request.rate_hz !== 1000) words.push("--rate-hz", request.rate_hz);
   return [...words, "--json"].join(" ");
 }

@@ -40,17 +40,23 @@ export class Engine {
     this.#waiting.clear();
   }
 
-  /** The answer to a request about the bytes of a file; `onProgress` receives reports on the way. */
-  ask(request, { file = new ArrayBuffer(0), onProgress } = {}) {
+  /** The answer to a request about the bytes of files; `onProgress` receives reports on the way. */
+  ask(request, { files = new ArrayBuffer(0), onProgress } = {}) {
     if (!this.#worker) this.#start();
     const id = ++this.#last;
     return new Promise((resolve, reject) => {
       this.#waiting.set(id, { resolve, reject, onProgress });
-      this.#worker.postMessage({ id, request, file });
+      this.#worker.postMessage({ id, request, files });
     });
   }
 
-  /** Stops what is computed; the next request starts a new worker. */
+  /** Asks for the best answer so far. Returns false where the browser cannot suspend WebAssembly to hear of it. */
+  stop() {
+    for (const id of this.#waiting.keys()) this.#worker.postMessage({ stop: id });
+    return "Suspending" in WebAssembly;
+  }
+
+  /** Ends what is computed, without an answer; the next request starts a new worker. */
   cancel() {
     this.#end(new Cancelled("cancelled"));
   }

@@ -6,7 +6,8 @@ import { RecordPanel } from "./records.js";
 import { resetSpring } from "./spring.js";
 
 const control = new ControlPanel();
-const records = new RecordPanel((plant) => {
+/** Controls a spring, the text of a plant file. */
+function controlSpring(plant) {
   byId("plant").value = plant;
   // An effect is hidden in a plain spring only.
   byId("effect").value = "";
@@ -14,7 +15,16 @@ const records = new RecordPanel((plant) => {
   byId("control-title").scrollIntoView();
   byId("controller").focus();
   control.update();
-});
+}
+
+/** Simulates a planned experiment, the text of a CSV file. */
+function simulate(csv) {
+  control.simulate(csv);
+  byId("control-title").scrollIntoView();
+  byId("target").focus();
+}
+
+const records = new RecordPanel(controlSpring, simulate);
 
 byId("report-spring").addEventListener("click", () => {
   resetSpring();
@@ -22,10 +32,20 @@ byId("report-spring").addEventListener("click", () => {
   control.update();
 });
 
+/** The bytes of the simulated record. */
+const simulated = () => new TextEncoder().encode(control.hidden.csv).buffer;
+
 byId("diagnose-hidden").addEventListener("click", () => {
-  records.take("record.csv", new TextEncoder().encode(control.hidden.csv).buffer);
+  records.take([{ name: "record.csv", bytes: simulated() }]);
   byId("between").value = "hold";
   byId("record-title").scrollIntoView();
   byId("cancel").focus();
   records.diagnose();
+});
+
+byId("add-hidden").addEventListener("click", () => {
+  records.add("record.csv", simulated());
+  byId("between").value = "hold";
+  byId("record-title").scrollIntoView();
+  byId("diagnose").focus();
 });

@@ -1,25 +1,34 @@
-// The record panel: a CSV file identified or diagnosed in a worker, with progress, and what was found.
+// The record panel: CSV files identified or diagnosed in a worker, with progress, and what was found.
 
 import { byId, digits, html, save, table } from "./dom.js";
 import { Cancelled, Engine } from "./engine.js";
+import { PlanPanel } from "./plan.js";
 import { COLOUR, show } from "./plot.js";
 import { spring } from "./spring.js";
 
-/** Largest file, in MiB: the engine's memory is the browser's. */
+/** Largest size of all files, in MiB: the engine's memory is the browser's. */
 const MOST_MIB = 64;
 
-/** The panel. `control` receives a plant file's text to be controlled. */
+/** The panel. `control` receives a plant file's text to be controlled, `simulate` the CSV of an experiment to be simulated. */
 export class RecordPanel {
   #engine = new Engine();
-  #file;
+  /** [{ name, bytes }], records of one spring. */
+  #files = [];
   #control;
+  #plan;
   #clock;
+  /** The command that is computed, and whether its best answer so far was asked for. */
+  #command;
+  #stopping = false;
+  #drawn = [];
+  #units = [];
 
-  constructor(control) {
+  constructor(control, simulate) {
     this.#control = control;
+    this.#plan = new PlanPanel(this.#engine, simulate);
     byId("file").addEventListener("change", ({ target }) => {
-      if (target.files[0]) this.#open(target.files[0]);
-      // The same file may be chosen again after it has changed.
+      if (target.files.length) this.#open([...target.files]);
+      // The same files may be chosen again after they have changed.
       target.value = "";
     });
     // Anywhere on the page: beside the field a browser would open the file instead.
@@ -27,12 +36,13 @@ export class RecordPanel {
       document.addEventListener(kind, (event) => {
         event.preventDefault();
         byId("drop").classList.toggle("over", kind === "dragover");
-        if (kind === "drop" && event.dataTransfer.files[0]) this.#open(event.dataTransfer.files[0]);
+        if (kind === "drop" && event.dataTransfer.files.length) this.#open([...event.dataTransfer.files]);
       });
     }
     byId("diagnose").addEventListener("click", () => this.#run("diagnose"));
     byId("identify").addEventListener("click", () => this.#run("identify"));
-    byId("cancel").addEventListener("click", () => this.#engine.cancel());
+    byId("cancel").addEventListener("click", () => this.#cancel());
+    byId("shown-record").addEventListener("change", () => this.#draw());
     byId("save-diagnosis").addEventListener("click", () =>
       save(byId("diagnosis-json").dataset.name, `${byId("diagnosis-json").textContent}\n`, "application/json"));
     byId("save-plant").addEventListener("click", () => save("plant.toml", byId("plant-text").textContent));
@@ -40,22 +50,40 @@ export class RecordPanel {
     this.#busy(false);
   }
 
-  async #open(file) {
-    if (file.size > MOST_MIB * 2 ** 20) return this.#refuse(`${file.name}: larger than ${MOST_MIB} MiB; \`vsj diagnose\` reads it`);
-    this.take(file.name, await file.arrayBuffer());
+  async #open(files) {
+    const size = files.reduce((sum, file) => sum + file.size, 0);
+    const names = files.map(({ name }) => name).join(", ");
+    if (size > MOST_MIB * 2 ** 20) return this.#refuse(`${names}: larger than ${MOST_MIB} MiB; \`vsj diagnose\` reads more`);
+    this.take(await Promise.all(files.map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() }))));
   }
 
-  /** Takes the bytes of a file as the record. */
-  take(name, bytes) {
-    this.#file = { name, bytes };
-    byId("file-name").textContent = `${name}, ${digits(bytes.byteLength / 1024, 3)} KiB`;
+  /** Takes the bytes of files as the records: [{ name, bytes }]. */
+  take(files) {
+    this.#files = files;
+    const listed = files.map(({ name, bytes }) => `${name}, ${digits(bytes.byteLength / 1024, 3)} KiB`);
+    byId("file-name").textContent = listed.join("; ");
     byId("record-error").textContent = "";
     this.#busy(false);
   }
 
-  /** Diagnoses the record. */
+  /** Adds a record of the same spring; `name` is made different from the names that are there. */
+  add(name, bytes) {
+    const names = this.#files.map((file) => file.name);
+    let free = name;
+    for (let count = 2; names.includes(free); count += 1) free = name.replace(".", `-${count}.`);
+    this.take([...this.#files, { name: free, bytes }]);
+  }
+
+  /** Diagnoses the records. */
   diagnose() {
     return this.#run("diagnose");
+  }
+
+  /** Asks for the best answer so far; if it was asked for, or if there is none, ends the work. */
+  #cancel() {
+    if (this.#stopping || this.#command !== "diagnose" || !this.#engine.stop()) return this.#engine.cancel();
+    this.#stopping = true;
+    byId("record-status").textContent = "Ending the search with its best answer so far. Cancel ends it without an answer.";
   }
 
   #request(command) {
@@ -63,7 +91,7 @@ export class RecordPanel {
     const plant = byId("nominal").value === "panel" ? spring() : byId("nominal").value;
     return {
       command,
-      name: this.#file.name,
+      files: this.#files.map(({ name, bytes }) => ({ name, length: bytes.byteLength })),
       time: text("time-column"),
       voltage: text("voltage-column"),
       reading: text("reading-column"),
@@ -75,7 +103,7 @@ export class RecordPanel {
   }
 
   #busy(busy) {
-    byId("diagnose").disabled = byId("identify").disabled = busy || !this.#file;
+    byId("diagnose").disabled = byId("identify").disabled = busy || !this.#files.length;
     byId("cancel").disabled = !busy;
     byId("progress").hidden = !busy;
     document.body.dataset.record = busy ? "running" : "idle";
@@ -88,17 +116,20 @@ export class RecordPanel {
   }
 
   async #run(command) {
+    const names = this.#files.map(({ name }) => name).join(", ");
+    [this.#command, this.#stopping] = [command, false];
     byId("record-error").textContent = "";
     byId("found").hidden = true;
-    byId("record-status").textContent = `${command === "diagnose" ? "Diagnosing" : "Identifying"} ${this.#file.name}.`;
+    byId("record-status").textContent = `${command === "diagnose" ? "Diagnosing" : "Identifying"} ${names}.`;
     byId("so-far").textContent = "";
     this.#busy(true);
     const onProgress = ({ causes }) => (byId("so-far").textContent = `So far: ${causes || "no cause"}.`);
     try {
-      const found = await this.#engine.ask(this.#request(command), { file: this.#file.bytes, onProgress });
+      const files = await new Blob(this.#files.map(({ bytes }) => bytes)).arrayBuffer();
+      const found = await this.#engine.ask(this.#request(command), { files, onProgress });
       this.#show(command, found);
     } catch (error) {
-      if (error instanceof Cancelled) byId("record-status").textContent = "Cancelled.";
+      if (error instanceof Cancelled) byId("record-status").textContent = `Cancelled. ${byId("so-far").textContent}`.trim();
       else this.#refuse(error.message);
     }
     this.#busy(false);
@@ -109,7 +140,7 @@ export class RecordPanel {
     byId("record-status").textContent = "";
   }
 
-  #show(command, { json, remarks, plant, units, curves }) {
+  #show(command, { json, remarks, plant, units, records }) {
     const report = JSON.parse(json);
     byId("diagnosis-json").textContent = json;
     byId("diagnosis-json").dataset.name = command === "diagnose" ? "diagnosis.json" : "identify.json";
@@ -117,27 +148,36 @@ export class RecordPanel {
     const parts = command === "diagnose" ? diagnosis(report) : identification(report);
     byId("answer").replaceChildren(...parts, ...remarks.map((remark) => html("p", { class: "small" }, remark)));
     byId("found").hidden = false;
-    draw(Object.fromEntries(curves), units, Boolean(report.findings?.length));
+    byId("shown-record").replaceChildren(...records.map(({ name }, index) => html("option", { value: index }, name)));
+    byId("which-record").hidden = records.length < 2;
+    // Without a cause the extended model is the nominal one.
+    const extended = report.findings?.length || command === "identify";
+    this.#drawn = records.map(({ curves }) => Object.fromEntries(curves.filter(([name]) => extended || name !== "extended")));
+    this.#units = units;
+    this.#draw();
+    this.#plan.offer(command === "diagnose" ? json : undefined);
     const identified = `Identified from ${report.rows} rows: held-out error ${digits(report.held_out_rmse)} ${report.unit}.`;
     byId("record-status").textContent = command === "diagnose" ? sentence(report) : identified;
   }
-}
-
-function draw(curves, [time, voltage, reading], extended) {
-  const models = [
-    { name: "nominal", colour: COLOUR.before, curve: curves.nominal },
-    { name: "extended", colour: COLOUR.after, curve: extended ? curves.extended : undefined },
-    { name: "model", colour: COLOUR.after, curve: curves.model },
-  ].filter(({ curve }) => curve);
-  const x = `time [${time}]`;
-  show(byId("record-plot"), {
-    title: "Readings and models", x, y: `reading [${reading}]`,
-    series: [{ name: "reading", colour: COLOUR.reading, curve: curves.reading, wide: true }, ...models],
-  });
-  show(byId("command-plot"), {
-    title: "Commanded voltage", x, y: `voltage [${voltage}]`,
-    series: [{ name: "commanded", colour: COLOUR.target, curve: curves.voltage }],
-  });
+  /** Draws the record that is chosen. */
+  #draw() {
+    const curves = this.#drawn[byId("shown-record").value];
+    const [time, voltage, reading] = this.#units;
+    const models = [
+      { name: "nominal", colour: COLOUR.before, curve: curves.nominal },
+      { name: "extended", colour: COLOUR.after, curve: curves.extended },
+      { name: "model", colour: COLOUR.after, curve: curves.model },
+    ].filter(({ curve }) => curve);
+    const x = `time [${time}]`;
+    show(byId("record-plot"), {
+      title: "Readings and models", x, y: `reading [${reading}]`,
+      series: [{ name: "reading", colour: COLOUR.reading, curve: curves.reading, wide: true }, ...models],
+    });
+    show(byId("command-plot"), {
+      title: "Commanded voltage", x, y: `voltage [${voltage}]`,
+      series: [{ name: "commanded", colour: COLOUR.target, curve: curves.voltage }],
+    });
+  }
 }
 
 /** A size with its unit and 95 % interval. */
@@ -150,7 +190,8 @@ function sizes(parameters) {
 }
 
 /** The verdict, and what the causes improve. */
-function sentence({ verdict, findings, baseline, extended }) {
+function sentence({ verdict, findings, baseline, extended, complete }) {
+  if (!complete) return `Ended early: the best answer so far. ${sentence({ verdict, findings, baseline, extended, complete: true })}`;
   if (!findings.length) return `Verdict: ${verdict}. No cause was found; held-out error ${digits(baseline.held_out_rmse)}.`;
   const [before, after] = [baseline, extended].map(({ held_out_rmse }) => digits(held_out_rmse));
   const causes = findings.map(({ cause }) => cause).join(", ");
@@ -158,7 +199,7 @@ function sentence({ verdict, findings, baseline, extended }) {
 }
 
 function diagnosis(report) {
-  const { findings, suspects, alternatives, next_experiment, leftover } = report;
+  const { findings, suspects, alternatives, records = [], next_experiment, leftover } = report;
   const parts = [];
   if (findings.length) {
     const names = ["cause", "probability", "size [95 % interval]", "error before", "after"];
@@ -171,6 +212,10 @@ function diagnosis(report) {
     ]);
     parts.push(table(["suspect", "size [95 % interval]", "error before", "after"], rows, "Suspects: they explain a part, without being shown"));
   }
+  if (records.length) {
+    const names = ["record", "rows", "zero offset", "noise", "error", "in this record only"];
+    parts.push(table(names, records.map(recordRow), "Each record has its own zero, start and noise"));
+  }
   if (alternatives.length) parts.push(html("p", {}, `As likely: ${alternatives.map((set) => set.join(" and ")).join("; ")}.`));
   if (leftover) parts.push(html("p", {}, `${leftover}.`));
   if (next_experiment) parts.push(html("p", {}, `Next experiment: ${next_experiment}.`));
@@ -181,6 +226,13 @@ function causeRow({ cause, probability, parameters, rmse_before, rmse_after }) {
   return [
     { text: cause, class: "cause" }, digits(probability, 3), { text: sizes(parameters), class: "" }, digits(rmse_before), digits(rmse_after),
   ];
+}
+
+function recordRow({ name, rows, offset, sigma, rmse, findings, leftover }) {
+  const faults = findings.map(({ cause, parameters }) => `${cause} (${sizes(parameters)})`);
+  if (leftover) faults.push(`unexplained: ${leftover}`);
+  const only = { text: faults.join("; ") || "none", class: "" };
+  return [{ text: name, class: "cause" }, String(rows), digits(offset), digits(sigma), digits(rmse), only];
 }
 
 function identification({ nominal }) {

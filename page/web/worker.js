@@ -1,8 +1,16 @@
-// Runs the WebAssembly: one request at a time, whose file and answer are bytes in its memory.
+// Runs the WebAssembly: one request at a time, whose files and answer are bytes in its memory.
+
+/** Time between two looks for messages, in ms. */
+const LOOK_MS = 100;
+/** Whether this browser can suspend WebAssembly, so that messages arrive while a request is computed. */
+const SUSPENDS = "Suspending" in WebAssembly;
 
 /** @type {WebAssembly.Exports} */
 let engine;
+/** The request that is computed, the one whose best answer so far is wanted, and the time of the last look for messages. */
 let current = 0;
+let wanted;
+let looked = 0;
 
 const encoder = new TextEncoder();
 const decoder = new TextDecoder();
@@ -19,6 +27,13 @@ function give(bytes) {
   return address;
 }
 
+/** Lets messages arrive; returns whether the best answer so far is wanted. */
+async function look() {
+  await new Promise((resolve) => setTimeout(resolve));
+  looked = performance.now();
+  return wanted === current ? 1 : 0;
+}
+
 /** Instantiates the engine from its gzip-compressed bytes in base 64. */
 async function start(base64) {
   const packed = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
@@ -27,16 +42,19 @@ async function start(base64) {
   const page = {
     progress: (address, length) =>
       postMessage({ id: current, progress: JSON.parse(textAt(address, length)) }),
+    due: () => (SUSPENDS && performance.now() - looked > LOOK_MS ? 1 : 0),
+    look: SUSPENDS ? new WebAssembly.Suspending(look) : () => 0,
     panicked: (address, length) => postMessage({ id: current, panicked: textAt(address, length) }),
   };
   const { instance } = await WebAssembly.instantiate(bytes, { page });
   engine = instance.exports;
 }
 
-/** Answers one request; returns the parsed answer. */
-function call(request, file) {
+/** Computes one request; returns the parsed answer. */
+async function call(request, files) {
   const bytes = encoder.encode(JSON.stringify(request));
-  const packed = engine.page_call(give(bytes), bytes.length, give(file), file.length);
+  const compute = SUSPENDS ? WebAssembly.promising(engine.page_call) : engine.page_call;
+  const packed = await compute(give(bytes), bytes.length, give(files), files.length);
   const [address, length] = [Number(packed >> 32n), Number(packed & 0xffffffffn)];
   const text = textAt(address, length);
   engine.page_free(address, length);
@@ -44,17 +62,20 @@ function call(request, file) {
 }
 
 let started;
+let last = Promise.resolve();
 
-onmessage = async ({ data }) => {
+async function answer({ id, request, files }) {
   try {
-    if (data.base64) {
-      started = start(data.base64);
-      return;
-    }
     await started;
-    current = data.id;
-    postMessage({ id: data.id, answer: call(data.request, new Uint8Array(data.file)) });
+    current = id;
+    postMessage({ id, answer: await call(request, new Uint8Array(files)) });
   } catch (error) {
-    postMessage({ id: data.id, failed: String(error) });
+    postMessage({ id, failed: String(error) });
   }
+}
+
+onmessage = ({ data }) => {
+  if (data.base64) started = start(data.base64);
+  else if (data.stop) wanted = data.stop;
+  else last = last.then(() => answer(data));
 };

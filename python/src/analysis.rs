@@ -1,5 +1,6 @@
 //! Identification, diagnosis and plan: records in, the command's JSON out, with the courses over time that it does not contain.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use ::identify::plan::{Basis, Request};
@@ -109,7 +110,7 @@ pub(crate) fn diagnose<'py>(
     let stop = deadline(within).map_err(crate::error::exception)?;
     let answer = interrupt::run(py, &stop.clone(), move || {
         let effort: Effort = effort.parse()?;
-        let records = options.open(&records)?;
+        let mut records = options.open(&records)?;
         let rows = records.rows();
         rows.iter().try_for_each(|record| records.input.check(record))?;
         let units = records.measured[0].units.clone();
@@ -122,6 +123,7 @@ pub(crate) fn diagnose<'py>(
             Plant::Text((name, text)) => (name.clone(), plant_file::parse_for_host(&name, &text)?, None),
         };
         let options = Options { plant, units, input: records.input, base: Base::new(file)?, effort, linear, stop };
+        records.remarks.extend(options.remark());
         let found = examine_several(&rows, &options, |_| {})?;
         let json = serde_json::to_string(&found.report)?;
         let plant = plant_text(&found.plant, &records)?;
@@ -134,11 +136,10 @@ pub(crate) fn diagnose<'py>(
 /// The courses of a diagnosis, one for each record with its own times.
 fn courses(found: &Diagnosis, records: &Records) -> Vec<(String, Course)> {
     let data = &found.data;
-    let places: Vec<(usize, f64)> = (0..data.rows()).map(|row| data.place(row)).collect();
     let less = |residual: &[f64]| -> Vec<f64> {
         data.reading.iter().zip(residual).map(|(reading, left)| reading - left).collect()
     };
-    let time_s: Vec<f64> = places.iter().map(|(_, time_s)| *time_s).collect();
+    let time_s: Vec<f64> = (0..data.rows()).map(|row| data.place(row).1).collect();
     let columns: [(&str, &[f64]); 9] = [
         ("time_s", &time_s),
         ("voltage_v", &data.voltage_v),
@@ -150,13 +151,11 @@ fn courses(found: &Diagnosis, records: &Records) -> Vec<(String, Course)> {
         ("baseline_held_out", &found.held_out[0]),
         ("held_out", &found.held_out[1]),
     ];
-    let of_record = |(index, measured): (usize, &MeasuredRecord)| {
-        let of = |values: &[f64]| -> Vec<f64> {
-            values.iter().zip(&places).filter(|(_, (record, _))| *record == index).map(|(value, _)| *value).collect()
-        };
+    let of_record = |(rows, measured): (Range<usize>, &MeasuredRecord)| {
+        let of = |values: &[f64]| values.get(rows.clone()).unwrap_or_default().to_vec();
         (measured.record.name.clone(), columns.iter().map(|(name, values)| (*name, of(values))).collect())
     };
-    records.measured.iter().enumerate().map(of_record).collect()
+    data.rows_of_records().into_iter().zip(&records.measured).map(of_record).collect()
 }
 
 /// A stop after `within` seconds.

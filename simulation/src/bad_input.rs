@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use anyhow::Result;
+use model::OutOfRange;
 
 /// Largest number of characters of a quoted text that a message shows.
 const MOST_SHOWN: usize = 40;
@@ -19,6 +20,13 @@ impl fmt::Display for BadInput {
 }
 
 impl std::error::Error for BadInput {}
+
+impl From<OutOfRange> for BadInput {
+    /// The message of a setting that the model rejects: field, value and allowed range.
+    fn from(error: OutOfRange) -> Self {
+        Self(error.to_string())
+    }
+}
 
 /// Returns early with a [`BadInput`] made from a format string.
 #[macro_export]

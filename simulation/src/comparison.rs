@@ -47,13 +47,13 @@ pub struct AtLimit {
 /// The responses to one change of the target.
 #[derive(Clone, Debug, Serialize)]
 pub struct Step {
-    /// Without a controller: the target is the voltage.
+    /// Response without a controller, where the target is the voltage.
     pub none: Response,
-    /// With the report's proportional-integral controller.
+    /// Response with the report's proportional-integral controller.
     pub paper: Response,
-    /// With the time-optimal controller.
+    /// Response with the time-optimal controller.
     pub fast: Response,
-    /// With the robust controller, if it was asked for.
+    /// Response with the robust controller; `None` if no margin was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robust: Option<Response>,
 }
@@ -144,7 +144,7 @@ fn on_spring<P: HasReference>(experiment: &Experiment<P>, (actual, sensor_noise_
     let interval_s = 1.0 / rate_hz;
     let feedback = sensor_noise_v.map(|noise_v| Feedback { noise_v, interval_s, ..Feedback::TYPICAL });
     let settings = Settings { feedback, ..*settings };
-    let config = settings.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
+    let config = settings.validate().map_err(BadInput::from)?.quantize();
     let with = actual.closed_loop(&config, &experiment.targets()?, interval_s, sensor_noise_v)?;
     let run = Run { start_s: schedule.start_s(), rate_hz, with, without: Vec::new() };
     let changes = schedule.changes();

@@ -38,8 +38,8 @@ impl<P: HasReference> Experiment<P> {
     pub fn run(&self, mut progress: impl FnMut(usize, usize)) -> Result<Run> {
         let rate_hz = self.settings.rate_hz;
         let uncontrolled = Settings { compensation: Compensation::None, ..self.settings };
-        let controlled = self.settings.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
-        let alone = uncontrolled.validate().map_err(|error| BadInput(error.to_string()))?.quantize();
+        let controlled = self.settings.validate().map_err(BadInput::from)?.quantize();
+        let alone = uncontrolled.validate().map_err(BadInput::from)?.quantize();
         let targets = self.targets()?;
         let ticks = targets.len();
         let mut run = Run { start_s: self.schedule.start_s(), rate_hz, with: Vec::new(), without: Vec::new() };
@@ -96,7 +96,7 @@ pub fn one_loop<E: Estimator>(
         if tick % 8192 == 0 {
             progress(tick);
         }
-        let target = Volts::new(target).map_err(|error| BadInput(error.to_string()))?;
+        let target = Volts::new(target).map_err(BadInput::from)?;
         let Output { code, applied, stiffness, limits, .. } =
             config.tick(&mut state, Input { target, ..Input::default() });
         samples.push(Sample { code, applied, stiffness, limits, reference: 0.0 });

@@ -18,9 +18,9 @@ use crate::schedule::{Change, Schedule};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StartsFrom {
-    /// Settled at the old target.
+    /// The spring is settled at the old target.
     Settled,
-    /// As the loop has left it.
+    /// The spring is in the state to which the loop has brought it.
     Reached,
 }
 

@@ -16,15 +16,14 @@ use crate::bad_input::BadInput;
 /// [`BadInput`] for a spring that the tick rejects at this rate, voltages beyond +-2000 V, and times that do not
 /// increase.
 pub fn simulate(spring: &impl Model, rate_hz: f64, time_s: &[f64], voltage_v: &[f64]) -> Result<Vec<f64>> {
-    let refused = |error: model::OutOfRange| BadInput(error.to_string());
-    let sample_time = SampleTime::from_rate(rate_hz).map_err(refused)?;
-    let config = spring.validate(sample_time).map_err(refused)?.quantize();
+    let sample_time = SampleTime::from_rate(rate_hz).map_err(BadInput::from)?;
+    let config = spring.validate(sample_time).map_err(BadInput::from)?.quantize();
     let start = time_s.first().copied().unwrap_or(0.0);
     let mut state = Default::default();
     let mut tick = 0;
     let mut stiffness = Vec::with_capacity(time_s.len());
     for (row, (&time, &voltage)) in time_s.iter().zip(voltage_v).enumerate() {
-        let applied = Volts::new(voltage).map_err(refused)?;
+        let applied = Volts::new(voltage).map_err(BadInput::from)?;
         let next = time_s.get(row + 1).copied().unwrap_or(time);
         if next < time || next.is_nan() {
             bad_input!("time_s = {next} after {time}; expected increasing times");

@@ -53,7 +53,7 @@ pub struct PlantFile {
     /// Limits of the amplifier with which the record was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub amplifier: Option<Amplifier>,
-    /// Oscillations beside the relaxation; the tick takes them as instantaneous.
+    /// Oscillations in parallel with the relaxation; the tick takes them as instantaneous.
     #[serde(rename = "mode", default, skip_serializing_if = "Vec::is_empty")]
     pub modes: Vec<Mode>,
     /// Effects that the tick does not simulate, kept unchanged.
@@ -250,6 +250,12 @@ impl PlantFile {
         wire.ok_or(OutOfRange { field: "lists", value: f64::NAN, lowest: 0.0, highest: 9.0, unit: "numbers" })
     }
 
+    fn check_schema(&self) -> Result<(), OutOfRange> {
+        let (value, unit) = (f64::from(self.schema), "as version of the format");
+        let refused = OutOfRange { field: "schema", value, lowest: 1.0, highest: 1.0, unit };
+        if self.schema == 1 { Ok(()) } else { Err(refused) }
+    }
+
     /// Checks whether the tick can run the spring at 10 kHz; at a lower rate a short time constant may still be
     /// rejected.
     ///
@@ -257,9 +263,7 @@ impl PlantFile {
     /// [`OutOfRange`] with table and field as named in the file, and the allowed range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         let refused = |field, value, lowest, highest, unit| Err(OutOfRange { field, value, lowest, highest, unit });
-        if self.schema != 1 {
-            return refused("schema", f64::from(self.schema), 1.0, 1.0, "as version of the format");
-        }
+        self.check_schema()?;
         let sample_time = SampleTime::from_rate(10_000.0)?;
         match self.extended().plain() {
             Some(plant) => plant.check(sample_time).map_err(|error| match error.field {
@@ -290,9 +294,7 @@ impl PlantFile {
         const ANY: f64 = f64::MAX;
         const POSITIVE: f64 = f64::MIN_POSITIVE;
         let refused = |field, value, lowest, highest, unit| Err(OutOfRange { field, value, lowest, highest, unit });
-        if self.schema != 1 {
-            return refused("schema", f64::from(self.schema), 1.0, 1.0, "as version of the format");
-        }
+        self.check_schema()?;
         let Relaxation { share, tau_s, weights, tau_high_s, tau_high_at_v } = &self.relaxation;
         let some = |value: &Option<f64>| value.iter().copied().collect::<Vec<_>>();
         let reading = self.reading.unwrap_or_default();
@@ -303,7 +305,7 @@ impl PlantFile {
         let of_modes = |of: fn(&Mode) -> f64| self.modes.iter().map(of).collect::<Vec<f64>>();
         let of_leakage = |of: fn(&Leakage) -> f64| leakage.map(of).into_iter().collect::<Vec<f64>>();
         for (field, values, lowest, highest, unit) in [
-            ("relaxation.share", vec![*share], 0.0, 1.0, ""),
+            ("relaxation.share", vec![*share], -ANY, ANY, ""),
             ("relaxation.tau_s", tau_s.clone(), POSITIVE, ANY, "s"),
             ("relaxation.weights", weights.clone(), -ANY, ANY, ""),
             ("relaxation.tau_high_s", some(tau_high_s), POSITIVE, ANY, "s"),
@@ -484,7 +486,7 @@ fn parse_checked(name: &str, text: &str, check: Check) -> Result<PlantFile> {
     }
     if let Err(error) = check(&file) {
         let at = place::of_field(text, error.field, error.value);
-        // The position already tells the table.
+        // The position already shows the table.
         let field = error.field.rsplit('.').next().unwrap_or(error.field);
         bad_input!("{}: {}", place::line_and_column(name, text, at), OutOfRange { field, ..error });
     }

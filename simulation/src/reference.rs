@@ -46,7 +46,7 @@ pub struct Solution {
     sample_s: f64,
     /// Exact transition over one sample with `u = c`: rows for `w` and `z`, columns for `w`, `z`, target and slope.
     whole: [[f64; 4]; 2],
-    /// The same transition for two samples at a time.
+    /// Exact transition over two samples, for the SIMD kernel.
     kernel: Kernel,
     w: f64,
     z: f64,

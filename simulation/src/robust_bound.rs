@@ -71,7 +71,7 @@ impl<'a> RobustBound<'a> {
             ("[memory]", file.memory.is_some()),
             ("[law]", file.law.is_some()),
             ("[leakage]", file.leakage.is_some()),
-            ("[[modes]]", !file.modes.is_empty()),
+            ("[[mode]]", !file.modes.is_empty()),
             ("tau_high_s", file.relaxation.tau_high_s.is_some()),
         ] {
             if has {

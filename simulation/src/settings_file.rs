@@ -240,6 +240,11 @@ impl From<&WireSettings> for SettingsFile {
     }
 }
 
+/// The values of keys, and those of `otherwise` for keys that the file does not have.
+fn over<const N: usize>(keys: [Option<f64>; N], otherwise: [f64; N]) -> [f64; N] {
+    std::array::from_fn(|index| keys[index].unwrap_or(otherwise[index]))
+}
+
 impl Sensor {
     /// The values in the order of [`model::Feedback::values`].
     fn values_mut(&mut self) -> [&mut Option<f64>; 8] {
@@ -253,11 +258,7 @@ impl Sensor {
         if !self.enabled.unwrap_or(*self != Self::default() || built_in.is_some()) {
             return None;
         }
-        let mut values = built_in.unwrap_or(model::Feedback::TYPICAL.values());
-        for (value, key) in values.iter_mut().zip(self.clone().values_mut()) {
-            *value = key.unwrap_or(*value);
-        }
-        Some(values)
+        Some(over(self.clone().values_mut().map(|key| *key), built_in.unwrap_or(model::Feedback::TYPICAL.values())))
     }
 }
 
@@ -265,11 +266,7 @@ impl Margin {
     /// The margin: the values of the file, else the built-in ones, else the typical ones.
     fn over(&self, built_in: Option<[f64; 4]>) -> [f64; 4] {
         let Self { time_constant, share, gain, overshoot } = *self;
-        let mut values = built_in.unwrap_or(model::Margin::TYPICAL.values());
-        for (value, key) in values.iter_mut().zip([time_constant, share, gain, overshoot]) {
-            *value = key.unwrap_or(*value);
-        }
-        values
+        over([time_constant, share, gain, overshoot], built_in.unwrap_or(model::Margin::TYPICAL.values()))
     }
 }
 

@@ -46,11 +46,11 @@ impl Parameter {
 /// Relative differences of the spring's parameters from the model's, above -1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SpringError {
-    /// Of the instantaneous share.
+    /// Relative difference of the instantaneous share.
     pub share: f64,
-    /// Of all time constants.
+    /// Relative difference of all time constants.
     pub time_constant: f64,
-    /// Of the gain of the whole response.
+    /// Relative difference of the gain of the whole response.
     pub gain: f64,
 }
 
@@ -128,7 +128,7 @@ impl DifferingSpring {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let stiffness = |volts: f64| ScaledStiffness(Signal::saturating_from_num(volts));
         let tick = |&target: &f64| {
-            let target = Volts::new(target).map_err(|error| BadInput(error.to_string()))?;
+            let target = Volts::new(target).map_err(BadInput::from)?;
             let measured = sensor_noise_v.and_then(|noise_v| {
                 let noise: f64 = StandardNormal.sample(&mut random);
                 Reading::fresh(stiffness(self.gain * spring.stiffness(&at) + noise_v * noise))

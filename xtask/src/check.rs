@@ -9,7 +9,7 @@ const STEPS: &[Step] = &[
     Step::new("format", &["fmt", "--all", "--check"]),
     Step::new("lint", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),
     Step::new("test", &["test", "--workspace", "--lib", "--bins"]),
-    Step::new("doc test", &["test", "-p", "model", "--doc"]),
+    Step::new("doc test", &["test", "-p", "vsj-model", "--doc"]),
 ];
 
 /// The steps for `--help`.

@@ -26,10 +26,10 @@ const SECTIONS: [(&str, &[Source]); 6] = [
             Test("formats", &["test", "--release", "-p", "end-to-end", "--test", "fuzz"]),
             Test("hostile", &["test", "--release", "-p", "end-to-end", "--test", "hostile"]),
             Command("fuzz", "cargo xtask fuzz"),
-            Test("frames", &["test", "-p", "link", "--test", "damaged"]),
+            Test("frames", &["test", "-p", "vsj-link", "--test", "damaged"]),
         ],
     ),
-    ("pairs of state and event", &[Test("pairs", &["test", "-p", "model", "--lib", "every_state_and_event"])]),
+    ("pairs of state and event", &[Test("pairs", &["test", "-p", "vsj-model", "--lib", "every_state_and_event"])]),
     (
         "faults injected",
         &[

@@ -19,8 +19,8 @@ const TOOL: Tool = Tool { name: "cargo-mutants", version: "26.0.0" };
 const LEAST_CAUGHT: f64 = 0.95;
 /// The list of changes that live.
 const SURVIVORS: &str = ".cargo/mutants-survivors.toml";
-/// The packages whose tests run on a host and that the MCU runs.
-const PACKAGES: [&str; 3] = ["model", "link", "firmware"];
+/// The folders of the packages whose tests run on a host and that the MCU runs, and their names.
+const PACKAGES: [(&str, &str); 3] = [("model", "vsj-model"), ("link", "vsj-link"), ("firmware", "firmware")];
 
 /// Arguments of `cargo test` in each pass. The first pass leaves out the unit tests that need most of the time.
 const PASSES: [&[&str]; 2] = [
@@ -32,7 +32,7 @@ const PASSES: [&[&str]; 2] = [
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Package whose code is changed; all three without it
-    #[arg(long, value_parser = PACKAGES)]
+    #[arg(long, value_parser = PACKAGES.map(|(folder, _)| folder))]
     package: Vec<String>,
     /// Only in files that match this pattern, for example 'model/src/extended/*'
     #[arg(long, value_name = "PATTERN")]
@@ -49,14 +49,11 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let program = TOOL.program()?;
     let listed = listed()?;
-    let packages: Vec<&str> = match args.package.as_slice() {
-        [] => PACKAGES.to_vec(),
-        some => some.iter().map(String::as_str).collect(),
-    };
+    let asked = |folder: &str| args.package.is_empty() || args.package.iter().any(|package| package == folder);
     let folder = shell::target_directory()?.join("mutants");
     let (mut all, mut unlisted) = (Counts::default(), Vec::new());
     let mut living = BTreeSet::new();
-    for package in &packages {
+    for (package, name) in PACKAGES.into_iter().filter(|(folder, _)| asked(folder)) {
         let out = folder.join(package);
         fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
         if args.iterate {
@@ -64,7 +61,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             keep(&out, true)?;
         }
         for (tests, iterate) in PASSES.into_iter().zip([args.iterate, true]) {
-            try_changes(&program, args, package, tests, iterate, &out)?;
+            try_changes(&program, args, name, tests, iterate, &out)?;
             keep(&out, iterate)?;
         }
         let outcomes = Outcomes::read(&out)?;

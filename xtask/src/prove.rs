@@ -32,7 +32,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     theorems.arg("model/proof/theorems.py").args(args.verbose.then_some("-v"));
     print!("{}", shell::output(&mut theorems)?);
 
-    shell::run(shell::cargo().args(["build", "--quiet", "--release", "-p", "model", "--example", "trace"]))?;
+    shell::run(shell::cargo().args(["build", "--quiet", "--release", "-p", "vsj-model", "--example", "trace"]))?;
     let numbers = [args.seed, args.ticks / TICKS_EACH, TICKS_EACH].map(|number| number.to_string());
     let mut trace = shell::command(target.join("release/examples/trace"));
     let mut trace = trace.args(&numbers).stdout(Stdio::piped()).spawn().context("cannot start the trace")?;

@@ -13,7 +13,7 @@ use crate::nightly;
 const CASES: &str = "4";
 
 /// Packages with the code of the control tick and of the link; the integration tests of `model` are all long.
-const INTERPRETED: &[&[&str]] = &[&["-p", "link"], &["-p", "model", "--lib"], &["-p", "firmware", "--lib"]];
+const INTERPRETED: &[&[&str]] = &[&["-p", "vsj-link"], &["-p", "vsj-model", "--lib"], &["-p", "firmware", "--lib"]];
 
 /// Arguments of `cargo xtask sanitize`.
 #[derive(clap::Args)]
@@ -40,7 +40,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         nightly::install("rust-src")?;
         let host = host()?;
         let mut command = nightly::cargo();
-        command.args(["test", "-p", "model", "-p", "link", "-p", "firmware", "--tests", "--target", &host]);
+        command.args(["test", "-p", "vsj-model", "-p", "vsj-link", "-p", "firmware", "--tests", "--target", &host]);
         command.env("RUSTFLAGS", "-Zsanitizer=address").env("CARGO_TARGET_DIR", target.join("sanitize"));
         shell::run(&mut command)?;
     }

@@ -29,6 +29,7 @@ const LANES: Lanes = Lanes {
         Step::xtask("package", &["python", "--only", "install"]),
     ],
     built: &[
+        Step::new("publish", &["package", "--quiet", "--offline", "--allow-dirty", "-pvsj-model", "-pvsj-link"]),
         Step::xtask("python", &["python", "--only", "test"]),
         Step::emulation("firmware", &["proof"]),
         Step::emulation("boot", &["boot"]),

@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use rand::RngExt;
 
 use super::chain::{Chain, Lag, Stage};
-use super::form::{Draw, Form};
+use super::draw::Draw;
+use super::form::Form;
 use crate::cause::Cause;
 
 /// Forms of delay, amplifier limit and amplifier slew.
@@ -93,14 +94,14 @@ pub const FORMS: [Form; 9] = [
     },
 ];
 
-/// Commands at time t arrive after `delay(t)` s, in their order.
-fn delayed(mut delay: impl FnMut(f64) -> f64 + 'static) -> Stage {
+/// Commands arrive in their order, after `delay(time in s, change in V)` s.
+pub(crate) fn delayed(mut delay: impl FnMut(f64, f64) -> f64 + 'static) -> Stage {
     let mut on_the_way: VecDeque<(f64, f64)> = VecDeque::new();
     let (mut last, mut at) = (0.0, 0.0);
     Box::new(move |command, now| {
         if command != last {
             let earliest = on_the_way.back().map_or(0.0, |&(arrival, _)| arrival);
-            on_the_way.push_back(((now.t + delay(now.t)).max(earliest), command));
+            on_the_way.push_back(((now.t + delay(now.t, command - last)).max(earliest), command));
             last = command;
         }
         while let Some((_, voltage)) = on_the_way.pop_front_if(|&mut (arrival, _)| arrival <= now.t + 1e-9) {
@@ -114,18 +115,18 @@ fn jitter(draw: &mut Draw) -> Chain {
     let least = (draw.every_s * draw.between(1.2, 3.0)).max(0.05);
     let spread = draw.every_s * draw.between(1.0, 3.0);
     let mut random = draw.random.clone();
-    Chain::before(delayed(move |_| least + spread * random.random_range(0.0..1.0)))
+    Chain::before(delayed(move |_, _| least + spread * random.random_range(0.0..1.0)))
 }
 
 fn two_clocks(draw: &mut Draw) -> Chain {
     let (first, last) = (draw.every_s * draw.between(0.5, 1.5), draw.every_s * draw.between(4.0, 7.0));
     let duration = draw.duration_s;
-    Chain::before(delayed(move |t| first + (last - first) * t / duration))
+    Chain::before(delayed(move |t, _| first + (last - first) * t / duration))
 }
 
 fn slow_update(draw: &mut Draw) -> Chain {
     let period = draw.every_s * draw.between(2.5, 6.0);
-    Chain::before(delayed(move |t| (t / period).ceil() * period - t))
+    Chain::before(delayed(move |t, _| (t / period).ceil() * period - t))
 }
 
 fn limit(draw: &mut Draw) -> f64 {

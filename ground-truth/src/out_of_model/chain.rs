@@ -4,8 +4,14 @@
 
 use std::fmt::{self, Debug};
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::noise::Noise;
 use crate::physics::{SHARE, TAU_S};
+use crate::record::LabelledRecord;
 use crate::schedule::Schedule;
+use crate::sensor::Readings;
 
 /// Time at which a stage is evaluated.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +73,20 @@ impl Chain {
             through(&mut self.spring, voltage, Now { t, dt: 0.0 })
         };
         schedule.rows().map(row).collect()
+    }
+
+    /// Record of this chain in 0.2 % white noise of the seed `seed`. It has no effects; its `expected` readings are those before the
+    /// sensor.
+    pub fn record(&mut self, schedule: Schedule, seed: u64, steps: usize) -> LabelledRecord {
+        let noise = Noise::white(0.2);
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(1);
+        let rows = noise.draw(&mut random, schedule.time_s.len());
+        let expected = self.stiffness(&schedule, steps);
+        let noisy = expected.iter().zip(&rows).map(|(y, noise)| y + noise);
+        let read = self.read(&schedule, noisy);
+        let readings = Readings { read, expected, limit: None, outliers: 0 };
+        LabelledRecord { schedule, effects: Vec::new(), noise, seed, readings }
     }
 
     /// Readings of a noisy stiffness, row by row, in V.

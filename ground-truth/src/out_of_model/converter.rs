@@ -3,7 +3,8 @@
 use rand::RngExt;
 
 use super::chain::Chain;
-use super::form::{Draw, Form};
+use super::draw::Draw;
+use super::form::Form;
 use crate::cause::Cause;
 
 /// Forms of sensor saturation and quantisation.

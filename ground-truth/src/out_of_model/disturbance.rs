@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 
 use super::chain::Chain;
-use super::form::{Draw, Form};
+use super::draw::Draw;
+use super::form::Form;
 use crate::cause::Cause;
 
 /// Forms of hum, reading offset and outliers.

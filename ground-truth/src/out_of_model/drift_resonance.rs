@@ -2,10 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::chain::{Chain, Stage};
-use super::form::{Draw, Form};
+use super::draw::Draw;
+use super::form::Form;
 use crate::cause::Cause;
 use crate::physics::FULL_V;
 
@@ -78,20 +80,27 @@ fn warm_up(draw: &mut Draw) -> Chain {
 }
 
 fn random_walk(draw: &mut Draw) -> Chain {
+    let (path, furthest) = brownian(&mut draw.random, draw.duration_s);
+    let scale = draw.between(0.08, 0.15) / furthest;
+    with_time(move |t| 1.0 + scale * path(t))
+}
+
+/// Brownian path from 0 over time in s, straight between 40 points, and its largest distance from 0.
+pub(crate) fn brownian(random: &mut ChaCha8Rng, duration_s: f64) -> (impl Fn(f64) -> f64 + use<>, f64) {
     const POINTS: usize = 40;
     let mut walk = vec![0.0];
-    for step in StandardNormal.sample_iter(&mut draw.random).take(POINTS) {
+    for step in StandardNormal.sample_iter(random).take(POINTS) {
         let step: f64 = step;
         walk.push(walk[walk.len() - 1] + step);
     }
-    let furthest = walk.iter().map(|b| b.abs()).fold(0.0, f64::max);
-    let scale = draw.between(0.08, 0.15) / furthest;
-    let every = draw.duration_s / POINTS as f64;
-    with_time(move |t| {
+    let furthest = walk.iter().map(|b: &f64| b.abs()).fold(0.0, f64::max);
+    let every = duration_s / POINTS as f64;
+    let path = move |t: f64| {
         let (place, last) = ((t / every).max(0.0), POINTS - 1);
         let i = (place as usize).min(last);
-        1.0 + scale * (walk[i] + (walk[i + 1] - walk[i]) * (place - i as f64))
-    })
+        walk[i] + (walk[i + 1] - walk[i]) * (place - i as f64)
+    };
+    (path, furthest)
 }
 
 fn by_decades(draw: &mut Draw) -> Chain {

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use super::chain::{Chain, Lag, Spectrum, paper};
-use super::form::{Draw, Form};
+use super::draw::Draw;
+use super::form::Form;
 use crate::cause::Cause;
 use crate::physics::FULL_V;
 

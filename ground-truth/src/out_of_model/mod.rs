@@ -9,7 +9,8 @@
 //! | module | contents |
 //! | --- | --- |
 //! | [`form`] | one law with its names, and how a record of it is drawn |
-//! | [`chain`] | the spring as stages between command and reading |
+//! | [`draw`] | random values of a law |
+//! | [`chain`] | the spring as stages between command and reading, and a record of it |
 //! | [`amplifier`] | forms of delay, limit, slew |
 //! | [`static_response`] | forms of static nonlinearity, hysteresis |
 //! | [`relaxation`], [`leakage`] | forms of share, time constants, creep; of leakage |
@@ -20,6 +21,7 @@ pub mod amplifier;
 pub mod chain;
 pub mod converter;
 pub mod disturbance;
+pub mod draw;
 pub mod drift_resonance;
 pub mod form;
 pub mod leakage;

@@ -1,7 +1,8 @@
 //! Static laws: nonlinearity and hysteresis.
 
 use super::chain::{Chain, Stage};
-use super::form::{Draw, Form};
+use super::draw::Draw;
+use super::form::Form;
 use crate::cause::Cause;
 use crate::physics::FULL_V;
 

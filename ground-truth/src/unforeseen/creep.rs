@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Lag, Spectrum, paper};
+use crate::out_of_model::draw::Draw;
 use crate::physics::{FULL_V, SHARE, TAU_S};
 
 /// Laws of relaxation, creep and leakage.
@@ -92,7 +93,7 @@ pub const LAWS: [Law; 9] = [
 ];
 
 /// y = s v + (1 - s) w; `w(v, t, dt)` is the law of the relaxing part.
-fn relaxing(mut w: impl FnMut(f64, f64, f64) -> f64 + 'static) -> Chain {
+pub(crate) fn relaxing(mut w: impl FnMut(f64, f64, f64) -> f64 + 'static) -> Chain {
     Chain::of(Box::new(move |v, now| SHARE * v + (1.0 - SHARE) * w(v, now.t, now.dt)))
 }
 
@@ -172,13 +173,17 @@ fn absorption(draw: &mut Draw) -> Chain {
 }
 
 fn tank(draw: &mut Draw) -> Chain {
-    let part = draw.sized(0.4, 1.0);
+    filling(draw.sized(0.4, 1.0), |w| (FULL_V * w.max(0.0)).sqrt())
+}
+
+/// The relaxing part as a store: dw/dt = (v - (1 - part) w - part outflow(w))/tau, from 0 upwards.
+pub(crate) fn filling(part: f64, outflow: fn(f64) -> f64) -> Chain {
     let (mut w, mut last) = (0.0f64, 0.0);
     relaxing(move |v, _, dt| {
         let middle = 0.5 * (last + v);
         last = v;
-        let rate = |w: f64| (middle - (1.0 - part) * w - part * (FULL_V * w.max(0.0)).sqrt()) / TAU_S;
-        // The square root is stiff near an empty tank.
+        let rate = |w: f64| (middle - (1.0 - part) * w - part * outflow(w)) / TAU_S;
+        // The square root of a tank is stiff near the bottom.
         const PIECES: u32 = 4;
         let h = dt / f64::from(PIECES);
         for _ in 0..PIECES {

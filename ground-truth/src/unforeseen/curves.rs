@@ -1,7 +1,8 @@
 //! Static curves and limits by other laws.
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Lag};
+use crate::out_of_model::draw::Draw;
 use crate::physics::FULL_V;
 
 /// Laws of the static curve and of the amplifier's bound.

@@ -1,8 +1,9 @@
 //! Friction and backlash after the relaxation, and a response that depends on the direction.
 
 use super::hysteresis::mixed;
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Stage};
+use crate::out_of_model::draw::Draw;
 
 /// Laws of friction, backlash and direction.
 pub const LAWS: [Law; 4] = [

@@ -1,7 +1,8 @@
 //! Hysteresis of the voltage by other laws, before the relaxation.
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::Chain;
+use crate::out_of_model::draw::Draw;
 use crate::physics::FULL_V;
 
 /// Laws of hysteresis.
@@ -61,7 +62,7 @@ pub const LAWS: [Law; 6] = [
 ];
 
 /// The paper's spring behind a law `f` of the voltage u, mixed as u + size (f(u) - u).
-pub(super) fn mixed(draw: &Draw, mut f: impl FnMut(f64) -> f64 + 'static) -> Chain {
+pub(crate) fn mixed(draw: &Draw, mut f: impl FnMut(f64) -> f64 + 'static) -> Chain {
     let (size, mut last) = (draw.size, (0.0, 0.0));
     Chain::before(Box::new(move |u: f64, _| {
         if u != last.0 {
@@ -72,7 +73,7 @@ pub(super) fn mixed(draw: &Draw, mut f: impl FnMut(f64) -> f64 + 'static) -> Cha
 }
 
 /// Integrates `f(h, du)` = dh over a change of the voltage to `to` in pieces of at most `piece` V by the midpoint rule.
-fn along(u: &mut f64, h: &mut f64, to: f64, piece: f64, f: impl Fn(f64, f64, f64) -> f64) {
+pub(crate) fn along(u: &mut f64, h: &mut f64, to: f64, piece: f64, f: impl Fn(f64, f64, f64) -> f64) {
     let pieces = ((to - *u).abs() / piece).ceil().max(1.0);
     let du = (to - *u) / pieces;
     for _ in 0..pieces as usize {

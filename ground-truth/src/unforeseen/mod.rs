@@ -1,4 +1,4 @@
-//! Laws from the literature that nobody looked at while the diagnosis was made: a test set of its own, beside
+//! Laws from the literature that nobody looked at while the diagnosis was made: a second test set besides
 //! [`out_of_model`](super::out_of_model).
 //!
 //! In: a law and a seed. Out: a record with that law in it, as simulated and as written. Each law states which cause codes are true
@@ -44,16 +44,17 @@ pub(crate) mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::law::{Draw, STEPS};
     use super::*;
     use crate::Schedule;
     use crate::out_of_model::chain::Chain;
+    use crate::out_of_model::draw::Draw;
+    use crate::out_of_model::form::STEPS;
     use crate::spring::Spring;
 
     /// A random source of laws of the given size for a record of 2000 rows in 200 s up to 500 V.
     pub(crate) fn draw(size: f64) -> Draw {
         let random = ChaCha8Rng::seed_from_u64(7);
-        Draw { random, size, duration_s: 200.0, every_s: 0.1, full_v: 500.0 }
+        Draw { random, size, duration_s: 200.0, every_s: 0.1, full_v: 500.0, top_v: 500.0 }
     }
 
     fn furthest<'a>(a: impl IntoIterator<Item = &'a f64>, b: impl IntoIterator<Item = &'a f64>) -> f64 {
@@ -62,7 +63,11 @@ pub(crate) mod tests {
 
     #[test]
     fn at_size_0_every_law_is_the_papers_spring_with_true_time_stamps() {
-        for (_, law) in all() {
+        are_the_papers_spring_at_size_0(&all());
+    }
+
+    pub(crate) fn are_the_papers_spring_at_size_0(laws: &[(&str, Law)]) {
+        for (_, law) in laws {
             let (hidden, written) = law.at(40, 0.0, STEPS);
             let spring = Spring::default().run(&hidden.schedule, 20);
             let off = furthest(&hidden.readings.expected, &spring);
@@ -77,11 +82,15 @@ pub(crate) mod tests {
 
     #[test]
     fn names_are_unique_and_every_law_exceeds_the_noise() {
-        let laws = all();
+        exceed_the_noise(&all());
+    }
+
+    pub(crate) fn exceed_the_noise(laws: &[(&str, Law)]) {
         assert!(laws.len() >= 30, "{}", laws.len());
         for (index, (_, law)) in laws.iter().enumerate() {
             assert!(laws[..index].iter().all(|(_, other)| other.name != law.name), "{law:?}");
             assert!(law.also.iter().all(|name| !law.first.contains(name)), "{law:?}");
+            assert!(law.first.iter().chain(law.also).all(|name| crate::Cause::named(name).is_some()), "{law:?}");
             for seed in 50..52 {
                 let (hidden, written) = law.draw(seed);
                 let (none, _) = law.at(seed, 0.0, STEPS);
@@ -97,7 +106,11 @@ pub(crate) mod tests {
 
     #[test]
     fn finer_time_steps_change_no_more_than_the_noise() {
-        for (_, law) in all() {
+        do_not_depend_on_the_time_steps(&all());
+    }
+
+    pub(crate) fn do_not_depend_on_the_time_steps(laws: &[(&str, Law)]) {
+        for (_, law) in laws {
             let [coarse, fine] = [STEPS, 3 * STEPS].map(|steps| law.at(60, 1.0, steps).0);
             let apart: f64 =
                 coarse.readings.expected.iter().zip(&fine.readings.expected).map(|(a, b)| (a - b).powi(2)).sum();
@@ -105,12 +118,6 @@ pub(crate) mod tests {
             let rms = (apart / coarse.readings.expected.len() as f64).sqrt();
             assert!(rms < 1.5 * coarse.noise.sigma_v, "{law:?}: {rms} V");
         }
-    }
-
-    #[test]
-    fn cause_codes_are_those_of_the_contract() {
-        let known = |name: &str| crate::Cause::named(name).is_some() || name == "series-lag";
-        assert!(all().iter().all(|(_, law)| law.first.iter().chain(law.also).all(|name| known(name))));
     }
 
     /// Settled stiffness at 250 V on the way up and down a slow loop from 0 to 500 V, by the law alone.

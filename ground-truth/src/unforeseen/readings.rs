@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Now};
+use crate::out_of_model::draw::Draw;
 
 /// Laws of the readings.
 pub const LAWS: [Law; 8] = [

@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use super::law::{Draw, Law, PLAIN};
+use super::law::{Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Lag, Now, Stage};
+use crate::out_of_model::draw::Draw;
 
 /// Laws of the sensor's dynamics.
 pub const LAWS: [Law; 7] = [
@@ -78,35 +79,54 @@ pub const LAWS: [Law; 7] = [
 ];
 
 /// The paper's spring followed by `f`, mixed as y + size (f(y) - y).
-fn filtered(draw: &Draw, mut f: impl FnMut(f64, Now) -> f64 + 'static) -> Chain {
+pub(crate) fn filtered(draw: &Draw, mut f: impl FnMut(f64, Now) -> f64 + 'static) -> Chain {
     let size = draw.size;
     let stage: Stage = Box::new(move |y, now| y + size * (f(y, now) - y));
     Chain::after(stage)
 }
 
 fn one_lag(draw: &mut Draw) -> Chain {
-    let (tau_s, mut z) = (log_between(draw, 0.3, 3.0), Lag::default());
+    let (tau_s, mut z) = (draw.log_between(0.3, 3.0), Lag::default());
     filtered(draw, move |y, now| z.follow(y, tau_s, now.dt))
 }
 
 fn two_lags(draw: &mut Draw) -> Chain {
-    let slow_s = log_between(draw, 0.4, 2.0);
+    let slow_s = draw.log_between(0.4, 2.0);
     let fast_s = slow_s * draw.between(0.2, 0.7);
     let (mut first, mut second) = (Lag::default(), Lag::default());
     filtered(draw, move |y, now| second.follow(first.follow(y, fast_s, now.dt), slow_s, now.dt))
 }
 
 fn lag_and_delay(draw: &mut Draw) -> Chain {
-    let (tau_s, late_s) = (log_between(draw, 0.3, 2.0), (draw.every_s * draw.between(2.0, 6.0)).max(0.2));
-    let (mut z, mut past) = (Lag::default(), VecDeque::from([(f64::NEG_INFINITY, 0.0)]));
+    let (tau_s, late_s) = (draw.log_between(0.3, 2.0), (draw.every_s * draw.between(2.0, 6.0)).max(0.2));
+    let (mut z, mut past) = (Lag::default(), Past::default());
     filtered(draw, move |y, now| {
-        past.push_back((now.t, z.follow(y, tau_s, now.dt)));
-        // The newest that is old enough.
-        while past.get(1).is_some_and(|&(t, _)| t <= now.t - late_s + 1e-9) {
-            past.pop_front();
-        }
-        past[0].1
+        past.push(now.t, z.follow(y, tau_s, now.dt));
+        past.at(now.t - late_s)
     })
+}
+
+/// A value over time, as far back as it is asked for; 0 before the first one.
+#[derive(Debug, Default)]
+pub(crate) struct Past {
+    /// Times in s and values; the first value is the last that was asked for.
+    values: VecDeque<(f64, f64)>,
+}
+
+impl Past {
+    /// Value at the time `t`, in s, which is not before that of any earlier push.
+    pub(crate) fn push(&mut self, t: f64, value: f64) {
+        self.values.push_back((t, value));
+    }
+
+    /// Newest value at the time `t`, in s, which is not before that of any earlier call.
+    pub(crate) fn at(&mut self, t: f64) -> f64 {
+        let old_enough = |&&(time, _): &&(f64, f64)| time <= t + 1e-9;
+        while self.values.get(1).as_ref().is_some_and(old_enough) {
+            self.values.pop_front();
+        }
+        self.values.front().filter(old_enough).map_or(0.0, |&(_, value)| value)
+    }
 }
 
 fn moving_average(draw: &mut Draw) -> Chain {
@@ -136,17 +156,12 @@ fn peak_detector(draw: &mut Draw) -> Chain {
     })
 }
 
-/// A random number between `low` and `high`, even in its logarithm.
-fn log_between(draw: &mut Draw, low: f64, high: f64) -> f64 {
-    draw.between(low.ln(), high.ln()).exp()
-}
-
-/// Mode p'' = omega^2 (y - p) - 2 zeta omega p' - c |p'| p', of the frequency `hertz` in Hz, as its distance from the response.
-fn mode(hertz: f64, zeta: f64, c: f64) -> impl FnMut(f64, Now) -> f64 {
+/// Mode p'' = omega^2 (y - p) - 2 zeta omega p' - friction(p'), of the frequency `hertz` in Hz, as its distance from the response.
+pub(crate) fn mode(hertz: f64, zeta: f64, friction: impl Fn(f64) -> f64) -> impl FnMut(f64, Now) -> f64 {
     let (omega, mut p, mut rate) = (TAU * hertz, 0.0, 0.0f64);
     move |y, now| {
         // Semi-implicit Euler, which conserves the energy of an oscillation.
-        rate += now.dt * (omega * omega * (y - p) - 2.0 * zeta * omega * rate - c * rate.abs() * rate);
+        rate += now.dt * (omega * omega * (y - p) - 2.0 * zeta * omega * rate - friction(rate));
         p += now.dt * rate;
         p - y
     }
@@ -155,13 +170,14 @@ fn mode(hertz: f64, zeta: f64, c: f64) -> impl FnMut(f64, Now) -> f64 {
 fn close_modes(draw: &mut Draw) -> Chain {
     let hertz = (draw.between(0.05, 0.12) / draw.every_s).max(0.3);
     let second = hertz * draw.between(1.08, 1.25);
-    let mut modes = [hertz, second].map(|hertz| mode(hertz, draw.between(0.02, 0.06), 0.0));
+    let mut modes = [hertz, second].map(|hertz| mode(hertz, draw.between(0.02, 0.06), |_| 0.0));
     filtered(draw, move |y, now| y + modes.iter_mut().map(|mode| 0.5 * mode(y, now)).sum::<f64>())
 }
 
 fn quadratic_damping(draw: &mut Draw) -> Chain {
     let hertz = (draw.between(0.05, 0.2) / draw.every_s).max(0.3);
-    let mut mode = mode(hertz, 0.02, draw.between(0.3, 1.0) / 45.0);
+    let c = draw.between(0.3, 1.0) / 45.0;
+    let mut mode = mode(hertz, 0.02, move |rate| c * rate.abs() * rate);
     filtered(draw, move |y, now| y + mode(y, now))
 }
 

@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::law::{Clock, Draw, Law, PLAIN};
+use super::law::{Clock, Law, PLAIN};
 use crate::out_of_model::chain::{Chain, Stage, paper};
+use crate::out_of_model::draw::Draw;
 
 /// Laws of slow changes and of time stamps.
 pub const LAWS: [Law; 7] = [
@@ -83,7 +84,7 @@ fn softening(draw: &mut Draw) -> Chain {
 }
 
 /// A stage that does not depend on the state: reading from response in V and time in s.
-fn of_time(f: impl Fn(f64, f64) -> f64 + 'static) -> Stage {
+pub(crate) fn of_time(f: impl Fn(f64, f64) -> f64 + 'static) -> Stage {
     Box::new(move |y, now| f(y, now.t))
 }
 

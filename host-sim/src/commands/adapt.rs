@@ -13,11 +13,12 @@ use simulation::bad_input;
 use simulation::control_loop::{Controller, Options};
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::load_plain;
-use simulation::spring_error::SpringError;
+use simulation::spring_error::{Parameter, SpringError};
 
 use super::choice::{CONTROLLER, Choices, one_of};
 use super::compare::sensor_noise_v;
-use super::spring_error::{ErrorOf, Known, identified, together};
+use super::identified::errors;
+use super::spring_error::{ErrorOf, Known, together};
 
 /// Run the controller with its sensor on a spring that changes, or whose sensor fails, and show how the model adapts
 ///
@@ -85,18 +86,20 @@ const MOST_STEPS: usize = 100;
 impl Arguments {
     fn bounds(&self) -> Result<Settings> {
         let typical = Settings::TYPICAL;
-        let SpringError { time_constant, share, gain } = match &self.identified {
-            Some(path) => identified(path)?,
-            None => {
-                let SpringError { time_constant, share, gain } = together("--within", &self.within)?;
-                let given = |value: f64, default: f64| if value == 0.0 { default } else { value };
-                SpringError {
-                    time_constant: given(time_constant, typical.time_constant),
-                    share: given(share, typical.share),
-                    gain: given(gain, typical.gain),
+        let mut within = errors("--within", &self.within, self.identified.as_deref())?;
+        if self.identified.is_none() {
+            let defaults = [
+                (Parameter::TimeConstant, typical.time_constant),
+                (Parameter::Share, typical.share),
+                (Parameter::Gain, typical.gain),
+            ];
+            for (parameter, default) in defaults {
+                if *within.of(parameter) == 0.0 {
+                    within = within.with(parameter, default);
                 }
             }
-        };
+        }
+        let SpringError { time_constant, share, gain } = within;
         Ok(Settings { time_constant, share, gain, ..typical })
     }
 }

@@ -11,9 +11,9 @@ use simulation::bad_input;
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file;
 use simulation::robust_bound::{Allowed, Question, answer};
-use simulation::spring_error::Parameter;
 
-use super::spring_error::{ErrorOf, identified, together};
+use super::identified::errors;
+use super::spring_error::ErrorOf;
 
 /// Compute how fast any controller without a sensor can be on a spring that is known only to within errors, and how well the spring has
 /// to be known
@@ -54,8 +54,6 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Largest error of a parameter, relative.
-const LARGEST: f64 = 0.9;
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let Arguments { limit_v, slew_v_per_s, overshoot_percent, within_s, .. } = *arguments;
@@ -65,16 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if !(within_s.is_finite() && within_s > 0.0) {
         bad_input!("--within-s {within_s}: expected a number above 0");
     }
-    let (option, mut spring_error) = match &arguments.identified {
-        Some(path) => ("--identified", identified(path)?),
-        None => ("--spring-error", together("--spring-error", &arguments.spring_error)?),
-    };
-    for parameter in Parameter::ALL {
-        let error = *spring_error.of(parameter);
-        if !(0.0..=LARGEST).contains(&error) {
-            bad_input!("{option}: {} known to {} %; expected 0 to 90", parameter.name(), 100.0 * error);
-        }
-    }
+    let spring_error = errors("--spring-error", &arguments.spring_error, arguments.identified.as_deref())?;
     let file = plant_file::load(&arguments.plant)?;
     let amplifier = file.behind(Amplifier { slew_v_per_s, ..Amplifier::up_to(limit_v) });
     let allowed = Allowed { amplifier, overshoot: overshoot_percent / 100.0 };

@@ -9,7 +9,7 @@ use clap::Args;
 use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, print_error, wrote};
+use host_sim::output::terminal::{json, print, print_error, remark, wrote};
 use host_sim::signals::on_ctrl_c;
 use identify::plant::base::Base;
 use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify};
@@ -28,7 +28,7 @@ use super::record_arguments::RecordArguments;
 /// instantaneous part of a step to this voltage. If voltage_v is missing, applied_v is used, as written by
 /// `vsj stair --out`.
 ///
-/// A file has at most a million rows and 512 MiB (64 MiB if it is not UTF-8).
+/// A file has at most a million rows and 512 MiB.
 ///
 /// Several files are records of one spring: each has its own initial state, zero offset and noise, the causes are shared, and
 /// what is in one record only is listed as a fault of that record.
@@ -151,6 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
     records.iter().try_for_each(|record| input.check(record))?;
     let options = arguments.options(&measured, &records, input, stop)?;
+    options.remark().iter().for_each(|text| remark(text));
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let mut diagnosis = with_progress(&records, &options, arguments.progress)?;

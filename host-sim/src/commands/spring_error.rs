@@ -1,15 +1,12 @@
-//! `KEY=PERCENT`: an error of one parameter of the spring, and errors that are the intervals of an identification.
+//! `KEY=PERCENT`: an error of one parameter of the spring.
 
-use std::path::Path;
 use std::str::FromStr;
 
 use anyhow::Result;
 use clap::Args;
 use model::Margin;
-use serde::Deserialize;
 use simulation::bad_input;
 use simulation::bad_input::{BadInput, excerpt};
-use simulation::bounded_file::read_text;
 use simulation::spring_error::{Parameter, SpringError};
 
 /// Smallest and largest error of a parameter, in percent.
@@ -54,50 +51,6 @@ pub(super) fn together(option: &str, errors: &[ErrorOf]) -> Result<SpringError> 
         *together.of(*parameter) = *error;
     }
     Ok(together)
-}
-
-/// Largest size of an identification, in MiB.
-const MOST_MIB: usize = 16;
-
-/// What is read of `vsj identify --json`.
-#[derive(Deserialize)]
-struct Identified {
-    nominal: Nominal,
-}
-
-#[derive(Deserialize)]
-struct Nominal {
-    gain: Interval,
-    share: Interval,
-    tau_s: Vec<Interval>,
-}
-
-#[derive(Deserialize)]
-struct Interval {
-    value: f64,
-    low: f64,
-    high: f64,
-}
-
-impl Interval {
-    /// Half the width, relative to the value.
-    fn relative(&self) -> f64 {
-        0.5 * (self.high - self.low) / self.value.abs()
-    }
-}
-
-/// The 95 % intervals of what `vsj identify --json` prints, as errors.
-pub(super) fn identified(path: &Path) -> Result<SpringError> {
-    let text = read_text(path, MOST_MIB, "the JSON of `vsj identify`")?;
-    let Identified { nominal } = match serde_json::from_str(&text) {
-        Ok(identified) => identified,
-        Err(error) => bad_input!("{}: {error}; expected the JSON of `vsj identify`", path.display()),
-    };
-    Ok(SpringError {
-        share: nominal.share.relative(),
-        time_constant: nominal.tau_s.iter().map(Interval::relative).fold(0.0, f64::max),
-        gain: nominal.gain.relative(),
-    })
 }
 
 /// How well the robust controller knows the spring.

@@ -119,7 +119,7 @@ pub struct Done {
     pub max: u32,
 }
 
-/// As a text, because JSON numbers do not hold 64 bits everywhere.
+/// Serializes a digest as hexadecimal text, because JSON numbers do not hold 64 bits everywhere.
 fn hexadecimal<S: Serializer>(digest: &u64, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&format_args!("{digest:016x}"))
 }

@@ -27,8 +27,10 @@ impl Effect for InstantaneousShare {
         "steps read within a hundredth of the time constant"
     }
 
-    fn coordinates(&self, _: usize, _: &Data) -> Vec<Coordinate> {
-        vec![Coordinate::new(-0.2, 1.0)]
+    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+        // A nominal share outside of 0 to 1 has room on both sides, too.
+        let far = 2.0 * data.normalisation.share;
+        vec![Coordinate::new(far.min(-0.2), far.max(1.0))]
     }
 
     fn initial_points(&self, _: usize, context: &FitContext) -> Vec<Vec<f64>> {

@@ -27,6 +27,20 @@ pub struct Options {
     pub stop: Stop,
 }
 
+impl Options {
+    /// Returns what the user should know who compares readings of another quantity with the paper's spring: its gain and zero are no
+    /// causes then.
+    pub fn remark(&self) -> Option<String> {
+        let reading = &self.units.reading;
+        (self.plant == "paper" && *reading != Units::default().reading).then(|| {
+            format!(
+                "the readings are in {reading}, those of the report's spring in V; `--plant identify` compares with the gain, zero and \
+                 time constants that the record shows"
+            )
+        })
+    }
+}
+
 impl Default for Options {
     /// Voltage held between rows, the paper's spring, and the normal effort.
     fn default() -> Self {

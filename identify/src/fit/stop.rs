@@ -1,4 +1,4 @@
-//! A request to end a diagnosis early, by time or by another thread.
+//! A request to end a diagnosis early: by time, by another thread, or by a function that is asked.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
     deadline: Option<Instant>,
+    asked: Option<fn() -> bool>,
     request: Arc<AtomicBool>,
 }
 
@@ -29,6 +30,12 @@ impl Stop {
         Self { deadline: Instant::now().checked_add(time), ..Self::default() }
     }
 
+    /// Returns a stop that asks a function whether the end was requested, where no other thread can request it. Once the function has
+    /// returned true it is not asked again.
+    pub fn when(asked: fn() -> bool) -> Self {
+        Self { asked: Some(asked), ..Self::default() }
+    }
+
     /// Requests the end.
     pub fn request(&self) {
         self.request.store(true, Ordering::Relaxed);
@@ -36,6 +43,9 @@ impl Stop {
 
     /// Returns true once the time is over or the end was requested.
     pub fn requested(&self) -> bool {
+        if !self.request.load(Ordering::Relaxed) && self.asked.is_some_and(|asked| asked()) {
+            self.request();
+        }
         self.request.load(Ordering::Relaxed) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }

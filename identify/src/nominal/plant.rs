@@ -29,8 +29,7 @@ fn square(full_scale_v: f64) -> Law {
     Law { voltage_v, stiffness }
 }
 
-/// The plant file. An instantaneous part outside of 0 to 1 is described under `[unmodelled]`. `spacing_s` stands in for the time
-/// constant of a spring that has neither a time constant nor an oscillation.
+/// The plant file. `spacing_s` stands in for the time constant of a spring that has neither a time constant nor an oscillation.
 pub(super) fn plant_file(
     nominal: &Nominal,
     oscillations: &[Oscillation],
@@ -39,12 +38,7 @@ pub(super) fn plant_file(
     units: &Units,
     spacing_s: f64,
 ) -> PlantFile {
-    let mut unmodelled = toml::Table::new();
-    let whole = nominal.share.value;
-    let share = whole.clamp(0.0, 1.0);
-    if share != whole {
-        unmodelled.insert("instantaneous_share".into(), whole.into());
-    }
+    let share = nominal.share.value;
     let mut tau_s: Vec<f64> = nominal.tau_s.iter().map(|lag| lag.tau.value).collect();
     let mut weights: Vec<f64> = nominal.tau_s.iter().map(|lag| lag.weight.value).collect();
     let mode = |of: &Oscillation| Mode {
@@ -82,6 +76,6 @@ pub(super) fn plant_file(
         relaxation: Relaxation { share, tau_s, weights, tau_high_s: None, tau_high_at_v: None },
         amplifier: (delay_s > 0.0).then(|| Amplifier { delay_s: Some(delay_s), ..Amplifier::default() }),
         modes,
-        unmodelled: (!unmodelled.is_empty()).then_some(unmodelled),
+        unmodelled: None,
     }
 }

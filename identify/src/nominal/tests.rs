@@ -1,6 +1,9 @@
 use simulation::record::Row;
 
 use super::*;
+use crate::answer::Verdict;
+use crate::examine::{Options, diagnose};
+use crate::plant::base::Base;
 use crate::stats::scale::normals;
 
 /// A record of a lag of 4 s with share 0.2, gain 0.5 and zero 3, by its exact recursion.
@@ -118,6 +121,20 @@ fn square_law_is_recognised_for_one_sign_and_for_both() {
 fn other_laws_of_one_sign_stay_linear() {
     for law in [|voltage: f64| voltage, |voltage: f64| voltage * (1.0 - voltage / 600.0)] {
         assert_eq!(found(&[of_law(law, false, 0.2, 4.0)]).report.input_law, InputLaw::Linear);
+    }
+}
+
+/// Springs whose first response goes the other way, or beyond the settled one. The noise is 0.02.
+#[test]
+fn plant_file_simulates_a_share_outside_of_0_to_1() {
+    for share in [-0.4, 1.6] {
+        let record = of_law(|voltage| voltage, true, share, 4.0);
+        let Identified { report, plant, .. } = found(std::slice::from_ref(&record));
+        assert!((report.nominal.share.value - share).abs() < 0.02, "{:#?}", report.nominal);
+        let options = Options { base: Base::new(plant).unwrap(), ..Options::default() };
+        let diagnosis = diagnose(&record, &options).unwrap();
+        assert_eq!(diagnosis.verdict, Verdict::Consistent, "{share}: {:?}", diagnosis.baseline);
+        assert!(diagnosis.baseline.rmse < 0.022, "{share}: {:?}", diagnosis.baseline);
     }
 }
 

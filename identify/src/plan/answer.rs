@@ -34,6 +34,14 @@ pub struct Plan {
     pub remarks: Vec<String>,
 }
 
+impl Plan {
+    /// Returns the schedule as CSV with the columns `time_s,voltage_v`, each voltage held until the next row.
+    pub fn csv(&self) -> String {
+        let row = |command: &Command| format!("{},{}\n", command.time_s, command.voltage_v);
+        std::iter::once("time_s,voltage_v\n".to_owned()).chain(self.commands.iter().map(row)).collect()
+    }
+}
+
 /// A true set of causes compared with a rival.
 #[derive(Clone, Debug, Serialize)]
 pub struct Separation {

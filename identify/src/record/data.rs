@@ -175,6 +175,14 @@ impl Data {
         (index, self.time_s[row] - self.parts.get(index).map_or(0.0, |part| part.shift_s))
     }
 
+    /// Returns the rows of each record.
+    pub fn rows_of_records(&self) -> Vec<Range<usize>> {
+        if !self.is_joined() {
+            return vec![0..self.rows()];
+        }
+        self.parts.iter().map(|part| part.rows.clone()).collect()
+    }
+
     /// Returns true if the records are several.
     pub fn is_joined(&self) -> bool {
         !self.parts.is_empty()

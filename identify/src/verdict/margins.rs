@@ -30,6 +30,6 @@ pub(crate) fn margins(engine: &mut Engine, nothing: &Fit, penalty_factor: f64) -
 /// True if both margins are narrow enough for the verdict that nothing is wrong.
 pub(crate) fn informative(margins: &Margins, base: &Base) -> bool {
     // The time constant of a spring that is all instantaneous has no effect.
-    let lags = base.relaxation.share < 1.0;
+    let lags = base.relaxation.share != 1.0;
     margins.gain < WIDEST_GAIN_MARGIN.get() && (!lags || margins.time_constant < WIDEST_TIME_CONSTANT_MARGIN.get())
 }

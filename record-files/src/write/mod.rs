@@ -80,9 +80,9 @@ pub struct Sheet<'a> {
 
 /// Writes a table. What has been added is in the file after [`Writer::flush`], and the file is whole after [`Writer::finish`].
 pub enum Writer<W: Write + Send> {
-    /// As an MCAP file.
+    /// A writer of an MCAP file.
     Mcap(Box<mcap::Writer<W>>),
-    /// As a Parquet file.
+    /// A writer of a Parquet file.
     Parquet(Box<parquet::Writer<W>>),
 }
 

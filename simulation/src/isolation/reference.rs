@@ -159,18 +159,8 @@ impl Bank {
 
     fn block(&mut self) {
         let sums = self.sums.clone();
-        self.sums = Sums {
-            ticks: 0,
-            voltage: 0.0,
-            model: 0.0,
-            jumps: 0.0,
-            residual: 0.0,
-            readings: 0,
-            identical: 0,
-            lags: [0.0; 3],
-            tails: [0.0; 2],
-            ..sums
-        };
+        let Sums { slewed, last_voltage, last_model, last_reading, .. } = sums;
+        self.sums = Sums { slewed, last_voltage, last_model, last_reading, ..Sums::default() };
         let ticks = f64::from(self.ticks);
         let expected = f64::from(self.settings.readings(self.block_s));
         let lags = sums.lags.map(|lag| lag / ticks);

@@ -6,14 +6,14 @@ use std::fmt::{self, Display, Formatter};
 use anyhow::Result;
 use model::estimator::Estimator;
 use model::isolation::{Cause, Finding, Report, Settings, State, Verdict, bank};
-use model::{OutOfRange, SampleTime, ScaledStiffness, Validate, Volts};
+use model::{SampleTime, ScaledStiffness, Validate, Volts};
 use serde::Serialize;
 
 use crate::bad_input;
 use crate::bad_input::BadInput;
 use crate::record::Record;
 
-/// A change of what the bank says.
+/// A change of the bank's verdict.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Time in the record, in s.
@@ -32,7 +32,7 @@ pub struct Event {
     pub explained: Option<f64>,
 }
 
-/// What the bank says: verdict, cause, size, part of the energy, beginning.
+/// Verdict, cause, size, part of the energy, beginning.
 impl Display for Event {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.write_str(self.verdict)?;
@@ -56,7 +56,7 @@ impl Display for Event {
 }
 
 impl Event {
-    /// What `report` says at `time_s` of a bank with these settings and ticks of `rate_hz`.
+    /// The verdict of `report` at `time_s`, in s, by a bank with these settings and `rate_hz` ticks per second.
     pub fn new(report: &Report, time_s: f64, settings: &Settings, rate_hz: f64) -> Self {
         let finding = report.finding(settings, rate_hz);
         let size = |Finding { cause, size, half_width, .. }| Size::around(size, half_width, cause);
@@ -93,7 +93,7 @@ impl Size {
     }
 }
 
-/// What the bank says of a record.
+/// Verdicts of the bank over a record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trace {
     /// Version of the JSON.
@@ -106,9 +106,9 @@ pub struct Trace {
     pub block_s: f64,
     /// Standard deviation of a reading, in V.
     pub noise_v: f64,
-    /// What the bank says at the end.
+    /// Verdict at the end of the record.
     pub last: Event,
-    /// Every change of what it says.
+    /// Every change of the verdict.
     pub trace: Vec<Event>,
 }
 
@@ -128,34 +128,33 @@ pub fn noise_v(record: &Record) -> Option<f64> {
 /// # Errors
 /// [`BadInput`] for settings that the bank rejects, voltages beyond +-2000 V, and rows more than 0.6 s apart.
 pub fn run(record: &Record, mut settings: Settings) -> Result<Trace> {
-    let refused = |error: OutOfRange| BadInput(error.to_string());
     let [first, .., last] = &record.rows[..] else { bad_input!("{}: expected at least 2 rows", record.name) };
     settings.interval_s = (last.time_s - first.time_s) / (record.rows.len() - 1) as f64;
     let rate_hz = if settings.interval_s > 0.5 * bank::block_s(1000.0) { 100.0 } else { 1000.0 };
     if settings.interval_s > 0.6 {
         bad_input!("{}: rows {:.3} s apart; expected at most 0.6 s", record.name, settings.interval_s);
     }
-    let sample_time = SampleTime::from_rate(rate_hz).map_err(refused)?;
+    let sample_time = SampleTime::from_rate(rate_hz).map_err(BadInput::from)?;
     settings.interval_s = settings.interval_s.max(sample_time.seconds());
-    let config = settings.validate(sample_time).map_err(refused)?.quantize();
-    let plant = settings.plant.validate(sample_time).map_err(refused)?.quantize();
+    let config = settings.validate(sample_time).map_err(BadInput::from)?.quantize();
+    let plant = settings.plant.validate(sample_time).map_err(BadInput::from)?.quantize();
     let (mut spring, mut state) = (Default::default(), State::default());
     let event = |state: &State, time_s: f64| Event::new(&state.report(), time_s, &settings, rate_hz);
     let mut trace = vec![event(&state, first.time_s)];
-    let mut says = state.verdict();
+    let mut verdict = state.verdict();
     let mut tick = 0u64;
     for (row, next) in record.rows.iter().zip(record.rows.iter().skip(1)) {
-        let applied = Volts::new(row.voltage_v).map_err(refused)?;
+        let applied = Volts::new(row.voltage_v).map_err(BadInput::from)?;
         let reading = |volts: f64| Volts::new(volts.clamp(-2000.0, 2000.0)).map(|volts| ScaledStiffness(volts.0));
-        let mut reading = row.measured.map(reading).transpose().map_err(refused)?;
+        let mut reading = row.measured.map(reading).transpose().map_err(BadInput::from)?;
         let until = ((next.time_s - first.time_s) * rate_hz).round() as u64;
         while tick < until {
             let model = plant.run(&mut spring, applied);
             // Only the row's first tick has its reading.
             config.tick(&mut state, applied, model, reading.take());
             tick += 1;
-            if state.verdict() != says {
-                says = state.verdict();
+            if state.verdict() != verdict {
+                verdict = state.verdict();
                 trace.push(event(&state, first.time_s + tick as f64 / rate_hz));
             }
         }

@@ -92,7 +92,7 @@ fn a_host_accepts_springs_beyond_the_ranges_of_the_tick() {
     assert_eq!(host.unwrap().reading, Some(Reading { gain: -0.05, zero: 20.5 }));
     for (from, to, expected) in [
         ("1e-6", "-1", "line 8, column 9: tau_s = -1 is not allowed"),
-        ("share = 1", "share = 1.1", "share = 1.1 is not allowed: expected 0 to 1"),
+        ("share = 1", "share = nan", "share = NaN is not allowed"),
         ("-0.05", "0", "line 4, column 8: gain = 0 is not allowed"),
         ("zero = 20.5", "zero = nan", "zero = NaN"),
         ("[reading]", "[units]\ntime = \"fortnight\"\n[reading]", "`fortnight` is not a unit of time"),

@@ -1,6 +1,6 @@
 //! Columns in memory as the text of a data file.
 //!
-//! They go through the reader of files, so that names, units, time stamps, missing readings and errors are those of a file.
+//! The columns go through the reader of files, so that names, units, time stamps, missing readings and errors are those of a file.
 //! Numbers are written with all their digits.
 
 use std::fmt::Write;

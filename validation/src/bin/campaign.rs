@@ -15,9 +15,10 @@ use validation::campaign::diagnosis::{self, diagnose};
 use validation::campaign::part::{self, Job};
 use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
+use validation::campaign::unforeseen::Edition;
 use validation::campaign::{
     answer_table, criteria, equation, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps,
-    tables, unforeseen,
+    tables,
 };
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
@@ -42,6 +43,7 @@ Examples:
   cargo campaign singles --export out/singles    its records as files, for `python -m vsj.fleet`
   cargo campaign --write out/hidden --cause hysteresis --seed 3
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
+  cargo campaign unforeseen unseen           laws that the diagnosis does not have
   cargo campaign rivals                      comparison with PySINDy and SysIdentPy
   cargo campaign equation                    the same on records that nothing explains
   cargo campaign real FOLDER                 measured records: FOLDER/NAME.csv, with an optional NAME.toml
@@ -60,8 +62,8 @@ struct Cli {
     #[arg(value_enum, default_values_t = [Part::Singles, Part::Nulls, Part::Pairs, Part::Triples, Part::Small])]
     parts: Vec<Part>,
     /// Records per cause (singles, scales, plants, forms, stress, small, noise, speed), per form or law (out-of-model,
-    /// unforeseen, equation), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each of two sets
-    /// (plan), in total (nulls, triples), or times 55 (thresholds) or 455 (reliability)
+    /// unforeseen, unseen, equation), per pair (pairs, long), per pair and size (shared), per cause and experiment (steps), in each
+    /// of two sets (plan), in total (nulls, triples), or times 55 (thresholds) or 455 (reliability)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     records: Option<u32>,
     /// First seed; another number gives other records
@@ -192,6 +194,8 @@ enum Part {
     OutOfModel,
     /// Laws from the literature that nobody looked at while the diagnosis was made: 3 records of each
     Unforeseen,
+    /// A second edition of unforeseen, whose author had not read the diagnosis: 3 records of each of its laws
+    Unseen,
     /// One effect in a spring of any time constant, share, full scale and unit: 20 records of each cause
     Scales,
     /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 8 records of each cause
@@ -268,11 +272,13 @@ fn positive(text: &str) -> Result<f64, String> {
 /// Result of a part.
 struct Done {
     part: Part,
+    /// Text of the page.
     markdown: String,
+    /// List of the records that are not diagnosed correctly, one line each, which is printed and not written.
     wrong: String,
     criteria: Vec<Criterion>,
     json: Value,
-    /// Name and text of an SVG file beside the page.
+    /// Name and text of an SVG file next to the page.
     figure: Option<(&'static str, String)>,
 }
 
@@ -362,9 +368,10 @@ impl Cli {
                 }
                 let markdown = reliability::page(&sets);
                 let figure = Some(("reliability.svg", reliability::figure(&sets)));
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(sets), figure })
+                Ok(Done { figure, ..Done::new(part, markdown, json!(sets)) })
             }
-            Part::Unforeseen => self.answers(part, &["law"], &unforeseen::cases(first, self.count(3))),
+            Part::Unforeseen => self.answers(part, &["law"], &Edition::First.cases(first, self.count(3))),
+            Part::Unseen => self.answers(part, &["law"], &Edition::Second.cases(first, self.count(3))),
             Part::Small => self.sensitivities(part, &[0.2]),
             Part::Noise => self.sensitivities(part, &[0.1, 0.2, 0.5, 1.0]),
             Part::OutOfModel => {
@@ -378,7 +385,7 @@ impl Cli {
                 let answers = out_of_model::run(&jobs, &diagnose, &bar)?;
                 bar.finish_and_clear();
                 let (markdown, wrong) = (out_of_model::page(&forms, &answers), out_of_model::wrong(&forms, &answers));
-                Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!(answers), figure: None })
+                Ok(Done { wrong, ..Done::new(part, markdown, json!(answers)) })
             }
             Part::Scales => {
                 let jobs = scales::jobs(first, self.count(20));
@@ -386,14 +393,7 @@ impl Cli {
                 let outcomes = scales::run(&jobs, &bar);
                 bar.finish_and_clear();
                 let (markdown, wrong) = (tables::named("cause", &jobs, &outcomes), tables::wrong(&jobs, &outcomes));
-                Ok(Done {
-                    part,
-                    markdown,
-                    wrong,
-                    criteria: Vec::new(),
-                    json: json!({"records": outcomes}),
-                    figure: None,
-                })
+                Ok(Done { wrong, ..Done::new(part, markdown, json!({"records": outcomes})) })
             }
             Part::Equation => {
                 let cases = equation::cases(first, self.count(1));
@@ -401,19 +401,19 @@ impl Cli {
                 let rows = equation::run(&cases, true, &bar)?;
                 bar.finish_and_clear();
                 let markdown = equation::page(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
+                Ok(Done::new(part, markdown, json!(rows)))
             }
             Part::Rivals => {
                 let bar = bar("rivals", rivals::RECORDS)?;
                 let rows = rivals::run(first, &bar)?;
                 bar.finish_and_clear();
                 let markdown = rivals::table(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
+                Ok(Done::new(part, markdown, json!(rows)))
             }
             Part::Instruments => {
                 let rows = measured("instruments", &real::twins(first), true)?;
                 let markdown = real::table(&rows);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json: json!(rows), figure: None })
+                Ok(Done::new(part, markdown, json!(rows)))
             }
             Part::Plan => {
                 let cases = plan::cases(&ground_truth::out_of_model::all(), first, self.count(30));
@@ -421,8 +421,7 @@ impl Cli {
                 let outcomes = plan::run(&cases, &bar)?;
                 bar.finish_and_clear();
                 let markdown = plan::page(&outcomes);
-                let json = json!(outcomes);
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None })
+                Ok(Done::new(part, markdown, json!(outcomes)))
             }
             #[cfg(not(feature = "sensitivity"))]
             Part::Thresholds => bail!("thresholds: expected the feature `sensitivity`; run `cargo thresholds`"),
@@ -435,8 +434,7 @@ impl Cli {
                 let (as_set, rows) = thresholds::run(&cases, diagnosis::vary, &diagnose, &bar)?;
                 bar.finish_and_clear();
                 let markdown = thresholds::page(&cases, &as_set, &rows);
-                let json = json!({"as_set": as_set, "thresholds": rows});
-                Ok(Done { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None })
+                Ok(Done::new(part, markdown, json!({"as_set": as_set, "thresholds": rows})))
             }
         }
     }
@@ -497,7 +495,7 @@ impl Cli {
         let wrong = tables::wrong(jobs, &outcomes);
         let criteria = criteria(&outcomes);
         let json = json!({"aims": criteria, "records": outcomes});
-        Ok(Done { part, markdown, wrong, criteria, json, figure: None })
+        Ok(Done { wrong, criteria, ..Done::new(part, markdown, json) })
     }
 
     /// Diagnoses cases and grades the answers; `heads` are those of the tables' first columns.
@@ -506,11 +504,12 @@ impl Cli {
         let answers = answer::run(cases, &diagnosis::answer, &bar);
         bar.finish_and_clear();
         let markdown = match part {
-            Part::Unforeseen => unforeseen::page(&answers),
+            Part::Unforeseen => Edition::First.page(&answers),
+            Part::Unseen => Edition::Second.page(&answers),
             _ => format!("{}\n{}", answer_table::legend(), answer_table::page(heads[0], &heads[1..], &answers)),
         };
         let wrong = answer_table::wrong(&answers);
-        Ok(Done { part, markdown, wrong, criteria: Vec::new(), json: json!({"records": answers}), figure: None })
+        Ok(Done { wrong, ..Done::new(part, markdown, json!({"records": answers})) })
     }
 
     fn sensitivities(&self, part: Part, levels: &[f64]) -> Result<Done> {
@@ -526,11 +525,16 @@ impl Cli {
         let markdown = if small { tables::sensitivity(&found) } else { tables::noise(&found) };
         let criteria = if small { criteria::small(&found) } else { Vec::new() };
         let json = json!({"aims": criteria, "climbs": found});
-        Ok(Done { part, markdown, wrong: String::new(), criteria, json, figure: None })
+        Ok(Done { criteria, ..Done::new(part, markdown, json) })
     }
 }
 
 impl Done {
+    /// A page without anything else.
+    fn new(part: Part, markdown: String, json: Value) -> Self {
+        Self { part, markdown, wrong: String::new(), criteria: Vec::new(), json, figure: None }
+    }
+
     fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let path = folder.join(format!("{}.md", self.part.name()));

@@ -6,6 +6,7 @@
 //! derivative and no bound here.
 
 use crate::ground_truth::{Cause, LabelledRecord};
+use crate::statistics::dot;
 
 /// Median distance from the mean of a normal distribution, in standard deviations.
 const MEDIAN: f64 = 0.6745;
@@ -54,10 +55,6 @@ fn derivative(hidden: &LabelledRecord, index: usize, value: usize) -> Vec<f64> {
     expected(change).iter().zip(expected(-change)).map(|(a, b)| (a - b) / (2.0 * change)).collect()
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,7 +82,7 @@ mod tests {
             for parameter in cause.facts().parameters {
                 let records = (0..9).map(|seed| Recipe::of(&[cause]).draw(300 + seed));
                 let bounds = records.filter_map(|hidden| median_error(&hidden, cause, parameter)).collect::<Vec<_>>();
-                let median = crate::campaign::statistics::quantile(&bounds, 0.5);
+                let median = crate::statistics::median(&bounds);
                 assert!(median.is_none_or(|bound| bound < 0.05), "{cause} {parameter}: {median:?} at best");
             }
         }

@@ -30,7 +30,11 @@ pub type Diagnose<'a> = dyn Fn(&LabelledRecord) -> Result<Value> + Sync + 'a;
 /// # Errors
 /// The record is rejected.
 pub fn diagnose(hidden: &LabelledRecord) -> Result<Value> {
-    Ok(serde_json::to_value(identify::examine::diagnose(&hidden.record(), &Options::default())?)?)
+    report(&hidden.record(), &Options::default())
+}
+
+fn report(record: &Record, options: &Options) -> Result<Value> {
+    Ok(serde_json::to_value(identify::examine::diagnose(record, options)?)?)
 }
 
 /// Times in s and the voltages, in V, that are held from then on.
@@ -51,18 +55,17 @@ pub fn planned(report: &Value, minutes: f64) -> Result<(Commands, Option<f64>)> 
 /// # Errors
 /// The record or the spring is rejected.
 pub fn compared_with(record: &Record, nominal: PlantFile) -> Result<Value> {
-    let options = Options { base: Base::new(nominal)?, ..Options::default() };
-    Ok(serde_json::to_value(identify::examine::diagnose(record, &options)?)?)
+    report(record, &Options { base: Base::new(nominal)?, ..Options::default() })
 }
 
 /// Report of `identify` on a record compared with its nominal spring, as JSON.
 ///
 /// # Errors
-/// As [`compared_with`].
+/// The record or the spring is rejected.
 pub fn answer(subject: &Subject) -> Result<Value> {
     match &subject.nominal {
         Some(nominal) => compared_with(&subject.record, nominal.clone()),
-        None => Ok(serde_json::to_value(identify::examine::diagnose(&subject.record, &Options::default())?)?),
+        None => report(&subject.record, &Options::default()),
     }
 }
 
@@ -70,7 +73,7 @@ pub fn answer(subject: &Subject) -> Result<Value> {
 /// the causes that were named.
 ///
 /// # Errors
-/// As [`diagnose`].
+/// The record is rejected.
 pub fn predict(hidden: &LabelledRecord, rows: usize) -> Result<(Vec<f64>, Vec<&'static str>)> {
     let whole = hidden.record();
     let (residual, identified) = residual(&whole, rows, &Options::default())?;
@@ -89,7 +92,7 @@ pub fn predict(hidden: &LabelledRecord, rows: usize) -> Result<(Vec<f64>, Vec<&'
     Ok((predicted, identified.report.findings.iter().map(|finding| finding.cause).collect()))
 }
 
-/// What a diagnosis says of a record that it does not explain.
+/// Verdict and equation of a diagnosis, which has an equation where it explains nothing.
 pub struct Hypothesis {
     /// Verdict.
     pub verdict: String,
@@ -104,7 +107,7 @@ pub struct Hypothesis {
 /// The hypothesis of a diagnosis of a record.
 ///
 /// # Errors
-/// As [`diagnose`].
+/// The record is rejected.
 pub fn hypothesis(record: &Record) -> Result<Hypothesis> {
     let report = identify::examine::diagnose(record, &Options::default())?;
     let details = report.equation_details.as_ref();
@@ -123,7 +126,7 @@ pub fn hypothesis(record: &Record) -> Result<Hypothesis> {
 /// best linear model, and of the equation, or of the extended simulation if there is none; `None` if a free run diverged.
 ///
 /// # Errors
-/// As [`diagnose`].
+/// The record is rejected.
 pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3]> {
     let (mut left, identified) = residual(record, rows, &Options::default())?;
     let extended = root_mean_square(&left.split_off(rows));
@@ -148,7 +151,7 @@ pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3
 /// initial state that is not known is estimated from the rows in which it has not decayed.
 ///
 /// # Errors
-/// As [`diagnose`].
+/// The record is rejected.
 pub fn residual_beyond(record: &Record, rows: usize, options: &Options) -> Result<Vec<f64>> {
     let (mut residual, identified) = residual(record, rows, options)?;
     Ok(residual.split_off(identified.data.rows()))

@@ -14,30 +14,16 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::case::Case;
 use super::diagnosis::{Hypothesis, hypothesis, hypothesis_beyond};
 use super::equation_blocks::true_blocks;
 use super::out_of_model;
-use super::part::seed;
-use super::rivals::{Answer, identification};
-use crate::ground_truth::{self, LabelledRecord};
+use super::rivals::{AT_FLOOR, Answer, LEARN, identification};
+use super::subject::Subject;
+use super::unforeseen::Edition;
+use crate::ground_truth;
 use crate::markdown::table;
-use simulation::record::Record;
-
-/// Fraction of a record for identification.
-const LEARN: f64 = 0.6;
-/// Largest error, relative to the floor, that counts as reaching the floor.
-const AT_FLOOR: f64 = 1.1;
-
-/// A record of one law.
-pub struct Case {
-    /// Set of the law.
-    pub set: &'static str,
-    /// Name of the law.
-    pub law: String,
-    /// Seed of the record.
-    pub seed: u64,
-    draw: Box<dyn Fn(u64) -> (LabelledRecord, Record) + Send + Sync>,
-}
+use crate::statistics::{median, quantile};
 
 /// Result for one record.
 #[derive(Clone, Debug, Serialize)]
@@ -69,44 +55,28 @@ pub struct Row {
     pub seconds: f64,
 }
 
-/// `count` records of every law of both sets.
-pub fn cases(first: u64, count: usize) -> Vec<Case> {
-    let forms =
-        out_of_model::jobs(&ground_truth::out_of_model::all(), first, count).into_iter().map(|(form, seed)| Case {
-            set: "out of model",
-            law: form.name.to_owned(),
-            seed,
-            draw: Box::new(move |seed| {
-                let hidden = form.draw(seed);
-                let record = hidden.record();
-                (hidden, record)
-            }),
-        });
-    let laws = ground_truth::unforeseen::all().into_iter().flat_map(|law| std::iter::repeat_n(law, count));
-    let laws = laws.enumerate().map(|(index, (_, law))| Case {
-        set: "unforeseen",
-        law: law.name.to_owned(),
-        seed: seed(first, 18, index),
-        draw: Box::new(move |seed| law.draw(seed)),
-    });
-    forms.chain(laws).collect()
+/// `count` records of every law of both sets, each with the name of its set.
+pub fn cases(first: u64, count: usize) -> Vec<(&'static str, Case)> {
+    let forms = out_of_model::jobs(&ground_truth::out_of_model::all(), first, count).into_iter().map(Case::from);
+    let laws = Edition::First.cases(first, count).into_iter().map(|case| ("unforeseen", case));
+    forms.map(|case| ("out of model", case)).chain(laws).collect()
 }
 
 /// Diagnoses every record, and predicts the last 40 % of those that are not explained; with `python`, also by the other tools.
 ///
 /// # Errors
 /// A record is rejected, or a tool fails.
-pub fn run(cases: &[Case], python: bool, progress: &ProgressBar) -> Result<Vec<Row>> {
-    let rows: Vec<Row> = cases.par_iter().map(|case| row(case, progress)).collect::<Result<_>>()?;
+pub fn run(cases: &[(&'static str, Case)], python: bool, progress: &ProgressBar) -> Result<Vec<Row>> {
+    let rows: Vec<Row> = cases.par_iter().map(|(set, case)| row(set, case, progress)).collect::<Result<_>>()?;
     if python { with_other_tools(cases, rows) } else { Ok(rows) }
 }
 
-fn row(case: &Case, progress: &ProgressBar) -> Result<Row> {
-    let (hidden, record) = (case.draw)(case.seed);
+fn row(set: &'static str, case: &Case, progress: &ProgressBar) -> Result<Row> {
+    let Subject { hidden, record, .. } = (case.draw)(case.seed);
     let start = ThreadTime::now();
     let Hypothesis { verdict, equation, blocks, held_out } = hypothesis(&record)?;
     let seconds = start.elapsed().as_secs_f64();
-    let truth = true_blocks(&case.law);
+    let truth = true_blocks(&case.group);
     let is_true =
         (equation.is_some() && !truth.is_empty()).then(|| blocks.iter().any(|of| truth.contains(&of.as_str())));
     let learnt = (LEARN * record.rows.len() as f64) as usize;
@@ -114,8 +84,8 @@ fn row(case: &Case, progress: &ProgressBar) -> Result<Row> {
     let left: Vec<f64> = hidden.readings.read.iter().zip(&hidden.readings.expected).map(|(read, y)| read - y).collect();
     progress.inc(1);
     Ok(Row {
-        set: case.set,
-        law: case.law.clone(),
+        set,
+        law: case.group.clone(),
         seed: case.seed,
         verdict,
         equation,
@@ -130,11 +100,11 @@ fn row(case: &Case, progress: &ProgressBar) -> Result<Row> {
 }
 
 /// Adds the errors of PySINDy and SysIdentPy on the records that are not explained.
-fn with_other_tools(cases: &[Case], mut rows: Vec<Row>) -> Result<Vec<Row>> {
+fn with_other_tools(cases: &[(&str, Case)], mut rows: Vec<Row>) -> Result<Vec<Row>> {
     let folder = tempfile::tempdir()?;
-    for (index, (case, row)) in cases.iter().zip(&rows).enumerate() {
+    for (index, ((_, case), row)) in cases.iter().zip(&rows).enumerate() {
         if row.verdict == "unexplained" {
-            (case.draw)(case.seed).0.write(folder.path(), &format!("{index:04}"))?;
+            (case.draw)(case.seed).hidden.write(folder.path(), &format!("{index:04}"))?;
         }
     }
     let answers = identification(folder.path(), &[])?;
@@ -186,9 +156,8 @@ have a block that is true of the law.
         counts(name, unexplained.iter().map(error).collect())
     });
     text += &table(&["model", "median", "within 10 % of the floor", "above twice the floor"], lines);
-    let mut seconds: Vec<f64> = unexplained.iter().map(|row| row.seconds).collect();
-    seconds.sort_by(f64::total_cmp);
-    if let (Some(median), Some(most)) = (seconds.get(seconds.len() / 2), seconds.last()) {
+    let seconds: Vec<f64> = unexplained.iter().map(|row| row.seconds).collect();
+    if let (Some(median), Some(most)) = (median(&seconds), quantile(&seconds, 1.0)) {
         let _ = write!(
             text,
             "\nCPU time of the diagnosis of an unexplained record: median {median:.1} s, at most {most:.1} s.\n\n"
@@ -227,9 +196,8 @@ have a block that is true of the law.
     text + &table(&header, unexplained.iter().map(line))
 }
 
-fn counts(name: &str, mut relative: Vec<f64>) -> Vec<String> {
-    relative.sort_by(f64::total_cmp);
-    let median = relative.get(relative.len() / 2).copied().unwrap_or(f64::NAN);
+fn counts(name: &str, relative: Vec<f64>) -> Vec<String> {
+    let median = median(&relative).unwrap_or(f64::NAN);
     let at_floor = relative.iter().filter(|error| **error <= AT_FLOOR).count();
     let far = relative.iter().filter(|error| **error > 2.0).count();
     let of = relative.len();
@@ -242,7 +210,7 @@ mod tests {
 
     #[test]
     fn every_law_with_a_true_block_exists_and_is_named_once() {
-        let laws: Vec<String> = cases(1, 1).into_iter().map(|case| case.law).collect();
+        let laws: Vec<String> = cases(1, 1).into_iter().map(|(_, case)| case.group).collect();
         for (index, (law, blocks)) in super::super::equation_blocks::TRUE_BLOCKS.iter().enumerate() {
             assert!(laws.iter().any(|name| name == law), "{law}");
             assert!(!blocks.is_empty());
@@ -253,8 +221,8 @@ mod tests {
     /// A record that the diagnosis leaves open, and its law.
     #[test]
     fn a_gain_by_direction_is_predicted_to_the_floor_by_its_equation() {
-        let case = cases(5, 1).into_iter().find(|case| case.law == "gain by direction").expect("a law");
-        let row = row(&case, &ProgressBar::hidden()).expect("a diagnosis");
+        let (set, case) = cases(5, 1).into_iter().find(|(_, case)| case.group == "gain by direction").expect("a law");
+        let row = row(set, &case, &ProgressBar::hidden()).expect("a diagnosis");
         assert_eq!((row.verdict.as_str(), row.is_true), ("unexplained", Some(true)), "{row:?}");
         let [extended, linear, equation] = row.held_out.map(|error| error.expect("an error"));
         assert!(equation < AT_FLOOR * row.floor && extended > 2.0 * row.floor && linear > 1.5 * row.floor, "{row:?}");

@@ -16,8 +16,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::detectable::{NONCENTRALITY, smallest};
 use super::mixture::Mixture;
-use super::statistics::NORMAL_95;
 use crate::ground_truth::{Cause, Effect, LabelledRecord};
+use crate::statistics::{NORMAL_95, dot};
 
 /// Distance for an error probability of 5 % either way, in standard deviations of the noise.
 const SEPARATION: f64 = 2.0 * NORMAL_95;
@@ -26,9 +26,8 @@ const SMALL: f64 = 0.01;
 /// Number of random shapes of each other cause.
 const SHAPES: u64 = 2;
 
-/// Smallest size of the record's effect that can be distinguished from every other cause, relative to its detectable
-/// size
-/// `size`; at least 1.
+/// Smallest size of the record's effect that can be distinguished from every other cause, relative to its detectable size `size`;
+/// at least 1.
 ///
 /// # Panics
 /// If the record does not have exactly one effect.
@@ -73,10 +72,6 @@ fn direction(hidden: &LabelledRecord, effect: &Effect, size: f64) -> Vec<f64> {
         LabelledRecord::new(hidden.schedule.clone(), effects, hidden.noise, hidden.seed).readings.expected
     };
     expected(size).iter().zip(expected(effect.least())).map(|(a, b)| a - b).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// True for causes that do not shift the expected readings in proportion to their size.

@@ -5,7 +5,6 @@
 //!
 //! | module | contents |
 //! | --- | --- |
-//! | [`statistics`] | a normal quantile and sample quantiles |
 //! | [`diagnosis`], [`real`] | the only modules that call `identify` |
 //! | [`cramer_rao`] | lower bound of a parameter's error |
 //! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
@@ -21,7 +20,7 @@
 //! | [`scales`] | single effects in springs of any size, in any unit |
 //! | [`plants`] | single effects in springs of several time constants, other schedules and noise |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
-//! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made |
+//! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made, in two editions |
 //! | [`reliability`] | stated probabilities compared with frequencies, over all sets |
 //! | [`plan`] | minutes of the next experiment until the diagnosis is right, by schedule |
 //! | [`equation`], [`equation_blocks`] | equations of records that nothing explains, compared with other tools |
@@ -50,7 +49,6 @@ pub mod scales;
 pub mod score;
 pub mod sensitivity;
 pub mod shared;
-pub mod statistics;
 pub mod steps;
 pub mod subject;
 pub mod summary;

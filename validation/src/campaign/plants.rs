@@ -1,7 +1,7 @@
 //! Single effects in other springs: nominal time constants from 1 ms to 1 h, one to three of them, shares from 0 to 0.8, full scales
 //! from 1 mV to 10 kV; stairs, random levels, multisines, chirps and ramps; white, coloured and rounded noise.
 //!
-//! As in [`scales`], the record is simulated in the paper's units and written in others. A record is drawn until an oracle
+//! The record is simulated in the paper's units and written in others, by [`scales`]. A record is drawn until an oracle
 //! detector could isolate its effect in the paper's spring with the same schedule and noise, at most 8 times.
 
 use rand::seq::IndexedRandom;
@@ -28,7 +28,8 @@ const NOISES: [(&str, NoiseKind, [f64; 2], f64); 5] = [
 ];
 /// Size relative to the smallest one that can be isolated in white noise.
 const MARGIN: f64 = 1.5;
-/// The same in coloured noise, in which neighbouring readings are less than two.
+/// Size in coloured noise relative to the smallest one that can be isolated in white noise, since neighbouring readings are not
+/// independent.
 const COLOURED_MARGIN: f64 = 2.5;
 /// Largest number of draws until an effect can be isolated; the strength of the noise shrinks from draw to draw.
 const DRAWS: i32 = 8;

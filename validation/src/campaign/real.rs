@@ -1,12 +1,12 @@
 //! Measured records of any instrument: what is identified, what is diagnosed, and how well each model predicts.
 //!
-//! In: a folder of CSV files, each with an optional description beside it, or the simulated instruments of
+//! In: a folder of CSV files, each with an optional description next to it, or the simulated instruments of
 //! [`other_plants`]. Out: for each record the verdict and causes, the held-out error and the
 //! error on the last 40 % by a fit to the first 60 %, of the nominal spring that `vsj identify` finds, of the spring that
 //! `vsj diagnose --plant identify` extends, of the best linear model, of PySINDy and of SysIdentPy, and the CPU time.
 //!
 //! ```toml
-//! # NAME.toml beside NAME.csv; without it the first three columns are time, voltage and reading
+//! # NAME.toml next to NAME.csv; without it the first three columns are time, voltage and reading
 //! known = "two lags in series, converter steps"
 //! [columns]
 //! time = "Time:s"
@@ -30,11 +30,9 @@ use simulation::record::{Format, Record, columns_file};
 use simulation::units::Units;
 
 use super::diagnosis::residual_beyond;
-use super::rivals::{self, Answer};
+use super::rivals::{self, Answer, LEARN};
 use crate::ground_truth::other_plants;
-
-/// Fraction of a record for the prediction of the rest.
-const LEARN: f64 = 0.6;
+use crate::markdown;
 
 /// A record with what is known of it.
 #[derive(Clone, Debug)]
@@ -45,7 +43,7 @@ pub struct Subject {
     pub known: String,
     /// The record.
     pub record: Record,
-    /// Its units.
+    /// Units of the record.
     pub units: Units,
     /// Course of the voltage between its rows.
     pub input: Input,
@@ -77,7 +75,7 @@ pub struct Row {
     pub nominal: String,
     /// Verdict of the diagnosis.
     pub verdict: String,
-    /// Its causes with their probabilities.
+    /// Causes that the diagnosis names, with their probabilities.
     pub causes: Vec<(String, f64)>,
     /// Errors of the nominal spring, of the extended one, and of the best linear models of order up to 3 and up to 4.
     pub errors: [Errors; 4],
@@ -248,11 +246,9 @@ Errors are root mean squares in percent of the standard deviation of the record'
 `linear` the best linear output-error model of order 1 to 3, and to 4. PySINDy and SysIdentPy are run on the last 40 % alone. `-`: not
 asked for, or diverged.
 
-| record | rows | verdict, causes (probability) | held out: nominal | extended | linear 3 | linear 4 | last 40 %: nominal | extended | PySINDy | SysIdentPy | CPU s: identify | with diagnosis |
-| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 "
     .to_owned();
-    for row in rows {
+    let line = |row: &Row| {
         let percent = |error: Option<f64>| match error {
             Some(error) if error.is_finite() => format!("{:.2}", 100.0 * error / row.spread),
             _ => "-".to_owned(),
@@ -262,19 +258,27 @@ asked for, or diverged.
         let held_out = row.errors.iter().map(|errors| percent(errors.held_out));
         let last = row.errors[..2].iter().map(|errors| percent(errors.last));
         let other = |index: usize| percent(row.others.get(index).and_then(|answer| answer.rmse));
-        let cells: Vec<String> = held_out.chain(last).chain([other(0), other(1)]).collect();
-        let [identifying, both] = row.seconds;
-        text += &format!(
-            "| {} | {} | {} | {} | {identifying:.2} | {both:.2} |\n",
-            row.name,
-            row.rows,
-            causes.join("; "),
-            cells.join(" | ")
-        );
-    }
-    text += "\n| record | known to be in it | nominal spring |\n| --- | --- | --- |\n";
-    for row in rows {
-        text += &format!("| {} | {} | {} |\n", row.name, row.known, row.nominal);
-    }
-    text
+        let mut cells = vec![row.name.clone(), row.rows.to_string(), causes.join("; ")];
+        cells.extend(held_out.chain(last).chain([other(0), other(1)]));
+        cells.extend(row.seconds.map(|seconds| format!("{seconds:.2}")));
+        cells
+    };
+    let header = [
+        "record",
+        "rows",
+        "verdict, causes (probability)",
+        "held out: nominal",
+        "extended",
+        "linear 3",
+        "linear 4",
+        "last 40 %: nominal",
+        "extended",
+        "PySINDy",
+        "SysIdentPy",
+        "CPU s: identify",
+        "with diagnosis",
+    ];
+    text += &markdown::table(&header, rows.iter().map(line));
+    let known = rows.iter().map(|row| vec![row.name.clone(), row.known.clone(), row.nominal.clone()]);
+    text + "\n" + &markdown::table(&["record", "known to be in it", "nominal spring"], known)
 }

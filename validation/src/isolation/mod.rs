@@ -15,7 +15,7 @@ pub use false_alarms::{Alarms, count, predicted_per_block};
 pub use fault::{Fault, SIZES};
 pub use least_squares::Thresholds;
 pub use page::page;
-pub use run::{Outcome, Says, run};
+pub use run::{Decision, Outcome, run};
 pub use tables::{Row, rows, summary, table};
 
 /// Standard deviations of the noise in the tables, in percent of 500 V.

@@ -14,9 +14,9 @@ pub(super) const RUN_S: f64 = 180.0;
 /// Time for which the rival may settle, in s; no fault begins before.
 pub(super) const SETTLED_S: f64 = 30.0;
 
-/// What is said of a fault.
+/// Decision of the bank, compared with the fault that is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Says {
+pub enum Decision {
     /// No alarm.
     Quiet,
     /// An alarm without a decision.
@@ -40,9 +40,9 @@ pub struct Outcome {
     pub limit_s: Option<f64>,
     /// Time of the first name, and whether it was right.
     pub first: Option<(f64, bool)>,
-    /// What is said at the end.
-    pub last: Says,
-    /// What is said at the end is ambiguous, and the right name is one of the two.
+    /// Decision at the end of the run.
+    pub last: Decision,
+    /// True if the decision at the end is ambiguous, and the right name is one of the two.
     pub one_of_two: bool,
     /// Time at which the rival leaves its band.
     pub rival_s: Option<f64>,
@@ -52,14 +52,14 @@ pub struct Outcome {
     pub deviations: [f64; 3],
 }
 
-fn says(verdict: Verdict, fault: Fault) -> Says {
+fn decision(verdict: Verdict, fault: Fault) -> Decision {
     match verdict {
-        Verdict::Quiet => Says::Quiet,
-        Verdict::Alarm => Says::Alarm,
-        Verdict::Unknown => Says::Unknown,
-        Verdict::Ambiguous(..) => Says::Ambiguous,
-        Verdict::Named(cause) if cause.name() == fault.name() => Says::Right,
-        Verdict::Named(_) => Says::Wrong,
+        Verdict::Quiet => Decision::Quiet,
+        Verdict::Alarm => Decision::Alarm,
+        Verdict::Unknown => Decision::Unknown,
+        Verdict::Ambiguous(..) => Decision::Ambiguous,
+        Verdict::Named(cause) if cause.name() == fault.name() => Decision::Right,
+        Verdict::Named(_) => Decision::Wrong,
     }
 }
 
@@ -92,7 +92,7 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
         alarm_s: None,
         limit_s: None,
         first: None,
-        last: Says::Quiet,
+        last: Decision::Quiet,
         one_of_two: false,
         rival_s: None,
         rival_right: false,
@@ -133,11 +133,11 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
             outcome.alarm_s = Some(since_s);
         }
         if outcome.first.is_none() && matches!(verdict, Verdict::Named(_)) {
-            outcome.first = Some((since_s, says(verdict, fault) == Says::Right));
+            outcome.first = Some((since_s, decision(verdict, fault) == Decision::Right));
         }
     }
     let verdict = watched.verdict();
-    outcome.last = says(verdict, fault);
+    outcome.last = decision(verdict, fault);
     outcome.one_of_two = matches!(verdict, Verdict::Ambiguous(a, b) if [a.name(), b.name()].contains(&fault.name()));
     Ok(outcome)
 }

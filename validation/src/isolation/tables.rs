@@ -5,8 +5,9 @@ use rayon::prelude::*;
 
 use super::fault::{Fault, SIZES};
 use super::least_squares::Thresholds;
-use super::run::{Outcome, Says, run};
+use super::run::{Decision, Outcome, run};
 use crate::markdown;
+use crate::statistics::median;
 
 /// The runs of one fault at one size.
 #[derive(Clone, Debug)]
@@ -37,22 +38,18 @@ pub fn rows(percent: f64, seeds: std::ops::Range<u64>, thresholds: &Thresholds) 
     cases.par_iter().map(row).collect()
 }
 
-fn median(mut values: Vec<f64>) -> String {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.1}"))
-}
-
 impl Row {
     fn count(&self, what: impl Fn(&Outcome) -> bool) -> usize {
         self.outcomes.iter().filter(|outcome| what(outcome)).count()
     }
 
-    fn ended(&self, says: Says) -> usize {
-        self.count(|outcome| outcome.last == says)
+    fn ended(&self, decision: Decision) -> usize {
+        self.count(|outcome| outcome.last == decision)
     }
 
     fn times(&self, time: impl Fn(&Outcome) -> Option<f64>) -> String {
-        median(self.outcomes.iter().filter_map(time).filter(|time| *time >= 0.0).collect())
+        let times: Vec<f64> = self.outcomes.iter().filter_map(time).filter(|time| *time >= 0.0).collect();
+        median(&times).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.1}"))
     }
 
     fn cells(&self) -> Vec<String> {
@@ -66,11 +63,11 @@ impl Row {
             self.times(|outcome| outcome.alarm_s),
             self.times(|outcome| outcome.limit_s),
             self.times(|outcome| outcome.first.map(|(time, _)| time)),
-            number(self.ended(Says::Right)),
-            format!("{} ({})", self.ended(Says::Ambiguous), self.count(|outcome| outcome.one_of_two)),
-            number(self.ended(Says::Unknown)),
-            number(self.ended(Says::Wrong)),
-            number(self.ended(Says::Quiet) + self.ended(Says::Alarm)),
+            number(self.ended(Decision::Right)),
+            format!("{} ({})", self.ended(Decision::Ambiguous), self.count(|outcome| outcome.one_of_two)),
+            number(self.ended(Decision::Unknown)),
+            number(self.ended(Decision::Wrong)),
+            number(self.ended(Decision::Quiet) + self.ended(Decision::Alarm)),
             number(first_wrong),
             format!("{rival} ({rival_right})"),
             self.times(|outcome| outcome.rival_s),
@@ -116,16 +113,16 @@ pub fn summary(rows: &[Row]) -> String {
         let total = |of: &dyn Fn(&Row) -> usize| part.iter().map(|row| of(row)).sum::<usize>();
         let runs = total(&|row| row.outcomes.len());
         let percent = |count: usize| format!("{:.1} %", 100.0 * count as f64 / runs as f64);
-        let ended = |says: Says| percent(total(&|row| row.ended(says)));
+        let ended = |decision: Decision| percent(total(&|row| row.ended(decision)));
         let with = |first: usize, second: usize| format!("{} ({})", percent(first), percent(second));
         vec![
             name.to_owned(),
             runs.to_string(),
             percent(total(&|row| row.count(|outcome| outcome.alarm_s.is_some()))),
-            ended(Says::Right),
-            with(total(&|row| row.ended(Says::Ambiguous)), total(&|row| row.count(|outcome| outcome.one_of_two))),
-            ended(Says::Unknown),
-            ended(Says::Wrong),
+            ended(Decision::Right),
+            with(total(&|row| row.ended(Decision::Ambiguous)), total(&|row| row.count(|outcome| outcome.one_of_two))),
+            ended(Decision::Unknown),
+            ended(Decision::Wrong),
             percent(total(&|row| row.count(|outcome| outcome.first.is_some_and(|(_, right)| !right)))),
             with(
                 total(&|row| row.count(|outcome| outcome.rival_s.is_some())),

@@ -86,7 +86,7 @@ impl Watched {
         Ok(Tick { applied, model: model.to_f64(), read, expected })
     }
 
-    /// What the bank says.
+    /// Verdict of the bank.
     pub(super) fn verdict(&self) -> Verdict {
         self.bank_state.verdict()
     }

@@ -41,14 +41,17 @@ pub(super) fn run(page: &Path) -> Result<()> {
     let vsj = build::vsj()?;
     let folder = env::temp_dir().join(format!("vsj-page-{}", std::process::id()));
     let mut test = Test { browser: Browser::start(folder.join("browser"))?, vsj, folder };
-    let tests: [(&str, Check); 8] = [
+    let tests: [(&str, Check); 11] = [
         ("the stair has the command's numbers", Test::stair),
         ("every field has a label", Test::labels),
         ("a target drawn by pointer and keys has the command's numbers", Test::drawn),
         ("settings out of range show the command's error", Test::refused),
         ("a hidden effect is diagnosed like the command's", Test::hidden),
         ("a file is diagnosed like the command's", Test::file),
-        ("cancel ends a diagnosis", Test::cancel),
+        ("several records are diagnosed like the command's", Test::several),
+        ("the next experiment is the command's, and is simulated", Test::planned),
+        ("cancel gives the best answer so far", Test::best_so_far),
+        ("cancel again ends a diagnosis without an answer", Test::cancel),
         ("a damaged file shows the command's error", Test::damaged),
     ];
     test.browser.screen(1400, "light")?;
@@ -69,8 +72,6 @@ pub(super) fn run(page: &Path) -> Result<()> {
 impl Test {
     /// Waits until the control panel has shown what the settings make, and returns its JSON.
     fn control(&mut self) -> Result<Value> {
-        // Longer than the panel's pause after a change.
-        std::thread::sleep(Duration::from_millis(300));
         self.browser.wait("document.body.dataset.control === 'done'", CONTROL)?;
         Ok(serde_json::from_str(&self.browser.text("stair-json")?)?)
     }
@@ -178,7 +179,6 @@ impl Test {
         self.browser.set("target", "stair")?;
         self.browser.set("effect", "hysteresis")?;
         self.control()?;
-        self.browser.wait("!document.getElementById('save-record').hidden", CONTROL)?;
         self.browser.click("save-record")?;
         let csv = self.browser.downloaded("record.csv")?;
         self.write("record.csv", &csv)?;
@@ -225,15 +225,101 @@ impl Test {
         self.control().map(drop)
     }
 
-    fn cancel(&mut self) -> Result<()> {
+    /// Two experiments with one hidden effect: a file, and the record that the panel has made.
+    fn several(&mut self) -> Result<()> {
+        let names = ["steps.csv", "record.csv"];
+        self.browser.click("report-spring")?;
+        self.browser.set("effect", "hysteresis")?;
+        let mut truths = Vec::new();
+        for (target, name) in ["step", "stair"].into_iter().zip(names) {
+            self.browser.set("target", target)?;
+            self.control()?;
+            truths.push(self.browser.text("truth")?);
+            self.browser.click("save-record")?;
+            let csv = self.browser.downloaded("record.csv")?;
+            self.write(name, &csv)?;
+        }
+        ensure!(truths[0] == truths[1], "not of one spring: {truths:?}");
+        let file = self.folder.join(names[0]);
+        self.browser.choose("file", &file)?;
+        self.browser.wait("document.getElementById('file-name').textContent.startsWith('steps')", CONTROL)?;
+        self.browser.click("add-hidden")?;
+        self.browser.set("nominal", "paper")?;
+        self.browser.set("effort", "quick")?;
+        for (command, more) in [("identify", &[][..]), ("diagnose", &["--effort", "quick"])] {
+            self.browser.click(command)?;
+            let page = self.found()?;
+            same(command, &page, &self.command(&[&[command][..], &names, more].concat())?, CONVERGENCE)?;
+        }
+        let listed = self.browser.value("[...document.getElementById('shown-record').options].map((of) => of.text)")?;
+        ensure!(listed == serde_json::json!(names), "the plots offer {listed}");
+        let rows = self.browser.text("answer")?;
+        ensure!(names.iter().all(|name| rows.contains(name)), "the table shows {rows}");
+        let drawn = "document.querySelector('#record-plot svg.live').outerHTML";
+        let before = self.browser.value(drawn)?;
+        self.browser.set("shown-record", "1")?;
+        ensure!(self.browser.value(drawn)? != before, "the plot has not changed");
+        Ok(())
+    }
+
+    /// The plan after the last diagnosis.
+    fn planned(&mut self) -> Result<()> {
+        self.browser.click("save-diagnosis")?;
+        let diagnosis = self.browser.downloaded("diagnosis.json")?;
+        self.write("diagnosis.json", &diagnosis)?;
+        self.browser.set("minutes", "2")?;
+        self.browser.click("plan")?;
+        self.browser.wait("!document.getElementById('planned').hidden", DIAGNOSIS)?;
+        let page: Value = serde_json::from_str(&self.browser.text("plan-json")?)?;
+        let mut command = self.command(&["plan", "diagnosis.json", "--minutes", "2", "--out", "plan"])?;
+        command["schedule"] = Value::Null;
+        same("plan", &page, &command, CONVERGENCE)?;
+        self.browser.click("save-schedule")?;
+        let schedule = self.browser.downloaded("schedule.csv")?;
+        let written = fs::read_to_string(self.folder.join("plan/schedule.csv"))?;
+        let written = written.split_once('\n').map_or("", |(_, rows)| rows);
+        same("schedule", &Value::from(schedule.as_str()), &Value::from(written), CONVERGENCE)?;
+        self.write("schedule.csv", &schedule)?;
+        self.browser.click("simulate-plan")?;
+        let args = ["stair", "--input", "schedule.csv", "--controller", "none"];
+        same("simulated", &self.control()?, &self.command(&args)?, ROUNDING)?;
+        self.browser.set("minutes", "-1")?;
+        self.browser.click("plan")?;
+        self.browser.wait("document.getElementById('plan-error').textContent !== ''", CONTROL)?;
+        let shown = self.browser.text("plan-error")?;
+        let refusal = self.refusal(&["plan", "diagnosis.json", "--minutes", "-1"])?;
+        ensure!(refusal == shown, "the page shows `{shown}`, the command `{refusal}`");
+        self.browser.set("minutes", "")
+    }
+
+    /// Cancels a long diagnosis as soon as it has a cause.
+    fn best_so_far(&mut self) -> Result<()> {
+        self.browser.choose("file", &shell::root().join(RECORD))?;
+        self.browser.wait("document.getElementById('file-name').textContent.startsWith('sample')", CONTROL)?;
         self.browser.set("effort", "thorough")?;
+        self.browser.click("diagnose")?;
+        self.browser.wait("document.getElementById('so-far').textContent !== ''", DIAGNOSIS)?;
+        let begin = Instant::now();
+        self.browser.click("cancel")?;
+        let page = self.found()?;
+        println!("the best answer so far comes {:.1} s after cancel", begin.elapsed().as_secs_f64());
+        ensure!(page["complete"] == false, "the answer is of a search that was finished");
+        let status = self.browser.text("record-status")?;
+        ensure!(status.starts_with("Ended early: the best answer so far. Verdict: "), "`{status}`");
+        Ok(())
+    }
+
+    /// Cancels twice, before there is an answer.
+    fn cancel(&mut self) -> Result<()> {
         self.browser.click("diagnose")?;
         self.browser.wait("document.body.dataset.record === 'running'", CONTROL)?;
         let begin = Instant::now();
-        self.browser.click("cancel")?;
+        for _ in 0..2 {
+            self.browser.click("cancel")?;
+        }
         self.browser.wait("document.body.dataset.record === 'idle'", Duration::from_secs(5))?;
         let status = self.browser.text("record-status")?;
-        ensure!(status == "Cancelled.", "`{status}` after {:?}", begin.elapsed());
+        ensure!(status.starts_with("Cancelled."), "`{status}` after {:?}", begin.elapsed());
         self.browser.set("effort", "quick")?;
         self.browser.click("diagnose")?;
         self.found().map(drop)

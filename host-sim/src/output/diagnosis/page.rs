@@ -79,7 +79,7 @@ fn footer(diagnosis: &Diagnosis, Origin { record, column, input, command }: &Ori
     html! {
         footer {
             dl {
-                dt { "Version" } dd { "vsj " (env!("CARGO_PKG_VERSION")) }
+                dt { "Version" } dd { "vsj " (crate::VERSION) }
                 dt { "Command" } dd { code { (command) } }
                 dt { "Data" } dd { (record) ", column " (column) }
                 dt { "Rows" } dd { (diagnosis.report.rows) }

@@ -16,6 +16,9 @@ use crate::output::diagnosis::suspects;
 
 /// Smallest held-out improvement that is reported as one.
 const SMALLEST_IMPROVEMENT: f64 = 0.005;
+/// Ratio of the held-out errors of the extended simulation and of the best linear model from which on the nominal spring is another
+/// one than that of the record.
+const ANOTHER_SPRING: f64 = 2.0;
 
 /// The text for the terminal.
 pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
@@ -141,6 +144,22 @@ fn parts_to_take_out(report: &answer::Report, scales: &Scales) -> Option<String>
             scales.number(Dimension::ReadingSize, before.held_out_rmse, 3),
             scales.with_unit(Dimension::ReadingSize, after.held_out_rmse, 3),
             if report.findings.is_empty() { "" } else { " and with the causes below" }
+        )
+    })
+}
+
+/// States that the record shows another spring than the nominal one; `None` unless a linear model predicts it far better.
+fn another_spring(report: &answer::Report) -> Option<String> {
+    let ratio = report.extended.quality.held_out_rmse / report.linear?.held_out_rmse;
+    let another = report.verdict == Verdict::Unexplained
+        && report.nominal.plant != "identify"
+        && ratio > ANOTHER_SPRING
+        && ratio.is_finite();
+    another.then(|| {
+        format!(
+            "A linear model predicts held-out readings {} times better: the record is of another spring than the nominal one. \
+             `--plant identify` judges the spring that it shows.",
+            significant(ratio, 2)
         )
     })
 }
@@ -288,8 +307,10 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         let small = if report.verdict == Verdict::Unexplained { "" } else { "Too small to change this verdict: " };
         sentences.push(format!("{small}{leftover}."));
     }
-    if let Some(next) = &report.next_experiment {
-        sentences.push(format!("To decide, {next}."));
+    match (another_spring(report), &report.next_experiment) {
+        (Some(another), _) => sentences.push(another),
+        (None, Some(next)) => sentences.push(format!("To decide, {next}.")),
+        (None, None) => {}
     }
     sentences
 }
@@ -397,6 +418,21 @@ mod tests {
         });
         let said = "The best suspect is reading-offset, 4.5 nats short of a finding: it changes the error from 42.675 to 20.029 V.";
         assert_eq!(sentences("r.csv", &report, &Scales::default())[1], said);
+    }
+
+    #[test]
+    fn a_record_of_another_spring_is_sent_to_identify() {
+        let mut report = report(Verdict::Unexplained, &[], &[]);
+        report.next_experiment = Some("run the same schedule again".into());
+        let last = |report: &answer::Report| sentences("r.csv", report, &Scales::default()).pop().expect("a sentence");
+        report.linear = Some(LinearError { order: 4, rmse: 0.5, held_out_rmse: 0.6, last_40_percent_rmse: 0.7 });
+        assert!(
+            last(&report).starts_with("A linear model predicts held-out readings 13 times better"),
+            "{}",
+            last(&report)
+        );
+        report.nominal.plant = "identify".into();
+        assert_eq!(last(&report), "To decide, run the same schedule again.");
     }
 
     #[test]

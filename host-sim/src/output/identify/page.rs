@@ -34,7 +34,7 @@ pub(super) fn page(identified: &Identified, units: &Units, origin: &Origin, figu
         pre { (identified.plant.to_toml().unwrap_or_default()) }
         footer {
             dl {
-                dt { "Version" } dd { "vsj " (env!("CARGO_PKG_VERSION")) }
+                dt { "Version" } dd { "vsj " (crate::VERSION) }
                 dt { "Command" } dd { code { (origin.command) } }
                 dt { "Rows" } dd { (report.rows) }
             }

@@ -43,11 +43,8 @@ pub(super) fn quantities(report: &Report, units: &Units) -> Vec<Line> {
         }
     }
     let noise = &report.noise;
-    lines.push([
-        "noise, standard deviation".into(),
-        format!("{} {reading}", number(noise.sigma)),
-        format!("correlation of neighbours {:.2}", noise.autocorrelation),
-    ]);
+    lines.push(["noise, standard deviation".into(), format!("{} {reading}", number(noise.sigma)), String::new()]);
+    lines.push(["  correlation of neighbours".into(), format!("{:.2}", noise.autocorrelation), String::new()]);
     lines
 }
 

@@ -31,6 +31,5 @@ pub fn write(mut files: Files, plan: &Plan, command: &str) -> Result<Vec<PathBuf
 /// Writes the schedule as CSV: each voltage is held until the next row.
 fn schedule(out: &mut dyn Write, plan: &Plan, command: &str) -> io::Result<()> {
     writeln!(out, "# {}; each voltage is held until the next row", command.replace(['\n', '\r'], " "))?;
-    writeln!(out, "time_s,voltage_v")?;
-    plan.commands.iter().try_for_each(|command| writeln!(out, "{},{}", command.time_s, command.voltage_v))
+    out.write_all(plan.csv().as_bytes())
 }

@@ -1,4 +1,4 @@
-//! Constants and quantiles that several parts of the campaign need.
+//! Constants, quantiles and sums that several modules need.
 
 /// One-sided 95 % point of the standard normal distribution.
 pub const NORMAL_95: f64 = 1.6449;
@@ -17,6 +17,16 @@ pub fn wilson(successes: usize, count: usize) -> [f64; 2] {
     let centre = (part + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = NORMAL_975 / (1.0 + z2 / n) * (part * (1.0 - part) / n + z2 / (4.0 * n * n)).sqrt();
     [(centre - half).max(0.0), (centre + half).min(1.0)]
+}
+
+/// Sum of the products of two vectors' elements.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Median of the values, the upper of two; `None` without values.
+pub fn median(values: &[f64]) -> Option<f64> {
+    quantile(values, 0.5)
 }
 
 /// Quantile of the values at `part` from 0 to 1, by the nearest rank; `None` without values.
