@@ -13,7 +13,12 @@ fn main() {
     }
     // memory.x of the workspace includes the board's flash.x and the controller's stack.x.
     let package = env::var("CARGO_MANIFEST_DIR").unwrap();
-    let stack = if env::var_os("CARGO_FEATURE_ROBUST").is_some() { "robust" } else { "usual" };
+    let has = |feature: &str| env::var_os(format!("CARGO_FEATURE_{feature}")).is_some();
+    let stack = match (has("ADAPTATION"), has("ROBUST")) {
+        (true, _) => "adaptation",
+        (false, true) => "robust",
+        (false, false) => "usual",
+    };
     let stack = format!("{package}/../stack/{stack}");
     for (folder, script) in [(format!("{package}/.."), "memory.x"), (stack, "stack.x"), (package, "flash.x")] {
         println!("cargo:rustc-link-search={folder}");

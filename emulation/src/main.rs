@@ -96,12 +96,13 @@ Examples:
   cargo xtask story --controller fast
   cargo xtask story --feedback                     the paper's model, without the sensor and with it
   cargo xtask story --isolation                    what changes is named by the board
+  cargo xtask story --adaptation                   and followed by its model
   cargo xtask story --all --json")]
     Story(story::Args),
     /// Flash, RAM and worst stack of each image
     ///
-    /// Exits with 1 unless flash stays below 128 KB, RAM below 16 KB (with the isolation bank 24 KB) and the stack within its
-    /// region.
+    /// Exits with 1 unless flash stays below 128 KB, RAM below 16 KB (with the isolation bank 24 KB, with the adaptation 32 KB) and the
+    /// stack within its region.
     #[command(after_help = "\
 Examples:
   cargo xtask size --json

@@ -6,10 +6,11 @@ use link::{Command, WireModel};
 use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
 use model::{
-    Config, ExtendedPlant, Input, OutOfRange, Output, Reading, ScaledStiffness, Settings, State, Validated, Volts,
-    estimator, extended,
+    Config, ExtendedPlant, Input, OutOfRange, Output, ScaledStiffness, Settings, State, Validated, Volts, estimator,
+    extended,
 };
 
+use crate::adaptation::Scale;
 use crate::isolation::News;
 
 /// Inputs of one tick from the board.
@@ -79,6 +80,7 @@ pub trait Source {
 #[derive(Clone, Debug)]
 pub struct Control {
     spring: Spring,
+    scale: Scale,
     supervisor: Supervisor,
     target: Volts,
     ticks_since_host: u32,
@@ -112,7 +114,8 @@ impl Control {
         let supervision = supervision.validate(settings.sample_time())?;
         let supervisor = Supervisor::new(supervision.quantize(), last_fault);
         let spring = Spring::Plain(Loop::new(settings));
-        Ok(Self { spring, supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
+        let scale = Scale::default();
+        Ok(Self { spring, scale, supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
     }
 
     /// Replaces the spring of `settings` by the identified `model`, and the amplifier's limits by its own where those are
@@ -147,13 +150,29 @@ impl Control {
         &self.supervisor
     }
 
-    /// The model's stiffness just after the voltage of the last tick, whose `output` this is, without the sensor's correction.
+    /// The model's stiffness just after the voltage of the last tick, whose `output` this is, without the sensor's correction and without
+    /// the gain that has been adapted.
     pub fn uncorrected(&self, output: &Output) -> ScaledStiffness {
         let correction = match &self.spring {
             Spring::Plain(spring) => spring.state.correction(),
             Spring::Extended(spring) => spring.state.correction(),
         };
-        ScaledStiffness(output.stiffness.0.saturating_sub(correction.0))
+        ScaledStiffness(self.scale.inward(output.stiffness).0.saturating_sub(correction.0))
+    }
+
+    /// A reading without the gain that has been adapted.
+    pub fn inward(&self, reading: ScaledStiffness) -> ScaledStiffness {
+        self.scale.inward(reading)
+    }
+
+    /// Exchanges the controller of a plain spring between two ticks, without a bump of voltage and estimate. `target` is that of the last
+    /// tick.
+    #[cfg(feature = "adaptation")]
+    pub fn exchange(&mut self, variant: &model::adaptation::Variant, target: Volts) {
+        if let Spring::Plain(spring) = &mut self.spring {
+            variant.take_over(&mut spring.state, (&spring.config, &self.scale), target);
+            (spring.config, self.scale) = (variant.control, variant.scale);
+        }
     }
 
     /// Executes one tick. Not inlined, so that the audit of the image finds it and verifies that it cannot panic.
@@ -170,11 +189,16 @@ impl Control {
             monitors: sensors.monitors,
             fault: sensors.fault,
         });
-        let measured = sensors.measured.and_then(|volts| Reading::fresh(ScaledStiffness(volts.0)));
-        let output = match &mut self.spring {
-            Spring::Plain(spring) => spring.step(decision, measured, stopwatch),
-            Spring::Extended(spring) => spring.step(decision, measured, stopwatch),
+        let target = match decision {
+            Decision::Rest => Volts::ZERO,
+            Decision::Start(target) | Decision::Pursue(target) => target,
         };
+        let input = self.scale.input(target, sensors.measured.map(|volts| ScaledStiffness(volts.0)));
+        let output = match &mut self.spring {
+            Spring::Plain(spring) => spring.step(decision, input, stopwatch),
+            Spring::Extended(spring) => spring.step(decision, input, stopwatch),
+        };
+        let output = self.scale.output(output);
         Tick { drive: self.supervisor.release(&output), output, measured: sensors.measured }
     }
 }
@@ -210,15 +234,15 @@ impl<E: Estimator> Loop<E> {
     }
 
     #[inline(always)]
-    fn step(&mut self, decision: Decision, measured: Option<Reading>, stopwatch: &mut impl Stopwatch) -> Output {
+    fn step(&mut self, decision: Decision, input: Input, stopwatch: &mut impl Stopwatch) -> Output {
         match decision {
-            Decision::Rest => self.config.rest(&mut self.state, measured),
-            Decision::Start(target) => {
+            Decision::Rest => self.config.rest(&mut self.state, input.measured),
+            Decision::Start(_) => {
                 // The initial condition is the steady state at a target of 0 V.
                 self.config.bumpless_transfer(&mut self.state, Volts::ZERO);
-                self.timed(Input { target, measured }, stopwatch)
+                self.timed(input, stopwatch)
             }
-            Decision::Pursue(target) => self.timed(Input { target, measured }, stopwatch),
+            Decision::Pursue(_) => self.timed(input, stopwatch),
         }
     }
 

@@ -45,6 +45,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod adaptation;
 pub mod board;
 pub mod capture;
 pub mod clock_test;

@@ -87,6 +87,21 @@ pub fn isolation(news: &News, tick: u32) {
     let _ = (news, tick);
 }
 
+/// Logs a change of the adaptation after the block that ended with `tick`: what it does, and the running parameters as ratios to those of
+/// the stored model.
+#[cfg(feature = "adaptation")]
+pub fn adaptation(change: &crate::adaptation::Change, tick: u32) {
+    let parameters = change.parameters;
+    info!(
+        "adaptation {=str} time_constant={=f64} share={=f64} gain={=f64} tick={=u32}",
+        change.phase.name(),
+        parameters.time_constant,
+        parameters.share,
+        parameters.gain,
+        tick
+    );
+}
+
 /// Logs the first lines after a reset: its cause, the code of the last fault, and rate, controller and amplifier in use.
 pub fn boot(reset: &'static str, last_fault: u8, settings: &device::Settings) {
     RATE_HZ.store(settings.rate_hz(), Ordering::Relaxed);

@@ -12,7 +12,7 @@ use crate::isolation::Isolation;
 use crate::log::{self, EVENTS, Event, Summary, queue};
 use crate::pace::Pace;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
-use crate::{crash_record, hang_guard, stop};
+use crate::{adaptation, crash_record, hang_guard, stop};
 
 /// Times of the control task.
 #[derive(Clone, Copy, Debug)]
@@ -79,6 +79,7 @@ pub async fn control<B: Board>(
             source.isolated(&news);
             log::isolation(&news, ticks);
         }
+        adaptation::after_tick(control, isolation, &tick, ticks);
 
         hang_guard::feed(timing.hang_ms);
         TASK_WATCHDOG.check_in(Task::Control);
@@ -163,16 +164,18 @@ impl Report {
     }
 }
 
-/// Logs the events that the control task has queued, and checks in. `each` is called after every event, and with `None` once
+/// Logs the events that the control task has queued, plans the adaptation, and checks in. `each` is called after every event, and with `None` once
 /// the queue has been empty for 10 ms.
 pub async fn housekeeping(mut each: impl FnMut(Option<&Event>)) -> ! {
     TASK_WATCHDOG.register(Task::Housekeeping);
+    let mut planner = adaptation::Planner::begin();
     loop {
         let event = with_timeout(Duration::from_millis(10), EVENTS.receive()).await.ok();
         if let Some(event) = event {
             log::event(event);
         }
         each(event.as_ref());
+        adaptation::serve(&mut planner);
         TASK_WATCHDOG.check_in(Task::Housekeeping);
     }
 }

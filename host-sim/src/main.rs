@@ -27,6 +27,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Adapt(commands::adapt::Arguments),
     Beam(commands::beam::Arguments),
     Bound(commands::bound::Arguments),
     Compare(commands::compare::Arguments),
@@ -56,6 +57,7 @@ fn main() -> ExitCode {
         remark(&format!("signals cannot be handled: {error}"));
     }
     let done = match cli.command {
+        Some(Command::Adapt(arguments)) => commands::adapt::run(&arguments),
         Some(Command::Beam(arguments)) => commands::beam::run(&arguments),
         Some(Command::Bound(arguments)) => commands::bound::run(&arguments),
         Some(Command::Compare(arguments)) => commands::compare::run(&arguments),

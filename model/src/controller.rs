@@ -338,6 +338,24 @@ impl<E: Estimator> Config<E> {
     /// pre-compensator the next voltage is the target.
     pub fn bumpless_transfer(&self, state: &mut State<E::State>, target: Volts) {
         state.feedback.transfer_to(self.feedback.as_ref());
+        self.preset(state, target);
+    }
+
+    /// Returns the estimate under the last voltage just before the next tick.
+    pub fn present(&self, state: &State<E::State>) -> ScaledStiffness {
+        let model = self.estimator.predict(&state.estimator, self.amplifier.applied(&state.amplifier)).now;
+        ScaledStiffness(model.saturating_add(state.correction().0))
+    }
+
+    /// Makes this configuration, which differs in the spring only, take over a running `state` without moving voltage and estimate:
+    /// the sensor's correction is what makes the estimate `stiffness` again. Otherwise as [`Config::bumpless_transfer`].
+    pub fn take_over(&self, state: &mut State<E::State>, target: Volts, stiffness: ScaledStiffness) {
+        state.feedback.shift(stiffness.0.saturating_sub(self.present(state).0));
+        self.preset(state, target);
+    }
+
+    /// Presets the pre-compensator so that for the same `target` the next voltage is the last one.
+    fn preset(&self, state: &mut State<E::State>, target: Volts) {
         let (desired, _) = self.amplifier.clamp_target(target);
         let (target, _) = self.amplifier.clamp_target(state.feedback.corrected(desired));
         match &self.pre_compensator {

@@ -35,6 +35,7 @@
 //! | [`robust`] | the pre-compensator that is as fast as a spring allows that is known to within errors |
 //! | [`feedback`] | correction of the estimate by a stiffness sensor, and detection of the sensor's faults |
 //! | [`isolation`] | which fault explains that sensor and model differ |
+//! | [`adaptation`] | parameters that it has named, taken over by the running model |
 //! | [`amplifier`] | slew, range, rounding to a DAC code |
 //! | [`controller`] | all of these in one tick |
 //! | [`supervisor`] | whether the output is enabled |
@@ -63,6 +64,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod adaptation;
 pub mod amplifier;
 pub mod coefficient;
 pub mod controller;

@@ -20,6 +20,7 @@
 //! | [`robust_bound`] | the shortest possible t97 for a spring that is known only to within errors |
 //! | [`comparison`], [`tune`] | controllers compared on the same steps; gains for a spring and the cost of a model error |
 
+pub mod adaptation;
 pub mod bad_input;
 pub mod bound;
 pub mod bounded_file;

@@ -5,6 +5,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
+//! | `adaptation` | A run of the adaptation, for counting instructions (feature `adaptation`). |
 //! | `blocks` | Runs of the tick with each kind of spring and each controller, for counting instructions (feature `robust`). |
 //! | [`digest`] | Checksum of a whole run. |
 //! | [`isolation`] | A run of the isolation bank with the controller, for counting instructions. |
@@ -21,6 +22,8 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(feature = "adaptation")]
+pub mod adaptation;
 #[cfg(feature = "robust")]
 pub mod blocks;
 pub mod digest;

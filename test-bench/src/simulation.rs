@@ -13,7 +13,7 @@ use crate::script::Script;
 ///
 /// # Errors
 /// [`OutOfRange`] if the settings of the script are invalid, which the tests exclude.
-pub fn simulate(script: Script, each: impl FnMut(&Control, &Tick)) -> Result<Digest, OutOfRange> {
+pub fn simulate(script: Script, each: impl FnMut(&mut Control, &Tick)) -> Result<Digest, OutOfRange> {
     simulate_with(script, None, |_| None, each)
 }
 
@@ -26,7 +26,7 @@ pub fn simulate_with(
     mut script: Script,
     model: Option<&WireModel>,
     mut measured: impl FnMut(u32) -> Option<Volts>,
-    mut each: impl FnMut(&Control, &Tick),
+    mut each: impl FnMut(&mut Control, &Tick),
 ) -> Result<Digest, OutOfRange> {
     let settings = script.settings();
     let mut control = Control::new(settings, &SUPERVISION, None)?;
@@ -40,7 +40,7 @@ pub fn simulate_with(
         let sensors = Sensors { interlock_closed: step.interlock_closed, measured, ..Sensors::default() };
         let tick = control.tick(&step.command, &sensors, &mut Untimed);
         digest.add(&tick);
-        each(&control, &tick);
+        each(&mut control, &tick);
         number += 1;
     }
     Ok(digest)

@@ -2,11 +2,13 @@
 //!
 //! `cargo xtask story --isolation` compares the emulated image with the same code.
 
+use firmware::adaptation::{self, Alone, Change};
 use firmware::control::{Control, Sensors, Untimed};
 use firmware::isolation::{Isolation, Terms};
 use firmware::settings::{SETTINGS, SUPERVISION, built_in};
 use link::Command;
 use link::isolation::Off;
+use model::adaptation::Parameters;
 use model::isolation::{self, Cause, Causes, Report, Verdict};
 use model::supervisor::{self, Fault, State};
 use model::{Feedback, Plant, Settings, Volts, device};
@@ -20,7 +22,7 @@ const RATE_HZ: f64 = 1000.0;
 
 /// What changes.
 #[derive(Clone, Copy, PartialEq)]
-enum Change {
+enum Happens {
     Nothing,
     /// The spring becomes stiffer by a tenth.
     Gain,
@@ -34,7 +36,7 @@ struct Said {
     report: Report,
 }
 
-impl Change {
+impl Happens {
     /// Tick in which it happens: a sensor that is stuck at 400 V, below the model and then above it, does not look like a saturated one.
     const fn tick(self) -> u32 {
         if matches!(self, Self::Stuck) { 44_000 } else { 20_000 }
@@ -47,6 +49,8 @@ struct Run {
     record: Record,
     states: Vec<(u32, State)>,
     terms: Terms,
+    /// What the adaptation has changed, with its tick.
+    adapted: Vec<(u32, Change)>,
 }
 
 fn settings(trip_on_cause: Causes) -> device::Settings {
@@ -54,19 +58,31 @@ fn settings(trip_on_cause: Causes) -> device::Settings {
     device::Settings { trip_on_cause, ..built_in(control) }
 }
 
-fn run(change: Change, trip_on_cause: Causes) -> Run {
+fn run(change: Happens, trip_on_cause: Causes) -> Run {
+    run_with(change, trip_on_cause, false)
+}
+
+/// As [`run`], with the adaptation if `adapts`.
+fn run_with(change: Happens, trip_on_cause: Causes, adapts: bool) -> Run {
     let settings = settings(trip_on_cause);
     settings.check().unwrap();
     let terms = Terms::new(&settings, Some(Plant::PAPER), settings.control.amplifier.max_v);
     let mut isolation = Box::new(Isolation::NEW);
     isolation.start(&terms);
     let mut control = Control::new(&settings.control, &SUPERVISION, None).unwrap();
+    let amplifier = settings.control.amplifier;
+    let mut adaptation = adapts.then(|| Alone::new(adaptation::Terms::new(&settings, amplifier, &terms)));
     let mut spring = Live::new(&[], Noise::white(0.2), 1, 500.0, UP_DOWN_TICKS as usize);
     let (mut measured, mut last) = (None, Verdict::Quiet);
-    let mut run =
-        Run { said: Vec::new(), record: Record { name: "run".into(), rows: Vec::new() }, states: Vec::new(), terms };
+    let mut run = Run {
+        said: Vec::new(),
+        record: Record { name: "run".into(), rows: Vec::new() },
+        states: Vec::new(),
+        terms,
+        adapted: Vec::new(),
+    };
     for tick in 0..UP_DOWN_TICKS {
-        if tick == change.tick() && change == Change::Gain {
+        if tick == change.tick() && change == Happens::Gain {
             let stiffer = Effect {
                 cause: ground_truth::Cause::GainError,
                 form: 0,
@@ -95,13 +111,17 @@ fn run(change: Change, trip_on_cause: Causes) -> Run {
             last = news.report.verdict;
             run.said.push(Said { tick: tick + 1, report: news.report });
         }
+        if let Some(adaptation) = &mut adaptation {
+            let change = adaptation.after_tick(&mut control, &mut isolation, &done);
+            run.adapted.extend(change.map(|change| (tick, change)));
+        }
         let now = control.supervisor().state();
         if run.states.last().is_none_or(|(_, state)| *state != now) {
             run.states.push((tick, now));
         }
         let applied_v = done.output.applied.to_f64();
         let (_, reading) = spring.hold(applied_v, 1.0 / RATE_HZ);
-        if tick < change.tick() || change != Change::Stuck {
+        if tick < change.tick() || change != Happens::Stuck {
             measured = Some(Volts::new(reading.read).unwrap());
         }
         let read = measured.map(Volts::to_f64);
@@ -114,14 +134,14 @@ fn run(change: Change, trip_on_cause: Causes) -> Run {
 
 #[test]
 fn nothing_is_named_of_a_spring_that_does_not_change() {
-    let run = run(Change::Nothing, Causes::NONE);
+    let run = run(Happens::Nothing, Causes::NONE);
     assert!(run.said.is_empty(), "{:?}", run.said.iter().map(|said| said.report.verdict).collect::<Vec<_>>());
 }
 
 /// The bank on the MCU says in the tick after what `vsj isolate` says of the record, bit for bit.
 #[test]
 fn what_is_said_of_a_change_is_what_vsj_isolate_says_of_the_record() {
-    for (change, cause) in [(Change::Gain, Cause::GainError), (Change::Stuck, Cause::StuckSensor)] {
+    for (change, cause) in [(Happens::Gain, Cause::GainError), (Happens::Stuck, Cause::StuckSensor)] {
         let run = run(change, Causes::NONE);
         let trace = trace::run(&run.record, isolation::Settings::PAPER).unwrap().trace;
         let bank = settings(Causes::NONE).isolation(Plant::PAPER, 700.0).unwrap();
@@ -135,7 +155,7 @@ fn what_is_said_of_a_change_is_what_vsj_isolate_says_of_the_record() {
         let since_tick = named.tick - 128 * named.report.since_blocks;
         assert!((change.tick() - 200..change.tick() + 600).contains(&since_tick), "{cause:?} since {since_tick}");
         let described = run.terms.describe(&named.report, u64::from(named.tick), u64::from(since_tick));
-        if change == Change::Gain {
+        if change == Happens::Gain {
             assert!((described.size - 0.1).abs() < 0.01 && described.half_width < 0.01, "{described:?}");
             assert!(described.explained > 0.95, "{described:?}");
         }
@@ -145,7 +165,7 @@ fn what_is_said_of_a_change_is_what_vsj_isolate_says_of_the_record() {
 
 #[test]
 fn a_cause_of_trip_on_cause_is_a_fault_until_it_is_acknowledged_and_another_cause_is_not() {
-    let tripped = run(Change::Gain, Causes::NONE.with(Cause::GainError));
+    let tripped = run(Happens::Gain, Causes::NONE.with(Cause::GainError));
     let states: Vec<State> = tripped.states.iter().map(|(_, state)| *state).collect();
     let faulted = State::Faulted(Fault::Isolation);
     assert_eq!(states[..4], [State::Armed, faulted, State::Disarmed, State::Armed], "{states:?}");
@@ -154,7 +174,7 @@ fn a_cause_of_trip_on_cause_is_a_fault_until_it_is_acknowledged_and_another_caus
     assert_eq!(tripped.states[1].0, named.tick);
     let quiet = tripped.said.iter().find(|said| said.tick > named.tick).unwrap();
     assert_eq!((quiet.report.verdict, quiet.tick), (Verdict::Quiet, tripped.states[2].0 + 1), "the bank begins anew");
-    let other = run(Change::Gain, Causes::NONE.with(Cause::StuckSensor));
+    let other = run(Happens::Gain, Causes::NONE.with(Cause::StuckSensor));
     assert_eq!(other.states.len(), 1, "{:?}", other.states);
 }
 
@@ -173,4 +193,30 @@ fn without_what_the_bank_needs_it_is_off_and_a_trip_is_refused() {
         assert_eq!(with(settings(trip), plant).check().unwrap_err().field, "trip_on_cause");
     }
     assert_eq!(with(settings(trip), Some(Plant::PAPER)).check(), Ok(()));
+}
+
+#[test]
+fn the_model_follows_a_gain_that_is_named_and_no_bad_sensor() {
+    let gain = run_with(Happens::Gain, Causes::NONE, true);
+    let (_, last) = gain.adapted.last().expect("it adapts");
+    let Parameters { time_constant, share, gain: ratio } = last.parameters;
+    assert!((ratio - 1.1).abs() < 0.002 && (time_constant, share) == (1.0, 1.0), "{last:?}");
+    assert_eq!(gain.states.len(), 1, "armed throughout: {:?}", gain.states);
+    // The bank is quiet on the adapted model, and the parameters moved slowly.
+    assert_eq!(gain.said.last().unwrap().report.verdict, Verdict::Quiet);
+    let moves = gain.adapted.windows(2).map(|pair| pair[1].1.parameters.gain - pair[0].1.parameters.gain);
+    assert!(moves.map(f64::abs).all(|step| step <= 0.05 * 0.128 + 1e-12));
+    let ratios = |run: &Run| run.adapted.iter().all(|(_, change)| change.parameters == Parameters::STORED);
+    for happens in [Happens::Nothing, Happens::Stuck] {
+        assert!(ratios(&run_with(happens, Causes::NONE, true)));
+    }
+}
+
+/// A cause that is a fault disables the output before it can be taken over.
+#[test]
+fn a_trip_comes_before_the_adaptation() {
+    let tripped = run_with(Happens::Gain, Causes::NONE.with(Cause::GainError), true);
+    assert_eq!(tripped.states[1].1, State::Faulted(Fault::Isolation), "{:?}", tripped.states);
+    let before = tripped.adapted.iter().take_while(|(tick, _)| *tick <= tripped.states[1].0);
+    assert!(before.map(|(_, change)| change.parameters).all(|parameters| parameters == Parameters::STORED));
 }

@@ -22,9 +22,9 @@ const LANES: Lanes = Lanes {
     ],
     beside: &[
         Step::new("lint nucleo", &lint("-pfirmware", "nucleo-g474re")),
-        Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,robust,isolation,kilovolt")),
+        Step::new("all nucleo", &lint("-pfirmware", "nucleo-g474re,fast,robust,adaptation,kilovolt")),
         Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
-        Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,robust,isolation,kilovolt")),
+        Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,robust,adaptation,kilovolt")),
         Step::xtask("prove", &["prove", "--ticks", "1000000"]),
         Step::xtask("package", &["python", "--only", "install"]),
     ],

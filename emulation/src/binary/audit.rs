@@ -16,6 +16,8 @@ use super::thumb::Code;
 const TICK: (&str, &str) = ("firmware::control::Control", "tick");
 /// The same of the isolation bank, in an image that contains it.
 const ISOLATION: (&str, &str) = ("firmware::isolation::enabled::Isolation", "tick");
+/// The same of the adaptation.
+const ADAPTATION: (&str, &str) = ("firmware::adaptation::shared", "after_tick");
 /// The tick of the C library.
 const C_TICK: &str = "vsj_tick";
 
@@ -27,6 +29,11 @@ pub(crate) fn run(bytes: &[u8]) -> Result<usize> {
 /// Runs all checks, those of the control tick for the tick of the isolation bank as well.
 pub(crate) fn with_isolation(bytes: &[u8]) -> Result<usize> {
     check(bytes, &[TICK, ISOLATION])
+}
+
+/// Runs all checks, those of the control tick for the bank and the adaptation as well.
+pub(crate) fn with_adaptation(bytes: &[u8]) -> Result<usize> {
+    check(bytes, &[TICK, ISOLATION, ADAPTATION])
 }
 
 fn check(bytes: &[u8], names: &[(&str, &str)]) -> Result<usize> {

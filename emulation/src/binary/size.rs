@@ -17,12 +17,17 @@ const MOST_FLASH: u32 = 128 << 10;
 const MOST_RAM: u32 = 16 << 10;
 /// The same for an image with the isolation bank.
 const MOST_RAM_ISOLATION: u32 = 24 << 10;
+/// The same for an image with the adaptation.
+const MOST_RAM_ADAPTATION: u32 = 32 << 10;
 
 /// Further bytes of RAM for the robust controller: a second spring, and the stack on which it is built.
 const MORE_RAM_ROBUST: u32 = 4 << 10;
 
 /// Features of an image with the isolation bank.
 pub(crate) const ISOLATION: &[&str] = &["isolation"];
+
+/// Features of an image with the adaptation.
+pub(crate) const ADAPTATION: &[&str] = &["adaptation"];
 
 /// Options of `cargo xtask size`.
 #[derive(clap::Args)]
@@ -38,6 +43,9 @@ pub(crate) struct Args {
     /// Measure images with a sensor and the isolation bank; 24 KB of RAM are allowed
     #[arg(long)]
     isolation: bool,
+    /// Measure images with the adaptation as well; 32 KB of RAM are allowed
+    #[arg(long)]
+    adaptation: bool,
 }
 
 /// Sizes of one image, in bytes.
@@ -53,6 +61,7 @@ pub(crate) struct Size {
 /// Measures the image of each board and prints the table. An image above a bound is an error.
 pub(crate) fn run(args: &Args) -> Result<()> {
     let features: &[&str] = match args {
+        Args { adaptation: true, .. } => ADAPTATION,
         Args { isolation: true, .. } => ISOLATION,
         Args { feedback: true, .. } => &["feedback"],
         Args { .. } => &[],
@@ -75,8 +84,11 @@ pub(crate) fn measure(variant: Variant, features: &[&str], board: Board) -> Resu
     let top = elf::symbol(&bytes, "_stack_start")?;
     Ok(Size {
         board,
-        most_ram: if features.contains(&"isolation") { MOST_RAM_ISOLATION } else { MOST_RAM }
-            + if variant.controller == Controller::Robust { MORE_RAM_ROBUST } else { 0 },
+        most_ram: match features {
+            ADAPTATION => MOST_RAM_ADAPTATION,
+            ISOLATION => MOST_RAM_ISOLATION,
+            _ => MOST_RAM,
+        } + if variant.controller == Controller::Robust { MORE_RAM_ROBUST } else { 0 },
         flash: segments::flash(&bytes)?.bytes.len() as u32,
         statics: elf::ram(&bytes)?,
         stack: top - bottom,

@@ -1,6 +1,7 @@
 //! A run on the emulated board, compared with the same code on the host.
 
 use anyhow::{Result, bail};
+use firmware::control::{Control, Tick};
 use link::WireModel;
 use model::Volts;
 use serde_json::{Value, json};
@@ -38,11 +39,23 @@ impl Comparison {
         measured: impl FnMut(u32) -> Option<Volts>,
         run: &Run,
     ) -> Result<Self> {
+        Self::after_each(name, found, measured, run, |_, _| ())
+    }
+
+    /// As [`Comparison::with`]; on the host `each` is called after each tick.
+    pub(crate) fn after_each(
+        name: &str,
+        found: Option<&WireModel>,
+        measured: impl FnMut(u32) -> Option<Volts>,
+        run: &Run,
+        mut each: impl FnMut(&mut Control, &Tick),
+    ) -> Result<Self> {
         let Some(script) = Script::parse(name) else { bail!("no script `{name}`") };
         // The board writes zero once before its first tick.
         let mut expected = vec![SAFE];
-        let digest = simulation::simulate_with(script, found, measured, |_, tick| {
+        let digest = simulation::simulate_with(script, found, measured, |control, tick| {
             expected.push(Written { code: tick.drive.code().0, enabled: tick.drive.enabled() });
+            each(control, tick);
         })?;
         let different = expected.iter().zip(&run.dac).position(|(host, target)| host != target);
         let done = run.done()?;

@@ -6,11 +6,13 @@
 //! 4. The restarted board drives the same spring up and down again.
 //!
 //! With `--isolation` the spring changes while the board drives it, and the board names the cause.
+//! With `--adaptation` the model on the board follows what changes.
 //! With `--feedback` the board keeps its wrong model and reads the spring's sensor instead.
 //!
 //! The result is the error of the true stiffness, which the hidden spring reports, relative to the desired one. Every
 //! run is compared with the same code on the host, code by code.
 
+mod adaptation;
 mod better_model;
 mod isolation;
 mod lock_step;
@@ -52,6 +54,9 @@ pub(crate) struct Args {
     /// Let the board's isolation bank name what changes: nothing, a gain, a sensor that gets stuck
     #[arg(long, conflicts_with_all = ["effect", "all", "feedback", "controller", "json"])]
     isolation: bool,
+    /// Let the board's model follow what changes: nothing, a gain, a sensor that gets stuck
+    #[arg(long, conflicts_with_all = ["effect", "all", "feedback", "controller", "isolation", "json", "bless", "check"])]
+    adaptation: bool,
     /// Seed of the effects' sizes and of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -76,6 +81,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     setup::emulator()?;
     if args.check {
         return check();
+    }
+    if args.adaptation {
+        return adaptation::check(&adaptation::stage()?);
     }
     if args.isolation {
         return isolation::check(&isolation::stage()?);

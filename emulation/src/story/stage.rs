@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use firmware::RATE_HZ;
+use firmware::control::{Control, Tick};
 use link::WireModel;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -130,11 +131,24 @@ impl Stage {
         disturbance: &Disturbance,
         found: Option<&WireModel>,
     ) -> Result<Pass> {
+        self.drive_with(run, folder, spring, disturbance, found, |_, _| ())
+    }
+
+    /// As [`Stage::drive`]; on the host `each` is called after each tick.
+    pub(super) fn drive_with(
+        &self,
+        run: &str,
+        folder: &Path,
+        spring: Live,
+        disturbance: &Disturbance,
+        found: Option<&WireModel>,
+        each: impl FnMut(&mut Control, &Tick),
+    ) -> Result<Pass> {
         let (played, moments) = lock_step::run(&self.elf, run, folder, spring, disturbance)?;
         ensure!(moments.len() == UP_DOWN_TICKS as usize, "{} ticks at the spring", moments.len());
         // A tick receives the reading at the end of the one before.
         let received = |tick: u32| moments.get(tick.checked_sub(1)? as usize)?.received;
-        let comparison = Comparison::with(run, found, received, &played)?;
+        let comparison = Comparison::after_each(run, found, received, &played, each)?;
         comparison.check()?;
         let log = played.log.into_iter().map(|line| line.message).collect();
         let [.., most_instructions] = comparison.instructions;

@@ -6,6 +6,7 @@ use link::{About, Block, Controller, Server};
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{OutOfRange, SampleTime, Spring};
 
+use crate::adaptation;
 use crate::control::Control;
 use crate::isolation::{self, Isolation};
 use crate::log;
@@ -33,6 +34,7 @@ pub fn open<P: Pages>(
         log::refused(field);
     }
     isolation::set_terms(start.isolation);
+    adaptation::set_terms(adaptation::Terms::new(&loaded.settings, start.amplifier, &start.isolation));
     let Some(isolation) = singleton!(: Isolation = Isolation::NEW) else { return Ok(None) };
     isolation.start(&start.isolation);
     Ok(server(&start, loaded, seed)?.map(|server| (control, isolation, server)))

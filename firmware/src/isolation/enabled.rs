@@ -2,6 +2,8 @@
 
 use link::isolation::Off;
 use link::{Command, IsolationReport};
+#[cfg(feature = "adaptation")]
+use model::adaptation;
 use model::isolation::{self, Causes, Report, Verdict};
 use model::supervisor::{self, Fault, State};
 use model::{OutOfRange, Plant, SampleTime, ScaledStiffness, Validate, Volts, device};
@@ -31,6 +33,12 @@ impl Terms {
             valid.map(|()| bank).map_err(|_| Off::OutOfRange)
         };
         Self { bank: bank.and_then(in_range), rate_hz, trip_on_cause: settings.trip_on_cause }
+    }
+
+    /// The bank's settings; `None` if no bank runs.
+    #[cfg(feature = "adaptation")]
+    pub fn bank(&self) -> Option<isolation::Settings> {
+        self.bank.ok()
     }
 
     /// Checks that a bank runs if the settings demand a trip.
@@ -86,6 +94,11 @@ pub struct Isolation {
     /// Verdict, age and number of decisions of the last news.
     reported: (Verdict, u32, u32),
     state: isolation::State,
+    #[cfg(feature = "adaptation")]
+    watch: adaptation::Watch,
+    /// Largest distance of the estimate from the target in an exchange, in V.
+    #[cfg(feature = "adaptation")]
+    tolerance: Volts,
 }
 
 impl Isolation {
@@ -96,6 +109,10 @@ impl Isolation {
         last: None,
         reported: (Verdict::Quiet, 0, 0),
         state: isolation::State::NEW,
+        #[cfg(feature = "adaptation")]
+        watch: adaptation::Watch::NEW,
+        #[cfg(feature = "adaptation")]
+        tolerance: Volts::ZERO,
     };
 
     /// Starts the bank for a spring at rest at 0 V. Call it before the first tick.
@@ -106,6 +123,10 @@ impl Isolation {
             Some(bank.validate(sample_time).ok()?.quantize())
         });
         self.trip_on_cause = terms.trip_on_cause;
+        #[cfg(feature = "adaptation")]
+        if let Ok(bank) = terms.bank {
+            self.tolerance = adaptation::settled_within(bank.range_v);
+        }
     }
 
     /// Before a tick: the acknowledgement of the bank's fault ends its alarm. Returns that fault as long as a cause of the setting
@@ -130,7 +151,7 @@ impl Isolation {
         let now = Moment { applied: output.applied, model: control.uncorrected(output), enabled: drive.enabled() };
         if let Some(last) = self.last.replace(now) {
             // The reading was sampled after the output of the tick before.
-            let reading = measured.filter(|_| last.enabled).map(|volts| ScaledStiffness(volts.0));
+            let reading = measured.filter(|_| last.enabled).map(|volts| control.inward(ScaledStiffness(volts.0)));
             config.tick(&mut self.state, last.applied, last.model, reading);
         }
         let says = (self.state.verdict(), self.state.since_blocks(), self.state.decisions());
@@ -145,5 +166,30 @@ impl Isolation {
     /// Ends an alarm: the bank looks for a fault anew.
     pub fn acknowledge(&mut self) {
         self.state.acknowledge();
+    }
+}
+
+#[cfg(feature = "adaptation")]
+impl Isolation {
+    /// After [`Isolation::tick`]: watches a tick for the adaptation. True at the end of a block, and never if no bank runs.
+    pub fn ends_block(&mut self, tick: &Tick) -> bool {
+        self.config.as_ref().is_some_and(|bank| self.watch.tick(bank, &self.state, &tick.output, self.tolerance))
+    }
+
+    /// At the end of a block: exchanges controller and bank for `next` if the loop is settled. The bank then begins anew. Returns what the
+    /// block has shown.
+    pub fn end_block(
+        &mut self,
+        control: &mut Control,
+        tick: &Tick,
+        next: Option<&adaptation::Variant>,
+    ) -> adaptation::Observation {
+        let next = next.filter(|_| self.watch.settled() && tick.drive.enabled());
+        if let Some(variant) = next {
+            control.exchange(variant, tick.output.target);
+            self.config = Some(variant.bank);
+            self.acknowledge();
+        }
+        self.watch.observe(&self.state, next.is_some())
     }
 }

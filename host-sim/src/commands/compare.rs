@@ -55,14 +55,20 @@ const MOST_AMPLIFIERS: usize = 16;
 const FULL_SCALE_V: f64 = 500.0;
 /// Smallest and largest noise of a sensor, in percent.
 const NOISE_PERCENT: (f64, f64) = (0.001, 10.0);
+
+/// The noise of a sensor in V; in percent on the command line.
+pub(super) fn sensor_noise_v(percent: f64) -> Result<f64> {
+    if !(NOISE_PERCENT.0..=NOISE_PERCENT.1).contains(&percent) {
+        bad_input!("--sensor-noise {percent}: expected {} to {}", NOISE_PERCENT.0, NOISE_PERCENT.1);
+    }
+    Ok(percent / 100.0 * FULL_SCALE_V)
+}
+
 impl Arguments {
     /// The spring and its sensor, where they differ from the model.
     fn actual(&self) -> Result<Option<Actual>> {
         let spring_error = together("--spring-error", &self.spring_error)?;
-        let sensor_noise_v = self.sensor_noise.map(|percent| percent / 100.0 * FULL_SCALE_V);
-        if let Some(percent) = self.sensor_noise.filter(|of| !(NOISE_PERCENT.0..=NOISE_PERCENT.1).contains(of)) {
-            bad_input!("--sensor-noise {percent}: expected {} to {}", NOISE_PERCENT.0, NOISE_PERCENT.1);
-        }
+        let sensor_noise_v = self.sensor_noise.map(sensor_noise_v).transpose()?;
         let differs = !self.spring_error.is_empty() || sensor_noise_v.is_some();
         Ok(differs.then_some(Actual { spring_error, sensor_noise_v }))
     }

@@ -1,5 +1,6 @@
 //! One module per subcommand: it reads arguments, calls a library, and hands the result to [`host_sim::output`].
 
+pub(crate) mod adapt;
 pub(crate) mod beam;
 pub(crate) mod bound;
 mod choice;

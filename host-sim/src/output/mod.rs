@@ -13,6 +13,7 @@
 //! | [`figure`], [`plots`] | plots as SVG |
 //! | `chart`, `page` | the parts of all plots and of all report pages |
 
+pub mod adapt;
 pub mod beam;
 pub mod bound;
 mod cells;

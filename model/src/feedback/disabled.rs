@@ -3,8 +3,8 @@
 use super::Observed;
 use crate::error::OutOfRange;
 #[cfg(feature = "robust")]
-use crate::units::{Accumulator, Signal};
-use crate::units::{SampleTime, ScaledStiffness, Volts};
+use crate::units::Accumulator;
+use crate::units::{SampleTime, ScaledStiffness, Signal, Volts};
 use crate::validated::{Validate, Validated};
 
 /// Settings of the stiffness sensor; without the feature `feedback` they have no values.
@@ -64,6 +64,11 @@ impl Sensor {
         match self {}
     }
 
+    /// Returns true for a sensor that is trusted; without the feature `feedback` it is never called.
+    pub const fn is_trusted(self) -> bool {
+        match self {}
+    }
+
     /// Returns the number for frames; without the feature `feedback` it is never called.
     pub const fn code(self) -> u8 {
         match self {}
@@ -87,6 +92,8 @@ impl Config {
 
 impl State {
     pub(crate) fn transfer_to(&mut self, _: Option<&Config>) {}
+
+    pub(crate) fn shift(&mut self, _: Signal) {}
 
     pub(crate) fn corrected(&self, target: Volts) -> Volts {
         target

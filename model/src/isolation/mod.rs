@@ -425,6 +425,11 @@ impl State {
         if self.alarmed { self.age } else { 0 }
     }
 
+    /// Returns the mean voltage of the last block, in V.
+    pub fn mean_voltage(&self) -> Volts {
+        Volts(Signal::from_bits(self.means.voltage))
+    }
+
     /// Returns what the bank says, in the numbers of the tick.
     pub fn report(&self) -> Report {
         let decision::Decision { size, energies, .. } = self.decision;

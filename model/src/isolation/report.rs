@@ -69,3 +69,14 @@ impl Report {
         Some(Finding { cause, other, size: factor * size, half_width: 1.96 * factor * deviation, explained })
     }
 }
+
+#[cfg(test)]
+impl Report {
+    /// A report of tests: the size is a multiple of 2^-20 below 128, its deviation about 2^-10; `energy` is that of a block without
+    /// that of the noise, in variances.
+    pub(crate) fn of(verdict: Verdict, since_blocks: u32, size: f64, energy: u32) -> Self {
+        let size = Size { numerator: (size * f64::from(1 << 20)) as i32, denominator: 1 << 20, exponent: 0, scale: 10 };
+        let none = i64::from(since_blocks) * (1 + i64::from(energy));
+        Self { verdict, since_blocks, size, energies: (none << 20, 0) }
+    }
+}

@@ -80,6 +80,11 @@ impl Sensor {
         SENSOR_NAMES[self.code() as usize]
     }
 
+    /// Returns true if the readings correct the estimate.
+    pub const fn is_trusted(self) -> bool {
+        matches!(self, Self::Trusted)
+    }
+
     /// Returns the stable number for frames: the index of the name in [`SENSOR_NAMES`], never 0.
     pub const fn code(self) -> u8 {
         match self {
@@ -180,6 +185,12 @@ impl State {
     #[inline]
     pub(super) fn model_envelope(&self) -> &Envelope {
         &self.envelope
+    }
+
+    /// Shifts the mismatch of the earlier readings, as a jump of the model does.
+    pub(super) fn shift(&mut self, by: Signal) {
+        self.mismatch = self.mismatch.saturating_add(widened(by));
+        self.last = self.last.saturating_add(by);
     }
 
     /// Moves the low-passed mismatch by `deviation` times `rate`.

@@ -14,7 +14,7 @@ pub use fault_detection::{Fault, Sensor};
 pub use settings::{Feedback, HISTORY, Reading};
 
 use super::Observed;
-use crate::coefficient::{Rate, upper};
+use crate::coefficient::{Rate, upper, widened};
 use crate::units::{Accumulator, ScaledStiffness, Signal, Volts};
 use crate::validated::Validated;
 
@@ -118,6 +118,12 @@ impl State {
         } else {
             *self = Self::default();
         }
+    }
+
+    /// Shifts the correction by a jump of the model that the spring has not made, and what the readings are compared with.
+    pub(crate) fn shift(&mut self, by: Signal) {
+        self.correction = self.correction.saturating_add(widened(by));
+        self.detection.shift(by);
     }
 
     /// Returns the stiffness to which the model has to be brought for the spring to reach `target`: `target - d`.

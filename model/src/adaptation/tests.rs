@@ -1,0 +1,294 @@
+use super::*;
+use crate::controller::{self, Compensation, Input};
+use crate::isolation::{Report, Verdict};
+use crate::units::{ScaledStiffness, Signal, Volts};
+use crate::{Amplifier, Approach, Feedback, Gains, Margin, Reading, State as ControlState};
+use proptest::prelude::*;
+
+const BLOCK_S: f64 = 0.128;
+const RANGE_V: f64 = 1000.0;
+
+fn control(compensation: Compensation) -> controller::Settings {
+    let feedback = Some(Feedback::TYPICAL);
+    controller::Settings { compensation, amplifier: Amplifier::up_to(RANGE_V), feedback, ..controller::Settings::PAPER }
+}
+
+fn compensations() -> [Compensation; 3] {
+    [
+        Compensation::ProportionalIntegral(Gains::PAPER),
+        Compensation::TimeOptimal(Approach::DEAD_BEAT),
+        Compensation::Robust(Margin::TYPICAL),
+    ]
+}
+
+fn bank() -> isolation::Settings {
+    isolation::Settings { range_v: RANGE_V, ..isolation::Settings::PAPER }
+}
+
+fn variant(compensation: Compensation, parameters: &Parameters) -> Variant {
+    Variant::new(&control(compensation), &bank(), parameters).unwrap()
+}
+
+/// What is known after a fault of this verdict began 100 blocks ago.
+fn seen(verdict: Verdict, size: f64) -> Observation {
+    let volts = |volts| Volts::new(volts).unwrap();
+    Observation {
+        report: Report::of(verdict, 100, size, 50),
+        moved: volts(300.0),
+        moved_since_exchange: volts(300.0),
+        trusted_blocks: 1000,
+        exchanged: false,
+    }
+}
+
+fn update(state: &mut State, seen: &Observation) -> Option<Parameters> {
+    state.update(&Settings::TYPICAL, seen, Plant::PAPER, RANGE_V, BLOCK_S)
+}
+
+/// Exchanges every proposal, with what the bank says of each model, until none comes for 20 blocks.
+fn follow(state: &mut State, mut says: impl FnMut(&State) -> Observation) {
+    let (mut proposed, mut idle) = (None, 0);
+    for _ in 0..10_000 {
+        let exchanged = proposed.is_some();
+        proposed = update(state, &Observation { exchanged, ..says(state) });
+        idle = if proposed.is_none() { idle + 1 } else { 0 };
+        if idle > 1000 {
+            return;
+        }
+    }
+    panic!("it does not come to rest");
+}
+
+const TAU: Verdict = Verdict::Named(Cause::TimeConstant);
+
+#[test]
+fn a_setting_out_of_range_is_rejected_by_name() {
+    let time = SampleTime::from_rate(1000.0).unwrap();
+    let good = Settings::TYPICAL;
+    assert_eq!(good.validate(time).map(drop), Ok(()));
+    for (settings, field) in [
+        (Settings { time_constant: 0.6, ..good }, "adaptation.time_constant"),
+        (Settings { share: -0.1, ..good }, "adaptation.share"),
+        (Settings { gain: f64::NAN, ..good }, "adaptation.gain"),
+        (Settings { rate_per_s: 0.0, ..good }, "adaptation.rate_per_s"),
+        (Settings { precision: 1.0, ..good }, "adaptation.precision"),
+        (Settings { excitation: 0.0, ..good }, "adaptation.excitation"),
+    ] {
+        assert_eq!(settings.validate(time).unwrap_err().field, field);
+    }
+}
+
+#[test]
+fn bounds_within_which_no_controller_can_run_are_rejected() {
+    let paper = control(Compensation::ProportionalIntegral(Gains::PAPER));
+    assert_eq!(Settings::TYPICAL.check_for(&paper, &bank()), Ok(()));
+    // The bank's shortest time constant is 0.256 s.
+    let short = Plant { time_constant_s: 0.3, ..Plant::PAPER };
+    let of = controller::Settings { plant: short, ..control(Compensation::None) };
+    assert_eq!(Settings::TYPICAL.check_for(&of, &bank()).unwrap_err().field, "plant.time_constant_s");
+}
+
+#[test]
+fn a_named_cause_moves_its_parameter_slowly_and_is_confirmed_when_the_bank_is_quiet() {
+    let mut state = State::default();
+    let mut moves = 0;
+    follow(&mut state, |state| {
+        let named = state.parameters() == Parameters::STORED;
+        moves += u32::from(state.phase() == Phase::Moving);
+        seen(if named { TAU } else { Verdict::Quiet }, 0.125)
+    });
+    let wanted = libm::exp(0.125);
+    assert!((state.parameters().time_constant - wanted).abs() < 1e-12);
+    assert_eq!((state.parameters().share, state.parameters().gain), (1.0, 1.0));
+    assert!(f64::from(moves) >= (wanted - 1.0) / (0.05 * BLOCK_S), "{moves}");
+    assert_eq!((state.phase(), state.confirmed), (Phase::Watching, state.parameters()));
+}
+
+#[test]
+fn the_size_of_each_cause_is_that_of_its_signature() {
+    for (cause, size, expected) in [
+        (Cause::GainError, 0.1, Parameters { gain: 1.1, ..Parameters::STORED }),
+        (Cause::InstantaneousShare, 0.01, Parameters { share: 1.11, ..Parameters::STORED }),
+        (Cause::TimeConstant, 0.1, Parameters { time_constant: libm::exp(0.1), ..Parameters::STORED }),
+    ] {
+        let next = Parameters::STORED.after(cause, size, Plant::PAPER);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(near(next.gain, expected.gain) && near(next.share, expected.share), "{cause:?}: {next:?}");
+        assert!(near(next.time_constant, expected.time_constant), "{cause:?}: {next:?}");
+    }
+}
+
+#[test]
+fn no_other_cause_and_no_weak_evidence_changes_anything() {
+    let named = seen(TAU, 0.125);
+    let still = Volts::new(50.0).unwrap();
+    let wide = Settings { precision: 1e-4, ..Settings::TYPICAL };
+    let others = Cause::ALL.into_iter().map(Verdict::Named).filter(|verdict| {
+        !matches!(verdict, Verdict::Named(Cause::GainError | Cause::TimeConstant | Cause::InstantaneousShare))
+    });
+    let ambiguous = Verdict::Ambiguous(Cause::TimeConstant, Cause::SecondRelaxation);
+    for verdict in others.chain([ambiguous, Verdict::Unknown, Verdict::Alarm, Verdict::Quiet]) {
+        assert_eq!(update(&mut State::default(), &seen(verdict, 0.125)), None, "{verdict:?}");
+    }
+    assert_eq!(update(&mut State::default(), &Observation { moved: still, ..named }), None, "no excitation");
+    assert_eq!(
+        update(&mut State::default(), &Observation { trusted_blocks: 0, ..named }),
+        None,
+        "the sensor is not trusted"
+    );
+    let wide = State::default().update(&wide, &named, Plant::PAPER, RANGE_V, BLOCK_S);
+    assert_eq!(wide, None, "the interval is too wide");
+    // Not trusted at some time since the fault began: the bank begins anew, with the same parameters.
+    let mut state = State::default();
+    assert_eq!(update(&mut state, &Observation { trusted_blocks: 99, ..named }), Some(Parameters::STORED));
+    assert!(update(&mut State::default(), &named).is_some());
+}
+
+/// A takeover that a fault of the sensor caused ends at the stored model, and stays there until it is acknowledged.
+#[test]
+fn what_is_not_confirmed_is_undone() {
+    let named = |cause| {
+        move |state: &State| {
+            let wrong = if state.phase() == Phase::Trial { Verdict::Named(cause) } else { TAU };
+            seen(wrong, 0.125)
+        }
+    };
+    for cause in [Cause::ReadingOffset, Cause::Drift, Cause::SensorSaturation, Cause::StuckSensor, Cause::TimeConstant]
+    {
+        let mut state = State::default();
+        let mut farthest = 0.0;
+        let says = named(cause);
+        follow(&mut state, |state| {
+            farthest = f64::max(farthest, state.parameters().time_constant);
+            says(state)
+        });
+        assert_eq!((state.parameters(), state.phase()), (Parameters::STORED, Phase::Stopped), "{cause:?}");
+        assert!(farthest > 1.1, "{cause:?}");
+        state.acknowledge();
+        assert_eq!(state.phase(), Phase::Watching);
+    }
+}
+
+#[test]
+fn a_parameter_that_its_bound_does_not_let_fit_goes_back_to_the_stored_one() {
+    let mut state = State::default();
+    let mut highest = 0.0;
+    // The size halves each time, so that only the bound stops it.
+    let mut size = 1.0;
+    follow(&mut state, |state| {
+        highest = f64::max(highest, state.parameters().time_constant);
+        if state.phase() == Phase::Trial {
+            size = 0.25;
+        }
+        seen(TAU, size)
+    });
+    assert_eq!((highest, state.parameters(), state.phase()), (1.25, Parameters::STORED, Phase::Stopped));
+}
+
+#[test]
+fn a_gain_of_1_changes_no_bit() {
+    let scale = Scale::default();
+    for bits in [0, 1, -1, 12_345_678, i32::MIN, i32::MAX] {
+        let stiffness = ScaledStiffness(Signal::from_bits(bits));
+        assert_eq!((scale.inward(stiffness), scale.outward(stiffness)), (stiffness, stiffness));
+    }
+}
+
+prop_compose! {
+    fn parameters()(time_constant in 0.75..1.25, share in 0.75..1.25, gain in 0.85..1.15) -> Parameters {
+        Parameters { time_constant, share, gain }
+    }
+}
+
+prop_compose! {
+    fn observation()(
+        code in prop::sample::select((0..=u16::MAX).filter(|code| Verdict::from_code(*code).is_some()).collect::<std::vec::Vec<_>>()),
+        three in any::<bool>(),
+        cause in 0u16..3,
+        (since_blocks, size, energy) in (0u32..4000, -100.0..100.0, 0u32..1000),
+        (moved, moved_since_exchange) in (0.0..1000.0, 0.0..1000.0),
+        trusted_blocks in prop_oneof![Just(0u32), 0u32..5000],
+        exchanged in any::<bool>(),
+    ) -> Observation {
+        // One of the three causes in half of the blocks.
+        let verdict = Verdict::from_code(if three { 3 << 8 | cause } else { code }).unwrap();
+        let volts = |volts| Volts::new(volts).unwrap();
+        Observation {
+            report: Report::of(verdict, since_blocks, if three { size / 100.0 } else { size }, energy),
+            moved: volts(moved),
+            moved_since_exchange: volts(moved_since_exchange),
+            trusted_blocks,
+            exchanged,
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// Whatever is observed, in any order: the parameters stay within their bounds and move by no more than the rate.
+    #[test]
+    fn parameters_stay_within_bounds_and_rate(observations in prop::collection::vec((observation(), 1usize..40), 1..60)) {
+        let (mut state, mut proposed) = (State::default(), None);
+        let (low, high) = Settings::TYPICAL.bounds();
+        for (seen, times) in observations {
+            for _ in 0..times {
+                let before = state.parameters();
+                // An exchange takes place only of what was proposed.
+                proposed = update(&mut state, &Observation { exchanged: seen.exchanged && proposed.is_some(), ..seen });
+                let now = state.parameters();
+                let next = proposed.unwrap_or(now);
+                prop_assert_eq!(next.within((low, high)), next);
+                let step = [before.time_constant - now.time_constant, before.share - now.share, before.gain - now.gain];
+                prop_assert!(step.iter().all(|step| step.abs() <= 0.05 * BLOCK_S + 1e-12), "{step:?}");
+                let learned = state.phase() == Phase::Moving && now != next;
+                prop_assert!(!learned || seen.trusted_blocks > 0);
+            }
+        }
+    }
+
+    /// In any state of a running loop: the estimate stays, and so does the code of the next tick for the same target without a
+    /// new reading.
+    #[test]
+    fn an_exchange_moves_neither_estimate_nor_code(
+        levels in prop::collection::vec((0.0..500.0f64, 1usize..3000, -30.0..30.0f64), 1..6),
+        (one, other) in (parameters(), parameters()),
+    ) {
+        for compensation in compensations() {
+            let (before, after) = (variant(compensation, &one), variant(compensation, &other));
+            let mut state = ControlState::default();
+            let mut last = None;
+            let (mut target, mut stiffness) = (Volts::ZERO, ScaledStiffness::default());
+            for &(level, ticks, off) in &levels {
+                target = Volts::new(level).unwrap();
+                for tick in 0..ticks {
+                    // A noise of one step, so that the sensor is not stuck.
+                    let noise = Signal::from_num(off + 0.5 * f64::from(tick as u32 % 2));
+                    let read = ScaledStiffness(stiffness.0.saturating_add(noise));
+                    let output = before.control.tick(&mut state, before.scale.input(target, Some(read)));
+                    let model = ScaledStiffness(output.stiffness.0 - state.correction().0);
+                    stiffness = before.scale.outward(model);
+                    last = Some(output);
+                }
+            }
+            let estimate = before.scale.outward(before.control.present(&state)).to_f64();
+            after.take_over(&mut state, (&before.control, &before.scale), target);
+            let now = after.scale.outward(after.control.present(&state)).to_f64();
+            prop_assert!((now - estimate).abs() < 1e-5, "{compensation:?}: {now} {estimate}");
+            let code = last.unwrap().code.0;
+            let next = after.control.tick(&mut state, after.scale.input(target, None)).code.0;
+            prop_assert!(next.abs_diff(code) <= 1, "{compensation:?}: {next} {code}");
+        }
+    }
+
+    /// As [`Input`] without a gain.
+    #[test]
+    fn the_input_of_a_gain_is_divided_by_it(gain in 0.5..1.5f64, target in 0.0..1000.0f64, read in -500.0..1000.0f64) {
+        let stiffness = |volts: f64| ScaledStiffness(Signal::from_num(volts));
+        let Input { target: inward, measured } = Scale::new(gain).input(Volts::new(target).unwrap(), Some(stiffness(read)));
+        prop_assert!((inward.to_f64() - target / gain).abs() < 1e-5);
+        let Some(Reading { stiffness: measured, .. }) = measured else { panic!("a reading") };
+        prop_assert!((measured.to_f64() - read / gain).abs() < 1e-5);
+        prop_assert!((Scale::new(gain).outward(measured).to_f64() - read).abs() < 1e-5);
+    }
+}
