@@ -44,7 +44,8 @@ enum {
 enum {
     VSJ_NONE = 0,  /* the target is the voltage */
     VSJ_PAPER = 1, /* proportional-integral, of the source report */
-    VSJ_FAST = 2   /* time-optimal */
+    VSJ_FAST = 2,  /* time-optimal */
+    VSJ_ROBUST = 3 /* as fast as a spring allows that is known to within errors */
 };
 
 /* Bits of vsj_output.limits. */
@@ -91,6 +92,14 @@ typedef struct vsj_sensor {
     double fade_s;            /* time constant with which the correction fades without trust, two ticks to 100 s */
 } vsj_sensor;
 
+/* How well VSJ_ROBUST knows the spring; all are parts, both ways. */
+typedef struct vsj_margin {
+    double time_constant; /* error of all time constants, 0 to 0.25 */
+    double share;         /* error of the share, 0 to 0.25 */
+    double gain;          /* error of the gain, 0 to 0.25 */
+    double overshoot;     /* overshoot that is allowed on any of these springs, as a part of the step, 0 to 0.2 */
+} vsj_margin;
+
 /* Everything that a controller is built from. */
 typedef struct vsj_settings {
     double rate_hz;      /* ticks per second, 100 to 10 000 */
@@ -102,9 +111,10 @@ typedef struct vsj_settings {
     double ki;           /* integral gain of VSJ_PAPER, 1/s */
     double approach_s;   /* time constant of the approach of VSJ_FAST, 0 to 1 s */
     uint32_t dac_bits;   /* width of the DAC, 8 to 16 bits */
-    uint32_t controller; /* VSJ_NONE, VSJ_PAPER or VSJ_FAST */
+    uint32_t controller; /* VSJ_NONE, VSJ_PAPER, VSJ_FAST or VSJ_ROBUST */
     vsj_spring spring;
     vsj_sensor sensor;
+    vsj_margin margin;
 } vsj_settings;
 
 /* A refused setting: field = value is not allowed, expected lowest to highest unit. */

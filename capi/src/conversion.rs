@@ -1,9 +1,9 @@
 //! The settings of C as those of the tick, and back.
 
 use model::extended;
-use model::{Amplifier, Compensation, ExtendedPlant, Feedback, Gains, OutOfRange, Settings};
+use model::{Amplifier, Compensation, ExtendedPlant, Feedback, Gains, Margin, OutOfRange, Settings};
 
-use crate::settings::{All, FAST, NONE, PAPER, Sensor, Spring};
+use crate::settings::{All, FAST, Known, NONE, PAPER, ROBUST, Sensor, Spring};
 
 impl All {
     /// The settings as C has them. Of lists that are longer than those of the tick, which refuses them, the beginning.
@@ -26,8 +26,10 @@ impl All {
                 (all.controller, all.kp, all.ki) = (PAPER, proportional, integral_per_s);
             }
             Compensation::TimeOptimal(approach) => (all.controller, all.approach_s) = (FAST, time_constant_s(approach)),
-            // The header has no such controller: the settings will be refused.
-            Compensation::Robust(_) => all.controller = u32::MAX,
+            Compensation::Robust(margin) => {
+                let [time_constant, share, gain, overshoot] = margin.values();
+                (all.controller, all.margin) = (ROBUST, Known { time_constant, share, gain, overshoot });
+            }
         }
         all
     }
@@ -43,8 +45,9 @@ impl All {
             NONE => Compensation::None,
             PAPER => Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki }),
             FAST => time_optimal(self.approach_s)?,
+            ROBUST => self.margin.compensation()?,
             other => {
-                let (field, lowest, highest) = ("controller", f64::from(NONE), f64::from(FAST));
+                let (field, lowest, highest) = ("controller", f64::from(NONE), f64::from(ROBUST));
                 return Err(OutOfRange { field, value: f64::from(other), lowest, highest, unit: "" });
             }
         };
@@ -97,6 +100,15 @@ impl Sensor {
         let unit = "V in a library without feedback";
         let none = OutOfRange { field: "noise_v", value: noise_v, lowest: 0.0, highest: 0.0, unit };
         Feedback::from_values(values).map(Some).ok_or(none)
+    }
+}
+
+impl Known {
+    fn compensation(&self) -> Result<Compensation, OutOfRange> {
+        let Self { time_constant, share, gain, overshoot } = *self;
+        let (value, highest) = (f64::from(ROBUST), f64::from(FAST));
+        let none = OutOfRange { field: "controller", value, lowest: 0.0, highest, unit: "in a library without robust" };
+        Margin::from_values([time_constant, share, gain, overshoot]).map(Compensation::Robust).ok_or(none)
     }
 }
 

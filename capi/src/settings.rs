@@ -67,6 +67,22 @@ pub const NONE: u32 = 0;
 pub const PAPER: u32 = 1;
 /// `VSJ_FAST`: the time-optimal pre-compensator.
 pub const FAST: u32 = 2;
+/// `VSJ_ROBUST`: the pre-compensator for a spring that is known to within errors.
+pub const ROBUST: u32 = 3;
+
+/// `vsj_margin`: how well [`ROBUST`] knows the spring, the fields of [`model::Margin`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Known {
+    /// Relative error of all time constants, both ways.
+    pub time_constant: f64,
+    /// Relative error of the share, both ways.
+    pub share: f64,
+    /// Relative error of the gain, both ways.
+    pub gain: f64,
+    /// Overshoot that is allowed, as a part of the step.
+    pub overshoot: f64,
+}
 
 /// `vsj_settings`: everything that a controller is built from, in SI units.
 #[repr(C)]
@@ -90,12 +106,14 @@ pub struct All {
     pub approach_s: f64,
     /// Width of the DAC, in bits.
     pub dac_bits: u32,
-    /// [`NONE`], [`PAPER`] or [`FAST`].
+    /// [`NONE`], [`PAPER`], [`FAST`] or [`ROBUST`].
     pub controller: u32,
     /// The spring.
     pub spring: Spring,
     /// The stiffness sensor.
     pub sensor: Sensor,
+    /// How well [`ROBUST`] knows the spring.
+    pub margin: Known,
 }
 
 impl All {
@@ -118,6 +136,7 @@ impl All {
             controller: PAPER,
             spring,
             sensor: Sensor::default(),
+            margin: Known::default(),
         }
     }
 }

@@ -1,6 +1,9 @@
 //! The functions of C, called from Rust: the same outputs as the tick's, and a status for every misuse.
 
-use model::{Amplifier, Feedback, Input, Reading, ScaledStiffness, Settings, State, Volts};
+use model::extended::Relaxation;
+use model::{
+    Amplifier, Compensation, ExtendedPlant, Feedback, Input, Margin, Reading, ScaledStiffness, Settings, State, Volts,
+};
 use vsj_tick::functions::{
     NOT_CONFIGURED, NOT_STARTED, NULL, OK, OUT_OF_RANGE, Refused, Text, vsj_configure, vsj_explain, vsj_from_volts,
     vsj_off, vsj_paper, vsj_range, vsj_start, vsj_tick, vsj_to_volts, vsj_transfer,
@@ -73,6 +76,27 @@ fn ticks_with_a_sensor_off_and_after_a_transfer_are_those_of_the_model() {
     let (mut lowest, mut highest) = (0, 0);
     assert_eq!(vsj_range(Some(&config), Some(&mut lowest), Some(&mut highest)), OK);
     assert_eq!([vsj_to_volts(lowest), vsj_to_volts(highest)], [rust.range().0.to_f64(), rust.range().1.to_f64()]);
+}
+
+#[test]
+fn ticks_of_the_robust_controller_are_those_of_the_model() {
+    let relaxation =
+        Relaxation { share: 0.1, time_constants_s: &[5.5, 40.0], weights: &[0.8, 0.1], time_constant_high_s: None };
+    let settings = Settings {
+        rate_hz: 1000.0,
+        plant: ExtendedPlant { memory: None, law: None, leakage: None, relaxation },
+        compensation: Compensation::Robust(Margin { gain: 0.01, ..Margin::TYPICAL }),
+        amplifier: Amplifier::up_to(1000.0),
+        feedback: None,
+    };
+    let (config, rust) = (configured(&All::new(&settings)), settings.validate().unwrap().quantize());
+    let (mut state, mut expected) = (started(&config), State::default());
+    for number in 0..3000 {
+        let volts = [300.0, 20.0, 650.0][number / 100 % 3];
+        let input = Input { target: Volts::new(volts).unwrap(), ..Input::default() };
+        let got = tick(&config, &mut state, TickInput { target: steps(volts), ..TickInput::default() });
+        assert_eq!(got, TickOutput::from(rust.tick(&mut expected, input)), "tick {number}");
+    }
 }
 
 #[test]

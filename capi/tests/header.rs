@@ -5,7 +5,7 @@ use std::mem::{offset_of, size_of};
 use std::process::Command;
 
 use vsj_tick::functions::{self, Refused, Text};
-use vsj_tick::settings::{self, All, Sensor, Spring};
+use vsj_tick::settings::{self, All, Known, Sensor, Spring};
 use vsj_tick::slot::{CONFIG_BYTES, STATE_BYTES};
 use vsj_tick::tick::{TickInput, TickOutput};
 
@@ -127,8 +127,10 @@ fn structures_have_the_same_places_and_constants_the_same_values() {
         dac_bits,
         controller,
         spring,
-        sensor
+        sensor,
+        margin
     );
+    structure!(text, "vsj_margin", Known, time_constant, share, gain, overshoot);
     structure!(text, "vsj_error", Refused, field, value, lowest, highest, unit);
     structure!(text, "vsj_input", TickInput, target, reading, reading_age, has_reading);
     structure!(text, "vsj_output", TickOutput, target, voltage, applied, stiffness, code, limits, sensor);
@@ -145,6 +147,7 @@ fn structures_have_the_same_places_and_constants_the_same_values() {
         ("VSJ_NONE", settings::NONE),
         ("VSJ_PAPER", settings::PAPER),
         ("VSJ_FAST", settings::FAST),
+        ("VSJ_ROBUST", settings::ROBUST),
         ("VSJ_LIMIT_UPPER", u32::from(limits[0].bits())),
         ("VSJ_LIMIT_LOWER", u32::from(limits[1].bits())),
         ("VSJ_LIMIT_SLEW", u32::from(limits[2].bits())),

@@ -1,7 +1,7 @@
 //! The settings of C become those of the tick, and back, without a loss.
 
 use model::extended::{Law, Leakage, Memory, Relaxation};
-use model::{Amplifier, Approach, Compensation, ExtendedPlant, Feedback, Gains, Settings};
+use model::{Amplifier, Approach, Compensation, ExtendedPlant, Feedback, Gains, Margin, Settings};
 use vsj_tick::settings::All;
 
 const PLAIN: ExtendedPlant<'static> = ExtendedPlant {
@@ -41,6 +41,7 @@ fn every_setting_of_the_tick_comes_back_from_those_of_c() {
         settings(PLAIN),
         Settings { compensation: Compensation::None, feedback: None, ..full },
         Settings { compensation: fast, amplifier: Amplifier::up_to(1000.0), ..full },
+        Settings { compensation: Compensation::Robust(Margin::TYPICAL), ..full },
         settings(ExtendedPlant { leakage: None, ..FULL }),
         settings(ExtendedPlant { memory: None, law: None, ..FULL }),
     ] {
@@ -59,7 +60,7 @@ fn lists_beyond_those_of_c_and_unknown_controllers_are_refused_by_name() {
     lags.spring.lags = 5;
     plays.spring.plays = u32::MAX;
     points.spring.points = 10;
-    controller.controller = 3;
+    controller.controller = 4;
     for (all, field) in [
         (lags, "relaxation.tau_s"),
         (plays, "memory.thresholds_v"),

@@ -147,6 +147,15 @@ class Board:
         """From now on a word of the flash has two wrong bits."""
         self.uc.hook_add(UC_HOOK_MEM_READ, lambda *_: self.two_wrong_bits(), begin=at, end=at + 7)
 
+    def watch(self, begin, end, what):
+        """Notes the first read from `begin` on, before `end`."""
+
+        def read(*_):
+            if not any(name == what for _, name, _ in self.log):
+                self.note(what, begin)
+
+        self.uc.hook_add(UC_HOOK_MEM_READ, read, begin=begin, end=end - 1)
+
     def stick(self, at, bit):
         """From now on a bit of the RAM's word at `at` reads as zero."""
 

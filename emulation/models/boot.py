@@ -1,9 +1,9 @@
-"""Boots an image, injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN STACK VOLTS HOST RECORDED RANDOM prints the events as JSON.
+"""Boots an image, injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN STACK VOLTS HOST RECORDED RANDOM STORED prints the events as JSON.
 
 TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's, MAIN that of the
 program's first function after start-up, TAKEN that of `cortex_m::peripheral::TAKEN`, STACK the top of the stack. VOLTS is the full scale of its
 amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each, and RECORDED the same of another chip. RANDOM
-is what the random number generator delivers.
+is what the random number generator delivers. STORED is a page of settings, in hex.
 """
 
 import json
@@ -16,7 +16,7 @@ from board import BUTTON, FLASH, HZ, LSI, POWER_ON, RAM, Board
 
 FAULT_TICK = 300
 GUARD = 256  # Bytes at the end of the stack.
-STORE = [FLASH + 0x7E000 + page * 0x800 for page in range(4)]  # First word of each page, half written at a power cut.
+STORE = [FLASH + 0x7E000 + page * 0x800 for page in range(4)]  # First word of each page, the settings first.
 UNDEFINED, HANG = b"\x00\xde", b"\xfe\xe7"
 
 
@@ -142,6 +142,17 @@ def flipped(board):
     board.uc.mem_write(FLASH + len(IMAGE) - 1, bytes([IMAGE[-1] ^ 0x10]))
 
 
+def stored(board):
+    """Settings are stored."""
+    board.uc.mem_write(STORE[0], STORED)
+
+
+def faded(board):
+    """A bit of the stored settings is wrong."""
+    stored(board)
+    board.uc.mem_write(STORE[0] + 40, bytes([STORED[40] ^ 4]))
+
+
 def play(host, fault, until_us, torn=(), before=None, first=None, random_number=None):
     """Injects `before` before power-on and `first` where the program begins. After the reset the flash is correct again; the
     memory keeps its content. Notes the instructions of every tick that no interrupt interrupts, and the stack's depth."""
@@ -150,6 +161,7 @@ def play(host, fault, until_us, torn=(), before=None, first=None, random_number=
         board.tear(at)
     if before:
         before(board)
+    board.watch(STORE[0], FLASH + 0x80000, "store read")
     ticks = 0
 
     def tick(board):
@@ -185,7 +197,7 @@ if __name__ == "__main__":
     TICK, PANIC, RTT, MAIN, TAKEN, STACK = (int(word, 0) for word in sys.argv[2:8])
     FULL_SCALE = float(sys.argv[8])
     HOST, RECORDED = ([(us, bytes.fromhex(frame)) for us, frame in json.loads(arg)] for arg in sys.argv[9:11])
-    RANDOM = int(sys.argv[11], 0)
+    RANDOM, STORED = int(sys.argv[11], 0), bytes.fromhex(sys.argv[12])
     print(json.dumps({
         "quiet": play([], None, 1_200_000),
         "host": play(HOST, stalled, 1_700_000),
@@ -194,6 +206,8 @@ if __name__ == "__main__":
         "two wrong bits": play(HOST, rotten, 400_000),
         "stack overflow": play(HOST, overflowing, 400_000),
         "torn": play([], None, 200_000, STORE),
+        "stored settings": play(HOST, None, 200_000, before=stored),
+        "damaged settings": play(HOST, None, 400_000, before=faded),
         "dip": play(HOST, dip, 400_000),
         "button": play(HOST, pressed, 400_000),
         "interlock": play(HOST, opened, 480_000),

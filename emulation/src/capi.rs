@@ -4,7 +4,7 @@
 //! same in Rust, in C on this machine and in C on an emulated Cortex-M4.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 use host_sim::qemu;
@@ -15,9 +15,11 @@ use test_bench::digest::Digest;
 use xtask::{build, setup, shell};
 
 use crate::binary::audit;
+use crate::qemu::emulator::{TIMEOUT, finish};
 
-/// The plain spring and one with every block, each with another controller.
-const CASES: [(&str, Controller); 2] = [("paper", Controller::Paper), ("docs/plant.toml", Controller::Fast)];
+/// The plain spring and one with every block, each with other controllers.
+const CASES: [(&str, Controller); 3] =
+    [("paper", Controller::Paper), ("docs/plant.toml", Controller::Fast), ("docs/plant.toml", Controller::Robust)];
 
 /// Builds and runs the example for each case.
 pub(crate) fn run() -> Result<()> {
@@ -37,11 +39,10 @@ pub(crate) fn run() -> Result<()> {
         let mut emulated = Command::new(qemu::PROGRAM);
         emulated.args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"]);
         emulated.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(&there);
-        emulated.stdin(Stdio::null());
         let rust = format!("digest {:016x}", in_rust(plant, controller)?);
         for (where_from, mut program) in [("this machine", Command::new(here)), ("the Cortex-M4", emulated)] {
             // QEMU writes the lines of semihosting to stderr.
-            let output = program.output().with_context(|| format!("the example on {where_from} does not start"))?;
+            let output = finish(&mut program, TIMEOUT).with_context(|| format!("the example on {where_from}"))?;
             let text = [output.stdout, output.stderr].concat();
             let text = String::from_utf8_lossy(&text).trim().to_owned();
             ensure!(output.status.success(), "the example on {where_from} has failed ({}): {text}", output.status);

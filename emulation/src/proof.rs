@@ -11,7 +11,7 @@ use crate::qemu::emulator;
 use crate::{drill, rivals, talk};
 
 /// Most instructions that one tick of the model may need.
-const MOST_INSTRUCTIONS: u32 = 150;
+const MOST_INSTRUCTIONS: u32 = 110;
 /// Scripts whose codes and estimates must be the host's, bit for bit.
 const RUNS: [&str; 3] = ["stair", "random 1", "random 20261121"];
 

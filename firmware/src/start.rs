@@ -1,7 +1,8 @@
 //! Settings, model and fault of the last run at the start, and the controller that is built from them.
 //!
 //! Stored settings run from the start on, or not at all: those of another format, out of range or beyond what the image
-//! contains are a `config` fault, and the built-in ones run. A damaged page counts as never written.
+//! contains are a `config` fault, and the built-in ones run. A damaged page of settings or model is a `config` fault as well, and
+//! the content before it runs, or the built-in one. An erased page is none.
 
 use link::{Block, BlockId, Blocks, Field, Reason, WireModel, WireSettings};
 use model::supervisor::Fault;
@@ -19,7 +20,8 @@ pub struct Loaded {
     pub settings: device::Settings,
     /// Their identity, and that of the stored ones, even if their validation failed.
     pub blocks: Blocks,
-    /// Invalid field of the stored settings, or `format`; `None` if they are valid.
+    /// Invalid field of the stored settings, or `format`, or which block is damaged; `None` if settings are valid and nothing is
+    /// damaged.
     pub rejected: Option<&'static str>,
 }
 
@@ -59,6 +61,9 @@ pub fn load<P: Pages>(store: &Store<P>, built_in: &device::Settings) -> Loaded {
             Err(_) => loaded.rejected = Some("format"),
         }
     }
+    let damaged = [(Block::Settings, "damaged settings"), (Block::Model, "damaged model")];
+    let damaged = damaged.into_iter().find(|(block, _)| store.is_damaged(*block)).map(|(_, what)| what);
+    loaded.rejected = loaded.rejected.or(damaged);
     loaded
 }
 
@@ -167,7 +172,7 @@ mod tests {
     use super::*;
     use crate::settings::BUILT_IN;
     use crate::settings::{SETTINGS, built_in};
-    use crate::store::Memory;
+    use crate::store::{Memory, Page, Side, WORD};
     use link::wire_model::FORMAT;
     use link::{Controller, Field, frame, wire_settings};
     use model::supervisor::{Faults, State};
@@ -291,6 +296,30 @@ mod tests {
             let (control, _) = control(&loaded, None, &cause, &mut place).unwrap();
             assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config), "{rejected}");
         }
+    }
+
+    #[test]
+    fn a_damaged_page_is_a_config_fault_until_it_is_written_again() {
+        let wire = WireSettings { rate_hz: 1250, ..built_in_settings() };
+        let (settings, model) = (wire.payload().unwrap(), model(0.1).payload().unwrap());
+        for (block, payload, what) in
+            [(Block::Settings, &settings[..], "damaged settings"), (Block::Model, &model[..], "damaged model")]
+        {
+            let mut pages = store(&[(block, payload)]).pages().clone();
+            let page = Page { block, side: Side::A };
+            let mut word = [0; WORD];
+            word.copy_from_slice(&pages.bytes(page)[2 * WORD..3 * WORD]);
+            word[3] ^= 1;
+            pages.program(page, 2 * WORD, word).unwrap();
+            let loaded = load(&Store::new(pages), &BUILT_IN);
+            assert_eq!((loaded.rejected, loaded.settings), (Some(what), BUILT_IN));
+            let mut place = None;
+            let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
+            let (control, _) = control(&loaded, None, &cause, &mut place).unwrap();
+            assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config), "{what}");
+            assert_eq!(load(&store(&[(block, payload)]), &BUILT_IN).rejected, None);
+        }
+        assert_eq!(load(&store(&[]), &BUILT_IN).rejected, None, "a board to which nothing was ever sent");
     }
 
     /// Settings with a sensor, and with these causes as a trip.

@@ -55,6 +55,9 @@ impl Machine {
         if options.controller != Controller::Fast {
             options.approach_s = None;
         }
+        if options.controller != Controller::Robust {
+            options.margin = None;
+        }
         let control = match unit.kind.has_controller() {
             false => None,
             true => {

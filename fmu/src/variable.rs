@@ -1,5 +1,6 @@
 //! What a variable of a unit is: its type, its range, and its place in the settings or the plant file.
 
+use model::Margin;
 use simulation::control_loop::{Controller, Options};
 use simulation::plant_file::PlantFile;
 
@@ -59,7 +60,7 @@ impl Role {
     }
 }
 
-/// A setting of the controller: a field of [`Options`].
+/// A setting of the controller: a field of [`Options`], or of its margin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "each is a field of `Options`")]
 pub enum Setting {
@@ -72,6 +73,10 @@ pub enum Setting {
     Kp,
     Ki,
     ApproachS,
+    KnownTau,
+    KnownShare,
+    KnownGain,
+    Overshoot,
 }
 
 impl Setting {
@@ -80,7 +85,9 @@ impl Setting {
         match self {
             Self::RateHz => options.rate_hz = value,
             // The instance accepts numbers of controllers only.
-            Self::Controller => options.controller = Controller::ALL[(value as usize).clamp(1, 3) - 1],
+            Self::Controller => {
+                options.controller = Controller::ALL[(value as usize).clamp(1, Controller::ALL.len()) - 1]
+            }
             Self::LimitV => options.limit_v = value,
             Self::MinV => options.min_v = value,
             Self::SlewVPerS => options.slew_v_per_s = Some(value),
@@ -88,6 +95,16 @@ impl Setting {
             Self::Kp => options.kp = value,
             Self::Ki => options.ki = value,
             Self::ApproachS => options.approach_s = Some(value),
+            Self::KnownTau | Self::KnownShare | Self::KnownGain | Self::Overshoot => {
+                let margin = options.margin.get_or_insert(Margin::TYPICAL);
+                let part = match self {
+                    Self::KnownTau => &mut margin.time_constant,
+                    Self::KnownShare => &mut margin.share,
+                    Self::KnownGain => &mut margin.gain,
+                    _ => &mut margin.overshoot,
+                };
+                *part = value;
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Parameters are the options of the command and the numbers of the plant file, by their names there: `spring.` is the simulated
 //! spring, `model.` the controller's model of it.
 
+use model::Margin;
 use simulation::control_loop::{CONTROLLERS, Options};
 use simulation::plant_file::PlantFile;
 
@@ -43,9 +44,11 @@ fn rate(options: &Options) -> Variable {
         .at(options.rate_hz)
 }
 
-fn settings(options: &Options) -> [Variable; 9] {
+fn settings(options: &Options) -> [Variable; 13] {
     let setting = |name, setting, unit, description| Variable::new(name, Role::Setting(setting), unit, description);
+    let part = |name, of, description| setting(name, of, "", description);
     let controllers = CONTROLLERS.len() as f64;
+    let margin = options.margin.unwrap_or(Margin::TYPICAL);
     [
         rate(options),
         Variable {
@@ -85,6 +88,22 @@ fn settings(options: &Options) -> [Variable; 9] {
         )
         .within(0.0, 1.0)
         .at(options.approach_s.unwrap_or(0.0)),
+        part(
+            "known_tau",
+            Setting::KnownTau,
+            "Error of the time constants within which the controller robust knows them",
+        )
+        .within(0.0, 0.25)
+        .at(margin.time_constant),
+        part("known_share", Setting::KnownShare, "Error of the share within which the controller robust knows it")
+            .within(0.0, 0.25)
+            .at(margin.share),
+        part("known_gain", Setting::KnownGain, "Error of the gain within which the controller robust knows it")
+            .within(0.0, 0.25)
+            .at(margin.gain),
+        part("overshoot", Setting::Overshoot, "Overshoot that the controller robust may cause, as a part of a step")
+            .within(0.0, 0.2)
+            .at(margin.overshoot),
     ]
 }
 

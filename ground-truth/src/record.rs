@@ -80,7 +80,7 @@ impl LabelledRecord {
         self.with_relaxation(share, [Further::default(); 2])
     }
 
-    /// This record's schedule, effects and noise with a spring of another share and further lags; an effect on the share precedes.
+    /// The same record with another instantaneous share, see [`with_share`](Self::with_share), and with further lags.
     pub fn with_relaxation(&self, share: f64, further: [Further; 2]) -> Self {
         let own = Spring { further, ..Spring::with(&self.effects) };
         let spring = if own.share == SHARE { Spring { share, ..own } } else { own };

@@ -109,3 +109,26 @@ fn unix(path: &str) -> io::Result<Box<dyn Stream>> {
 fn unix(_: &str) -> io::Result<Box<dyn Stream>> {
     Err(ErrorKind::Unsupported.into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+    use std::time::Instant;
+
+    /// A listener that accepts nothing takes as many connections as it may keep waiting; further ones are not answered.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_timeout_also_ends_a_connection_that_nobody_answers() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let connect = |_| TcpStream::connect_timeout(&address, Duration::from_millis(200)).ok();
+        let waiting: Vec<TcpStream> = (0..10_000).map_while(connect).collect();
+        assert!(waiting.len() < 10_000, "every connection is answered");
+        let begin = Instant::now();
+        let error = Port::open(&format!("tcp:{address}"), 0, Duration::from_millis(300)).err().unwrap().to_string();
+        assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
+        let expected = "no connection within 0.3 s; expected a serial device, unix:PATH or tcp:HOST:PORT";
+        assert_eq!(error, format!("tcp:{address}: cannot be opened: {expected}"));
+    }
+}

@@ -17,7 +17,7 @@
 use fixed::types::I3F29;
 
 use crate::error::OutOfRange;
-use crate::units::{Accumulator, DacCode, SampleTime, Signal, Volts, accumulator, signal};
+use crate::units::{Accumulator, DacCode, SampleTime, Signal, Volts, accumulator, rarely, signal};
 use crate::validated::{Validate, Validated};
 
 /// An amplifier and its digital-to-analog converter, in SI units.
@@ -137,9 +137,24 @@ impl Limits {
         self.0
     }
 
+    /// Returns the union of both sets.
     #[inline(always)]
-    pub(crate) fn with(self, other: Self, acted: bool) -> Self {
-        if acted { Self(self.0 | other.0) } else { self }
+    pub(crate) const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Returns `value` moved into the range from `lowest` to `highest`, and adds `below` or `above` to the set if it had to be moved.
+    #[inline(always)]
+    fn hold(&mut self, mut value: Signal, (lowest, highest): (Signal, Signal), (below, above): (Self, Self)) -> Signal {
+        if value < lowest {
+            value = rarely(lowest);
+            *self = self.with(below);
+        }
+        if value > highest {
+            value = rarely(highest);
+            *self = self.with(above);
+        }
+        value
     }
 }
 
@@ -152,7 +167,7 @@ impl Validated<'_, Amplifier> {
         let mut config = Config {
             lowest: Signal::ZERO,
             highest: Signal::ZERO,
-            slew: Limits::NONE.with(Limits::SLEW, step_v.is_some()),
+            slew: if step_v.is_some() { Limits::SLEW } else { Limits::NONE },
             // 1 V more than any change inside the range, so that a voltage beyond its end is seen to be held there.
             step: accumulator(step_v.unwrap_or(amplifier.full_scale_v + 1.0)),
             codes_per_volt: signal(1.0 / unit),
@@ -168,25 +183,18 @@ impl Validated<'_, Amplifier> {
 }
 
 impl Config {
-    /// Limits the wanted voltage, rounds it to a code, and advances the state by one tick.
+    /// Limits the wanted voltage, rounds it to a code, and advances the state by one tick. `limits` are those that have acted before.
     #[inline(always)]
-    pub(crate) fn drive(&self, state: &mut State, wanted: Volts) -> Drive {
+    pub(crate) fn drive(&self, state: &mut State, wanted: Volts, mut limits: Limits) -> Drive {
         let step = self.step.to_bits() + i64::from(state.carried);
         state.carried = step as u32;
         let step = Signal::from_bits((step >> 32) as i32);
-        let slewed = wanted.0.max(state.voltage - step).min(state.voltage + step);
-        let voltage = slewed.max(self.lowest).min(self.highest);
+        let reachable = (state.voltage - step, state.voltage + step);
+        let slewed = limits.hold(wanted.0, reachable, (self.slew, self.slew));
+        let voltage = limits.hold(slewed, (self.lowest, self.highest), (Limits::LOWER, Limits::UPPER));
         state.voltage = voltage;
-        let code = self.code(Volts(voltage));
-        Drive {
-            voltage: Volts(voltage),
-            code,
-            applied: self.volts(code),
-            limits: Limits::NONE
-                .with(self.slew, slewed != wanted.0)
-                .with(Limits::UPPER, slewed > self.highest)
-                .with(Limits::LOWER, slewed < self.lowest),
-        }
+        let code = self.nearest(voltage);
+        Drive { voltage: Volts(voltage), code: DacCode(code as u16), applied: self.voltage_of(code), limits }
     }
 
     /// Returns the voltage that the last tick put across the spring, rounded to a code.
@@ -195,11 +203,12 @@ impl Config {
         self.volts(self.code(Volts(state.voltage)))
     }
 
-    /// Returns `target` moved into the range, and whether it had to be moved.
+    /// Returns `target` moved into the range, and [`Limits::TARGET`] if it had to be moved.
     #[inline(always)]
-    pub(crate) fn clamp_target(&self, target: Volts) -> (Volts, bool) {
-        let clamped = target.0.max(self.lowest).min(self.highest);
-        (Volts(clamped), clamped != target.0)
+    pub(crate) fn clamp_target(&self, target: Volts) -> (Volts, Limits) {
+        let mut limits = Limits::NONE;
+        let held = limits.hold(target.0, (self.lowest, self.highest), (Limits::TARGET, Limits::TARGET));
+        (Volts(held), limits)
     }
 
     /// Returns the lowest and the highest voltage that is put out, moved inward to the next code.
@@ -210,15 +219,27 @@ impl Config {
     /// Returns the code nearest to a voltage inside the range.
     #[inline(always)]
     pub fn code(&self, voltage: Volts) -> DacCode {
-        // 20 and 20 fraction bits; the upper half keeps 8 of them for rounding.
-        let codes = (voltage.0.wide_mul(self.codes_per_volt).to_bits() >> 32) as i32;
-        DacCode(((codes + (1 << 7)) >> 8) as u16)
+        DacCode(self.nearest(voltage.0) as u16)
     }
 
     /// Returns the voltage of a code, too low by at most 0.13 mV (at 16 bits; 9 uV at 12 bits).
     #[inline(always)]
     pub fn volts(&self, code: DacCode) -> Volts {
-        Volts(Signal::from_bits(((i64::from(code.0) * i64::from(self.volts_per_code.to_bits())) >> 9) as i32))
+        self.voltage_of(u32::from(code.0))
+    }
+
+    /// Returns the number of the code nearest to a voltage inside the range, which fits 16 bits.
+    #[inline(always)]
+    fn nearest(&self, voltage: Signal) -> u32 {
+        // 20 and 20 fraction bits; the upper half keeps 8 of them for rounding.
+        let codes = (voltage.wide_mul(self.codes_per_volt).to_bits() >> 32) as i32;
+        (codes + (1 << 7)) as u32 >> 8
+    }
+
+    /// Returns the voltage of the code of this number.
+    #[inline(always)]
+    fn voltage_of(&self, code: u32) -> Volts {
+        Volts(Signal::from_bits(((i64::from(code) * i64::from(self.volts_per_code.to_bits())) >> 9) as i32))
     }
 }
 

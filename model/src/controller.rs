@@ -15,14 +15,14 @@
 //! amplifier limits and rounding, estimator on the applied voltage, integrator. All types are generic over the spring;
 //! without a parameter it is the plain one, [`Plant`].
 
-use crate::amplifier::{self, Amplifier, Limits};
+use crate::amplifier::{self, Amplifier, Drive, Limits};
 use crate::error::OutOfRange;
 use crate::estimator::{self, Estimator, Invertible, Model, Plant};
 use crate::feedback::{self, Feedback, Observed, Reading, Sensor};
 use crate::pre_compensator::{self, Gains, ProportionalIntegral};
 use crate::robust::{self, Aim, Margin, Robust};
 use crate::time_optimal::{self, Approach, TimeOptimal};
-use crate::units::{DacCode, SampleTime, ScaledStiffness, Volts};
+use crate::units::{DacCode, SampleTime, ScaledStiffness, Signal, Volts};
 use crate::validated::{Validate, Validated};
 
 /// Everything the controller is built from, in SI units.
@@ -129,9 +129,9 @@ impl<P: Model> Validated<'_, Settings<P>> {
             Compensation::Robust(margin) => self.robust(margin, step_v),
         };
         Config {
+            amplifier: self.part(&settings.amplifier).quantize(),
             estimator: P::quantize(plant),
             pre_compensator,
-            amplifier: self.part(&settings.amplifier).quantize(),
             feedback: settings.feedback.as_ref().map(|feedback| self.part(feedback).quantize()),
         }
     }
@@ -156,11 +156,13 @@ enum PreCompensator<E: Estimator> {
 }
 
 /// A validated configuration, quantized for the tick.
+// In this order the MCU's compiler needs no stack for a tick of the plain spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
 pub struct Config<E: Estimator = estimator::Config> {
+    amplifier: amplifier::Config,
     estimator: E,
     pre_compensator: PreCompensator<E>,
-    amplifier: amplifier::Config,
     feedback: Option<feedback::Config>,
 }
 
@@ -210,6 +212,22 @@ pub struct Output {
     pub sensor: Option<Sensor>,
 }
 
+impl Output {
+    /// Output of an amplifier that is off, across a spring at rest.
+    #[inline(always)]
+    fn off() -> Self {
+        Self {
+            target: Volts::ZERO,
+            voltage: Volts::ZERO,
+            code: DacCode(0),
+            applied: Volts::ZERO,
+            stiffness: ScaledStiffness(Signal::ZERO),
+            limits: Limits::NONE,
+            sensor: None,
+        }
+    }
+}
+
 impl<E: Estimator> Config<E> {
     /// Returns the lowest and the highest voltage that is put out, moved inward to the next DAC code.
     pub fn range(&self) -> (Volts, Volts) {
@@ -220,7 +238,10 @@ impl<E: Estimator> Config<E> {
     /// machine.
     #[inline(always)]
     pub fn tick(&self, state: &mut State<E::State>, input: Input) -> Output {
-        let (target, moved) = self.amplifier.clamp_target(input.target);
+        // Each part is stored as soon as it is known, so that it does not occupy a register until the end.
+        let mut output = Output::off();
+        let (target, limits) = self.amplifier.clamp_target(input.target);
+        output.target = target;
         let (pursued, observed) = match &self.feedback {
             None => (target, None),
             Some(feedback) => {
@@ -236,23 +257,23 @@ impl<E: Estimator> Config<E> {
             PreCompensator::TimeOptimal(it) => self.time_optimal(it, state, pursued),
             PreCompensator::Robust(it) => self.robust(it, state, target, pursued, observed),
         };
-        let drive = self.amplifier.drive(&mut state.amplifier, wanted);
-        let model = self.estimator.run(&mut state.estimator, drive.applied);
+        let Drive { voltage, code, applied, limits } = self.amplifier.drive(&mut state.amplifier, wanted, limits);
+        (output.voltage, output.code, output.applied, output.limits) = (voltage, code, applied, limits);
+        let model = self.estimator.run(&mut state.estimator, applied);
+        (output.stiffness, output.sensor) = self.estimate(&mut state.feedback, model);
         match &self.pre_compensator {
-            PreCompensator::ProportionalIntegral(it) => it.track(&mut state.pre_compensator, drive.voltage),
-            PreCompensator::Robust(it) => it.run(&mut state.robust, drive.applied),
+            PreCompensator::ProportionalIntegral(it) => it.track(&mut state.pre_compensator, voltage),
+            PreCompensator::Robust(it) => it.run(&mut state.robust, applied),
             PreCompensator::None | PreCompensator::TimeOptimal(_) => (),
         }
-        let (stiffness, sensor) = self.estimate(&mut state.feedback, model);
-        let limits = drive.limits.with(Limits::TARGET, moved);
-        Output { target, voltage: drive.voltage, code: drive.code, applied: drive.applied, stiffness, limits, sensor }
+        output
     }
 
     /// Advances the controller by one tick with the amplifier off: 0 V regardless of slew and range. The integrator is
     /// not advanced; [`Config::bumpless_transfer`] presets it. The sensor's readings are processed as in
     /// [`Config::tick`].
     pub fn rest(&self, state: &mut State<E::State>, measured: Option<Reading>) -> Output {
-        let (zero, code) = (Volts::ZERO, DacCode(0));
+        let zero = Volts::ZERO;
         state.amplifier = amplifier::State::default();
         if let Some(feedback) = &self.feedback {
             feedback.update(&mut state.feedback, zero, measured);
@@ -262,7 +283,7 @@ impl<E: Estimator> Config<E> {
             it.run(&mut state.robust, zero);
         }
         let (stiffness, sensor) = self.estimate(&mut state.feedback, model);
-        Output { target: zero, voltage: zero, code, applied: zero, stiffness, limits: Limits::NONE, sensor }
+        Output { stiffness, sensor, ..Output::off() }
     }
 
     /// Returns the model's stiffness corrected by the sensor, and whether the sensor is trusted.

@@ -30,7 +30,7 @@
 use crate::coefficient::{Gain, Rate, upper, widened};
 use crate::error::OutOfRange;
 use crate::estimator::{OperatingPoint, StepGain};
-use crate::units::{Accumulator, SampleTime, Signal, Volts, signal};
+use crate::units::{Accumulator, SampleTime, Signal, Volts, rarely, signal};
 use crate::validated::Validated;
 
 /// Proportional action, in V, beyond which any amplifier is at the end of its range.
@@ -109,13 +109,19 @@ impl ProportionalIntegral {
     /// Returns the voltage that this loop asks for, before the amplifier's limits.
     #[inline(always)]
     pub(crate) fn voltage(&self, state: &State, target: Volts, point: OperatingPoint) -> Volts {
-        Volts(upper(state.integrator).saturating_add(self.without_integrator(target, point)))
+        Volts(self.without_integrator(target, point).saturating_add(upper(state.integrator)))
     }
 
     /// Returns `(1 - g) v0 + g Kp (target - y0)`, in V.
     #[inline(always)]
     fn without_integrator(&self, target: Volts, point: OperatingPoint) -> Signal {
-        let error = (target.0 - point.stiffness).max(-self.largest_error).min(self.largest_error);
+        let mut error = target.0 - point.stiffness;
+        if error < -self.largest_error {
+            error = rarely(-self.largest_error);
+        }
+        if error > self.largest_error {
+            error = rarely(self.largest_error);
+        }
         self.operating_point_gain.times(point.voltage) + self.error_gain.times(error)
     }
 

@@ -53,6 +53,16 @@ pub(crate) fn saturated_to_32(bits: i64) -> i32 {
     bits.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32
 }
 
+/// Returns `value`, and marks the branch that calls it as rare.
+///
+/// A limit rarely acts. Marked so, its branch stays one: the MCU's compiler makes a single comparison, under whose condition it moves
+/// the value and reports the limit, and a host, which predicts branches, does not wait for limits that do not act.
+#[cold]
+#[inline]
+pub(crate) fn rarely(value: Signal) -> Signal {
+    value
+}
+
 /// Converts a signal to volts, exactly.
 fn volts(signal: Signal) -> f64 {
     f64::from(signal.to_bits()) / TWO_TO_20

@@ -1,7 +1,7 @@
 //! A target through the controller.
 
 use anyhow::Result;
-use model::{Amplifier, Approach, Compensation, Gains};
+use model::{Amplifier, Approach, Compensation, Gains, Margin};
 use paper::stair::request::{Answer, Request, Target};
 use serde::{Deserialize, Serialize};
 use simulation::bad_input;
@@ -24,7 +24,7 @@ pub struct Control {
     /// Whether the voltage between two rows of a CSV file is interpolated linearly instead of held.
     #[serde(default)]
     pub linear: bool,
-    /// `none`, `paper` or `fast`.
+    /// `none`, `paper`, `fast` or `robust`.
     pub controller: String,
     /// Highest voltage of the amplifier, in V.
     pub limit_v: f64,
@@ -36,8 +36,32 @@ pub struct Control {
     pub ki: f64,
     /// Time constant of the fast controller's approach to the target, in s.
     pub approach_s: f64,
+    /// How well the robust controller knows the spring; absent for 5 % in share and time constants.
+    #[serde(default)]
+    pub known: Option<Known>,
     /// Ticks per second, in Hz.
     pub rate_hz: f64,
+}
+
+/// Errors to within which the robust controller knows the spring, and the overshoot that it may cause, in percent.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Known {
+    /// Error of all time constants.
+    pub tau: f64,
+    /// Error of the share.
+    pub share: f64,
+    /// Error of the gain.
+    pub gain: f64,
+    /// Overshoot of a step.
+    pub overshoot: f64,
+}
+
+impl Known {
+    fn margin(self) -> Margin {
+        let Self { tau, share, gain, overshoot } = self;
+        Margin { time_constant: tau / 100.0, share: share / 100.0, gain: gain / 100.0, overshoot: overshoot / 100.0 }
+    }
 }
 
 /// Largest number of ticks: a browser has less memory than the command.
@@ -129,7 +153,8 @@ pub(crate) fn answer(control: &Control, plant: &PlantFile) -> Result<Answer> {
             "none" | "paper" => {
                 Compensation::ProportionalIntegral(Gains { proportional: control.kp, integral_per_s: control.ki })
             }
-            other => bad_input!("controller {other}: expected none, paper or fast"),
+            "robust" => Compensation::Robust(control.known.map_or(Margin::TYPICAL, Known::margin)),
+            other => bad_input!("controller {other}: expected none, paper, fast or robust"),
         },
         controlled: control.controller != "none",
         amplifier: Amplifier { slew_v_per_s: control.slew_v_per_s, ..Amplifier::up_to(control.limit_v) },
@@ -137,4 +162,40 @@ pub(crate) fn answer(control: &Control, plant: &PlantFile) -> Result<Answer> {
     };
     request.check().map_err(|error| named(error, SETTINGS))?;
     request.run(|_, _| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(request: &str) -> Result<Shown> {
+        run(&serde_json::from_str(request).expect("a request"))
+    }
+
+    /// The request of the page for the robust controller, and what `vsj stair` runs for it.
+    #[test]
+    fn the_robust_controller_is_that_of_the_command_to_the_bit() {
+        let request = r#"{"plant":"paper","target":"step","controller":"robust","limit_v":1000,"slew_v_per_s":null,"kp":4,"ki":1.35,
+            "approach_s":0,"known":{"tau":7,"share":3,"gain":1,"overshoot":2},"rate_hz":500}"#;
+        let margin = Margin { time_constant: 0.07, share: 0.03, gain: 0.01, overshoot: 0.02 };
+        let plant = spring("paper").expect("the report's spring");
+        let settings = Request {
+            plant: &plant,
+            paper: true,
+            target: Target::Step,
+            compensation: Compensation::Robust(margin),
+            controlled: true,
+            amplifier: Amplifier::up_to(1000.0),
+            rate_hz: 500.0,
+        };
+        let expected = settings.run(|_, _| ()).expect("a run");
+        assert_eq!(of(request).expect("a run").json, serde_json::to_string(&expected.report).expect("JSON"));
+        let control = serde_json::from_str(request).expect("a request");
+        let codes = |answer: &Answer| answer.run.with.iter().map(|sample| sample.code).collect::<Vec<_>>();
+        assert!(codes(&answer(&control, &plant).expect("a run")) == codes(&expected));
+        let fast = Control { controller: "fast".to_owned(), ..control };
+        assert!(codes(&answer(&fast, &plant).expect("a run")) != codes(&expected));
+        let error = of(&request.replace("\"tau\":7", "\"tau\":70")).expect_err("out of range").to_string();
+        assert!(error.starts_with("--known: margin.time_constant = 0.7 is not allowed: "), "{error}");
+    }
 }

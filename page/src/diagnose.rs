@@ -98,7 +98,7 @@ impl Records {
             let Some((file, rest)) = bytes.split_at_checked(*length) else {
                 bad_input!("{name}: {} bytes; expected {length}", bytes.len());
             };
-            measured.push(format.read(Source::read(name, file)?)?);
+            measured.push(format.read(Source::read(name, file))?);
             bytes = rest;
         }
         let Some(MeasuredRecord { units, .. }) = measured.first() else {

@@ -127,6 +127,7 @@ mod tests {
             kp: 4.0,
             ki: 1.35,
             approach_s: 0.0,
+            known: None,
             rate_hz: 100.0,
         };
         Hidden { control, effect: effect.to_owned(), size: 1.0, noise_percent: 0.2, seed: 1, rows: 1000 }

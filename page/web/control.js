@@ -54,6 +54,7 @@ export class ControlPanel {
   /** The request that the settings make. */
   request() {
     const target = byId("target").value;
+    const percents = () => ({ tau: number("known-tau"), share: number("known-share"), gain: number("known-gain"), overshoot: number("overshoot") });
     const files = { drawn: this.#target.csv(), planned: this.#planned };
     return {
       plant: spring(),
@@ -65,6 +66,7 @@ export class ControlPanel {
       kp: number("kp"),
       ki: number("ki"),
       approach_s: number("approach"),
+      known: byId("controller").value === "robust" ? percents() : null,
       rate_hz: number("rate"),
     };
   }
@@ -85,6 +87,7 @@ export class ControlPanel {
     byId("hand").hidden = target !== "drawn";
     byId("gains").hidden = controller !== "paper";
     byId("braking").hidden = controller !== "fast";
+    byId("known").hidden = controller !== "robust";
     byId("record-settings").hidden = byId("effect").value === "";
     this.#target.highest = Number(byId("limit").value);
     this.#target.draw();
@@ -214,8 +217,12 @@ function command(request) {
   if (request.plant !== "paper") words.push("--plant", "plant.toml");
   words.push("--limit-v", request.limit_v);
   if (request.slew_v_per_s != null) words.push("--slew-v-per-s", request.slew_v_per_s);
-  if (request.controller !== "fast") words.push("--kp", request.kp, "--ki", request.ki);
+  if (["none", "paper"].includes(request.controller)) words.push("--kp", request.kp, "--ki", request.ki);
   if (request.controller === "fast" && request.approach_s) words.push("--approach-s", request.approach_s);
+  if (request.known) {
+    for (const key of ["tau", "share", "gain"]) words.push("--known", `${key}=${request.known[key]}`);
+    words.push("--overshoot-percent", request.known.overshoot);
+  }
   if (request.rate_hz !== 1000) words.push("--rate-hz", request.rate_hz);
   return [...words, "--json"].join(" ");
 }

@@ -5,7 +5,7 @@ use identify::effects::model::Model;
 use identify::fit::simulator::Simulator;
 use identify::plant::base::Base;
 use identify::record::data::Data;
-use model::{Feedback, Input, OutOfRange, Output, Reading, ScaledStiffness, Volts};
+use model::{Feedback, Input, Margin, OutOfRange, Output, Reading, ScaledStiffness, Volts};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use simulation::bad_input;
@@ -30,6 +30,7 @@ pub(crate) struct LoopOptions {
     kp: f64,
     ki: f64,
     approach_s: Option<f64>,
+    margin: Option<[f64; 4]>,
     rate_hz: f64,
     feedback: Option<Sensor>,
 }
@@ -86,6 +87,7 @@ impl LoopOptions {
             kp: self.kp,
             ki: self.ki,
             approach_s: self.approach_s,
+            margin: self.margin.and_then(Margin::from_values),
             rate_hz: self.rate_hz,
             feedback,
         })

@@ -18,6 +18,11 @@ CASES = [
     (dict(controller="paper"), []),
     (dict(controller="none"), []),
     (dict(controller="fast", limit_v=1000), ["--limit-v", 1000]),
+    (dict(controller="robust", limit_v=1000), ["--limit-v", 1000]),
+    (
+        dict(controller="robust", known={"tau": 7, "gain": 1.5}, overshoot_percent=3),
+        ["--known", "tau=7", "--known", "gain=1.5", "--overshoot-percent", 3],
+    ),
     (dict(controller="paper", rate_hz=500, slew_v_per_s=2000.0, dac_bits=16), ["--rate-hz", 500, "--slew-v-per-s", 2000, "--dac-bits", 16]),
 ]
 
@@ -74,6 +79,9 @@ def test_settings_and_inputs_out_of_range_are_bad_input(command):
         (dict(kp=-1), ["--kp", -1]),
         (dict(dac_bits=40), ["--dac-bits", 40]),
         (dict(approach_s=0.1), ["--approach-s", 0.1]),
+        (dict(known={"tau": 5}), ["--controller", "paper", "--known", "tau=5"]),
+        (dict(controller="robust", known={"tau": 30}), ["--known", "tau=30"]),
+        (dict(controller="robust", overshoot_percent=21), ["--known", "tau=5", "--overshoot-percent", 21]),
         (dict(plant="no.toml"), ["--plant", "no.toml"]),
     ):
         with pytest.raises(vsj.BadInput) as error:
@@ -81,6 +89,7 @@ def test_settings_and_inputs_out_of_range_are_bad_input(command):
         assert str(error.value) == command.error("stair", *words)
     for call in (
         lambda: vsj.Controller("paper", "slow"),
+        lambda: vsj.Controller("paper", "robust", known={"mass": 5}),
         lambda: vsj.Controller().run([1.0, np.nan]),
         lambda: vsj.Controller().run([1.0], [1.0]),
         lambda: vsj.Controller(feedback=vsj.Feedback()).run([1.0, 2.0], [1.0]),

@@ -124,6 +124,15 @@ def test_ctrl_c_and_a_killed_worker_cost_no_record_and_double_none(folder, tmp_p
     assert drift["after"]["time"].startswith("2026-02-12") and drift["by"]["time"].startswith("2026-05-30")
 
 
+def test_results_that_cannot_be_written_are_refused_before_anything_is_computed(copied, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(run, "run", lambda *_: pytest.fail("it computes"))
+    (tmp_path / "file").touch()
+    for out in (tmp_path / "file", tmp_path / "file" / "out", "/dev/full/out"):
+        assert fleet.main([str(copied), "--out", str(out)]) == 2
+        line = capsys.readouterr().err.strip()
+        assert line.startswith(f"vsj.fleet: --out {out}: cannot be written (") and line.endswith("for the results")
+
+
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_ctrl_c_ends_the_run_also_where_python_drops_the_exception(copied, tmp_path, engine, monkeypatch, capsys):
     class Dropped:

@@ -22,6 +22,11 @@ CASES = {
     "paper": ("paper", dict(controller="paper"), []),
     "example": (ROOT / "docs/plant.toml", dict(controller="paper", slew_v_per_s=2000.0), ["--slew-v-per-s", 2000]),
     "fast": ("paper", dict(controller="fast", limit_v=1000.0), ["--controller", "fast", "--limit-v", 1000]),
+    "robust": (
+        ROOT / "docs/plant.toml",
+        dict(controller="robust", known={"tau": 7, "share": 3}, overshoot_percent=3),
+        ["--known", "tau=7", "--known", "share=3", "--overshoot-percent", 3],
+    ),
 }
 
 
@@ -133,6 +138,10 @@ def test_parameters_are_those_of_the_command_and_its_plant_file(export, tmp_path
     (code,) = instance.run("target_v", TARGETS, ["dac_code"])
     expected = vsj.Controller("paper", "fast", limit_v=1000.0, slew_v_per_s=5000.0, dac_bits=16).run(TARGETS)
     np.testing.assert_array_equal(code, expected.code)
+    instance = Instance(path, controller=4, limit_v=1000.0, known_tau=0.1, known_share=0.0, overshoot=0.05)
+    (code,) = instance.run("target_v", TARGETS, ["dac_code"])
+    known = dict(known={"tau": 10}, overshoot_percent=5)
+    np.testing.assert_array_equal(code, vsj.Controller("paper", "robust", limit_v=1000.0, **known).run(TARGETS).code)
     # The spring is half as fast as the controller's model of it.
     instance = Instance(path, **{"spring.relaxation.tau_s[1]": 11.0})
     applied, estimate, stiffness = instance.run("target_v", TARGETS, ["applied_v", "estimate_v", "stiffness_v"])
@@ -155,8 +164,9 @@ def test_every_parameter_beyond_the_range_of_the_description_is_an_error(export,
             if bound is not None and (variable.name, side) != ("slew_v_per_s", 1):
                 outside = float(bound) + side * max(1e-3, 0.01 * abs(float(bound)))
                 value = outside if variable.type in ("Real", "Float64") else int(bound) + side
-                # Only this controller has an approach.
-                others = dict(controller=3) if variable.name == "approach_s" else {}
+                # Only one controller has an approach, and only one a margin.
+                with_margin = variable.name.startswith("known_") or variable.name == "overshoot"
+                others = dict(controller=4) if with_margin else dict(controller=3) if variable.name == "approach_s" else {}
                 with pytest.raises(FMICallException):
                     Instance(path, **{variable.name: value}, **others)
                     pytest.fail(f"{variable.name} = {value} is accepted")

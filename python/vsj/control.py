@@ -3,7 +3,7 @@
 import warnings
 from dataclasses import asdict, dataclass
 from enum import IntFlag
-from typing import Optional, Tuple
+from typing import List, Mapping, Optional, Tuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,8 +78,9 @@ class Controller:
     ----------
     plant : str, path, Identified, Diagnosis or Spring
         The spring that the estimator runs: ``"paper"``, a plant file, or an answer of this package.
-    controller : {"paper", "fast", "none"}
-        The report's proportional-integral pre-compensator, the time-optimal one, or none.
+    controller : {"paper", "fast", "robust", "none"}
+        The report's proportional-integral pre-compensator, the time-optimal one, the one for a spring that is known to within
+        errors, or none.
     limit_v, min_v : float
         Highest and lowest voltage of the amplifier, in V.
     slew_v_per_s : float, optional
@@ -90,6 +91,11 @@ class Controller:
         Proportional gain, and integral gain in 1/s, of the controller ``"paper"``.
     approach_s : float, optional
         Time constant of the approach to the target of the controller ``"fast"``, in s.
+    known : mapping, optional
+        How well the controller ``"robust"`` knows the spring: errors of ``"tau"``, ``"share"`` and ``"gain"``, both ways, in percent,
+        0 to 25; what is not in it is exact. Default: ``{"tau": 5, "share": 5}``.
+    overshoot_percent : float
+        Overshoot that the controller ``"robust"`` may cause, in percent of a step, 0 to 20.
     rate_hz : float
         Ticks per second, 100 to 10 000.
     feedback : Feedback, optional
@@ -113,6 +119,8 @@ class Controller:
         kp: float = 4.0,
         ki: float = 1.35,
         approach_s: Optional[float] = None,
+        known: Optional[Mapping[str, float]] = None,
+        overshoot_percent: float = 2.0,
         rate_hz: float = 1000.0,
         feedback: Optional[Feedback] = None,
     ) -> None:
@@ -125,6 +133,7 @@ class Controller:
             kp=float(kp),
             ki=float(ki),
             approach_s=approach_s,
+            margin=margin(controller, known, overshoot_percent),
             rate_hz=float(rate_hz),
             feedback=None if feedback is None else asdict(feedback),
         )
@@ -192,6 +201,18 @@ def simulate(
     stiffness, left_out = _vsj.simulate(named_plant(plant), vector(time), vector(voltage), float(rate_hz))
     warn_of(left_out)
     return stiffness
+
+
+def margin(controller: str, known: Optional[Mapping[str, float]], overshoot_percent: float) -> Optional[List[float]]:
+    """The parts that a margin consists of: time constant, share, gain, overshoot; None for a controller that has none."""
+    if known is None and controller != "robust":
+        return None
+    known = {"tau": 5.0, "share": 5.0} if known is None else known
+    unknown = set(known) - {"tau", "share", "gain"}
+    if unknown:
+        raise _vsj.BadInput(f"known: {', '.join(sorted(map(str, unknown)))}; expected tau, share or gain")
+    parts = [known.get("tau", 0.0), known.get("share", 0.0), known.get("gain", 0.0), overshoot_percent]
+    return [float(part) / 100.0 for part in parts]
 
 
 def vector(values):

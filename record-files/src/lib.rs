@@ -85,7 +85,7 @@ pub fn open(path: &Path, format: &Format, topic: Option<&str>) -> Result<Measure
             let magic = expected.magic().escape_ascii();
             bad_input!("{name}: does not start with `{magic}`; expected {}", expected.name())
         }
-        (None, None) => format.read(Source::read(&name, file)?),
+        (None, None) => format.read(Source::read(&name, file)),
         (Some(container), _) => {
             let mut bytes = Vec::new();
             if let Err(error) = file.take(MOST_BYTES as u64 + 1).read_to_end(&mut bytes) {

@@ -6,8 +6,8 @@ use anyhow::Result;
 use model::estimator::{self, Estimator};
 use model::extended;
 use model::{
-    Amplifier, Approach, Compensation, Config, ExtendedPlant, Feedback, Gains, Input, OutOfRange, Output, SampleTime,
-    ScaledStiffness, Settings, State, Validate, Volts,
+    Amplifier, Approach, Compensation, Config, ExtendedPlant, Feedback, Gains, Input, Margin, OutOfRange, Output,
+    SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
 };
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ use crate::option_names::{SETTINGS, named};
 use crate::plant_file::PlantFile;
 
 /// Names of the controllers, in the order of [`Controller::ALL`].
-pub const CONTROLLERS: [&str; 3] = ["none", "paper", "fast"];
+pub const CONTROLLERS: [&str; 4] = ["none", "paper", "fast", "robust"];
 
 /// Choice of the pre-compensator, by the names of the command's option `--controller`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,11 +30,13 @@ pub enum Controller {
     Paper,
     /// The time-optimal pre-compensator.
     Fast,
+    /// The one for a spring that is known to within errors.
+    Robust,
 }
 
 impl Controller {
     /// All controllers.
-    pub const ALL: [Self; 3] = [Self::None, Self::Paper, Self::Fast];
+    pub const ALL: [Self; 4] = [Self::None, Self::Paper, Self::Fast, Self::Robust];
 
     /// Returns the controller of this name.
     ///
@@ -43,7 +45,7 @@ impl Controller {
     pub fn by_name(name: &str) -> Result<Self> {
         match CONTROLLERS.iter().zip(Self::ALL).find(|(known, _)| **known == name) {
             Some((_, controller)) => Ok(controller),
-            None => bad_input!("--controller {name}: expected none, paper or fast"),
+            None => bad_input!("--controller {name}: expected none, paper, fast or robust"),
         }
     }
 
@@ -73,6 +75,10 @@ pub struct Options {
     pub ki: f64,
     /// Time constant of the approach of [`Controller::Fast`], in s; `None` for 0 s.
     pub approach_s: Option<f64>,
+    /// How well [`Controller::Robust`] knows the spring; `None` for [`Margin::TYPICAL`]. In a file the values of the margin, in their
+    /// order.
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "margin")]
+    pub margin: Option<Margin>,
     /// Ticks per second, in Hz.
     pub rate_hz: f64,
     /// A stiffness sensor; `None` if there is none. Not in a file.
@@ -91,6 +97,7 @@ impl Options {
         kp: Gains::PAPER.proportional,
         ki: Gains::PAPER.integral_per_s,
         approach_s: None,
+        margin: None,
         rate_hz: Settings::PAPER.rate_hz,
         feedback: None,
     };
@@ -98,10 +105,13 @@ impl Options {
     /// Rejects an option that would be ignored.
     ///
     /// # Errors
-    /// [`BadInput`] for an approach without the controller that has one.
+    /// [`BadInput`] for an approach or a margin without the controller that has one.
     pub fn check(&self) -> Result<()> {
         if self.approach_s.is_some() && self.controller != Controller::Fast {
             bad_input!("--approach-s applies to the fast controller only: expected --controller fast");
+        }
+        if self.margin.is_some() && self.controller != Controller::Robust {
+            bad_input!("--known applies to the robust controller only: expected --controller robust");
         }
         Ok(())
     }
@@ -114,6 +124,7 @@ impl Options {
                 Compensation::ProportionalIntegral(Gains { proportional: self.kp, integral_per_s: self.ki })
             }
             Controller::Fast => Compensation::TimeOptimal(Approach { time_constant_s: self.approach_s.unwrap_or(0.0) }),
+            Controller::Robust => Compensation::Robust(self.margin.unwrap_or(Margin::TYPICAL)),
         }
     }
 
@@ -132,6 +143,20 @@ impl Options {
             amplifier: plant.behind(self.amplifier()),
             feedback: self.feedback,
         }
+    }
+}
+
+/// A margin in a file.
+mod margin {
+    use model::Margin;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(margin: &Option<Margin>, to: S) -> Result<S::Ok, S::Error> {
+        margin.map(|margin| margin.values()).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Margin>, D::Error> {
+        Ok(Option::deserialize(from)?.and_then(Margin::from_values))
     }
 }
 
@@ -273,6 +298,18 @@ mod tests {
         for (options, error) in [
             (Options { limit_v: 2e4, ..Options::PAPER }, "--limit-v: full_scale_v = 20000 is not allowed: "),
             (Options { approach_s: Some(0.1), ..Options::PAPER }, "--approach-s applies to the fast controller only: "),
+            (
+                Options { margin: Some(Margin::TYPICAL), ..Options::PAPER },
+                "--known applies to the robust controller only: ",
+            ),
+            (
+                Options {
+                    controller: Controller::Robust,
+                    margin: Some(Margin { gain: 0.3, ..Margin::TYPICAL }),
+                    ..Options::PAPER
+                },
+                "--known: margin.gain = 0.3 is not allowed: ",
+            ),
         ] {
             let said = ControlLoop::new(&paper, &options).unwrap_err();
             assert!(said.is::<BadInput>() && said.to_string().starts_with(error), "{said}");

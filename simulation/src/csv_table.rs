@@ -5,6 +5,7 @@
 //! Errors are one line that names file, line, column and what was expected.
 
 pub mod dialect;
+mod stream;
 pub mod text;
 
 use std::path::Path;
@@ -14,8 +15,9 @@ use csv::StringRecord;
 
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
-use dialect::{Dialect, Numbers, Preamble, Separator, has_thousands_separators};
-use text::Source;
+use dialect::{CHECKED_ROWS, Dialect, Numbers, Separator, has_thousands_separators};
+use stream::Stream;
+use text::{Source, unwrapped};
 
 /// Reads the text of a file.
 ///
@@ -35,17 +37,19 @@ pub enum Numbering {
     Rows,
 }
 
-/// A table, read row by row.
+/// A table, read row by row from a stream.
 pub struct Table<'a> {
-    name: &'a str,
+    name: String,
     numbering: Numbering,
     header: StringRecord,
     header_line: usize,
     separator: Separator,
     numbers: Numbers,
-    reader: csv::Reader<&'a [u8]>,
+    reader: csv::Reader<Stream<'a>>,
     record: StringRecord,
-    lines: Lines<'a>,
+    line: usize,
+    /// True if the row in `record` is the next one as well.
+    is_returned: bool,
 }
 
 /// A row of a [`Table`].
@@ -64,25 +68,29 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// [`BadInput`] with the line of an invalid header.
-    pub fn new(name: &'a str, text: &'a str) -> Result<Self> {
-        Self::with_dialect(name, text, Dialect::default(), Numbering::Lines)
+    pub fn new(name: &str, text: &'a str) -> Result<Self> {
+        Self::read(Source::read(name, text.as_bytes()), Dialect::default())
     }
 
     /// Reads the header of a table whose dialect may be known.
     ///
     /// # Errors
-    /// The errors of [`Table::new`].
-    pub fn with_dialect(name: &'a str, text: &'a str, dialect: Dialect, numbering: Numbering) -> Result<Self> {
-        let preamble = Preamble::of(text);
-        let text = &text[preamble.bytes..];
-        let separator = dialect.separator.or(preamble.separator).unwrap_or_else(|| Separator::of(text));
+    /// [`BadInput`] with the line of an invalid header, and where the source cannot be read or exceeds its bounds. Reading a row
+    /// has the latter errors, too.
+    pub fn read(source: Source<'a>, dialect: Dialect) -> Result<Self> {
+        let (name, numbering) = (source.name.clone(), source.numbering());
+        let mut text = Stream::new(source);
+        let named = text.skip_preamble()?;
+        let separator = match dialect.separator.or(named) {
+            Some(separator) => separator,
+            None => Separator::of(text.head(1 + CHECKED_ROWS)?),
+        };
         // Rows of another length are reported by [`Table::next_row`], which knows their line.
         let mut builder = csv::ReaderBuilder::new();
         builder.delimiter(separator.0).comment(Some(b'#')).trim(csv::Trim::All).flexible(true);
-        let mut reader = builder.from_reader(text.as_bytes());
-        let mut lines = Lines { text, byte: 0, line: 1 + preamble.lines };
-        let mut header = reader.headers().map_err(|error| unreadable(name, &mut lines, &error))?.clone();
-        let line = lines.at(header.position());
+        let mut reader = builder.from_reader(text);
+        let mut header = reader.headers().map_err(unreadable)?.clone();
+        let line = line_of(&header, &mut reader);
         let names = header.iter().enumerate().filter(|(_, column)| !column.is_empty());
         let last_name = names.map(|(index, _)| index).last().unwrap_or(0);
         keep_columns(&mut header, separator, |index| index <= last_name);
@@ -90,15 +98,33 @@ impl<'a> Table<'a> {
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
         if let Some((_, column)) = header.iter().enumerate().find(twice) {
             let column = excerpt(column);
-            bad_input!("{}: column `{column}` appears twice; expected every column once", numbering.header(name, line));
+            bad_input!(
+                "{}: column `{column}` appears twice; expected every column once",
+                numbering.header(&name, line)
+            );
         }
-        let (numbers, record) = (Numbers::new(dialect, separator), StringRecord::new());
-        Ok(Self { name, numbering, header, header_line: line, separator, numbers, reader, record, lines })
+        Ok(Self {
+            name,
+            numbering,
+            header,
+            header_line: line,
+            separator,
+            numbers: Numbers::new(dialect, separator),
+            reader,
+            record: StringRecord::new(),
+            line,
+            is_returned: false,
+        })
     }
 
     /// Name of the table in messages.
-    pub fn name(&self) -> &'a str {
-        self.name
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the user should know about the encoding of what was read so far.
+    pub fn remark(&self) -> Option<&str> {
+        self.reader.get_ref().remark()
     }
 
     /// Names of the columns, in their order.
@@ -123,7 +149,7 @@ impl<'a> Table<'a> {
 
     /// File and line of the header, for messages.
     pub fn header_place(&self) -> String {
-        self.numbering.header(self.name, self.header_line)
+        self.numbering.header(&self.name, self.header_line)
     }
 
     /// Index of a column that must exist; `expected` lists the columns for the error.
@@ -133,7 +159,7 @@ impl<'a> Table<'a> {
 
     /// The error for a missing column.
     pub fn lacks(&self, column: &str, expected: &str) -> BadInput {
-        let name = self.name;
+        let name = &self.name;
         if self.columns().all(str::is_empty) {
             return BadInput(format!("{name}: no header; expected one with {expected}"));
         }
@@ -153,34 +179,43 @@ impl<'a> Table<'a> {
     /// # Errors
     /// [`BadInput`] with the line of a row that has not as many fields as the header; empty ones at its end do not count.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>> {
-        let (name, numbering, expected) = (self.name, self.numbering, self.header.len());
-        loop {
-            match self.reader.read_record(&mut self.record) {
-                Ok(false) => return Ok(None),
-                Ok(true) => (),
-                Err(error) => return Err(unreadable(name, &mut self.lines, &error).into()),
-            }
-            let line = self.lines.at(self.record.position());
+        if !std::mem::take(&mut self.is_returned) && !self.advance()? {
+            return Ok(None);
+        }
+        let Self { name, numbering, header, numbers, record, line, .. } = self;
+        let line = if *numbering == Numbering::Rows { *line - self.header_line } else { *line };
+        Ok(Some(Row { name, numbering: *numbering, header, numbers, record, line }))
+    }
+
+    /// Makes the row that was read last the next one again.
+    pub(crate) fn return_row(&mut self) {
+        self.is_returned = true;
+    }
+
+    /// Reads the next row; `false` after the last.
+    fn advance(&mut self) -> Result<bool> {
+        let expected = self.header.len();
+        while self.reader.read_record(&mut self.record).map_err(unreadable)? {
+            self.line = line_of(&self.record, &mut self.reader);
             if self.separator == Separator::BLANKS || self.record.len() > expected {
                 let is_trailing = self.record.iter().skip(expected).all(str::is_empty);
                 keep_columns(&mut self.record, self.separator, |index| index < expected || !is_trailing);
             }
             let found = self.record.len();
-            if found == 0 {
-                continue;
+            if found == expected {
+                return Ok(true);
             }
-            if found != expected {
+            if found > 0 {
                 let why = if self.record.iter().any(unclosed) { format!(" with {UNCLOSED}") } else { String::new() };
                 let has_decimal_commas =
                     self.separator == Separator::COMMA && (expected + 1..=2 * expected).contains(&found);
                 let hint =
                     if has_decimal_commas { " (decimal commas need another separator, `;` or a tab)" } else { "" };
+                let (name, line) = (&self.name, self.line);
                 bad_input!("{name}, line {line}: {found} field(s){why}; expected {expected} as in the header{hint}");
             }
-            let line = if numbering == Numbering::Rows { line - self.header_line } else { line };
-            let (header, numbers, record) = (&self.header, &self.numbers, &self.record);
-            return Ok(Some(Row { name, numbering, header, numbers, record, line }));
         }
+        Ok(false)
     }
 }
 
@@ -211,8 +246,17 @@ pub(crate) fn plain(name: &str) -> String {
     name.chars().filter(is_kept).flat_map(char::to_lowercase).collect()
 }
 
-fn unreadable(name: &str, lines: &mut Lines<'_>, error: &csv::Error) -> BadInput {
-    BadInput(format!("{name}, line {}: {error}; expected CSV", lines.at(error.position())))
+/// The error of the stream: no row is invalid CSV, since it is UTF-8 and of any length.
+fn unreadable(error: csv::Error) -> anyhow::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => unwrapped(error),
+        other => anyhow::anyhow!("{other:?}"),
+    }
+}
+
+/// Line of a record. Its position is that of the reader before it skipped comments and blank lines.
+fn line_of(record: &StringRecord, reader: &mut csv::Reader<Stream<'_>>) -> usize {
+    reader.get_mut().line_at(record.position().map_or(0, csv::Position::byte))
 }
 
 /// Describes a cell that contains a line break.
@@ -251,7 +295,7 @@ impl Row<'_> {
 
     /// True if a cell holds a finite number.
     pub fn is_number(&self, column: usize) -> bool {
-        matches!(self.any_number(column), Ok(Some(number)) if number.is_finite())
+        self.numbers.value(self.text(column)).is_some_and(f64::is_finite)
     }
 
     /// A finite number.
@@ -302,23 +346,5 @@ impl Row<'_> {
         }
         let hint = if has_thousands_separators(text) { " (without separators of thousands)" } else { "" };
         BadInput(format!("{place}: `{}` is not {what}{hint}", excerpt(text))).into()
-    }
-}
-
-/// Finds the line numbers of records, read in order.
-struct Lines<'a> {
-    text: &'a str,
-    byte: usize,
-    line: usize,
-}
-
-impl Lines<'_> {
-    /// Line number of a record. Its position is that of the reader before it skipped comments and blank lines.
-    fn at(&mut self, position: Option<&csv::Position>) -> usize {
-        let start = position.map_or(0, |at| at.byte() as usize).clamp(self.byte, self.text.len());
-        self.line += self.text[self.byte..start].matches('\n').count();
-        self.byte = start;
-        let skipped = self.text[start..].lines().take_while(|line| line.is_empty() || line.starts_with('#'));
-        self.line + skipped.count()
     }
 }

@@ -20,7 +20,7 @@ use crate::schedule::{Change, Schedule};
 pub enum StartsFrom {
     /// The spring is settled at the old target.
     Settled,
-    /// The state that the loop has reached when the target changes.
+    /// The spring is in the state to which the loop has brought it.
     Reached,
 }
 

@@ -17,7 +17,9 @@ use anyhow::Result;
 
 use crate::bad_input;
 use crate::bad_input::number;
-use crate::csv_table::{Table, read};
+use crate::csv_table::Table;
+use crate::csv_table::dialect::Dialect;
+use crate::csv_table::text::Source;
 
 /// One row of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +86,7 @@ impl Record {
     /// # Errors
     /// [`crate::bad_input::BadInput`] with file, line, column and what was expected.
     pub fn open(path: &Path, measured: &str) -> Result<Self> {
-        Self::parse(&path.display().to_string(), &read(path)?, measured)
+        Self::read(Source::open(path)?.expect_utf_8(), measured)
     }
 
     /// Parses a record; `name` is what messages call it.
@@ -92,7 +94,11 @@ impl Record {
     /// # Errors
     /// The errors of [`Record::open`].
     pub fn parse(name: &str, text: &str, measured: &str) -> Result<Self> {
-        let table = Table::new(name, text)?;
+        Self::read(Source::read(name, text.as_bytes()), measured)
+    }
+
+    fn read(source: Source<'_>, measured: &str) -> Result<Self> {
+        let table = Table::read(source, Dialect::default())?;
         // Only the default column may be absent.
         let measured = (measured != MEASURED || table.find(measured).is_some()).then_some(measured);
         Self::from_table(table, measured)
@@ -105,7 +111,7 @@ impl Record {
         let voltage = table.require("voltage_v", &expected)?;
         let measured = measured.map(|column| table.require(column, &expected)).transpose()?;
 
-        let name = table.name();
+        let name = table.name().to_owned();
         let mut rows: Vec<Row> = Vec::new();
         while let Some(row) = table.next_row()? {
             let row = Row {
@@ -130,7 +136,7 @@ impl Record {
         if rows.len() < 2 {
             bad_input!("{name}: {} row(s) of data; expected at least 2", rows.len());
         }
-        Ok(Self { name: name.to_owned(), rows })
+        Ok(Self { name, rows })
     }
 }
 
@@ -138,7 +144,6 @@ impl Record {
 mod tests {
     use super::*;
     use crate::bad_input::BadInput;
-    use crate::csv_table::text::Source;
 
     fn message(text: &str) -> String {
         let error = Record::parse("data.csv", text, MEASURED).unwrap_err();

@@ -46,11 +46,11 @@ impl Parameter {
 /// Relative differences of the spring's parameters from the model's, above -1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SpringError {
-    /// Error of the instantaneous share.
+    /// Relative difference of the instantaneous share.
     pub share: f64,
-    /// Error of all time constants.
+    /// Relative difference of all time constants.
     pub time_constant: f64,
-    /// Error of the gain of the whole response.
+    /// Relative difference of the gain of the whole response.
     pub gain: f64,
 }
 

@@ -6,9 +6,11 @@
 //! - Time-optimal controller: the longest approach time constant whose steps stay within [`WITHIN`] of the dead-beat t97
 //!   and within the overshoot limit, which is the smoothest that is nearly as fast as dead-beat.
 //! - [`trade`]: both controllers on springs that differ from their model.
+//! - [`uncertainty`]: what the controllers keep of their performance on a spring that is known only to within errors.
 
 pub mod margins;
 pub mod trade;
+pub mod uncertainty;
 mod worst;
 
 use anyhow::Result;
@@ -23,6 +25,7 @@ use crate::schedule::Schedule;
 
 pub use margins::Margins;
 pub use trade::Trade;
+pub use uncertainty::{Knowledge, Uncertainty, Within};
 pub use worst::Worst;
 
 /// Largest ratio of a step's t97 to that of the dead-beat controller.
@@ -39,6 +42,8 @@ pub struct Specification<'a> {
     pub rate_hz: f64,
     /// Largest overshoot of any step, in percent.
     pub overshoot_percent: f64,
+    /// How well the spring is known; `None` if nobody asks.
+    pub knowledge: Option<Knowledge>,
 }
 
 /// The answer of `vsj tune --json`.
@@ -52,6 +57,9 @@ pub struct Tuning {
     pub fast: TunedApproach,
     /// Responses under model errors.
     pub trade: Vec<Trade>,
+    /// Performance within the errors to within which the spring is known, if they were given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainty>,
 }
 
 /// Gains and their performance.
@@ -169,16 +177,19 @@ impl Specification<'_> {
 pub fn tune(specification: &Specification<'_>) -> Result<Tuning> {
     let fast = specification.approach()?;
     let proportional_integral = specification.gains();
+    let approach = Compensation::TimeOptimal(Approach { time_constant_s: fast.approach_s });
     let compensations = [
         proportional_integral.map(|TunedGains { proportional, integral_per_s, .. }| {
             Compensation::ProportionalIntegral(Gains { proportional, integral_per_s })
         }),
-        Some(Compensation::TimeOptimal(Approach { time_constant_s: fast.approach_s })),
+        Some(approach),
     ];
     let runs = compensations.map(|compensation| compensation.map(|it| specification.run(it)).transpose());
     let [with_gains, with_approach] = runs;
     let trade = trade::over_model_errors(specification.file, with_gains?.as_ref(), with_approach?.as_ref());
-    Ok(Tuning { limit_v: specification.amplifier.max_v, proportional_integral, fast, trade })
+    let evaluated = |knowledge| uncertainty::evaluate(specification, approach, knowledge);
+    let uncertainty = specification.knowledge.as_ref().map(evaluated).transpose()?;
+    Ok(Tuning { limit_v: specification.amplifier.max_v, proportional_integral, fast, trade, uncertainty })
 }
 
 fn responses(run: &Run) -> Vec<crate::response::Response> {

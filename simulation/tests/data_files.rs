@@ -1,5 +1,7 @@
 //! Measured records in every supported dialect, and damaged ones.
 
+use std::io::BufReader;
+
 use proptest::prelude::*;
 use simulation::bad_input::BadInput;
 use simulation::csv_table::text::Source;
@@ -163,6 +165,7 @@ proptest! {
     fn a_damaged_file_is_read_or_rejected_in_one_line(
         dialect in dialects(),
         rows in rows(),
+        piece in 1..40usize,
         damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         sort in any::<bool>(),
     ) {
@@ -171,9 +174,15 @@ proptest! {
             let place = place.index(bytes.len());
             bytes[place] = byte;
         }
-        if let Err(error) = (Format { sort, ..dialect.format() }).read(Source::new("r.csv", bytes)) {
-            prop_assert!(error.is::<BadInput>(), "{error}");
-            let error = error.to_string();
+        let format = Format { sort, ..dialect.format() };
+        let in_pieces = format.read(Source::read("r.csv", BufReader::with_capacity(piece, &*bytes)));
+        let in_pieces = in_pieces.map_err(|error| error.to_string());
+        let whole = read(bytes, &format);
+        // What cannot be a text is said before what is wrong in an earlier line of the same piece.
+        if !matches!(&whole, Err(error) if error.contains("a byte 0") || error.contains("not UTF-16")) {
+            prop_assert_eq!(&in_pieces, &whole);
+        }
+        if let Err(error) = whole {
             prop_assert!(error.starts_with("r.csv") && says_what_was_expected(&error), "{error}");
         }
     }
@@ -342,6 +351,11 @@ fn encodings_that_are_guessed_are_remarked_on() {
     for (bytes, remarks) in [
         (text.as_bytes().to_vec(), vec![]),
         (latin, vec!["r.csv, line 1: not UTF-8; read as Latin-1 (Windows-1252)"]),
+        // From there on: what was read before is UTF-8.
+        (
+            [text.as_bytes(), b"# m\xe4rz\n2,0,1\n"].concat(),
+            vec!["r.csv, line 4: not UTF-8; read as Latin-1 (Windows-1252)"],
+        ),
         (utf_16, vec!["r.csv: read as UTF-16BE; UTF-8 is the usual encoding"]),
     ] {
         let read = read(bytes, &Format::default()).unwrap();

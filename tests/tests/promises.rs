@@ -185,7 +185,7 @@ fn drill(fault: Fault) -> &'static str {
         Fault::Interlock => "drill `interlock`, boot `interlock`",
         Fault::Watchdog => "drill `hang`, drill `deaf`, drill `stall`, boot `hang`, boot `deaf`",
         Fault::Monitor => "boot `no voltage`, boot `current`, boot `supply of 3.6 V`",
-        Fault::Config => "drill `unguarded`, boot `unguarded`",
+        Fault::Config => "drill `unguarded`, boot `unguarded`, boot `damaged settings`",
         Fault::Supply => "boot `dip`",
         Fault::SelfTest => "boot `stuck bit`, boot `coupled bits`, boot `slow processor`",
         Fault::Isolation => {

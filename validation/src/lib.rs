@@ -6,6 +6,7 @@
 //! | --- | --- |
 //! | [`ground_truth`] | simulators of springs with known effects; they share no code with `identify` |
 //! | [`criterion`], [`markdown`] | one acceptance criterion; Markdown tables |
+//! | [`statistics`] | normal and sample quantiles, an interval of a frequency, sums |
 //! | [`campaign`] | counts the causes that the diagnosis names in many records |
 //! | [`isolation`] | the fault isolation in the tick, on springs in which a fault begins |
 //! | [`closed_loop`] | the controller in closed loop with a spring with known effects, with a stiffness sensor and without |
@@ -16,3 +17,4 @@ pub mod criterion;
 pub use ground_truth;
 pub mod isolation;
 pub mod markdown;
+pub mod statistics;

@@ -1,5 +1,6 @@
-"""Times the report's closed loop in Python, for `cargo xtask bench`.
+"""Times the report's closed loop in Python and C, for `cargo xtask bench`.
 
+Usage: rivals.py [TICK], the shared library of tick.c, without which there is no time for C.
 Prints one JSON object, ns per sample of each implementation. Ends with an error if the stiffness of two of them
 differs by more than TOLERANCE_V, or that of a loop with limits and DAC codes by more than TICK_TOLERANCE_V.
 
@@ -9,6 +10,7 @@ r target, u voltage, y stiffness, in volts. y and u depend on each other within 
              y = (4 r + z + 10 w) / 15
 """
 
+import ctypes
 import json
 import statistics
 import sys
@@ -22,6 +24,8 @@ from scipy import signal
 RATE_HZ = 1000
 LIMIT_V = 700.0
 DAC_STEPS = 4095
+# Largest change of the voltage in a tick: 100 000 V/s.
+STEP_V = 100.0
 SAMPLES = 70_001
 TOLERANCE_V = 1e-6
 # Of loops that write DAC codes: steps of 0.17 V, and a voltage that is held between the samples.
@@ -91,22 +95,34 @@ def numpy_loop(r, phi, now, later, c, d, y_out):
 
 
 @numba.njit
-def tick(r, kept, y_out, code_out):
-    """The loop with what the tick has besides: the amplifier's limits, DAC codes that the spring sees, no windup."""
+def tick(r, relaxation, y_out, code_out):
+    """What the tick does, in float64: limits of range and slew, DAC codes that the spring sees, an integrator that follows the voltage."""
+    g = 1 / (1 + KP * SHARE)
+    reset = KI_PER_S / KP / RATE_HZ
     w = 0.0
     z = 0.0
-    y = 0.0
+    voltage = 0.0
     for k in range(len(r)):
-        # The equation in the head of this file with the stiffness that follows from the voltage of the same instant.
-        wanted = (KP * (r[k] - (1 - SHARE) * w) + z) / (1 + KP * SHARE)
-        code = round(min(max(wanted, 0.0), LIMIT_V) / LIMIT_V * DAC_STEPS)
+        target = min(max(r[k], 0.0), LIMIT_V)
+        # The equation in the head of this file, with the stiffness that follows from the voltage of the same instant.
+        wanted = z + (1 - g) * w + KP * g * (target - w)
+        slewed = min(max(wanted, voltage - STEP_V), voltage + STEP_V)
+        voltage = min(max(slewed, 0.0), LIMIT_V)
+        z += reset * (g * voltage - z)
+        code = int(voltage * (DAC_STEPS / LIMIT_V) + 0.5)
         applied = code * (LIMIT_V / DAC_STEPS)
-        y = SHARE * applied + (1 - SHARE) * w
-        w = applied + kept * (w - applied)
-        if 0.0 <= wanted <= LIMIT_V:
-            z += KI_PER_S * (r[k] - y) / RATE_HZ
-        y_out[k] = y
+        y_out[k] = w + SHARE * (applied - w)
         code_out[k] = code
+        w += relaxation * (applied - w)
+
+
+def tick_in_c(library, r, relaxation, y_out, code_out):
+    """A call of the same loop in C."""
+    settings = (ctypes.c_double * 7)(SHARE, relaxation, KP, KI_PER_S / KP / RATE_HZ, LIMIT_V, STEP_V, DAC_STEPS)
+    run = ctypes.CDLL(library).tick
+    run.restype = None
+    arguments = [ctypes.c_void_p(array.ctypes.data) for array in (r, y_out, code_out)]
+    return lambda: run(settings, arguments[0], ctypes.c_int64(len(r)), arguments[1], arguments[2])
 
 
 def median_ns(call, repeats):
@@ -134,20 +150,24 @@ def main():
     cy, dy = c[0].copy(), d[0, 0]
     y, u = np.empty(SAMPLES), np.empty(SAMPLES)
     stepped, held, codes = np.empty(SAMPLES), np.empty(SAMPLES), np.empty(SAMPLES, np.uint16)
-    kept = np.exp(-1 / (TAU_S * RATE_HZ))
-    controller = vsj.Controller("paper", "paper", limit_v=LIMIT_V, rate_hz=RATE_HZ, kp=KP, ki=KI_PER_S)
+    held_in_c, codes_in_c = np.empty(SAMPLES), np.empty(SAMPLES, np.uint16)
+    relaxation = -np.expm1(-1 / (TAU_S * RATE_HZ))
+    slew = STEP_V * RATE_HZ
+    controller = vsj.Controller("paper", "paper", limit_v=LIMIT_V, slew_v_per_s=slew, rate_hz=RATE_HZ, kp=KP, ki=KI_PER_S)
 
     rivals = {  # name: (call, repeats in one group)
         "lsim": (lambda: signal.lsim(stiffness, r, t), 3),
         "lfilter": (lambda: signal.lfilter(numerator, denominator, r), 101),
         "numba": (lambda: loop(r, phi, now, later, cy, dy, y, u), 101),
         "numpy": (lambda: numpy_loop(r, phi, now, later, cy, dy, stepped), 1),
-        "numba_tick": (lambda: tick(r, kept, held, codes), 101),
+        "numba_tick": (lambda: tick(r, relaxation, held, codes), 101),
         "controller": (lambda: controller.run(r), 101),
     }
+    for library in sys.argv[1:]:
+        rivals["c_tick"] = (tick_in_c(library, r, relaxation, held_in_c, codes_in_c), 101)
 
     # The first calls compile and are compared, but not timed.
-    for name in ("numba", "numpy", "numba_tick"):
+    for name in {"numba", "numpy", "numba_tick", "c_tick"} & set(rivals):
         rivals[name][0]()
     both = signal.lsim(signal.StateSpace(a, b, c, d), r, t)[1]
     apart = {
@@ -160,6 +180,8 @@ def main():
         "numba with limits and DAC": np.abs(held - both[:, 0]).max(),
         "vsj.Controller": np.abs(controller.run(r).stiffness_v - both[:, 0]).max(),
     }
+    if "c_tick" in rivals:
+        apart_ticks["C with limits and DAC"] = np.abs(held_in_c - both[:, 0]).max()
     for each, tolerance_v in ((apart, TOLERANCE_V), (apart_ticks, TICK_TOLERANCE_V)):
         for name, volts in each.items():
             print(f"{name} is within {volts:.1e} V of lsim", file=sys.stderr)

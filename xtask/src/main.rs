@@ -122,11 +122,11 @@ Examples:
     Capi(Forwarded),
     /// Compare the host's speed with Python's
     ///
-    /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba and Rust, in turns. Marks a time of Rust's above
-    /// its bound, a multiple of numba's time.
+    /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba, C and Rust, in turns. Marks a time of Rust's above
+    /// its bound, a multiple of that of the fastest rival that does the same work.
     #[command(
         verbatim_doc_comment,
-        after_help = "Example:\n  cargo xtask bench --json | jq '.rows[] | {name, to_numba, met}'"
+        after_help = "Example:\n  cargo xtask bench --json | jq '.rows[] | {name, to_rival, met}'"
     )]
     Bench(bench::Args),
     /// Install the Python package in a virtual environment and run its tests

@@ -5,9 +5,13 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::control::{Control, Sensors, Untimed};
-use firmware::settings::SUPERVISION;
+use firmware::settings::{SUPERVISION, WATCHDOG_MS, built_in};
+use firmware::store::{Memory, Page, Pages, Side, Store};
 use link::nonce::Nonces;
-use link::{Command, Desired, Frame, Packet, Receiver, Reply, Request, Sequence, State, WireVolts};
+use link::{
+    Block, Command, Desired, Frame, Packet, Reason, Receiver, Reply, Request, Sequence, State, WireSettings, WireVolts,
+    block, frame,
+};
 use model::{Settings, Volts, supervisor};
 use serde_json::{Value, json};
 
@@ -44,10 +48,35 @@ pub(super) const RANDOM: u32 = 0x7a11_ab1e;
 /// a chip whose generator delivers `random`.
 pub(super) fn frames(random: u32) -> Value {
     let nonce = Nonces::new(random).draw();
-    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     let frame =
         |(number, (us, request))| json!([us, hex(Frame::new(nonce.stamp(Sequence(number)), &request).as_bytes())]);
     (0..).zip(schedule()).map(frame).collect()
+}
+
+/// Bytes as text.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Time of the watchdog in the stored settings, in ms.
+pub(super) const STORED_RESET_MS: u32 = 2 * WATCHDOG_MS;
+
+/// A page of settings that differ from the built-in ones of `variant` in the time of the watchdog.
+pub(super) fn stored_settings(variant: Variant) -> Result<Vec<u8>> {
+    let built_in = WireSettings::new(&built_in(variant::settings(variant)));
+    let [hang_ms, stall_ms, _] = built_in.watchdogs_ms;
+    let settings = WireSettings { watchdogs_ms: [hang_ms, stall_ms, STORED_RESET_MS], ..built_in };
+    let payload = settings.payload().context("settings without a payload")?;
+    let mut store = Store::new(Memory::default());
+    let refused = |reason: Reason| anyhow::anyhow!("{reason}");
+    for (number, part) in (0..).zip(payload.chunks(block::PART)) {
+        let mut bytes = [0; block::PART];
+        bytes[..part.len()].copy_from_slice(part);
+        store.part(Block::Settings, number, &bytes).map_err(refused)?;
+    }
+    let length = u16::try_from(payload.len())?;
+    store.end(Block::Settings, length, frame::checksum(&payload), |_, _| Ok(())).map_err(refused)?;
+    Ok(store.pages().bytes(Page { block: Block::Settings, side: Side::A }).to_vec())
 }
 
 /// An error unless every answer is the expected one and every DAC code is the host's for `variant`. Returns a line for

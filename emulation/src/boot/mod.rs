@@ -71,7 +71,8 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
             .arg(amplifier.full_scale_v.to_string())
             .arg(host::frames(host::RANDOM).to_string())
             .arg(host::frames(!host::RANDOM).to_string())
-            .arg(format!("{:#x}", host::RANDOM)),
+            .arg(format!("{:#x}", host::RANDOM))
+            .arg(host::hex(&host::stored_settings(variant)?)),
     )?;
     let events = |name: &str| Events::deserialize(&output[name]).with_context(|| format!("no run `{name}`"));
 
@@ -103,6 +104,8 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         println!("{name}: {}", runs::faulted(&events(name)?, &bytes, within_us, mismatch).context(name)?);
     }
     println!("torn store: {}", runs::torn(&events("torn")?, &bytes).context("torn")?);
+    println!("stored settings: {}", runs::stored(&events("stored settings")?, &bytes).context("stored settings")?);
+    println!("damaged settings: {}", runs::damaged(&events("damaged settings")?, &bytes).context("damaged settings")?);
     for (name, cause) in [("dip", "reset=brown-out last_fault=8"), ("button", "reset=pin last_fault=4")] {
         println!("{name}: {}", runs::cut(&events(name)?, &bytes, cause).context(name)?);
     }

@@ -49,6 +49,7 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
     ensure!(events.times("reset").len() == 1, "it was reset");
     // Start-up writes zero once, before the first tick.
     let (setup, ticking) = events.split("watchdog started")?;
+    ensure!(!ticking.times("store read").is_empty(), "the store is read before the watchdog is started, or never");
     let ticks = ticking.times("dac");
     ensure!(ticks.len() > 1180, "{} ticks in 1.2 s", ticks.len());
     // The lateness of each tick on a grid from the first one on, so that drift and missing ticks show.
@@ -130,6 +131,29 @@ pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, mismatch: O
 pub(super) fn torn(events: &Events, image: &[u8]) -> Result<String> {
     let boot = restarted_safe(events, image, "reset=power-on last_fault=0")?;
     Ok(format!("words with two wrong bits are forgiven there alone; `{boot}`"))
+}
+
+/// A start with stored settings, which run: the time of the watchdog is theirs.
+pub(super) fn stored(events: &Events, image: &[u8]) -> Result<String> {
+    let log = events.log(image)?;
+    ensure!(
+        !log.iter().any(|line| line.contains("refused") || line.contains("fault code")),
+        "they are refused: {log:?}"
+    );
+    let expected_us = u64::from(host::STORED_RESET_MS) * 1000;
+    let mut fed = events.0.iter().filter(|event| event.1 == "fed").map(|event| &event.2).peekable();
+    ensure!(fed.peek().is_some(), "the watchdog is not fed");
+    let other = fed.find(|time| time.as_u64() != Some(expected_us));
+    ensure!(other.is_none(), "a watchdog of {other:?} us, {expected_us} us in the settings");
+    ensure!(events.times("reset").len() == 1, "it was reset");
+    Ok(format!("they run: the watchdog, started with {WATCHDOG_MS} ms, has {} ms", host::STORED_RESET_MS))
+}
+
+/// A start with stored settings of which a bit is wrong: the built-in ones run, nothing is armed, and the host hears why.
+pub(super) fn damaged(events: &Events, image: &[u8]) -> Result<String> {
+    let line = "config refused field=damaged settings";
+    not_armed(events, image, line, Fault::Config)?;
+    Ok(format!("`{line}`; reported on the line, arming is refused, DAC zero and enable off throughout"))
 }
 
 /// A run with a reset from outside: a dip of the supply is a fault of its own, and an earlier fault still has to be
@@ -248,19 +272,23 @@ pub(super) fn unfit(events: &Events, image: &[u8]) -> Result<String> {
 /// A start with a processor whose clock is not what it should be compared with the watchdog's, which it sees as
 /// `seen_hz`: nothing is armed, and the host hears why.
 pub(super) fn wrong_clock(events: &Events, image: &[u8], seen_hz: u32) -> Result<String> {
+    let line = format!("self-test failed part=clock value={seen_hz}");
+    not_armed(events, image, &line, Fault::SelfTest)?;
+    Ok(format!("`{line}`; reported on the line, arming is refused, DAC zero and enable off throughout"))
+}
+
+/// An error unless the start logs `line` and `fault`, the host hears of the fault, and arming is refused.
+fn not_armed(events: &Events, image: &[u8], line: &str, fault: Fault) -> Result<()> {
     events.safe()?;
     let log = events.log(image)?;
-    let line = format!("self-test failed part=clock value={seen_hz}");
-    for part in [line.as_str(), "fault code=9 name=self-test"] {
+    for part in [line, &format!("fault code={} name={}", fault.code(), fault.name())] {
         ensure!(log.iter().any(|said| said.contains(part)), "no `{part}` in {log:?}");
     }
     let answers = answers(events)?;
-    let refused = Reply::Refused(Reason::Faulted(Fault::SelfTest.into()));
-    ensure!(answers.contains(&refused), "arming is not refused: {answers:?}");
-    let reported =
-        |reply: &Reply| matches!(reply, Reply::Fault(report) if report.fault == link::Fault::from(Fault::SelfTest));
+    ensure!(answers.contains(&Reply::Refused(Reason::Faulted(fault.into()))), "arming is not refused: {answers:?}");
+    let reported = |reply: &Reply| matches!(reply, Reply::Fault(report) if report.fault == link::Fault::from(fault));
     ensure!(answers.iter().any(reported), "the host does not hear of it: {answers:?}");
-    Ok(format!("`{line}`; reported on the line, arming is refused, DAC zero and enable off throughout"))
+    Ok(())
 }
 
 /// A start with the brown-out level of a new chip, which the log says.

@@ -8,7 +8,7 @@
 use std::fs;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -24,7 +24,7 @@ use xtask::build::{self, Opt};
 use xtask::shell;
 
 /// Longest time of a run on the host's clock; after it the emulator is stopped.
-const TIMEOUT: Duration = Duration::from_secs(120);
+pub(crate) const TIMEOUT: Duration = Duration::from_secs(120);
 
 /// A code on the DAC's wire, and whether the amplifier is enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +73,22 @@ impl Values<'_> {
         let value = self.0.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('=')?.parse().ok());
         value.with_context(|| format!("no {key} in `{}`", self.0))
     }
+}
+
+/// Runs a program that prints little to its end. One that takes longer than `most` is stopped, which is an error.
+pub(crate) fn finish(program: &mut Command, most: Duration) -> Result<Output> {
+    let mut child = program.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
+    let begin = Instant::now();
+    while child.try_wait()?.is_none() {
+        if begin.elapsed() > most {
+            child.kill()?;
+            let output = child.wait_with_output()?;
+            let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+            bail!("it was stopped after {} s; it said {said:?}", most.as_secs_f64());
+        }
+        thread::sleep(Duration::from_millis(5));
+    }
+    Ok(child.wait_with_output()?)
 }
 
 /// Builds an example of the package `firmware` that counts instructions and runs it to its end.
@@ -252,6 +268,14 @@ fn written(bytes: &[u8]) -> Vec<Written> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_program_that_does_not_end_is_stopped() {
+        let finish = |script| finish(Command::new("sh").args(["-c", script]), Duration::from_millis(300));
+        assert_eq!(finish("echo out").unwrap().stdout, b"out\n");
+        let error = finish("echo said; exec sleep 1000").unwrap_err().to_string();
+        assert_eq!(error, "it was stopped after 0.3 s; it said \"said\\n\"");
+    }
 
     #[test]
     fn an_incomplete_code_is_dropped() {

@@ -42,10 +42,12 @@ unsafe fn FMAC() {
 fn main() -> ! {
     switch_amplifier_off();
     let cause = crash_record::reset_cause(Some(reset()));
-    let (mut board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()));
+    // The watchdog is started with its built-in time, before anything stored is read.
+    let reset_ms = BUILT_IN.watchdogs.reset_ms;
+    let (mut board, line, flash) = Nucleo::init(embassy_stm32::init(clocks::config()), reset_ms);
     let mut store = Store::new(flash);
     let loaded = start::load(&store, &BUILT_IN);
-    board.start_watchdog(loaded.settings.watchdogs.reset_ms);
+    board.set_watchdog(loaded.settings.watchdogs.reset_ms);
     log::boot(cause.name, cause.fault.map_or(0, Fault::code), &loaded.settings);
     if guards::start(clocks::CORE_HZ).is_none() {
         // As after rejected settings: the output stays at zero and off until the watchdog resets the chip.

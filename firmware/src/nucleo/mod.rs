@@ -14,6 +14,7 @@
 //! | [`random`] | Random number generator. |
 //! | [`clock_test`] | Measurement of the processor's clock. |
 //! | [`brown_out`] | Level of the brown-out reset. |
+//! | `watchdog` | The chip's watchdog. |
 
 pub mod amplifier;
 pub mod brown_out;
@@ -23,11 +24,10 @@ pub mod flash;
 pub mod random;
 pub mod reset;
 pub mod uart;
+mod watchdog;
 
+use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
-use embassy_stm32::peripherals::IWDG;
-use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Peri, Peripherals};
 use model::supervisor::Fault;
 
 use crate::board::Board;
@@ -40,23 +40,21 @@ pub use reset::reset;
 pub struct Nucleo {
     amplifier: amplifier::Amplifier,
     interlock: Input<'static>,
-    /// Until [`Nucleo::start_watchdog`].
-    idle_watchdog: Option<Peri<'static, IWDG>>,
-    watchdog: Option<IndependentWatchdog<'static, IWDG>>,
+    watchdog: watchdog::Watchdog,
     led: Output<'static>,
     fault: Option<Fault>,
 }
 
 impl Nucleo {
-    /// Initialises the hardware, the amplifier port first. The line to the host (`None` if it is in use already) and the flash are
+    /// Initialises the hardware, the amplifier port first, and starts the watchdog: the chip is reset after `reset_ms` without
+    /// feeding, until [`Nucleo::set_watchdog`]. The line to the host (`None` if it is in use already) and the flash are
     /// returned separately because other tasks own them.
-    pub fn init(p: Peripherals) -> (Self, Option<uart::Uart>, flash::Flash) {
+    pub fn init(p: Peripherals, reset_ms: u32) -> (Self, Option<uart::Uart>, flash::Flash) {
         let amplifier = amplifier::Amplifier::new(p.DAC1, p.PA4, p.PB5, p.ADC1, p.PA0, p.PA1);
         let board = Self {
             amplifier,
             interlock: Input::new(p.PB10, Pull::Down),
-            idle_watchdog: Some(p.IWDG),
-            watchdog: None,
+            watchdog: watchdog::Watchdog::start(p.IWDG, reset_ms),
             led: Output::new(p.PA5, Level::Low, Speed::Low),
             fault: None,
         };
@@ -65,11 +63,9 @@ impl Nucleo {
 }
 
 impl Nucleo {
-    /// Starts the hardware watchdog: the chip is reset after `reset_ms` without feeding.
-    pub fn start_watchdog(&mut self, reset_ms: u32) {
-        if let Some(idle) = self.idle_watchdog.take() {
-            self.watchdog.insert(IndependentWatchdog::new(idle, reset_ms * 1000)).unleash();
-        }
+    /// Changes the time of the watchdog, in ms, from the next feeding on.
+    pub fn set_watchdog(&mut self, reset_ms: u32) {
+        self.watchdog.set(reset_ms);
     }
 
     /// Compares the processor's clock with the watchdog's, and reads the level of the brown-out reset. A wrong clock is a
@@ -97,9 +93,7 @@ impl Board for Nucleo {
     }
 
     fn feed_watchdog(&mut self) {
-        if let Some(watchdog) = &mut self.watchdog {
-            watchdog.pet();
-        }
+        self.watchdog.feed();
     }
 
     fn fault(&self) -> Option<Fault> {

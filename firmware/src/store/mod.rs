@@ -125,6 +125,19 @@ impl<P: Pages> Store<P> {
         self.find(block).map(|(_, id, payload)| (id, payload))
     }
 
+    /// Whether the newest content of a block was sealed and is damaged now, so that an older one is valid, or none. After a power
+    /// cut in the last word of a page it cannot be known, and counts as damaged; an erased page and one of another program do not.
+    pub fn is_damaged(&self, block: Block) -> bool {
+        let newest = self.newest(block).map(|(id, _)| id.number);
+        let broken = |side| {
+            let page = self.pages.bytes(Page { block, side });
+            if open(block, page).is_some() { None } else { sealed_number(block, page) }
+        };
+        let broken = self.pages.tolerate_bit_errors(|| [Side::A, Side::B].map(broken));
+        // A page with a smaller number is one whose erasure a power cut has interrupted.
+        broken.into_iter().flatten().any(|number| newest.is_none_or(|newest| number == newest.wrapping_add(1)))
+    }
+
     /// Writes part `number` of a block's new content. Part 0 starts a new transfer; one of another block ends there.
     ///
     /// # Errors
@@ -232,6 +245,13 @@ fn open(block: Block, page: &[u8; PAGE]) -> Option<(BlockId, &[u8])> {
     let payload = page.get(HEADER..HEADER + length)?;
     let id = BlockId::of(u32::from_le_bytes([n0, n1, n2, n3]), payload);
     (header(block, &id) == [*first, *last]).then_some((id, payload))
+}
+
+/// The number of a block's page that has its mark and a seal, correct or not.
+fn sealed_number(block: Block, page: &[u8; PAGE]) -> Option<u32> {
+    let ([first, last], _) = page.as_chunks::<WORD>().0.split_first_chunk()?;
+    let [n0, n1, n2, n3, ..] = *last;
+    (first.starts_with(&mark(block)) && *last != [0xff; WORD]).then(|| u32::from_le_bytes([n0, n1, n2, n3]))
 }
 
 #[cfg(test)]

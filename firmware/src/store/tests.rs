@@ -116,6 +116,37 @@ fn newest_block(flash: &Flash, block: Block) -> Option<Vec<u8>> {
     Store::new(flash.clone()).newest(block).map(|(_, payload)| payload.to_vec())
 }
 
+fn is_damaged(flash: &Flash, block: Block) -> bool {
+    Store::new(flash.clone()).is_damaged(block)
+}
+
+/// Every single bit of a sealed page: with it wrong, the content before is valid, or none, and that is known. Not known is only
+/// that the page was one of this block, or that its content was newer than the valid one.
+#[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
+fn a_damaged_page_is_neither_valid_nor_taken_for_an_erased_one() {
+    let (first, _) = store_block(&Flash::BLANK, Settings, &payload(1), Ok(()));
+    let (second, _) = store_block(&first, Settings, &payload(2), Ok(()));
+    let is_mark = |bit: usize| bit < 8 * 4;
+    let is_number = |bit: usize| (8 * WORD..8 * (WORD + 4)).contains(&bit);
+    for (flash, page, old) in [(&first, 2, None), (&second, 3, Some(payload(1)))] {
+        assert!(!is_damaged(flash, Settings) && !is_damaged(flash, Model));
+        let end = 8 * (HEADER + newest_block(flash, Settings).unwrap().len());
+        for bit in 0..end {
+            let mut damaged = flash.clone();
+            damaged.pages[page][bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(newest_block(&damaged, Settings), old, "bit {bit}");
+            let is_unknown = is_mark(bit) || (is_number(bit) && old.is_some());
+            assert_eq!(is_damaged(&damaged, Settings), !is_unknown, "bit {bit}");
+            assert!(!is_damaged(&damaged, Model));
+        }
+    }
+    let zeros = Flash { pages: [[0; PAGE]; PAGES], ..Flash::BLANK };
+    for flash in [Flash::BLANK, zeros] {
+        assert!(!is_damaged(&flash, Settings) && !is_damaged(&flash, Model), "nothing was stored");
+    }
+}
+
 #[test]
 fn the_model_with_the_highest_number_is_valid() {
     let mut flash = Flash::BLANK;
@@ -150,12 +181,19 @@ fn a_power_cut_preserves_the_old_or_the_new_block() {
                 assert!(found == old || found.as_ref() == Some(&new), "step {cut}, {torn:?}: {found:?}");
                 assert!(cut == steps || found == old, "only the last step makes the new block valid");
                 assert_eq!(newest_block(&again, other).as_ref(), Some(&kept), "step {cut}, {torn:?}: the other block");
+                assert!(
+                    !is_damaged(&again, block) || cut == steps,
+                    "step {cut}, {torn:?}: only the last word is unclear"
+                );
+                assert!(!is_damaged(&again, other), "step {cut}, {torn:?}");
                 (cuts, old_ones, new_ones) =
                     (cuts + 1, old_ones + u32::from(found == old), new_ones + u32::from(found != old));
                 // The next attempt succeeds.
                 let (repaired, stored) = store_block(&again, block, &new, Ok(()));
                 assert!(
-                    stored.is_ok() && newest_block(&repaired, block).as_ref() == Some(&new),
+                    stored.is_ok()
+                        && newest_block(&repaired, block).as_ref() == Some(&new)
+                        && !is_damaged(&repaired, block),
                     "step {cut}, {torn:?}"
                 );
             }

@@ -1,21 +1,19 @@
 //! `vsj bound`: how fast any controller can be that knows the spring only to within errors.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::bound::text;
 use host_sim::output::terminal::{json, print};
 use model::Amplifier;
-use serde::Deserialize;
 use simulation::bad_input;
-use simulation::bounded_file::read_text;
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file;
 use simulation::robust_bound::{Allowed, Question, answer};
-use simulation::spring_error::{Parameter, SpringError};
 
-use super::spring_error::{ErrorOf, together};
+use super::identified::errors;
+use super::spring_error::ErrorOf;
 
 /// Compute how fast any controller without a sensor can be on a spring that is known only to within errors, and how well the spring has
 /// to be known
@@ -56,52 +54,6 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Largest error of a parameter, relative.
-const LARGEST: f64 = 0.9;
-/// Largest size of an identification, in MiB.
-const MOST_MIB: usize = 16;
-
-/// What is read of `vsj identify --json`.
-#[derive(Deserialize)]
-struct Identified {
-    nominal: Nominal,
-}
-
-#[derive(Deserialize)]
-struct Nominal {
-    gain: Interval,
-    share: Interval,
-    tau_s: Vec<Interval>,
-}
-
-#[derive(Deserialize)]
-struct Interval {
-    value: f64,
-    low: f64,
-    high: f64,
-}
-
-impl Interval {
-    /// Half the width, relative to the value.
-    fn relative(&self) -> f64 {
-        0.5 * (self.high - self.low) / self.value.abs()
-    }
-}
-
-/// The intervals of an identification as errors.
-fn of_identification(path: &Path) -> Result<SpringError> {
-    let text = read_text(path, MOST_MIB, "the JSON of `vsj identify`")?;
-    let Identified { nominal } = match serde_json::from_str(&text) {
-        Ok(identified) => identified,
-        Err(error) => bad_input!("{}: {error}; expected the JSON of `vsj identify`", path.display()),
-    };
-    Ok(SpringError {
-        share: nominal.share.relative(),
-        time_constant: nominal.tau_s.iter().map(Interval::relative).fold(0.0, f64::max),
-        gain: nominal.gain.relative(),
-    })
-}
-
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let Arguments { limit_v, slew_v_per_s, overshoot_percent, within_s, .. } = *arguments;
@@ -111,16 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if !(within_s.is_finite() && within_s > 0.0) {
         bad_input!("--within-s {within_s}: expected a number above 0");
     }
-    let (option, mut spring_error) = match &arguments.identified {
-        Some(path) => ("--identified", of_identification(path)?),
-        None => ("--spring-error", together("--spring-error", &arguments.spring_error)?),
-    };
-    for parameter in Parameter::ALL {
-        let error = *spring_error.of(parameter);
-        if !(0.0..=LARGEST).contains(&error) {
-            bad_input!("{option}: {} known to {} %; expected 0 to 90", parameter.name(), 100.0 * error);
-        }
-    }
+    let spring_error = errors("--spring-error", &arguments.spring_error, arguments.identified.as_deref())?;
     let file = plant_file::load(&arguments.plant)?;
     let amplifier = file.behind(Amplifier { slew_v_per_s, ..Amplifier::up_to(limit_v) });
     let allowed = Allowed { amplifier, overshoot: overshoot_percent / 100.0 };

@@ -52,6 +52,7 @@ pub(crate) const CONTROLLER: Choices<Controller> = &[
         "Time-optimal: the end of the range until the target can be held, then the holding voltage",
         Controller::Fast,
     ),
+    ("robust", "As fast as a spring allows that is known to within errors, see --known", Controller::Robust),
 ];
 
 /// `--unit` of `vsj export fmu`: the parts of a unit.

@@ -28,7 +28,7 @@ use super::record_arguments::RecordArguments;
 /// instantaneous part of a step to this voltage. If voltage_v is missing, applied_v is used, as written by
 /// `vsj stair --out`.
 ///
-/// A file has at most a million rows and 512 MiB (64 MiB if it is not UTF-8).
+/// A file has at most a million rows and 512 MiB.
 ///
 /// Several files are records of one spring: each has its own initial state, zero offset and noise, the causes are shared, and
 /// what is in one record only is listed as a fault of that record.

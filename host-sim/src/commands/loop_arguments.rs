@@ -1,17 +1,19 @@
 //! The options of a controlled loop, which `vsj stair` and `vsj export` share.
 
+use anyhow::Result;
 use clap::Args;
 use model::Gains;
 use simulation::control_loop::{Controller, Options};
 
 use super::choice::{CONTROLLER, one_of};
+use super::spring_error::Known;
 
 /// Spring, controller and amplifier.
 #[derive(Args, Debug)]
 pub(crate) struct LoopArguments {
-    /// Controller
-    #[arg(long, value_parser = one_of(CONTROLLER), default_value = "paper")]
-    controller: Controller,
+    /// Controller; default: paper, with --known robust
+    #[arg(long, value_parser = one_of(CONTROLLER))]
+    controller: Option<Controller>,
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded limit and slew apply where they are stricter than
     /// the options
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
@@ -37,6 +39,8 @@ pub(crate) struct LoopArguments {
     /// Time constant of the fast controller's approach to the target, in s, 0 to 1; default: 0
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     approach_s: Option<f64>,
+    #[command(flatten)]
+    known: Known,
     /// Ticks per second, 100 to 10 000
     #[arg(long, default_value_t = 1000.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
@@ -44,8 +48,29 @@ pub(crate) struct LoopArguments {
 
 impl LoopArguments {
     /// The settings of the loop.
-    pub(crate) fn options(&self) -> Options {
-        let Self { controller, limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, .. } = *self;
-        Options { controller, limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, feedback: None }
+    ///
+    /// # Errors
+    /// [`simulation::BadInput`] for options that would be ignored.
+    pub(crate) fn options(&self) -> Result<Options> {
+        let Self { limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, .. } = *self;
+        let margin = self.known.margin()?;
+        let default = if margin.is_some() { Controller::Robust } else { Controller::Paper };
+        let controller = self.controller.unwrap_or(default);
+        let feedback = None;
+        let options = Options {
+            controller,
+            limit_v,
+            min_v,
+            slew_v_per_s,
+            dac_bits,
+            kp,
+            ki,
+            approach_s,
+            margin,
+            rate_hz,
+            feedback,
+        };
+        options.check()?;
+        Ok(options)
     }
 }

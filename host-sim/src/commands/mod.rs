@@ -8,6 +8,7 @@ pub(crate) mod completions;
 pub(crate) mod diagnose;
 pub(crate) mod dynamics;
 pub(crate) mod export;
+mod identified;
 pub(crate) mod identify;
 pub(crate) mod isolate;
 pub(crate) mod joint;

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use super::choice::{BETWEEN, one_of};
 use super::loop_arguments::LoopArguments;
-use super::spring_error::Known;
 use anyhow::Result;
 use clap::{Args, Parser};
 use host_sim::output::file::write_whole;
@@ -13,7 +12,6 @@ use host_sim::output::terminal::{json, print, remark, wrote};
 use host_sim::output::ticks::Ticks;
 use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
-use model::{Compensation, Margin};
 use paper::stair::request::{Answer, Request, Target};
 use record_files::Container;
 use simulation::bad_input;
@@ -41,8 +39,6 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     control: LoopArguments,
-    #[command(flatten)]
-    known: Known,
     /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns
     /// time_s,voltage_v
     #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
@@ -78,27 +74,17 @@ impl Arguments {
     }
 
     /// The experiment on a plant file's spring.
-    fn request<'a>(
-        &self,
-        options: Options,
-        margin: Option<Margin>,
-        plant: &'a PlantFile,
-        target: Target<'a>,
-    ) -> Request<'a> {
+    fn request<'a>(&self, options: Options, plant: &'a PlantFile, target: Target<'a>) -> Request<'a> {
         // The loop without a controller is run beside one with the report's.
         let compared = match options.controller {
             Controller::None => Controller::Paper,
             controller => controller,
         };
-        let compensation = match margin {
-            Some(margin) => Compensation::Robust(margin),
-            None => Options { controller: compared, ..options }.compensation(),
-        };
         Request {
             plant,
             paper: self.control.plant == "paper",
             target,
-            compensation,
+            compensation: Options { controller: compared, ..options }.compensation(),
             controlled: options.controller != Controller::None,
             amplifier: options.amplifier(),
             rate_hz: options.rate_hz,
@@ -106,17 +92,14 @@ impl Arguments {
     }
 
     /// Rejects options that would be ignored.
-    fn check(&self, options: &Options, margin: Option<Margin>) -> Result<()> {
+    fn check(&self) -> Result<()> {
         let no_file = ["stair", "step"].contains(&self.input.as_str());
         for (option, given) in [("--between", self.between.is_some()), ("--column", self.column.is_some())] {
             if given && no_file {
                 bad_input!("{option} has no effect with --input {}: expected --input FILE.csv", self.input);
             }
         }
-        if margin.is_some() && options.controller != Controller::Paper {
-            bad_input!("--known has a controller of its own: expected no --controller");
-        }
-        options.check()
+        Ok(())
     }
 
     /// Number of ticks between two rows of the CSV.
@@ -131,8 +114,8 @@ impl Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let (options, margin) = (arguments.control.options(), arguments.known.margin()?);
-    arguments.check(&options, margin)?;
+    arguments.check()?;
+    let options = arguments.control.options()?;
     let file = plant_file::load(&arguments.control.plant)?;
     let left_out = file.left_out();
     if !left_out.is_empty() {
@@ -149,7 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         None => Target::Step,
     };
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
-    let request = arguments.request(options, margin, &file, target);
+    let request = arguments.request(options, &file, target);
     request.check().map_err(|error| named(error, SETTINGS))?;
     let answer = request.run(|done, all| {
         bar.set_length(all as u64);

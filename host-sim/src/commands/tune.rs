@@ -11,7 +11,10 @@ use model::Amplifier;
 use simulation::bad_input;
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file;
-use simulation::tune::{Specification, tune};
+use simulation::tune::{Knowledge, Specification, tune};
+
+use super::identified::errors;
+use super::spring_error::ErrorOf;
 
 /// Choose gains and settings for a spring and an amplifier, with stability margins and the effect of model errors
 #[derive(Args, Debug)]
@@ -20,6 +23,8 @@ Examples:
   vsj tune                                     the report's spring at 700 V
   vsj tune --limit-v 1000 --overshoot-percent 1
   vsj tune --plant spring.toml --out out/tune  with plots over model errors
+  vsj tune --known tau=2 --known share=2       what remains on a spring known to within 2 %
+  vsj tune --identified identified.json        the same for the intervals of vsj identify --json
   vsj tune --json | jq .fast")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter
@@ -37,12 +42,36 @@ pub(crate) struct Arguments {
     /// Largest overshoot allowed for a step, in percent
     #[arg(long, default_value_t = 5.0, value_name = "PERCENT", allow_negative_numbers = true)]
     overshoot_percent: f64,
+    /// `tau`, `gain` or `share` is known to within this, both ways, in 95 % of cases, 0 to 25 %; repeatable
+    #[arg(long, value_name = "KEY=PERCENT", allow_hyphen_values = true)]
+    known: Vec<ErrorOf>,
+    /// The spring is known to the 95 % intervals of this file, what `vsj identify --json` prints; at most 16 MiB
+    #[arg(long, value_name = "FILE.json", conflicts_with = "known")]
+    identified: Option<PathBuf>,
+    /// Time in which each step has to be done, in s, for how well the spring has to be known
+    #[arg(long, default_value_t = 0.6, value_name = "S", allow_negative_numbers = true)]
+    within_s: f64,
     /// Write tune.json, tune.txt, trade.csv, t97.svg and overshoot.svg to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON object on stdout
     #[arg(long)]
     json: bool,
+}
+
+impl Arguments {
+    /// How well the spring is known, if an option says so.
+    fn knowledge(&self) -> Result<Option<Knowledge>> {
+        let within_s = self.within_s;
+        if !(within_s.is_finite() && within_s > 0.0) {
+            bad_input!("--within-s {within_s}: expected a number above 0");
+        }
+        if self.known.is_empty() && self.identified.is_none() {
+            return Ok(None);
+        }
+        let spring_error = errors("--known", &self.known, self.identified.as_deref())?;
+        Ok(Some(Knowledge { spring_error, within_s }))
+    }
 }
 
 /// Runs the command.
@@ -54,7 +83,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant_file::load(&arguments.plant)?;
     let amplifier =
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
-    let specification = Specification { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent };
+    let knowledge = arguments.knowledge()?;
+    let specification =
+        Specification { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent, knowledge };
     let answer = tune(&specification).map_err(|error| named(error, SETTINGS))?;
     let json = json(&answer)?;
     let text = output::text(&answer, &arguments.plant);

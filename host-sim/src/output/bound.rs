@@ -1,19 +1,12 @@
 //! The answer of `vsj bound` as text.
 
 use crate::output::cells::{line, optional, tidy};
-use simulation::robust_bound::Answer;
-use simulation::spring_error::Parameter;
+use simulation::robust_bound::{Answer, Needed};
+use simulation::spring_error::{Parameter, SpringError};
 
 /// The shortest times of all steps, and how well the spring has to be known.
 pub fn text(answer: &Answer) -> String {
     let mut text = String::new();
-    let mut error = answer.spring_error;
-    let known: Vec<String> = Parameter::ALL
-        .into_iter()
-        .map(|parameter| (parameter.name(), 100.0 * *error.of(parameter)))
-        .filter(|(_, percent)| *percent != 0.0)
-        .map(|(name, percent)| format!("{name} to +-{percent:.3} %"))
-        .collect();
     let slew = answer.slew_v_per_s.map_or(String::new(), |slew| format!(", {} V/s", tidy(slew)));
     line(
         &mut text,
@@ -36,15 +29,28 @@ pub fn text(answer: &Answer) -> String {
             ),
         );
     }
-    line(&mut text, &format!("Errors: {}", if known.is_empty() { "none".to_owned() } else { known.join(", ") }));
+    line(&mut text, &format!("Errors: {}", errors(&answer.spring_error)));
     text.push('\n');
-    line(
-        &mut text,
-        &format!("For all steps in {} s the spring has to be known, each parameter alone, to", tidy(answer.within_s)),
-    );
-    for (parameter, needed) in
-        Parameter::ALL.into_iter().zip([answer.needed.share, answer.needed.time_constant, answer.needed.gain])
-    {
+    text + &needed(&answer.needed, answer.within_s)
+}
+
+/// The errors to within which a spring is known.
+pub(crate) fn errors(spring_error: &SpringError) -> String {
+    let mut error = *spring_error;
+    let known: Vec<String> = Parameter::ALL
+        .into_iter()
+        .map(|parameter| (parameter.name(), 100.0 * *error.of(parameter)))
+        .filter(|(_, percent)| *percent != 0.0)
+        .map(|(name, percent)| format!("{name} to +-{percent:.3} %"))
+        .collect();
+    if known.is_empty() { "none".to_owned() } else { known.join(", ") }
+}
+
+/// How well the spring has to be known for a time in s.
+pub(crate) fn needed(needed: &Needed, within_s: f64) -> String {
+    let mut text =
+        format!("For all steps in {} s the spring has to be known, each parameter alone, to\n", tidy(within_s));
+    for (parameter, needed) in Parameter::ALL.into_iter().zip([needed.share, needed.time_constant, needed.gain]) {
         let needed = needed
             .map_or("impossible even if it is known exactly".to_owned(), |needed| format!("+-{:.1} %", 100.0 * needed));
         line(&mut text, &format!("  {:<14} {needed}", parameter.name()));

@@ -2,17 +2,18 @@
 
 use anyhow::Result;
 
-use crate::output::cells::{line, optional};
+use crate::output::bound::{errors, needed as needed_text};
+use crate::output::cells::{line, optional, tidy};
 use crate::output::figure;
 use crate::output::files::Files;
 use paper::figure::Figure;
 use simulation::spring_error::Parameter;
-use simulation::tune::{Margins, Trade, Tuning, Worst};
+use simulation::tune::{Margins, Trade, Tuning, Uncertainty, Within, Worst};
 
 /// Settings, their performance, and the responses under some model errors.
 pub fn text(tuning: &Tuning, plant: &str) -> String {
     let mut text = String::new();
-    let Tuning { limit_v, proportional_integral, fast, trade } = tuning;
+    let Tuning { limit_v, proportional_integral, fast, trade, uncertainty } = tuning;
     line(&mut text, &format!("Slowest step of the ideal stair, up to {limit_v} V:"));
     let worst =
         |worst: &Worst| format!("t97 {} s, overshoot {:.2} %", optional(worst.t97_s, 3), worst.overshoot_percent);
@@ -69,7 +70,34 @@ pub fn text(tuning: &Tuning, plant: &str) -> String {
             ),
         );
     }
+    uncertainty.iter().for_each(|uncertainty| text += &within_errors(uncertainty));
     text
+}
+
+/// The controllers on a spring that is known to within errors.
+fn within_errors(uncertainty: &Uncertainty) -> String {
+    let Uncertainty { spring_error, controllers, within_s, overshoot_percent, needed } = uncertainty;
+    let mut text = format!("\nOn a spring that is known to within errors: {}.\n", errors(spring_error));
+    line(&mut text, "Not exceeded on 95 % of these springs, and at all ends of the errors (guaranteed):");
+    line(&mut text, "           |      nominal       |   worst at 95 %    |     guaranteed");
+    line(&mut text, "controller |     t97  overshoot |     t97  overshoot |     t97  overshoot");
+    line(&mut text, "           |     [s]        [%] |     [s]        [%] |     [s]        [%]");
+    for Within { controller, nominal, worst_95, guaranteed } in controllers {
+        let cells = [nominal, worst_95, guaranteed]
+            .map(|worst| format!("{:>7} {:>10.2}", optional(worst.t97_s, 3), worst.overshoot_percent));
+        line(&mut text, &format!("{controller:<10} | {}", cells.join(" | ")));
+    }
+    line(
+        &mut text,
+        &format!(
+            "\nWhatever the controller, without a sensor and with at most {} % of overshoot:",
+            tidy(*overshoot_percent)
+        ),
+    );
+    text + &match needed {
+        Some(it) => needed_text(it, *within_s),
+        None => "how well the spring has to be known is computed for linear springs only\n".to_owned(),
+    }
 }
 
 /// Adds trade.csv, t97.svg and overshoot.svg.

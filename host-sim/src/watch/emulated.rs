@@ -21,7 +21,7 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 /// Longest wait for the emulator's socket.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// A running emulated board; it ends when dropped, and when a signal ends the program.
+/// A running emulated board; it ends when dropped, when a signal ends the program, and with the thread that has started it.
 pub struct Emulated {
     child: Arc<Mutex<Child>>,
     /// Name of its port.
@@ -35,7 +35,7 @@ impl Emulated {
     /// # Errors
     /// If QEMU, the compiler's target or the image is missing, with the command that helps; if QEMU does not start.
     pub fn start(elf: Option<&Path>, say: impl Fn(&str)) -> Result<Self> {
-        emulator()?;
+        let ends_with_us = emulator()?;
         let elf = match elf {
             Some(elf) => std::path::absolute(elf)?,
             None => image(say)?,
@@ -45,7 +45,8 @@ impl Emulated {
         let (socket, messages) = (folder.path().join("link"), folder.path().join("messages"));
         let (host, clock) = (Run::socket(&socket), Run::real_time());
         let run = Run { script: LINK, host: &host, wire: Path::new("/dev/null"), clock: &clock };
-        let mut command = run.command(&elf);
+        let command = run.command(&elf);
+        let mut command = if ends_with_us { ending_with_us(&command) } else { command };
         // A stored model of the board ends with the folder.
         command.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(File::create(&messages)?);
         own_group(&mut command);
@@ -99,14 +100,26 @@ fn own_group(command: &mut Command) {
 #[cfg(not(unix))]
 fn own_group(_: &mut Command) {}
 
-/// Checks that the emulator is installed.
-fn emulator() -> Result<()> {
-    match Command::new(PROGRAM).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status() {
+/// Checks that the emulator is installed. Returns whether [`ending_with_us`] works here.
+fn emulator() -> Result<bool> {
+    let started = |command: &mut Command| command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+    let mut asked = Command::new(PROGRAM);
+    asked.arg("--version");
+    match started(&mut asked) {
         Err(error) if error.kind() == ErrorKind::NotFound => {
             bail!("--emulated: {PROGRAM} is not installed; install it: {INSTALL}")
         }
-        started => started.map(drop).with_context(|| format!("cannot start {PROGRAM}")),
+        Err(error) => Err(error).with_context(|| format!("cannot start {PROGRAM}")),
+        Ok(_) => Ok(started(&mut ending_with_us(&asked)).is_ok_and(|status| status.success())),
     }
+}
+
+/// The command as one that the kernel of Linux ends together with the thread that starts it, even where this program cannot do it
+/// any more, as after SIGKILL. That needs `setpriv` (util-linux): setting it in the child from here would be unsafe code.
+fn ending_with_us(command: &Command) -> Command {
+    let mut ending = Command::new("setpriv");
+    ending.args(["--pdeathsig", "KILL", "--"]).arg(command.get_program()).args(command.get_args());
+    ending
 }
 
 /// The image: that of the release which this program is in, otherwise built from the sources.

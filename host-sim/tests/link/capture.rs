@@ -36,13 +36,18 @@ fn every_tick_is_a_row(setup: Setup) {
     assert!(highest(0, 300) > 250.0 && highest(500, 700) > 600.0, "{} {}", highest(0, 300), highest(500, 700));
     assert!(rows[1100].voltage_v < 100.0 && rows.iter().all(|row| row.measured.is_some()));
     // A voltage is that of its code, as in telemetry.
-    let step = 700.0 / 4095.0;
+    let step = 700.0 / f64::from((1 << setup.dac_bits) - 1);
     assert!(rows.iter().all(|row| ((row.voltage_v / step).round() * step - row.voltage_v).abs() < 1e-4));
 }
 
 #[test]
 fn a_capture_has_every_tick_and_is_a_record_for_diagnose() {
     every_tick_is_a_row(Setup { sensor: true, ..Setup::default() });
+}
+
+#[test]
+fn the_voltage_of_a_code_is_that_of_the_converter_that_the_mcu_has() {
+    every_tick_is_a_row(Setup { sensor: true, dac_bits: 10, ..Setup::default() });
 }
 
 /// One byte in 400 is damaged: about every third frame of rows.

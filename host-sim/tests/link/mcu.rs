@@ -37,12 +37,14 @@ pub(crate) struct Setup {
     pub(crate) silence_ms: u32,
     /// True if a restart erases the stored models.
     pub(crate) forgets: bool,
+    /// Width of the converter.
+    pub(crate) dac_bits: u32,
 }
 
 impl Default for Setup {
     fn default() -> Self {
         // Longer than a busy machine needs to start one command after another.
-        Self { damage_one_in: None, sensor: false, hang_up_after: None, silence_ms: 5000, forgets: false }
+        Self { damage_one_in: None, sensor: false, hang_up_after: None, silence_ms: 5000, forgets: false, dac_bits: 12 }
     }
 }
 
@@ -240,6 +242,7 @@ impl Chip {
         let store = Store::new(shared.lock().unwrap().flash.clone());
         let mut loaded = start::load(&store, &BUILT_IN);
         assert_eq!(loaded.rejected, None);
+        loaded.settings.control.amplifier.dac_bits = setup.dac_bits;
         let settings = loaded.settings;
         loaded.settings.supervision.host_timeout_s = f64::from(setup.silence_ms) / 1000.0;
         let cause = Cause { name: "power-on", fault: None, standing: supervisor::Faults::NONE };

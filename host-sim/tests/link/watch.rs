@@ -2,7 +2,7 @@
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -346,6 +346,43 @@ fn emulated(folder: &Path, working: &Path) -> String {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!((output.status.code(), said.lines().count()), (Some(1), 1), "{said}");
     said
+}
+
+/// The emulator is a program that writes its number and stays, and the link a socket that never answers.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_emulated_board_ends_with_the_program_whatever_ends_it() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let (program, number) = (folder.path().join("qemu-system-arm"), folder.path().join("number"));
+    let _socket = std::os::unix::net::UnixListener::bind(folder.path().join("socket")).unwrap();
+    let script = format!(
+        "#!/bin/sh\n[ \"$1\" = --version ] && exit\necho $$ > {}\nln -s {} link\nexec sleep 1000\n",
+        number.display(),
+        folder.path().join("socket").display()
+    );
+    std::fs::write(&program, script).unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
+    command.args(["watch", "--emulated", "--lines", "--timeout", "60", "--firmware"]).arg(&program);
+    command.env("PATH", format!("{}:{}", folder.path().display(), std::env::var("PATH").unwrap()));
+    let mut vsj = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let wait_for = |what: &str, is: &dyn Fn() -> bool| {
+        let begin = Instant::now();
+        while !is() {
+            assert!(begin.elapsed() < Duration::from_secs(30), "{what}");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    };
+    let read = || std::fs::read_to_string(&number).unwrap_or_default();
+    wait_for("it starts", &|| read().ends_with('\n'));
+    let stat = format!("/proc/{}/stat", read().trim());
+    assert!(Path::new(&stat).exists());
+    // SIGKILL, which no program can handle.
+    vsj.kill().unwrap();
+    vsj.wait().unwrap();
+    // One that nobody has waited for is dead, too.
+    wait_for("it ends", &|| std::fs::read_to_string(&stat).map_or(true, |text| text.contains(") Z ")));
 }
 
 #[test]

@@ -178,7 +178,7 @@ impl Data {
     /// Returns the rows of each record.
     pub fn rows_of_records(&self) -> Vec<Range<usize>> {
         if !self.is_joined() {
-            return vec![0..self.rows()];
+            return std::iter::once(0..self.rows()).collect();
         }
         self.parts.iter().map(|part| part.rows.clone()).collect()
     }

@@ -34,7 +34,7 @@ proptest! {
         prop_assert!(inward.contains(&(lowest.to_f64() - min_v + 1.5e-4)));
         prop_assert!(inward.contains(&(max_v - highest.to_f64() + 1.5e-4)));
 
-        let drive = config.drive(&mut State::default(), volts(wanted));
+        let drive = config.drive(&mut State::default(), volts(wanted), Limits::NONE);
         let out = drive.applied;
         prop_assert!(out >= lowest && out <= highest, "{out:?} outside {lowest:?}..{highest:?}");
         let ideal = wanted.clamp(lowest.to_f64(), highest.to_f64());
@@ -50,9 +50,9 @@ proptest! {
         let config = config(&Amplifier { slew_v_per_s: Some(slew), ..Amplifier::PAPER }, rate);
         let mut state = State::default();
         let ticks = (rate / 20.0) as u32;
-        let mut drive = config.drive(&mut state, volts(700.0));
+        let mut drive = config.drive(&mut state, volts(700.0), Limits::NONE);
         for _ in 1..ticks {
-            drive = config.drive(&mut state, volts(700.0));
+            drive = config.drive(&mut state, volts(700.0), Limits::NONE);
         }
         let expected = (slew / rate * f64::from(ticks)).min(700.0);
         prop_assert!((drive.voltage.to_f64() - expected).abs() < 5e-5);
@@ -141,17 +141,17 @@ fn a_limit_is_reported_only_when_it_holds_the_voltage_back() {
     assert_eq!((lowest.to_f64(), highest.to_f64()), (100.0, 400.0));
     let limits = |from: f64, to: Volts| {
         let mut state = State::default();
-        config.drive(&mut state, volts(from));
-        config.drive(&mut state, to).limits
+        config.drive(&mut state, volts(from), Limits::NONE);
+        config.drive(&mut state, to, Limits::NONE).limits
     };
     let step = Signal::from_bits(1);
     assert_eq!(limits(250.0, highest), Limits::NONE);
     assert_eq!(limits(250.0, Volts(highest.0 + step)), Limits::UPPER);
     assert_eq!(limits(250.0, lowest), Limits::NONE);
     assert_eq!(limits(250.0, Volts(lowest.0 - step)), Limits::LOWER);
-    assert_eq!(config.clamp_target(highest), (highest, false));
-    assert_eq!(config.clamp_target(Volts(highest.0 + step)), (highest, true));
-    assert_eq!(config.clamp_target(Volts(lowest.0 - step)), (lowest, true));
+    assert_eq!(config.clamp_target(highest), (highest, Limits::NONE));
+    assert_eq!(config.clamp_target(Volts(highest.0 + step)), (highest, Limits::TARGET));
+    assert_eq!(config.clamp_target(Volts(lowest.0 - step)), (lowest, Limits::TARGET));
 }
 
 /// A slew that crosses the whole range in one tick is not a limit; the range alone is reported, in the same tick.
@@ -161,14 +161,14 @@ fn a_jump_over_the_whole_range_is_held_by_its_end_and_not_by_the_slew() {
     for slew_v_per_s in [None, Some(511_875.0), Some(1e6)] {
         let config = config(&Amplifier { slew_v_per_s, ..Amplifier::up_to(511.875) }, 1000.0);
         let mut state = State::default();
-        let up = config.drive(&mut state, volts(2000.0));
+        let up = config.drive(&mut state, volts(2000.0), Limits::NONE);
         assert_eq!((up.code, up.limits), (DacCode(4095), Limits::UPPER), "{slew_v_per_s:?}");
-        let down = config.drive(&mut state, volts(-2000.0));
+        let down = config.drive(&mut state, volts(-2000.0), Limits::NONE);
         assert_eq!((down.code, down.limits), (DacCode(0), Limits::LOWER), "{slew_v_per_s:?}");
     }
     // Just slower: the slew holds the voltage back.
     let config = config(&Amplifier { slew_v_per_s: Some(511_000.0), ..Amplifier::up_to(511.875) }, 1000.0);
-    let drive = config.drive(&mut State::default(), volts(511.875));
+    let drive = config.drive(&mut State::default(), volts(511.875), Limits::NONE);
     assert_eq!((drive.voltage, drive.limits), (volts(511.0), Limits::SLEW));
 }
 
@@ -177,7 +177,7 @@ fn the_state_keeps_the_limited_voltage_and_its_code() {
     let config = config(&Amplifier::PAPER, 1000.0);
     let mut state = State::default();
     assert_eq!((state.voltage(), config.applied(&state)), (Volts::ZERO, Volts::ZERO));
-    let drive = config.drive(&mut state, volts(123.4));
+    let drive = config.drive(&mut state, volts(123.4), Limits::NONE);
     assert_eq!((state.voltage(), config.applied(&state)), (volts(123.4), drive.applied));
 }
 
@@ -190,8 +190,8 @@ fn each_limit_has_its_own_bit_in_the_telemetry() {
             assert_eq!(limit.intersects(other), limit == other);
         }
     }
-    let both = Limits::UPPER.with(Limits::SLEW, true).with(Limits::LOWER, false);
-    assert_eq!((both.bits(), both.intersects(Limits::SLEW), both.with(Limits::SLEW, true)), (5, true, both));
+    let both = Limits::UPPER.with(Limits::SLEW);
+    assert_eq!((both.bits(), both.intersects(Limits::SLEW), both.with(Limits::SLEW)), (5, true, both));
     assert!(!Limits::NONE.intersects(both));
 }
 
@@ -199,8 +199,10 @@ fn each_limit_has_its_own_bit_in_the_telemetry() {
 fn the_slew_is_the_same_in_both_directions() {
     let config = config(&Amplifier { slew_v_per_s: Some(1000.0), ..Amplifier::PAPER }, 1000.0);
     let mut state = State::default();
-    let up: Vec<f64> = (0..300).map(|_| config.drive(&mut state, volts(300.0)).voltage.to_f64()).collect();
-    let down: Vec<f64> = (0..300).map(|_| config.drive(&mut state, volts(0.0)).voltage.to_f64()).collect();
+    let up: Vec<f64> =
+        (0..300).map(|_| config.drive(&mut state, volts(300.0), Limits::NONE).voltage.to_f64()).collect();
+    let down: Vec<f64> =
+        (0..300).map(|_| config.drive(&mut state, volts(0.0), Limits::NONE).voltage.to_f64()).collect();
     for (tick, (up, down)) in up.into_iter().zip(down).enumerate() {
         assert_eq!((up, down), (tick as f64 + 1.0, 299.0 - tick as f64));
     }

@@ -17,7 +17,7 @@ pub enum Fault {
     Watchdog = 5,
     /// The amplifier's monitors disagree with the output.
     Monitor = 6,
-    /// The settings were rejected, or the processor's guards could not be set up.
+    /// Settings or model were rejected or damaged, or the processor's guards could not be set up.
     Config = 7,
     /// The supply voltage dipped and reset the chip.
     Supply = 8,
@@ -72,7 +72,7 @@ impl Fault {
             Self::Interlock => "the supervisor: the safety circuit is open",
             Self::Watchdog => "the hang guard, the task watchdog or the chip's watchdog",
             Self::Monitor => "the supervisor: voltage, current or the converters' supply disagree with the output",
-            Self::Config => "the start: rejected settings, a rejected model, no guards",
+            Self::Config => "the start: rejected or damaged settings or model, no guards",
             Self::Supply => "the chip's brown-out reset, with RAM that has kept its content",
             Self::SelfTest => "the start: a word of the RAM, or the processor's clock compared with the watchdog's",
             Self::Isolation => "the isolation bank: it has named a cause of the setting trip_on_cause",

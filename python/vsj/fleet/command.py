@@ -51,6 +51,7 @@ def _diagnose(wanted):
     folder, table = records.listed(wanted.records, store.addresses(out))
     settings, plants = _settings(wanted, table, folder)
     table = _with_plants(table, wanted.plant)
+    store.expect_writable(out)
     outcome, count = run.Outcome(len(table)), len(table)
     try:
         with run.interrupts() as interrupts, tqdm(total=count, unit="record", disable=None, desc="diagnosed", smoothing=0.05) as bar:

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 import pyarrow as pa
 from pyarrow import parquet
 
+from .. import BadInput
 from .records import filesystem, readable
 
 QUANTITY = pa.struct(
@@ -60,6 +61,19 @@ READERS = 32
 def addresses(out):
     """Beginnings of the addresses of the Parquet files in the folder of results ``out``."""
     return f"{out}/{TABLE}", f"{out}/{_PARTS}/"
+
+
+def expect_writable(out):
+    """Raise BadInput unless files can be written to the folder of results ``out``: before anything is computed for it."""
+    fs, path = filesystem(out)
+    probe = posixpath.join(path, f".{uuid.uuid4().hex}.partial")
+    try:
+        fs.makedirs(path, exist_ok=True)
+        with fs.open(probe, "wb") as file:
+            file.write(b"vsj")
+        fs.rm(probe)
+    except OSError as error:
+        raise BadInput(f"--out {out}: cannot be written ({error}); expected a folder or URL for the results") from error
 
 
 def write_part(out, rows):

@@ -9,7 +9,7 @@ use crate::bad_input;
 use crate::bad_input::BadInput;
 
 /// Number of rows that have to agree with the header about the separator.
-const CHECKED_ROWS: usize = 10;
+pub(super) const CHECKED_ROWS: usize = 10;
 
 /// How a table is written, as far as its user says; the rest is found in the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,6 +47,11 @@ impl Separator {
             }
         }
         last
+    }
+
+    /// The separator that a spreadsheet's line `sep=;` names.
+    pub(super) fn named_by(line: &str) -> Option<Self> {
+        line.trim().strip_prefix("sep=")?.parse().ok()
     }
 
     /// Returns the separator of a text that starts with its header: of those that split the header, the first for which the
@@ -123,18 +128,22 @@ impl Numbers {
         Self { accepted: dialect.decimal.or(point), found: Cell::new(None) }
     }
 
-    /// The number in a cell of line `line`, not necessarily finite; `None` if it is no number.
+    /// The number in a cell, not necessarily finite; `None` if it is no number.
+    pub(super) fn value(&self, text: &str) -> Option<f64> {
+        match Decimal::of(text) {
+            Some(Decimal::Comma) if self.accepted != Some(Decimal::Point) => text.replacen(',', ".", 1).parse().ok(),
+            Some(Decimal::Point) if self.accepted == Some(Decimal::Comma) => None,
+            _ => text.parse().ok(),
+        }
+    }
+
+    /// The number in a cell of line `line`, as [`Numbers::value`]; its decimal mark holds for all later ones.
     ///
     /// # Errors
     /// [`BadInput`] for a decimal mark other than that of an earlier line; `place` starts the message.
     pub(super) fn parse(&self, text: &str, line: usize, place: impl Fn() -> String) -> Result<Option<f64>> {
-        let mark = Decimal::of(text);
-        let number: Option<f64> = match mark {
-            Some(Decimal::Comma) if self.accepted != Some(Decimal::Point) => text.replacen(',', ".", 1).parse().ok(),
-            Some(Decimal::Point) if self.accepted == Some(Decimal::Comma) => None,
-            _ => text.parse().ok(),
-        };
-        let Some((number, mark)) = number.zip(mark) else { return Ok(number) };
+        let number = self.value(text);
+        let Some((number, mark)) = number.zip(Decimal::of(text)) else { return Ok(number) };
         match self.found.get() {
             None => self.found.set(Some((mark, line))),
             Some((other, first)) if other != mark => bad_input!(
@@ -159,30 +168,8 @@ pub(super) fn has_thousands_separators(text: &str) -> bool {
         && digits.chars().all(|letter| letter.is_ascii_digit() || MARKS.contains(&letter))
 }
 
-/// The lines above a header.
-pub(super) struct Preamble {
-    /// Length of these lines, in bytes.
-    pub(super) bytes: usize,
-    /// Number of these lines.
-    pub(super) lines: usize,
-    /// The separator that a line `sep=;` names.
-    pub(super) separator: Option<Separator>,
-}
-
-impl Preamble {
-    /// Blank lines, comments that start with `#`, `%` or `//`, and a spreadsheet's line `sep=;`.
-    pub(super) fn of(text: &str) -> Self {
-        let mut preamble = Self { bytes: 0, lines: 0, separator: None };
-        for line in text.split_inclusive('\n') {
-            let content = line.trim();
-            match content.strip_prefix("sep=").map(Separator::from_str) {
-                Some(Ok(separator)) => preamble.separator = Some(separator),
-                _ if content.is_empty() || ["#", "%", "//"].iter().any(|mark| content.starts_with(mark)) => (),
-                _ => break,
-            }
-            preamble.bytes += line.len();
-            preamble.lines += 1;
-        }
-        preamble
-    }
+/// True for a blank line, and for a comment that starts with `#`, `%` or `//`.
+pub(super) fn is_above_header(line: &str) -> bool {
+    let content = line.trim();
+    content.is_empty() || ["#", "%", "//"].iter().any(|mark| content.starts_with(mark))
 }

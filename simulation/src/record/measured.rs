@@ -126,7 +126,7 @@ impl Format {
     pub fn indices<'a>(&self, name: &str, columns: impl IntoIterator<Item = &'a str>) -> Result<[usize; 3]> {
         let header = columns::header(columns);
         let dialect = Dialect { separator: Some(Separator::COMMA), ..self.dialect };
-        let columns = self.columns.find(&Table::with_dialect(name, &header, dialect, Numbering::Rows)?)?;
+        let columns = self.columns.find(&Table::read(Source::of_rows(name, header), dialect)?)?;
         Ok([columns.time, columns.voltage, columns.reading].map(|column| column.index))
     }
 
@@ -134,35 +134,32 @@ impl Format {
     ///
     /// # Errors
     /// The errors of [`Format::open`].
-    pub fn read(&self, source: Source) -> Result<MeasuredRecord> {
+    pub fn read(&self, source: Source<'_>) -> Result<MeasuredRecord> {
         let (name, numbering) = (source.name.clone(), source.numbering());
         let dialect = match numbering {
             Numbering::Lines => self.dialect,
             Numbering::Rows => Dialect { separator: Some(Separator::COMMA), decimal: Some(Decimal::Point) },
         };
-        let (text, remark) = source.decode()?;
-        let mut remarks: Vec<String> = remark.into_iter().collect();
-        let table = || Table::with_dialect(&name, &text, dialect, numbering);
-
-        let columns = self.columns.find(&table()?)?;
-        let below_header = below_header(&mut table()?, &columns)?;
+        let mut table = Table::read(source, dialect)?;
+        let columns = self.columns.find(&table)?;
+        let below_header = below_header(&mut table, &columns)?;
         let [time, voltage, reading] = &below_header;
         let units = self.units(&columns, &below_header)?;
         let mut rows =
-            Rows { table: table()?, columns: &columns, units: &units, clock: Clock::default(), sort: self.sort };
+            Rows { table: &mut table, columns: &columns, units: &units, clock: Clock::default(), sort: self.sort };
+        let mut timed = rows.read()?;
+        let has_stamps = rows.clock.has_stamps();
+        let mut remarks: Vec<String> = table.remark().map(str::to_owned).into_iter().collect();
         if below_header.iter().any(Option::is_some) {
-            rows.table.next_row()?;
             let shown = [time, voltage, reading].map(|unit| unit.as_deref().unwrap_or("-"));
             remarks.push(format!("{name}: units {} below the header", shown.join(", ")));
         }
-        let mut timed = rows.read()?;
-        let has_stamps = rows.clock.has_stamps();
         for (column, below, unit, is_known) in [
             (&columns.time, time, &units.time.name, has_stamps),
             (&columns.voltage, voltage, &units.voltage.name, false),
         ] {
             if column.unit.is_none() && below.is_none() && !is_known {
-                let column = excerpt(rows.table.column(column.index));
+                let column = excerpt(table.column(column.index));
                 remarks.push(format!("{name}: column `{column}` has no unit; read in {unit}"));
             }
         }
@@ -186,7 +183,7 @@ impl Format {
         let longest_s = LONGEST_S.min(LONGEST_INTERVALS * median_interval(&rows).unwrap_or(LONGEST_S));
         let is_late = |row: &&Row| row.time_s - start_s > longest_s || !row.time_s.is_finite();
         if let Some(Row { line, time_s, .. }) = rows.iter().find(is_late) {
-            let column = excerpt(table()?.column(columns.time.index)).replace(['\n', '\r'], " ");
+            let column = excerpt(table.column(columns.time.index)).replace(['\n', '\r'], " ");
             let (after_s, longest_s) = (number(time_s - start_s), number(longest_s));
             bad_input!(
                 "{name}, {} {line}, column {column}: {after_s} s after the first row; expected at most {longest_s} s for rows \
@@ -194,7 +191,7 @@ impl Format {
                 numbering.word()
             );
         }
-        let column = table()?.column(columns.reading.index).to_owned();
+        let column = table.column(columns.reading.index).to_owned();
         let record = Record { name, rows };
         Ok(MeasuredRecord { record, units, column, remarks })
     }
@@ -221,7 +218,8 @@ impl Format {
     }
 }
 
-/// The units of time, voltage and reading in the first row below the header, if it is a row of units.
+/// The units of time, voltage and reading in the first row below the header, if it is a row of units; any other one is still to
+/// be read.
 fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<String>; 3]> {
     const BRACKETS: [char; 5] = ['[', ']', '(', ')', ' '];
     let Some(row) = table.next_row()? else { return Ok([None, None, None]) };
@@ -237,7 +235,11 @@ fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<Stri
             row.text(time).is_empty() && units[1].is_some() && !row.is_number(reading)
         }
     };
-    Ok(if is_of_units { units } else { [None, None, None] })
+    if !is_of_units {
+        table.return_row();
+        return Ok([None, None, None]);
+    }
+    Ok(units)
 }
 
 /// True for a cell that says that there is no reading.
@@ -246,15 +248,15 @@ fn is_missing(text: &str) -> bool {
 }
 
 /// The rows of a table in the order of the file, their times not yet in s.
-struct Rows<'a> {
-    table: Table<'a>,
+struct Rows<'a, 't> {
+    table: &'a mut Table<'t>,
     columns: &'a Columns,
     units: &'a Units,
     clock: Clock,
     sort: bool,
 }
 
-impl Rows<'_> {
+impl Rows<'_, '_> {
     fn read(&mut self) -> Result<Vec<(Time, Row)>> {
         let Columns { time, voltage, reading } = self.columns;
         let unit = &self.units.voltage;

@@ -56,12 +56,26 @@ pub struct Step {
 /// Largest relative errors, both ways; `None` if the time is too short even without errors.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Needed {
-    /// Largest error of the instantaneous share.
+    /// Largest relative error of the instantaneous share.
     pub share: Option<f64>,
-    /// Largest error of all time constants.
+    /// Largest relative error of all time constants.
     pub time_constant: Option<f64>,
-    /// Largest error of the gain of the whole response.
+    /// Largest relative error of the gain of the whole response.
     pub gain: Option<f64>,
+}
+
+impl Needed {
+    /// The errors with which all steps of the ideal stair take at most `within_s`.
+    pub fn of(bound: &RobustBound<'_>, within_s: f64) -> Self {
+        let steps = steps();
+        let of = |parameter| bound.needed(parameter, within_s, &steps);
+        Self { share: of(Parameter::Share), time_constant: of(Parameter::TimeConstant), gain: of(Parameter::Gain) }
+    }
+}
+
+/// Voltages in V before and after each step of the ideal stair.
+fn steps() -> Vec<(f64, f64)> {
+    Schedule::ideal_stair().changes().iter().map(|change| (change.from_v, change.to_v)).collect()
 }
 
 /// Computes the bounds of the stair's steps and the errors that a time allows.
@@ -73,8 +87,6 @@ pub fn answer(file: &PlantFile, question: &Question) -> Result<Answer> {
     // The rate has no part in it.
     allowed.amplifier.validate(SampleTime::from_rate(1000.0).map_err(BadInput::from)?).map_err(BadInput::from)?;
     let bound = RobustBound::new(file, allowed)?;
-    let steps: Vec<(f64, f64)> =
-        Schedule::ideal_stair().changes().iter().map(|change| (change.from_v, change.to_v)).collect();
     let of = |&(from_v, to_v): &(f64, f64)| {
         let known_s = bound.shortest_s(from_v, to_v, &SpringError::default());
         let t97_s = if spring_error == SpringError::default() {
@@ -84,18 +96,13 @@ pub fn answer(file: &PlantFile, question: &Question) -> Result<Answer> {
         };
         Step { from_v, to_v, known_s, t97_s }
     };
-    let needed = |parameter| bound.needed(parameter, within_s, &steps);
     Ok(Answer {
         limit_v: allowed.amplifier.max_v,
         slew_v_per_s: allowed.amplifier.slew_v_per_s,
         overshoot_percent: 100.0 * allowed.overshoot,
         spring_error,
-        steps: steps.iter().map(of).collect(),
+        steps: steps().iter().map(of).collect(),
         within_s,
-        needed: Needed {
-            share: needed(Parameter::Share),
-            time_constant: needed(Parameter::TimeConstant),
-            gain: needed(Parameter::Gain),
-        },
+        needed: Needed::of(&bound, within_s),
     })
 }

@@ -33,16 +33,17 @@ pub(super) fn over_model_errors(file: &PlantFile, with_gains: Option<&Run>, fast
     for parameter in Parameter::ALL {
         for part in -10..=10 {
             let error = f64::from(part) / 20.0;
-            let on = |run: Option<&Run>| run.map(|run| with_model_error(file, parameter, error, run));
+            let errors = SpringError::default().with(parameter, error);
+            let on = |run: Option<&Run>| run.map(|run| with_errors(file, &errors, run));
             trade.push(Trade { parameter, error, proportional_integral: on(with_gains), fast: on(fast) });
         }
     }
     trade
 }
 
-/// Worst response when the voltages of `run` drive a spring that differs from the file's.
-fn with_model_error(file: &PlantFile, parameter: Parameter, error: f64, run: &Run) -> Worst {
-    let differing = DifferingSpring::new(file, &SpringError::default().with(parameter, error));
+/// Worst response when the voltages of `run` drive a spring that differs from the file's by these errors.
+pub(super) fn with_errors(file: &PlantFile, errors: &SpringError, run: &Run) -> Worst {
+    let differing = DifferingSpring::new(file, errors);
     let times: Vec<f64> = (0..run.with.len()).map(|tick| run.time_s(tick)).collect();
     let volts: Vec<f64> = run.with.iter().map(|sample| sample.applied.to_f64()).collect();
     let stiffness = sampled::simulate(&differing.spring(), &times, &volts);

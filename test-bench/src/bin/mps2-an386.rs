@@ -63,6 +63,7 @@ enum Mode {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut board = Mps2::init();
+    board.start_watchdog(BUILT_IN.watchdogs.reset_ms);
     let cause = crash_record::reset_cause(None);
 
     let mut buffer = [0; 64];

@@ -51,7 +51,8 @@ impl Mps2 {
 }
 
 impl Mps2 {
-    /// Starts the hardware watchdog: it interrupts after `reset_ms` without feeding, and resets after twice that time.
+    /// Starts the hardware watchdog, or changes its time: it interrupts after `reset_ms` without feeding, and resets after twice
+    /// that time.
     pub fn start_watchdog(&mut self, reset_ms: u32) {
         watchdog::start(reset_ms);
     }

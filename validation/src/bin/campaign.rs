@@ -43,6 +43,7 @@ Examples:
   cargo campaign singles --export out/singles    its records as files, for `python -m vsj.fleet`
   cargo campaign --write out/hidden --cause hysteresis --seed 3
   cargo campaign --write out/hidden --cause drift --cause hum --rows 600 --uneven
+  cargo campaign unforeseen unseen           laws that the diagnosis does not have
   cargo campaign rivals                      comparison with PySINDy and SysIdentPy
   cargo campaign equation                    the same on records that nothing explains
   cargo campaign real FOLDER                 measured records: FOLDER/NAME.csv, with an optional NAME.toml

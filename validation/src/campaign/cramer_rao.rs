@@ -5,8 +5,8 @@
 //! Quantisation, outliers, saturation, the ends of a segment and the curve of a static nonlinearity have no such
 //! derivative and no bound here.
 
-use super::statistics::dot;
 use crate::ground_truth::{Cause, LabelledRecord};
+use crate::statistics::dot;
 
 /// Median distance from the mean of a normal distribution, in standard deviations.
 const MEDIAN: f64 = 0.6745;
@@ -82,7 +82,7 @@ mod tests {
             for parameter in cause.facts().parameters {
                 let records = (0..9).map(|seed| Recipe::of(&[cause]).draw(300 + seed));
                 let bounds = records.filter_map(|hidden| median_error(&hidden, cause, parameter)).collect::<Vec<_>>();
-                let median = crate::campaign::statistics::quantile(&bounds, 0.5);
+                let median = crate::statistics::median(&bounds);
                 assert!(median.is_none_or(|bound| bound < 0.05), "{cause} {parameter}: {median:?} at best");
             }
         }

@@ -15,8 +15,8 @@
 //!   with none.
 
 use super::mixture::Mixture;
-use super::statistics::NORMAL_95;
 use crate::ground_truth::{Cause, LabelledRecord};
+use crate::statistics::NORMAL_95;
 
 /// Noncentrality for a detection probability of 95 % at the 5 % level, by the number of unknown values from 1 to 3.
 pub const NONCENTRALITY: [f64; 3] = [12.9947, 15.4432, 17.1699];

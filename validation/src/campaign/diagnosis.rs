@@ -61,7 +61,7 @@ pub fn compared_with(record: &Record, nominal: PlantFile) -> Result<Value> {
 /// Report of `identify` on a record compared with its nominal spring, as JSON.
 ///
 /// # Errors
-/// The errors of [`compared_with`].
+/// The record or the spring is rejected.
 pub fn answer(subject: &Subject) -> Result<Value> {
     match &subject.nominal {
         Some(nominal) => compared_with(&subject.record, nominal.clone()),
@@ -73,7 +73,7 @@ pub fn answer(subject: &Subject) -> Result<Value> {
 /// the causes that were named.
 ///
 /// # Errors
-/// The errors of [`diagnose`].
+/// The record is rejected.
 pub fn predict(hidden: &LabelledRecord, rows: usize) -> Result<(Vec<f64>, Vec<&'static str>)> {
     let whole = hidden.record();
     let (residual, identified) = residual(&whole, rows, &Options::default())?;
@@ -107,7 +107,7 @@ pub struct Hypothesis {
 /// The hypothesis of a diagnosis of a record.
 ///
 /// # Errors
-/// The errors of [`diagnose`].
+/// The record is rejected.
 pub fn hypothesis(record: &Record) -> Result<Hypothesis> {
     let report = identify::examine::diagnose(record, &Options::default())?;
     let details = report.equation_details.as_ref();
@@ -126,7 +126,7 @@ pub fn hypothesis(record: &Record) -> Result<Hypothesis> {
 /// best linear model, and of the equation, or of the extended simulation if there is none; `None` if a free run diverged.
 ///
 /// # Errors
-/// The errors of [`diagnose`].
+/// The record is rejected.
 pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3]> {
     let (mut left, identified) = residual(record, rows, &Options::default())?;
     let extended = root_mean_square(&left.split_off(rows));
@@ -151,7 +151,7 @@ pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3
 /// initial state that is not known is estimated from the rows in which it has not decayed.
 ///
 /// # Errors
-/// The errors of [`diagnose`].
+/// The record is rejected.
 pub fn residual_beyond(record: &Record, rows: usize, options: &Options) -> Result<Vec<f64>> {
     let (mut residual, identified) = residual(record, rows, options)?;
     Ok(residual.split_off(identified.data.rows()))

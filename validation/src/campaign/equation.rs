@@ -23,6 +23,7 @@ use super::subject::Subject;
 use super::unforeseen::Edition;
 use crate::ground_truth;
 use crate::markdown::table;
+use crate::statistics::{median, quantile};
 
 /// Result for one record.
 #[derive(Clone, Debug, Serialize)]
@@ -155,9 +156,8 @@ have a block that is true of the law.
         counts(name, unexplained.iter().map(error).collect())
     });
     text += &table(&["model", "median", "within 10 % of the floor", "above twice the floor"], lines);
-    let mut seconds: Vec<f64> = unexplained.iter().map(|row| row.seconds).collect();
-    seconds.sort_by(f64::total_cmp);
-    if let (Some(median), Some(most)) = (seconds.get(seconds.len() / 2), seconds.last()) {
+    let seconds: Vec<f64> = unexplained.iter().map(|row| row.seconds).collect();
+    if let (Some(median), Some(most)) = (median(&seconds), quantile(&seconds, 1.0)) {
         let _ = write!(
             text,
             "\nCPU time of the diagnosis of an unexplained record: median {median:.1} s, at most {most:.1} s.\n\n"
@@ -196,9 +196,8 @@ have a block that is true of the law.
     text + &table(&header, unexplained.iter().map(line))
 }
 
-fn counts(name: &str, mut relative: Vec<f64>) -> Vec<String> {
-    relative.sort_by(f64::total_cmp);
-    let median = relative.get(relative.len() / 2).copied().unwrap_or(f64::NAN);
+fn counts(name: &str, relative: Vec<f64>) -> Vec<String> {
+    let median = median(&relative).unwrap_or(f64::NAN);
     let at_floor = relative.iter().filter(|error| **error <= AT_FLOOR).count();
     let far = relative.iter().filter(|error| **error > 2.0).count();
     let of = relative.len();

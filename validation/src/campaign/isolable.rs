@@ -16,8 +16,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::detectable::{NONCENTRALITY, smallest};
 use super::mixture::Mixture;
-use super::statistics::{NORMAL_95, dot};
 use crate::ground_truth::{Cause, Effect, LabelledRecord};
+use crate::statistics::{NORMAL_95, dot};
 
 /// Distance for an error probability of 5 % either way, in standard deviations of the noise.
 const SEPARATION: f64 = 2.0 * NORMAL_95;

@@ -5,8 +5,8 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
-use super::statistics::NORMAL_95;
 use crate::ground_truth::Effect;
+use crate::statistics::NORMAL_95;
 
 /// Width of an integration cell, in standard deviations of the noise.
 const STEP: f64 = 0.02;

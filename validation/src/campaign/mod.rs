@@ -5,7 +5,6 @@
 //!
 //! | module | contents |
 //! | --- | --- |
-//! | [`statistics`] | normal and sample quantiles, an interval of a frequency, sums |
 //! | [`diagnosis`], [`real`] | the only modules that call `identify` |
 //! | [`cramer_rao`] | lower bound of a parameter's error |
 //! | [`mixture`], [`detectable`], [`isolable`] | the smallest effect that can be detected, and distinguished from every other cause |
@@ -50,7 +49,6 @@ pub mod scales;
 pub mod score;
 pub mod sensitivity;
 pub mod shared;
-pub mod statistics;
 pub mod steps;
 pub mod subject;
 pub mod summary;

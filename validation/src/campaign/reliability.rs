@@ -5,11 +5,11 @@ use std::fmt::Write;
 
 use super::answer::{Answer, CERTAIN, Named};
 use super::case::Case;
-use super::statistics::wilson;
 use super::tables::percent;
 use super::{out_of_model, part, plants, shared, steps, unforeseen};
 use crate::ground_truth;
 use crate::markdown::table;
+use crate::statistics::wilson;
 
 /// Lower ends of the bins of the stated probability; the last bin ends at 1.
 const BINS: [f64; 7] = [0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 0.999];

@@ -16,8 +16,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::diagnosis::predict;
+use super::part::seed;
 use crate::ground_truth::record::Recipe;
 use crate::ground_truth::{Cause, LabelledRecord};
+use crate::statistics::median;
 
 /// Fraction of a record for identification; the rest is predicted.
 pub(super) const LEARN: f64 = 0.6;
@@ -60,8 +62,7 @@ pub const RECORDS: usize = Cause::ALL.len() + 1;
 pub fn run(first: u64, progress: &ProgressBar) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (place, cause) in Cause::ALL.into_iter().map(Some).chain([None]).enumerate() {
-        let seed = first.wrapping_mul(1_000_000_007) + 900_000_000 + place as u64;
-        let hidden = Recipe::of(cause.as_slice()).draw(seed);
+        let hidden = Recipe::of(cause.as_slice()).draw(seed(first, 9, place));
         let folder = tempfile::tempdir()?;
         hidden.write(folder.path(), "record")?;
         let answers = identification(folder.path(), &[])?;
@@ -166,9 +167,8 @@ Where the paper's plant is at the floor, the effect is not visible in the last 4
         let worse =
             count(&|row, rmse| rmse.is_some_and(|rmse| row.tools[0].rmse.is_some_and(|paper| !at_floor(rmse, paper))));
         let diverged = count(&|_, rmse| rmse.is_none());
-        let mut seconds: Vec<f64> = rows.iter().map(|row| row.tools[tool].seconds).collect();
-        seconds.sort_by(f64::total_cmp);
-        let median = seconds.get(seconds.len() / 2).copied().unwrap_or(f64::NAN);
+        let seconds: Vec<f64> = rows.iter().map(|row| row.tools[tool].seconds).collect();
+        let median = median(&seconds).unwrap_or(f64::NAN);
         text += &format!("| {name} | {floor} | {worse} | {diverged} | {median:.1} |\n");
     }
     text

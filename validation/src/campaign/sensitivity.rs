@@ -5,12 +5,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::diagnosis::Diagnose;
+use super::part::seed;
 use super::score::Outcome;
-use super::statistics::quantile;
 use super::{detectable, isolable};
 use crate::ground_truth::noise::Noise;
 use crate::ground_truth::record::Recipe;
 use crate::ground_truth::{Cause, LabelledRecord};
+use crate::statistics::{self, quantile};
 
 /// Sizes that are tried in this order, relative to the detectable size of each record.
 pub const SIZES: [f64; 9] = [1.0, 1.25, 1.5, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0];
@@ -52,7 +53,7 @@ pub fn measure(
     progress: &ProgressBar,
 ) -> Sensitivity {
     let recipe = Recipe { noise: Noise::white(noise_percent), ..Recipe::of(&[cause]) };
-    let seeds = (0..count as u64).map(|k| first.wrapping_mul(1_000_000_007) + 700_000_000 + cause as u64 * 10_000 + k);
+    let seeds = (0..count).map(|k| seed(first, 7, cause as usize * 10_000 + k));
     let records: Vec<(LabelledRecord, f64)> = seeds
         .collect::<Vec<_>>()
         .into_par_iter()
@@ -63,7 +64,7 @@ pub fn measure(
         .collect();
     let median = |factor: f64| {
         let sizes = records.iter().map(|(hidden, size)| hidden.effects[0].at((factor * size).min(1.0)).magnitude());
-        quantile(&sizes.collect::<Vec<_>>(), 0.5)
+        statistics::median(&sizes.collect::<Vec<_>>())
     };
     let factors: Vec<f64> = records.par_iter().map(|(hidden, size)| isolable::factor(hidden, *size)).collect();
     let mut named = Vec::new();

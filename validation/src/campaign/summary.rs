@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::part::Job;
 use super::score::{Estimate, Outcome};
-use super::statistics::quantile;
 use crate::ground_truth::Cause;
+use crate::statistics::{median, quantile};
 
 /// Counts over the records of one table row.
 #[derive(Clone, Debug, Serialize)]
@@ -86,9 +86,9 @@ impl Summary {
             truth_among_alternatives: share(|outcome| outcome.truth_among_alternatives),
             verdicts,
             parameters: accuracies(outcomes),
-            held_out_ratio: quantile(&ratios, 0.5),
+            held_out_ratio: median(&ratios),
             held_out_ratio_95: quantile(&ratios, 0.95),
-            seconds: quantile(&outcomes.iter().map(|outcome| outcome.seconds).collect::<Vec<_>>(), 0.5),
+            seconds: median(&outcomes.iter().map(|outcome| outcome.seconds).collect::<Vec<_>>()),
         }
     }
 }
@@ -105,8 +105,8 @@ fn accuracies(outcomes: &[&Outcome]) -> Vec<Accuracy> {
             cause: cause.name(),
             name,
             estimates: estimates.len(),
-            median_error: quantile(&errors, 0.5).unwrap_or(f64::NAN),
-            at_best: quantile(&estimates.iter().filter_map(|estimate| estimate.at_best).collect::<Vec<_>>(), 0.5),
+            median_error: median(&errors).unwrap_or(f64::NAN),
+            at_best: median(&estimates.iter().filter_map(|estimate| estimate.at_best).collect::<Vec<_>>()),
             covered: share(&estimates, |estimate| estimate.covered),
         }
     };

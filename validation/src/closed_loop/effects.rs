@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::scenario::{Sample, Scenario, fresh};
 use super::stair::{self, Step};
 use crate::ground_truth::Cause;
+use crate::statistics::median;
 
 /// Effects whose steady error a sensor has to correct to within the noise of one reading.
 pub const CORRECTED: [Cause; 6] = [
@@ -78,11 +79,10 @@ impl Figures {
     fn of(steps: &[Step]) -> Self {
         let mean_square = steps.iter().map(|step| step.steady_v.powi(2)).sum::<f64>() / steps.len() as f64;
         let up: Vec<_> = steps.iter().filter(|step| step.up).collect();
-        let mut times: Vec<f64> = up.iter().map(|step| step.t97_s.unwrap_or(f64::INFINITY)).collect();
-        times.sort_by(f64::total_cmp);
+        let times: Vec<f64> = up.iter().map(|step| step.t97_s.unwrap_or(f64::INFINITY)).collect();
         Self {
             steady_v: mean_square.sqrt(),
-            t97_s: Some(times[times.len() / 2]).filter(|time| time.is_finite()),
+            t97_s: median(&times).filter(|time| time.is_finite()),
             overshoot_percent: up.iter().map(|step| step.overshoot_percent).fold(0.0, f64::max),
         }
     }

@@ -7,6 +7,7 @@ use super::fault::{Fault, SIZES};
 use super::least_squares::Thresholds;
 use super::run::{Decision, Outcome, run};
 use crate::markdown;
+use crate::statistics::median;
 
 /// The runs of one fault at one size.
 #[derive(Clone, Debug)]
@@ -37,11 +38,6 @@ pub fn rows(percent: f64, seeds: std::ops::Range<u64>, thresholds: &Thresholds) 
     cases.par_iter().map(row).collect()
 }
 
-fn median(mut values: Vec<f64>) -> String {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.1}"))
-}
-
 impl Row {
     fn count(&self, what: impl Fn(&Outcome) -> bool) -> usize {
         self.outcomes.iter().filter(|outcome| what(outcome)).count()
@@ -52,7 +48,8 @@ impl Row {
     }
 
     fn times(&self, time: impl Fn(&Outcome) -> Option<f64>) -> String {
-        median(self.outcomes.iter().filter_map(time).filter(|time| *time >= 0.0).collect())
+        let times: Vec<f64> = self.outcomes.iter().filter_map(time).filter(|time| *time >= 0.0).collect();
+        median(&times).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.1}"))
     }
 
     fn cells(&self) -> Vec<String> {

@@ -22,6 +22,7 @@ use super::super::loop_arguments::LoopArguments;
 Examples:
   vsj export c                                        the report's spring
   vsj export c --plant spring.toml --out out/c --controller fast --limit-v 1000
+  vsj export c --known tau=5 --known share=5          a spring known to within 5 %
 
 Exit codes: 0 success, 1 a file cannot be written, 2 bad arguments, a plant file that the tick cannot run.")]
 pub(crate) struct Arguments {
@@ -37,7 +38,7 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let (name, options) = (&arguments.control.plant, arguments.control.options());
+    let (name, options) = (&arguments.control.plant, arguments.control.options()?);
     let plant = plant_file::load(name)?;
     let not_simulated = plant.left_out();
     if !not_simulated.is_empty() {

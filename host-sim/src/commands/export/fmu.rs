@@ -59,8 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if !not_simulated.is_empty() {
         remark(&format!("{}: not simulated: {}", arguments.control.plant, not_simulated.join(", ")));
     }
-    let unit = Unit { kind: Kind::Both, plant, options: arguments.control.options() };
-    unit.options.check()?;
+    let unit = Unit { kind: Kind::Both, plant, options: arguments.control.options()? };
     unit.check()?;
     let libraries = libraries(&arguments.library)?;
     let all = Kind::ALL.into_iter().flat_map(|kind| Version::ALL.map(|version| (kind, version)));

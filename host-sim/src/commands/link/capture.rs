@@ -9,8 +9,8 @@ use host_sim::link::Failure;
 use host_sim::output::recording::{Every, Recording};
 use host_sim::output::terminal::{print, remark};
 use link::capture::Row;
-use link::{Reason, Request, Telemetry};
-use model::{DacCode, SampleTime, Validate, amplifier, device};
+use link::{Reason, Request, Telemetry, WireVolts};
+use model::{Amplifier, DacCode, SampleTime, Validate, amplifier, device};
 use serde_json::json;
 use simulation::bad_input;
 use simulation::schedule::Schedule;
@@ -22,6 +22,9 @@ use super::session::{Session, seconds, stop_on_interrupt, stopped};
 const LONGEST_S: f64 = 1e6;
 /// Time between two questions of how far the capture is.
 const POLL: Duration = Duration::from_millis(50);
+
+/// Widths of converters that an amplifier may have.
+const DAC_BITS: std::ops::RangeInclusive<u32> = 8..=16;
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -57,7 +60,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let length_s = arguments.seconds.or(schedule.as_ref().map(|it| it.end_s() - it.start_s())).unwrap_or_default();
     let rate_hz = session.status.rate_hz;
     let rows = (length_s * f64::from(rate_hz)).round().clamp(1.0, f64::from(u32::MAX)) as u32;
-    let volts = volts_of(session)?;
+    let amplifier = amplifier_of(session)?;
     stop_on_interrupt();
     let room = session.client.capture_state().with_context(|| name.clone())?.most;
     if rows > room {
@@ -75,8 +78,9 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     // Sending the rows takes longer than the capture, and must not hold a voltage meanwhile.
     let ends = arguments.arm || schedule.is_some();
     let disarmed = if ends { session.order(Request::Disarm).map(drop) } else { Ok(()) };
-    let captured = followed?;
+    let (captured, shown) = followed?;
     disarmed?;
+    let volts = volts_of(&amplifier, rate_hz, shown.as_ref()).with_context(|| name.clone())?;
     let mut all = Vec::new();
     while (all.len() as u32) < captured {
         let first = all.len() as u32;
@@ -111,11 +115,17 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// Commands the schedule until all rows are captured; returns their number, fewer after Ctrl-C.
-fn follow(session: &mut Session, schedule: Option<&Schedule>, length: Duration, rows: u32) -> Result<u32> {
+/// Commands the schedule until all rows are captured. Returns their number, fewer after Ctrl-C, and a sample of the time with a
+/// voltage.
+fn follow(
+    session: &mut Session,
+    schedule: Option<&Schedule>,
+    length: Duration,
+    rows: u32,
+) -> Result<(u32, Option<Telemetry>)> {
     let mut drive = Drive::new(session, schedule);
     let start = Instant::now();
-    let mut asked = start;
+    let (mut asked, mut shown) = (start, None);
     loop {
         drive.step(session)?;
         if start.elapsed() >= length || asked.elapsed() >= POLL || stopped() {
@@ -124,22 +134,39 @@ fn follow(session: &mut Session, schedule: Option<&Schedule>, length: Duration, 
             if state.wanted != rows {
                 bail!("{}: the capture was replaced or lost: {state:?}", session.client.name());
             }
+            if shown.is_none() {
+                let status = session.client.status().with_context(|| session.client.name().to_owned())?;
+                shown = Some(status.sample).filter(|sample| sample.code > 0);
+            }
             if state.captured >= rows || stopped() {
-                return Ok(state.captured);
+                return Ok((state.captured, shown));
             }
         }
         std::thread::sleep(Duration::from_millis(2));
     }
 }
 
-/// The amplifier stage that the MCU runs: the voltage of a code.
-fn volts_of(session: &mut Session) -> Result<amplifier::Config> {
-    let name = session.client.name().to_owned();
-    let running = session.client.read_settings(false).with_context(|| name.clone())?;
+/// The amplifier that the MCU runs, with the converter of the report's.
+fn amplifier_of(session: &mut Session) -> Result<Amplifier> {
+    let running = session.client.read_settings(false).with_context(|| session.client.name().to_owned())?;
     let settings = running.over(&device::Settings::PAPER);
-    let amplifier = settings.map_err(|field| Failure::Refused(Reason::NotBuiltIn(field)))?.control.amplifier;
-    let sample_time = SampleTime::from_rate(f64::from(running.rate_hz))?;
-    Ok(amplifier.validate(sample_time).with_context(|| name)?.quantize())
+    Ok(settings.map_err(|field| Failure::Refused(Reason::NotBuiltIn(field)))?.control.amplifier)
+}
+
+/// The voltages of codes. The settings of an MCU do not contain the width of its converter: it is the one with which the code of the
+/// sample `shown` has the sample's voltage. Without a voltage in the capture it does not matter.
+fn volts_of(amplifier: &Amplifier, rate_hz: u32, shown: Option<&Telemetry>) -> Result<amplifier::Config> {
+    let sample_time = SampleTime::from_rate(f64::from(rate_hz))?;
+    let of = |dac_bits| anyhow::Ok(Amplifier { dac_bits, ..*amplifier }.validate(sample_time)?.quantize());
+    let Some(shown) = shown else { return of(amplifier.dac_bits) };
+    for dac_bits in DAC_BITS {
+        let volts = of(dac_bits)?;
+        if WireVolts::from(volts.volts(DacCode(shown.code))) == shown.applied {
+            return Ok(volts);
+        }
+    }
+    let (code, applied, full) = (shown.code, shown.applied.to_f64(), amplifier.full_scale_v);
+    bail!("code {code} is {applied} V; expected a converter of 8 to 16 bits with {full} V at its highest code")
 }
 
 /// The row as the telemetry of that tick.

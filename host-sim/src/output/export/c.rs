@@ -7,7 +7,7 @@ use anyhow::Result;
 use model::{ExtendedPlant, Settings};
 use serde::Serialize;
 use simulation::bad_input::one_line;
-use vsj_tick::settings::{All, FAST, NONE, PAPER, Sensor, Spring};
+use vsj_tick::settings::{All, FAST, Known, NONE, PAPER, ROBUST, Sensor, Spring};
 
 use crate::output::files::Files;
 
@@ -74,6 +74,7 @@ fn header(all: &All, name: &str, not_simulated: &[String]) -> String {
         controller,
         spring,
         sensor,
+        margin,
     } = all;
     // No text of a file ends a comment.
     let commented = |text: &str| one_line(text).replace("*/", "* /");
@@ -98,11 +99,13 @@ fn header(all: &All, name: &str, not_simulated: &[String]) -> String {
         NONE => "VSJ_NONE".to_owned(),
         PAPER => "VSJ_PAPER".to_owned(),
         FAST => "VSJ_FAST".to_owned(),
+        ROBUST => "VSJ_ROBUST".to_owned(),
         other => other.to_string(),
     };
     let _ = write!(text, "    .dac_bits = {dac_bits},\n    .controller = {controller},\n");
     text += &spring_text(spring);
     text += &sensor_text(sensor);
+    text += &margin_text(margin);
     text + "};\n\n#endif\n"
 }
 
@@ -161,8 +164,19 @@ fn sensor_text(sensor: &Sensor) -> String {
         ("highest_v", highest_v),
         ("fade_s", fade_s),
     ];
+    part("sensor", &entries)
+}
+
+fn margin_text(margin: &Known) -> String {
+    let Known { time_constant, share, gain, overshoot } = margin;
+    let entries = [("time_constant", time_constant), ("share", share), ("gain", gain), ("overshoot", overshoot)];
+    part("margin", &entries)
+}
+
+/// A structure of numbers.
+fn part(name: &str, entries: &[(&str, &f64)]) -> String {
     let lines: String = entries.iter().map(|(key, value)| format!("        .{key} = {value:?},\n")).collect();
-    format!("    .sensor = {{\n{lines}    }},\n")
+    format!("    .{name} = {{\n{lines}    }},\n")
 }
 
 /// The answer for a terminal.

@@ -1,4 +1,4 @@
-//! Constants, quantiles and sums that several parts of the campaign need.
+//! Constants, quantiles and sums that several modules need.
 
 /// One-sided 95 % point of the standard normal distribution.
 pub const NORMAL_95: f64 = 1.6449;
@@ -22,6 +22,11 @@ pub fn wilson(successes: usize, count: usize) -> [f64; 2] {
 /// Sum of the products of two vectors' elements.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Median of the values, the upper of two; `None` without values.
+pub fn median(values: &[f64]) -> Option<f64> {
+    quantile(values, 0.5)
 }
 
 /// Quantile of the values at `part` from 0 to 1, by the nearest rank; `None` without values.
