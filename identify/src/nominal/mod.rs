@@ -198,7 +198,7 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     let most = if both_signs { 1.0 } else { MOST_OF_SQUARE };
     let full_scale = series.iter().map(Series::full_scale).fold(0.0, f64::max);
     let squared: Vec<Series> = series.iter().map(|series| series.squared(full_scale)).collect();
-    let (order, best) = models.fits.iter().enumerate().take(2).last().expect("a model of order 0");
+    let (order, best) = models.fits.iter().enumerate().take(2).next_back().expect("a model of order 0");
     if best_up_to(&Problem::new(squared.clone()), order)[order].cost < best.fit.cost {
         let square = Models::of(squared, InputLaw::Square);
         if square.held_out_rmse() < most * models.held_out_rmse() {
