@@ -35,6 +35,7 @@ pub struct Search<'e, E> {
 }
 
 /// First fits of a model's extensions.
+#[derive(Clone, Debug)]
 pub(super) struct FirstFits {
     /// The model that is extended, with its parameters.
     pub(super) of: Model,
