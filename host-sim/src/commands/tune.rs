@@ -23,7 +23,7 @@ Examples:
   vsj tune                                     the report's spring at 700 V
   vsj tune --limit-v 1000 --overshoot-percent 1
   vsj tune --plant spring.toml --out out/tune  with plots over model errors
-  vsj tune --known tau=2 --known share=2       what remains on a spring known to within 2 %
+  vsj tune --known tau=2 --known share=2       a spring known to within 2 %
   vsj tune --identified identified.json        the same for the intervals of vsj identify --json
   vsj tune --json | jq .fast")]
 pub(crate) struct Arguments {

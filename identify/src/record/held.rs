@@ -22,6 +22,8 @@ const THRESHOLD: f64 = 0.3;
 const TURNING: f64 = 0.2;
 /// Scatter of the numbers of rows from one new reading to the next, relative to their mean, below which a clock sets them.
 const CLOCK: f64 = 0.3;
+/// Largest part of the held readings in one run: beyond, the sensor was stuck for a while.
+const LARGEST_RUN: f64 = 0.25;
 /// Fewest new readings.
 const FEWEST_NEW: usize = 30;
 /// Largest difference of equal readings, relative to the range of all: what converting between units leaves.
@@ -79,8 +81,11 @@ pub fn without_held(record: &Record) -> Option<(Held, Record)> {
     let new: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || stays(reading(row))).collect();
     let count = rows.len() - new.len();
     let fraction = count as f64 / rows.len() as f64;
-    let changes = changes(&values);
     let lengths: Vec<f64> = new.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
+    if lengths.iter().any(|length| length - 1.0 > LARGEST_RUN * count as f64) {
+        return None;
+    }
+    let changes = changes(&values);
     let reason = reason(&lengths);
     let (mut ages, mut squares) = (Vec::new(), 0.0);
     for pair in new.windows(2) {
@@ -186,6 +191,13 @@ mod tests {
         let mut slow = record(|_, new, _| new);
         (0..ROWS).filter(|row| row % 3 > 0).for_each(|row| slow.rows[row].measured = slow.rows[row - 1].measured);
         assert_eq!(without_held(&slow).unwrap().0.reason, Reason::SlowClock);
+    }
+
+    #[test]
+    fn a_sensor_that_sticks_for_a_while_is_not_left_out() {
+        let mut stuck = record(|_, new, _| new);
+        (701..1200).for_each(|row| stuck.rows[row].measured = stuck.rows[700].measured);
+        assert_eq!(without_held(&stuck), None);
     }
 
     #[test]
