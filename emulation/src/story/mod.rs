@@ -131,8 +131,8 @@ fn each<T: Send>(
     effects.par_iter().map(one).collect()
 }
 
-/// The step of `cargo xtask test`: three effects, whose summary must be the approved one, a sensor that falls silent, and the
-/// isolation bank.
+/// The step of `cargo xtask test`: three effects, whose summary must be the approved one, a sensor that falls silent, the
+/// isolation bank, and the adaptation.
 fn check() -> Result<()> {
     let begin = Instant::now();
     let demonstration = Demonstration::new(Controller::Paper)?;
@@ -146,5 +146,8 @@ fn check() -> Result<()> {
     let begin = Instant::now();
     isolation::check(&stage)?;
     eprintln!("the isolation bank in the loop, in {:.0} s", begin.elapsed().as_secs_f64());
+    let begin = Instant::now();
+    adaptation::check(&adaptation::stage()?)?;
+    eprintln!("the adaptation in the loop, in {:.0} s", begin.elapsed().as_secs_f64());
     Ok(())
 }

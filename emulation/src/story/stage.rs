@@ -20,11 +20,14 @@ use xtask::variant::Controller;
 
 use super::lock_step::{self, Disturbance, Moment};
 use crate::qemu::comparison::Comparison;
+use crate::qemu::emulator;
 
 /// Ticks between two rows of a record.
 pub(super) const EVERY: usize = 50;
 /// Standard deviation of the white noise on the readings, in percent of 500 V.
 const NOISE_PERCENT: f64 = 0.2;
+/// Most lines of the log in an error.
+const MOST_LINES: usize = 10;
 /// Length of the settled part at the end of each step, in ticks.
 const SETTLED: usize = 2 * RATE_HZ as usize;
 
@@ -145,7 +148,13 @@ impl Stage {
         each: impl FnMut(&mut Control, &Tick),
     ) -> Result<Pass> {
         let (played, moments) = lock_step::run(&self.elf, run, folder, spring, disturbance)?;
-        ensure!(moments.len() == UP_DOWN_TICKS as usize, "{} ticks at the spring", moments.len());
+        // A board that was reset plays another script to its end: its log says why.
+        ensure!(
+            moments.len() == UP_DOWN_TICKS as usize,
+            "{} ticks at the spring; the board says {:?}",
+            moments.len(),
+            played.log.iter().rev().take(MOST_LINES).rev().map(emulator::text).collect::<Vec<_>>()
+        );
         // A tick receives the reading at the end of the one before.
         let received = |tick: u32| moments.get(tick.checked_sub(1)? as usize)?.received;
         let comparison = Comparison::after_each(run, found, received, &played, each)?;

@@ -88,7 +88,7 @@ struct Takeover {
 
 /// Mean energy of the residual in a block since the fault began, in variances, without that of the noise.
 fn energy(report: &Report) -> f64 {
-    let blocks = report.since_blocks.min(bank::MOST_BLOCKS).max(1);
+    let blocks = report.since_blocks.clamp(1, bank::MOST_BLOCKS);
     (report.energies().0 / f64::from(blocks) - 1.0).max(0.0)
 }
 

@@ -93,6 +93,8 @@ fn main() -> ! {
             semihosting::exit(1)
         }
     };
+    // At about a tenth of the real board's speed, what is built above and the check of the image below take more than one period.
+    board.feed_watchdog();
 
     if mode == Mode::Play(Script::Drill(FaultInjection::Unguarded)) {
         let _taken = Peripherals::take();
