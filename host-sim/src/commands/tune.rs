@@ -24,7 +24,7 @@ Examples:
   vsj tune --limit-v 1000 --overshoot-percent 1
   vsj tune --plant spring.toml --out out/tune  with plots over model errors
   vsj tune --known tau=2 --known share=2       a spring known to within 2 %
-  vsj tune --identified identified.json        the same for the intervals of vsj identify --json
+  vsj tune --identified identified.json        known to the intervals of a file
   vsj tune --json | jq .fast")]
 pub(crate) struct Arguments {
     /// The spring: `paper`, or a plant file of at most 1 MiB; its recorded amplifier applies where it is stricter
