@@ -114,8 +114,7 @@ impl Control {
         let supervision = supervision.validate(settings.sample_time())?;
         let supervisor = Supervisor::new(supervision.quantize(), last_fault);
         let spring = Spring::Plain(Loop::new(settings));
-        let scale = Scale::default();
-        Ok(Self { spring, scale, supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
+        Ok(Self { spring, scale: Default::default(), supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
     }
 
     /// Replaces the spring of `settings` by the identified `model`, and the amplifier's limits by its own where those are
