@@ -12,6 +12,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
+use crate::bad_input;
 use crate::bad_input::BadInput;
 use crate::plant_file::PlantFile;
 use crate::run::Sample;
@@ -103,6 +104,10 @@ impl DifferingSpring {
     /// # Errors
     /// [`BadInput`] with the parameter and its range.
     pub fn check(&self) -> Result<()> {
+        let share = self.file.relaxation.share;
+        if !(0.0..=1.0).contains(&share) {
+            bad_input!("the spring with its errors: relaxation.share = {share} is not allowed: expected 0 to 1");
+        }
         self.file.check_for_host().map_err(|error| BadInput(format!("the spring with its errors: {error}")).into())
     }
 

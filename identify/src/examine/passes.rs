@@ -27,7 +27,6 @@ use crate::fit::engine::Engine;
 use crate::nominal::{BestLinear, best_linear};
 use crate::plant::base::Base;
 use crate::record::data::Data;
-use crate::record::held::without_held;
 use crate::record::input::Input;
 use crate::record::normalisation::Normalisation;
 use crate::record::observed::Observed;
@@ -36,10 +35,8 @@ use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS,
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::{self, Diagnosis};
-use crate::verdict::held_findings::add_held;
-use crate::verdict::hypotheses;
+use crate::verdict::hypotheses::hypotheses;
 use crate::verdict::linear_rival::compare;
-use crate::verdict::suspects::add_suspects;
 
 /// Finds out what the simulation gets wrong on a record.
 ///
@@ -55,17 +52,12 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
-    let held = without_held(record);
-    let record = held.as_ref().map_or(record, |(_, without)| without);
     let records = std::slice::from_ref(record);
-    let mut found = joint(records, options, None, &mut progress)?.reported();
+    let mut found = joint(records, options, None, Rivals::Reported, &mut progress)?;
     let linear = linear(records, options);
     compare(&mut found, linear.as_ref());
     credibility::unlikely_to_suspects(&mut found.report);
     hypothesise(&mut found, record, options, linear.as_ref());
-    if let Some((held, _)) = &held {
-        add_held(&mut found.report, held, &options.units);
-    }
     Ok(found)
 }
 
@@ -74,56 +66,24 @@ pub(super) fn linear(records: &[Record], options: &Options) -> Option<BestLinear
     options.linear.clone().or_else(|| best_linear(records, options.input))
 }
 
-/// A diagnosis after all passes, in the coordinates of the search.
-pub(super) struct Examined<'r> {
-    pub(super) found: Diagnosis,
-    records: &'r [Record],
-    options: &'r Options,
-    normalisations: Vec<Normalisation>,
-    budget: Budget,
-    only: Option<&'r [&'static str]>,
-}
-
-impl Examined<'_> {
-    /// Returns the diagnosis in the files' units, with suspects and rivals.
-    pub(super) fn reported(mut self) -> Diagnosis {
-        let Self { found, budget, records, options, only, .. } = &mut self;
-        let (data, observed, base) = (found.data.clone(), found.observed.clone(), found.base.clone());
-        let mut engine = Engine::within(&data, &observed, &base, budget).limited_to(*only);
-        add_suspects(&mut engine, found);
-        let rivals = hypotheses::rivals(&mut engine, found);
-        let experiment = hypotheses::experiment(found, records, &options.units.reading);
-        let mut found = self.restored();
-        (found.report.rivals, found.report.experiment) = (rivals, Some(experiment));
-        found
-    }
-
-    /// Returns the diagnosis in the files' units, with its findings alone.
-    pub(super) fn restored(self) -> Diagnosis {
-        let Self { found, records, options, normalisations, budget, .. } = self;
-        let mut found = found.restored(records, &normalisations);
-        found.report.nominal = nominal(options);
-        found.report.complete = !budget.is_stopped();
-        found.report.search = SearchReport {
-            effort: options.effort.name(),
-            work: budget.spent(),
-            allowed: budget.total(),
-            finished: !budget.was_cut(),
-        };
-        found
-    }
+/// Whether the rival sets of causes are fitted and reported, for the plan of the next experiment.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Rivals {
+    Reported,
+    Omitted,
 }
 
 /// Finds out what the simulation gets wrong on all of several records of one spring; `only` limits the search to some causes.
 ///
 /// # Errors
 /// The errors of [`examine`], for the first record that has one.
-pub(super) fn joint<'r>(
-    records: &'r [Record],
-    options: &'r Options,
-    only: Option<&'r [&'static str]>,
+pub(super) fn joint(
+    records: &[Record],
+    options: &Options,
+    only: Option<&[&'static str]>,
+    rivals: Rivals,
     progress: &mut dyn FnMut(&str),
-) -> Result<Examined<'r>> {
+) -> Result<Diagnosis> {
     let normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
     let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
     let base = options.base.normalised(&normalisations[0]);
@@ -148,7 +108,20 @@ pub(super) fn joint<'r>(
     let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget, only };
     let found = of_readings(&examined, &base, progress);
     let found = without_unsupported_terms(&examined, &base, found, progress);
-    Ok(Examined { found, records, options, normalisations, budget, only })
+    let reported = (rivals == Rivals::Reported).then(|| hypotheses(&found, records, &options.units.reading));
+    let mut found = found.restored(records, &normalisations);
+    if let Some((rivals, experiment)) = reported {
+        (found.report.rivals, found.report.experiment) = (rivals, Some(experiment));
+    }
+    found.report.nominal = nominal(options);
+    found.report.complete = !budget.is_stopped();
+    found.report.search = SearchReport {
+        effort: options.effort.name(),
+        work: budget.spent(),
+        allowed: budget.total(),
+        finished: !budget.was_cut(),
+    };
+    Ok(found)
 }
 
 /// The nominal spring for the report.
@@ -278,6 +251,7 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
     report.extended.gain = 1.0 - report.extended.quality.held_out_rmse / report.baseline.held_out_rmse.max(1e-12);
     if report.verdict == Verdict::Consistent {
         report.verdict = Verdict::Explained;
+        report.suspects.clear();
     }
     report.take_out = unsupported_terms;
     without.baseline = with.baseline;

@@ -19,7 +19,7 @@ use simulation::record::Record;
 use crate::answer::{RecordReport, Verdict};
 use crate::effects::EFFECTS;
 use crate::examine::options::Options;
-use crate::examine::passes::{self, Examined, examine, joint};
+use crate::examine::passes::{self, Rivals, examine, joint};
 use crate::plant::base::Base;
 use crate::stats::median::median;
 use crate::stats::scale::root_mean_square;
@@ -44,20 +44,19 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
-        let alone = joint(record, options, None, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
-        shown.extend(alone.found.report.findings.iter().map(|finding| finding.cause));
+        let alone = joint(record, options, None, Rivals::Omitted, &mut |causes| {
+            progress(&format!("{}: {causes}", record[0].name))
+        })?;
+        shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
-    let mut joint = joint(records, options, Some(&shown), &mut progress)?;
+    let mut joint = joint(records, options, Some(&shown), Rivals::Reported, &mut progress)?;
     let all: Vec<&'static str> =
         EFFECTS.iter().map(|effect| effect.cause()).filter(|cause| !OF_ONE_RECORD.contains(cause)).collect();
-    let weak = self::joint(records, options, Some(&all), &mut progress)?;
-    if weak.found.score > joint.found.score + CLEARLY_LIKELIER
-        && predicts_most_records_better(&weak.found, &joint.found)
-    {
+    let weak = self::joint(records, options, Some(&all), Rivals::Reported, &mut progress)?;
+    if weak.score > joint.score + CLEARLY_LIKELIER && predicts_most_records_better(&weak, &joint) {
         joint = weak;
     }
-    let mut joint = joint.reported();
     // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
     let mut spring = joint.plant.clone();
     spring.unmodelled = None;
@@ -66,8 +65,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     for (record, mut offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let mut from = |offset: f64| {
             let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-            let said = &mut |of: &str| progress(&format!("{}: {of}", record.name));
-            self::joint(&[from_zero], &options, None, said).map(Examined::restored)
+            self::joint(&[from_zero], &options, None, Rivals::Omitted, &mut |of| {
+                progress(&format!("{}: {of}", record.name))
+            })
         };
         let mut alone = from(offset)?;
         // A shifted stretch had a part in the zero that the joint fit found.

@@ -13,7 +13,6 @@ pub mod initial_state;
 pub mod knots;
 pub mod law;
 pub mod leakage;
-pub mod load_friction;
 pub mod play_bank;
 pub mod relaxation;
 pub mod visited;

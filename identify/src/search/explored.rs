@@ -10,7 +10,7 @@ use crate::search::scored::{Scored, effects};
 use crate::search::structure_search::{FirstFits, Search};
 
 /// The structures of a finished search, with their fits.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub struct Explored {
     evaluated: Evaluated,
     first_fits: HashMap<Vec<Block>, Vec<FirstFits>>,

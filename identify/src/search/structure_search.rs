@@ -35,7 +35,6 @@ pub struct Search<'e, E> {
 }
 
 /// First fits of a model's extensions.
-#[derive(Clone, Debug)]
 pub(super) struct FirstFits {
     /// The model that is extended, with its parameters.
     pub(super) of: Model,

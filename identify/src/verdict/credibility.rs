@@ -19,9 +19,8 @@
 //! and what is then less likely true than untrue is a suspect, no finding.
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
-use crate::linear::LARGEST_ORDER;
-use crate::plant::base::Base;
-use crate::stats::thresholds::empirical::{IF_BEYOND_LINEAR, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
+use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
+use crate::verdict::extrapolation::Spoils;
 use crate::verdict::finding::explained;
 
 /// Probability of what is as likely true as untrue.
@@ -32,9 +31,6 @@ const EXACT: [&str; 2] = ["quantisation", "sensor-saturation"];
 
 /// Causes that do not respond to the voltage, so that they correct no law.
 const APART: [&str; 2] = ["hum", "outliers"];
-
-/// Causes that add poles to the spring.
-const WITH_POLES: [&str; 4] = ["second-relaxation", "charge-leakage", "series-lag", "resonance"];
 
 /// Lowers probabilities by the chance that a law which no cause describes is behind a finding.
 pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
@@ -65,19 +61,10 @@ pub(crate) fn in_unexplained(findings: &mut [Finding], structure: f64) {
     }
 }
 
-/// Cause that adds poles to a nominal spring which has as many as the largest linear model: it rather corrects a law that is not linear.
-/// `None` if there is none.
-pub(crate) fn beyond_linear(base: &Base, findings: &[Finding]) -> Option<&'static str> {
-    let file = base.file();
-    let poles = file.relaxation.tau_s.len() + 2 * file.modes.len();
-    let cause = findings.iter().map(|finding| finding.cause).find(|cause| WITH_POLES.contains(cause));
-    cause.filter(|_| poles >= LARGEST_ORDER)
-}
-
-/// Lowers probabilities of causes with poles of their own.
-pub(crate) fn of_beyond_linear(findings: &mut [Finding]) {
-    let has_poles = |finding: &&mut Finding| WITH_POLES.contains(&finding.cause);
-    findings.iter_mut().filter(has_poles).for_each(|finding| lower(finding, IF_BEYOND_LINEAR.get()));
+/// Lowers probabilities of causes that spoil an extrapolation.
+pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
+    let spoils = |finding: &&mut Finding| spoiling.iter().any(|spoils| spoils.is(finding));
+    findings.iter_mut().filter(spoils).for_each(|finding| lower(finding, IF_SPOILING.get()));
 }
 
 /// In a record with the verdict `unexplained`, makes suspects of the findings that are less likely true than untrue.

@@ -1,4 +1,6 @@
-//! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict.
+//! From a record to a report: search, held-out errors, ranking, checks of the residual, findings, verdict, suspects.
+
+use std::mem;
 
 use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
 use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, SearchReport, Verdict};
@@ -6,23 +8,24 @@ use crate::dimension::Dimension;
 use crate::effects::model::Model;
 use crate::equation::fitted::Fitted;
 use crate::fit::engine::{Engine, Fit};
-use crate::linear::LARGEST_ORDER;
 use crate::plant::base::Base;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::record::scales::Scales;
-use crate::search::{Explored, Scored, WarmStart};
+use crate::search::{Scored, WarmStart};
 
 use crate::stats::thresholds::empirical::{FINEST_V, SHARE_UNEXPLAINED, STEPS_BEYOND_BOUND};
 use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
 use crate::verdict::credibility;
 use crate::verdict::export::{export, restored};
+use crate::verdict::extrapolation::spoiling;
 use crate::verdict::finding::{explained, finding};
 use crate::verdict::found::{self, Found};
 use crate::verdict::margins;
 use crate::verdict::quality::{noise_report, quality, residual_report};
 use crate::verdict::ranking::{RankedCauses, ranking};
 use crate::verdict::reading_findings::reading_findings;
+use crate::verdict::suspects::suspects;
 use simulation::plant_file::PlantFile;
 
 /// A finished diagnosis: the report and what is needed to draw it. All numbers are in the file's units, but for the points of
@@ -61,16 +64,9 @@ pub struct Diagnosis {
     pub(crate) unexplained_v: f64,
     /// From which a search under another reading of the same rows starts; `None` if no search was run.
     pub(crate) warm_start: Option<WarmStart>,
-    /// All that the search has evaluated.
-    pub(crate) explored: Explored,
 }
 
 impl Diagnosis {
-    /// Returns the structure of the extended simulation with its score; `None` if no search was run.
-    pub(crate) fn best(&self) -> Option<&Scored> {
-        self.contenders.iter().find(|it| it.fit.model == self.extended.model)
-    }
-
     /// True if the extended simulation goes beyond the bounds at which readings stopped; on a quantisation grid, a plateau may
     /// only look like a bound.
     pub(crate) fn confirms_bounds(&self) -> bool {
@@ -100,7 +96,7 @@ pub(crate) fn diagnose(
 }
 
 /// Reports a finished search.
-fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) -> Diagnosis {
+fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Found) -> Diagnosis {
     let (data, observed) = (engine.data, engine.observed);
     let extended = &found.best.fit;
     let mut held_out = [&baseline, extended].map(|fit| engine.held_out_residual(fit));
@@ -113,18 +109,16 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
     let held_out_in_place = engine.held_out_residual_in_place(extended);
     let unmodelled = adequacy::first_significant(engine, extended).filter(|found| found.rms > FINEST_V.get());
     let left = || unmodelled.as_ref().map(|found| sentence(found, data.scales()));
+    let spoiling = spoiling(engine, &found);
     let unfinished = engine.budget().was_cut() && adequacy::doubts(engine, extended);
     let before = quality(engine, &baseline, &held_out[0], false);
     let after = quality(engine, extended, &held_out[1], true);
 
     let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
+    let unexplained = structured || !spoiling.is_empty() || unfinished;
     let mut findings = findings(engine, &found);
-    let beyond_linear = credibility::beyond_linear(engine.base(), &findings);
-    let unexplained = structured || beyond_linear.is_some() || !found.spoiling.is_empty() || unfinished;
     credibility::with_unknown_laws(&mut findings);
-    if beyond_linear.is_some() {
-        credibility::of_beyond_linear(&mut findings);
-    }
+    credibility::of_spoiling(&mut findings, &spoiling);
     if unexplained {
         let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
         credibility::in_unexplained(&mut findings, share * after.rmse.powi(2));
@@ -135,6 +129,17 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));
     let verdict = verdict(unexplained, &alternatives, insufficient, &findings);
+    let may_be_suspect = |cause| match verdict {
+        Verdict::Explained => false,
+        // The open question is which of the alternatives it is.
+        Verdict::Ambiguous => alternatives.iter().any(|set| set.contains(&cause)),
+        Verdict::Consistent => unmodelled.is_some(),
+        Verdict::Unexplained | Verdict::Insufficient => true,
+    };
+    let suspects = match verdict {
+        Verdict::Explained => Vec::new(),
+        _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect),
+    };
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
     let export = export(engine, found.model(), held);
 
@@ -156,18 +161,18 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         },
         next_experiment: next_experiment(verdict, &findings, &alternatives, extended.strongly_autocorrelated()),
         findings,
-        suspects: Vec::new(),
+        suspects,
         take_out: Vec::new(),
         would_show,
         alternatives,
         linear: None,
         equation: None,
         equation_details: None,
-        leftover: match found.spoiling.first() {
+        leftover: match spoiling.first() {
             _ if structured => left(),
             Some(spoils) => Some(spoils.sentence(data.scales())),
             None if unfinished => Some(UNFINISHED.to_owned()),
-            None => beyond_linear.map(too_many_poles).or_else(left),
+            None => left(),
         },
         noise: noise_report(&extended.noise),
         residual: residual_report(data, extended),
@@ -191,7 +196,6 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, found: Found) 
         contenders: found.contenders,
         unexplained_v: unmodelled.map_or(0.0, |found| found.rms),
         warm_start: Some(found.warm_start),
-        explored: found.explored,
         extended: found.best.fit,
     }
 }
@@ -220,13 +224,6 @@ fn verdict(unexplained: bool, alternatives: &[Vec<&'static str>], insufficient: 
 
 /// The report's sentence on a search that its budget ended.
 const UNFINISHED: &str = "The search ended before it had tried all that it would, and the residual may hold structure: a larger effort may find more";
-
-/// The report's sentence on a cause that adds poles to a nominal spring which has many.
-fn too_many_poles(cause: &str) -> String {
-    format!(
-        "The nominal spring has {LARGEST_ORDER} poles or more: {cause}, which adds others, rather corrects a law that is not linear"
-    )
-}
 
 /// The report's sentence on unmodelled dynamics.
 fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics, scales: &Scales) -> String {
@@ -288,6 +285,5 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         contenders: Vec::new(),
         unexplained_v: 0.0,
         warm_start: None,
-        explored: Explored::default(),
     }
 }

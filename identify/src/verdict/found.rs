@@ -8,7 +8,6 @@ use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::LARGEST_ERROR_RATIO;
 use crate::verdict::alternatives::rivals;
 use crate::verdict::cause::Cause;
-use crate::verdict::extrapolation::{Spoils, without_spoiling};
 use crate::verdict::ranking;
 
 /// A finished search.
@@ -19,8 +18,6 @@ pub(crate) struct Found {
     pub(crate) causes: Vec<Cause>,
     /// Sets of causes that the record cannot reject.
     pub(crate) rivals: Vec<Vec<&'static str>>,
-    /// Causes that were taken out of the best structure because they spoil an extrapolation.
-    pub(crate) spoiling: Vec<Spoils>,
     /// Structures to rank, the best first.
     pub(crate) contenders: Vec<Scored>,
     /// From which a search under another reading of the same rows starts.
@@ -67,22 +64,13 @@ pub(crate) fn search(
     }
     // The rivals before further structures are evaluated for comparison, the contenders after.
     let rivals = rivals(&search, &best);
-    let (best, spoiling) = without_spoiling(&mut search, best);
     let effects = effects(&best.fit.model);
     let left_out: Vec<Scored> = effects.iter().map(|&effect| search.left_out(&best, effect)).collect();
     // The best without a cause is chosen after all were evaluated, so that sentence and ranking name the same.
     let cause = |(effect, left_out)| Cause { effect, without: search.best_without(effect), left_out };
     let causes: Vec<Cause> = effects.into_iter().zip(left_out).map(cause).collect();
-    let contenders = ranking::contenders(&search, &best, &causes);
-    Ok(Found {
-        causes,
-        rivals,
-        spoiling,
-        contenders,
-        warm_start: search.warm_start(),
-        best,
-        explored: search.into_explored(),
-    })
+    let contenders = ranking::contenders(&search, &causes);
+    Ok(Found { causes, rivals, contenders, warm_start: search.warm_start(), best, explored: search.into_explored() })
 }
 
 impl Found {

@@ -20,30 +20,32 @@ const MOST_FURTHER: usize = 4;
 /// names them or structure is left unexplained.
 const TIMES_RIVAL_ODDS: f64 = 10.0;
 
-/// Returns the rivals of a diagnosis that is not restored yet, the best set first; `engine` has its record, its readings and its
-/// spring. Sets that the search has not evaluated are fitted as far as the work allows.
-pub(crate) fn rivals(engine: &mut Engine, diagnosis: &Diagnosis) -> Vec<Rival> {
-    let Some(best) = diagnosis.best() else { return Vec::new() };
+/// Returns the rivals of a diagnosis that is not restored yet, and its experiment.
+pub(crate) fn hypotheses(diagnosis: &Diagnosis, records: &[Record], reading_unit: &str) -> (Vec<Rival>, Experiment) {
+    let experiment = experiment(diagnosis, records, reading_unit);
+    let Some(best) = diagnosis.contenders.iter().find(|it| it.fit.model == diagnosis.extended.model) else {
+        return (Vec::new(), experiment);
+    };
     let names = |model: &Model| effects(model).iter().map(|&effect| EFFECTS[effect].cause()).collect::<Vec<_>>();
     let named = |model: &Model| diagnosis.report.alternatives.iter().any(|set| same(set, &names(model)));
     let unexplained = diagnosis.unexplained_v > 0.0;
     let near = |score: f64| unexplained || score > best.score - TIMES_RIVAL_ODDS * RIVAL_ODDS;
     let others = || diagnosis.contenders.iter().filter(|it| it.fit.model.structure() != best.fit.model.structure());
     let further = others().filter(|it| !named(&it.fit.model) && near(it.score)).take(MOST_FURTHER);
-    let mut rivals = vec![rival(engine, &best.fit, 0.0)];
+    let mut engine = Engine::new(&diagnosis.data, &diagnosis.observed, &diagnosis.base);
+    let mut rivals = vec![rival(&mut engine, &best.fit, 0.0)];
     for other in others().filter(|it| named(&it.fit.model)).chain(further) {
-        rivals.push(rival(engine, &other.fit, other.score - best.score));
+        rivals.push(rival(&mut engine, &other.fit, other.score - best.score));
     }
     for set in &diagnosis.report.alternatives {
-        if !engine.budget().is_over()
-            && !rivals.iter().any(|rival| same(set, &rival.causes))
-            && let Some(fit) = exchanged(engine, &best.fit, set)
+        if !rivals.iter().any(|rival| same(set, &rival.causes))
+            && let Some(fit) = exchanged(&mut engine, &best.fit, set)
         {
             let nats = (fit.log_likelihood - best.fit.log_likelihood).min(0.0);
-            rivals.push(rival(engine, &fit, nats));
+            rivals.push(rival(&mut engine, &fit, nats));
         }
     }
-    rivals
+    (rivals, experiment)
 }
 
 /// Returns true if two sets of causes are the same, in any order.
@@ -104,7 +106,7 @@ fn rival(engine: &mut Engine, fit: &Fit, nats: f64) -> Rival {
 }
 
 /// Returns the experiment of a diagnosis that is not restored yet.
-pub(crate) fn experiment(diagnosis: &Diagnosis, records: &[Record], reading_unit: &str) -> Experiment {
+fn experiment(diagnosis: &Diagnosis, records: &[Record], reading_unit: &str) -> Experiment {
     let (data, noise) = (&diagnosis.data, &diagnosis.extended.noise);
     let voltages = || records.iter().flat_map(|record| record.rows.iter().map(|row| row.voltage_v));
     let scales = data.scales();

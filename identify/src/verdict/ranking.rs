@@ -33,13 +33,11 @@ pub struct RankedCauses {
 /// Number of sets that are listed for their score alone.
 const LISTED_BY_SCORE: usize = 8;
 
-/// Structures to rank: those with the best scores, the one that is reported, the best without each cause that was found, and the
-/// simulation as it is given.
-pub(crate) fn contenders<E: Evaluator>(search: &Search<E>, reported: &Scored, causes: &[Cause]) -> Vec<Scored> {
+/// Structures to rank: the best sets of causes, the best without each cause that was found, and the simulation as it is given.
+pub(crate) fn contenders<E: Evaluator>(search: &Search<E>, causes: &[Cause]) -> Vec<Scored> {
     let kept = |(place, scored): &(usize, &Scored)| {
         *place < LISTED_BY_SCORE
             || scored.fit.model.blocks.is_empty()
-            || is_same(reported, scored)
             || causes.iter().any(|cause| is_same(&cause.without, scored))
     };
     search.ranked().into_iter().enumerate().filter(kept).map(|(_, scored)| scored.clone()).collect()

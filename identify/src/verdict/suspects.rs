@@ -10,15 +10,12 @@
 //! other segments cannot know it. Its errors before and after are those of single readings instead, each predicted by a fit to all
 //! others.
 
-use std::mem;
-
-use crate::answer::{Judge, Suspect, Verdict};
+use crate::answer::{Judge, Suspect};
 use crate::effects::{EFFECTS, contains};
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::parameters;
-use crate::search::{Scored, Search, effects};
+use crate::search::{Explored, Scored, Search, effects};
 use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
-use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::ranking::rms;
 
 /// Largest number of suspects that are listed.
@@ -26,47 +23,37 @@ const MOST_SUSPECTS: usize = 5;
 /// Share of the work that is left for fits that no search has made, the rest for errors and intervals.
 const SHARE_OF_FITS: f64 = 0.4;
 
-/// Adds the suspects to a diagnosis whose findings do not explain its record, the closest first: causes whose 95 % interval excludes
-/// that they have no effect. Sets that its search has evaluated are used; the best set extended by each other effect is fitted once,
-/// as far as the work allows. `engine` has the record, the readings and the spring of the diagnosis.
-pub(crate) fn add_suspects(engine: &mut Engine, diagnosis: &mut Diagnosis) {
-    let Some(best) = diagnosis.best().cloned() else { return };
-    if diagnosis.report.verdict == Verdict::Explained {
-        return;
-    }
+/// The suspects beside the findings of the set `best`, the closest first: causes whose 95 % interval excludes that they have no
+/// effect. Sets that the search has evaluated are used; the best set extended by each other effect is fitted once, as far as the
+/// work allows. `may` says which causes are considered.
+pub(crate) fn suspects(
+    engine: &mut Engine,
+    best: &Scored,
+    explored: Explored,
+    may: impl Fn(&'static str) -> bool,
+) -> Vec<Suspect> {
     let budget = engine.budget();
-    let mut search = Search::resumed(engine, mem::take(&mut diagnosis.explored));
+    let mut search = Search::resumed(engine, explored);
     let mut sets: Vec<(usize, Scored)> = Vec::new();
     budget.grant(SHARE_OF_FITS);
     let own = effects(&best.fit.model);
     let is_found = |effect: usize| own.iter().any(|&other| other == effect || contains(other, effect));
-    let may = |effect: &usize| !is_found(*effect) && may_be_suspect(diagnosis, EFFECTS[*effect].cause());
-    for effect in (0..EFFECTS.len()).filter(may) {
+    for effect in (0..EFFECTS.len()).filter(|effect| !is_found(*effect) && may(EFFECTS[*effect].cause())) {
         if !budget.is_over() {
-            search.evaluate_extension(&best, effect);
+            search.evaluate_extension(best, effect);
         }
         sets.extend(search.best_with(effect).map(|set| (effect, set)));
     }
     budget.grant(1.0);
     sets.sort_by(|(_, a), (_, b)| b.score.total_cmp(&a.score));
-    let suspects = &mut diagnosis.report.suspects;
+    let mut suspects = Vec::new();
     for (effect, set) in sets {
         if suspects.len() == MOST_SUSPECTS || budget.is_over() {
             break;
         }
-        suspects.extend(suspect(&mut search, &best, effect, &set));
+        suspects.extend(suspect(&mut search, best, effect, &set));
     }
-}
-
-/// True if a cause beside the findings is open after a diagnosis.
-fn may_be_suspect(diagnosis: &Diagnosis, cause: &'static str) -> bool {
-    match diagnosis.report.verdict {
-        Verdict::Explained => false,
-        // The open question is which of the alternatives it is.
-        Verdict::Ambiguous => diagnosis.report.alternatives.iter().any(|set| set.contains(&cause)),
-        Verdict::Consistent => diagnosis.unexplained_v > 0.0,
-        Verdict::Unexplained | Verdict::Insufficient => true,
-    }
+    suspects
 }
 
 /// Reports an effect as a suspect in a set of causes; `None` if it explains too little.

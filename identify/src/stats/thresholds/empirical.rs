@@ -64,12 +64,6 @@ thresholds! {
     COARSE = 2.0, "scales of the noise";
     /// Truncation instead of rounding is considered from this size of a step.
     LEAST_TRUNCATION = 0.5, "scales of the noise";
-    /// Smallest part of the readings that repeat the one before, from which they are examined for having been held.
-    LEAST_HELD = 0.15, "of the readings";
-    /// Readings of which more return to the one before last are on a grid, and not held.
-    MOST_RETURNS = 0.02, "of the new readings";
-    /// Readings on a grid with a larger step repeat because of it, and are not held.
-    COARSEST_GRID_OF_HELD = 0.05, "of the median change";
     /// A spectral line with fewer periods in the record may be a harmonic of the schedule that a nonlinear spring makes.
     FEWEST_PERIODS = 10.0, "periods";
     /// Records with fewer rows have no spectral lines.
@@ -209,8 +203,7 @@ thresholds! {
     SHARE_UNEXPLAINED = 0.1, "of the residual's mean square";
     /// The verdict is `unexplained` if the held-out error is this many times that of the best linear model.
     WORSE_THAN_LINEAR = 1.05, "errors of the linear model";
-    /// A cause is taken out, and the verdict is `unexplained`, if the rest of the record is predicted with this many times the error
-    /// without it by a fit to its first or last 60 %.
+    /// The verdict is `unexplained` if the last 40 % of the record are predicted with this many times the error without a cause.
     WORSE_THAN_WITHOUT = 1.05, "errors without the cause";
     /// Mean square error that a law of unknown form may leave for a further cause.
     UNKNOWN_FORM = 0.01, "of the mean square that the largest other cause removes", set by "cargo campaign out-of-model";
@@ -218,8 +211,8 @@ thresholds! {
     UNKNOWN_NOISE = 0.1, "of the mean square that is left", set by "cargo campaign out-of-model";
     /// Largest probability of a cause in a record with the verdict `unexplained`.
     IF_UNEXPLAINED = 0.9, "probability", set by "cargo campaign out-of-model";
-    /// Largest probability of a cause that adds poles to a nominal spring which has as many as the largest linear model.
-    IF_BEYOND_LINEAR = 0.5, "probability";
+    /// Largest probability of a cause with which the last 40 % of the record are predicted worse than without it.
+    IF_SPOILING = 0.5, "probability";
     /// Readings at a bound have saturated if the stiffness exceeds the bound by more in the mean.
     STEPS_BEYOND_BOUND = 0.5, "steps of the readings";
     /// A record is insufficient if an error of the gain as large as this could have been missed.
