@@ -137,7 +137,7 @@ impl Stage {
         self.drive_with(run, folder, spring, disturbance, found, |_, _| ())
     }
 
-    /// As [`Stage::drive`]; on the host `each` is called after each tick.
+    /// Runs one pass as [`Stage::drive`] does; on the host `each` is called after each tick.
     pub(super) fn drive_with(
         &self,
         run: &str,
