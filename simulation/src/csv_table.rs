@@ -16,8 +16,8 @@ use csv::StringRecord;
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
 use dialect::{CHECKED_ROWS, Dialect, Numbers, Separator, has_thousands_separators};
-use stream::Stream;
-use text::{Source, unwrapped};
+use stream::{Stream, unwrapped};
+use text::Source;
 
 /// Reads the text of a file.
 ///

@@ -283,6 +283,24 @@ impl Lines {
     }
 }
 
+impl Source<'_> {
+    /// Reads the whole text of a file in UTF-8, with or without byte order mark; its lines end with line feeds.
+    ///
+    /// # Errors
+    /// [`BadInput`] with the line of a byte that is not UTF-8, if the file cannot be read or is too large, and for the other
+    /// bounds of a table.
+    pub fn utf_8(self) -> anyhow::Result<String> {
+        let mut text = String::new();
+        Stream::new(self.expect_utf_8()).read_to_string(&mut text).map_err(unwrapped)?;
+        Ok(text)
+    }
+}
+
+/// The message that a [`Stream`] has passed through an input/output error.
+pub(super) fn unwrapped(error: std::io::Error) -> anyhow::Error {
+    error.downcast::<BadInput>().map_or_else(anyhow::Error::from, anyhow::Error::from)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

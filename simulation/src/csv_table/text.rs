@@ -1,15 +1,13 @@
 //! Where the text of a table comes from: a file, a pipe or the memory.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read};
+use std::io::{BufRead, BufReader, Cursor};
 use std::path::Path;
 
-use anyhow::{Error, Result};
+use anyhow::Result;
 
 use super::Numbering;
-use super::stream::Stream;
 use crate::bad_input;
-use crate::bad_input::BadInput;
 
 /// Largest number of rows: a row of a record takes 64 bytes, its diagnosis 500.
 pub const MOST_ROWS: usize = 1_000_000;
@@ -30,7 +28,7 @@ impl<'a> Source<'a> {
     /// Opens a file; `name` is its path.
     ///
     /// # Errors
-    /// [`BadInput`] if the file cannot be opened.
+    /// [`crate::bad_input::BadInput`] if the file cannot be opened.
     pub fn open(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
         match File::open(path) {
@@ -63,22 +61,6 @@ impl<'a> Source<'a> {
     pub(crate) fn numbering(&self) -> Numbering {
         self.numbering
     }
-
-    /// Reads the whole text of a file in UTF-8, with or without byte order mark; its lines end with line feeds.
-    ///
-    /// # Errors
-    /// [`BadInput`] with the line of a byte that is not UTF-8, if the file cannot be read or is too large, and for the other
-    /// bounds of a table.
-    pub fn utf_8(self) -> Result<String> {
-        let mut text = String::new();
-        Stream::new(self.expect_utf_8()).read_to_string(&mut text).map_err(unwrapped)?;
-        Ok(text)
-    }
-}
-
-/// The message that a [`Stream`] has passed through an input/output error.
-pub(super) fn unwrapped(error: std::io::Error) -> Error {
-    error.downcast::<BadInput>().map_or_else(Error::from, Error::from)
 }
 
 #[cfg(test)]
