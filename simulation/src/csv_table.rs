@@ -5,6 +5,7 @@
 //! Errors are one line that names file, line, column and what was expected.
 
 pub mod dialect;
+mod header;
 mod stream;
 pub mod text;
 
@@ -15,7 +16,7 @@ use csv::StringRecord;
 
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
-use dialect::{CHECKED_ROWS, Dialect, Numbers, Separator, has_thousands_separators};
+use dialect::{Dialect, Numbers, Separator, has_thousands_separators};
 use stream::{Stream, unwrapped};
 use text::Source;
 
@@ -43,6 +44,8 @@ pub struct Table<'a> {
     numbering: Numbering,
     header: StringRecord,
     header_line: usize,
+    /// Line of a header with other text above it.
+    below_titles: Option<usize>,
     separator: Separator,
     numbers: Numbers,
     reader: csv::Reader<Stream<'a>>,
@@ -81,9 +84,9 @@ impl<'a> Table<'a> {
         let (name, numbering) = (source.name.clone(), source.numbering());
         let mut text = Stream::new(source);
         let named = text.skip_preamble()?;
-        let separator = match dialect.separator.or(named) {
-            Some(separator) => separator,
-            None => Separator::of(text.head(1 + CHECKED_ROWS)?),
+        let (separator, below_titles) = match numbering {
+            Numbering::Lines => text.skip_titles(dialect.separator.or(named))?,
+            Numbering::Rows => (Separator::COMMA, None),
         };
         // Rows of another length are reported by [`Table::next_row`], which knows their line.
         let mut builder = csv::ReaderBuilder::new();
@@ -108,6 +111,7 @@ impl<'a> Table<'a> {
             numbering,
             header,
             header_line: line,
+            below_titles,
             separator,
             numbers: Numbers::new(dialect, separator),
             reader,
@@ -122,9 +126,16 @@ impl<'a> Table<'a> {
         &self.name
     }
 
-    /// What the user should know about the encoding of what was read so far.
-    pub fn remark(&self) -> Option<&str> {
-        self.reader.get_ref().remark()
+    /// What the user should know about the encoding of what was read so far, and about text above the header.
+    pub fn remarks(&self) -> impl Iterator<Item = String> {
+        let encoding = self.reader.get_ref().remark().map(str::to_owned);
+        encoding.into_iter().chain(self.titles().map(|titles| format!("{titles}, skipped")))
+    }
+
+    /// Says which line is the header, where other text than comments is above it.
+    pub(crate) fn titles(&self) -> Option<String> {
+        let (name, line) = (&self.name, self.below_titles?);
+        Some(format!("{name}: {} line(s) above the header in line {line}", line - 1))
     }
 
     /// Names of the columns, in their order.

@@ -99,6 +99,9 @@ impl Record {
 
     fn read(source: Source<'_>, measured: &str) -> Result<Self> {
         let table = Table::read(source, Dialect::default())?;
+        if let Some(titles) = table.titles() {
+            bad_input!("{titles}; expected comments only, lines that start with `#`");
+        }
         // Only the default column may be absent.
         let measured = (measured != MEASURED || table.find(measured).is_some()).then_some(measured);
         Self::from_table(table, measured)
@@ -189,6 +192,10 @@ mod tests {
             ("time_s,voltage_v\n0,1\n  \n", "line 3: 1 field(s); expected 2"),
             ("time_s,volts\n0,1\n", "line 1: no column `voltage_v`"),
             ("time_s,voltage_v\n", "0 row(s) of data; expected at least 2"),
+            (
+                "by X\ntime_s,voltage_v\n0,1\n1,2\n",
+                "1 line(s) above the header in line 2; expected comments only, lines that start with `#`",
+            ),
             ("time_s,voltage_v\n0,1\n", "1 row(s)"),
             ("time_s,voltage_v\n0,1\n1,abc\n", "line 3, column voltage_v: `abc` is not a finite number"),
             ("time_s,voltage_v\n0,1\n1,NaN\n", "line 3, column voltage_v: `NaN`"),

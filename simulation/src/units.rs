@@ -73,6 +73,13 @@ pub(crate) fn usual_reading(name: &str) -> bool {
     READINGS.contains(&name)
 }
 
+/// True for a cell that holds a unit and nothing else: a usual one, or any in brackets.
+pub(crate) fn is_unit(cell: &str) -> bool {
+    let is_in = |open, close| cell.len() > 2 && cell.starts_with(open) && cell.ends_with(close);
+    let is_usual = Unit::of_time(cell).is_ok() || usual_volts(cell).is_some() || usual_reading(cell);
+    is_usual || is_in('[', ']') || is_in('(', ')')
+}
+
 impl Unit {
     fn of(name: &str, si: f64) -> Self {
         Self { name: name.into(), si }

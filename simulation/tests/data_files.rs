@@ -77,6 +77,23 @@ fn rows() -> impl Strategy<Value = Vec<Cells>> {
     })
 }
 
+/// A line that is no header, with `|` for the separator of the table below.
+fn titles() -> impl Strategy<Value = String> {
+    let fixed = [
+        "Channel list",
+        "***End_of_Header***",
+        "exported by X, of Y; see Z",
+        "Serial|12345",
+        "Samples|100|100|100",
+        "Date|2026/01/31||",
+        "Recorded on 31 January at 12:00 by two people",
+        "Rack 7|||",
+        "\"a quoted title\"",
+    ];
+    let words = prop::collection::vec("[a-z]{1,8}", 5..9).prop_map(|words| words.join(" "));
+    prop_oneof![prop::sample::select(fixed.to_vec()).prop_map(str::to_owned), words]
+}
+
 impl Dialect {
     /// The voltage in this dialect's unit, within the range of amplifiers.
     fn voltage(&self, cell: &str) -> String {
@@ -159,6 +176,29 @@ proptest! {
             prop_assert_eq!(read.voltage_v, number(&dialect.voltage(voltage)) * dialect.voltage.1);
             prop_assert_eq!(read.measured, reading.as_deref().map(number));
         }
+    }
+
+    #[test]
+    fn lines_of_titles_above_the_header_change_nothing_but_the_line_numbers(
+        dialect in dialects(),
+        rows in rows(),
+        titles in prop::collection::vec(titles(), 1..30),
+    ) {
+        let dialect = Dialect { preamble: "", encoding: "utf-8", ..dialect };
+        let plain = dialect.file(&rows);
+        let end = dialect.line_end;
+        let above: String = titles.iter().map(|title| title.replace('|', &dialect.separator.to_string()) + end).collect();
+        let read = |bytes: Vec<u8>| dialect.format().read(Source::new("r", bytes));
+        let titled = [above.as_bytes(), &plain].concat();
+        let shown = String::from_utf8_lossy(&titled).into_owned();
+        let titled = read(titled).map_err(|error| TestCaseError::fail(format!("{error}\n{shown}")))?;
+        let mut expected = read(plain).expect("every dialect is read");
+        for row in &mut expected.record.rows {
+            row.line += titles.len();
+        }
+        let (lines, header) = (titles.len(), titles.len() + 1);
+        expected.remarks.insert(0, format!("r: {lines} line(s) above the header in line {header}, skipped"));
+        prop_assert_eq!(titled, expected, "{}", shown);
     }
 
     #[test]
@@ -302,6 +342,46 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
     assert_eq!(
         read(broken, &any).unwrap_err(),
         "r.csv: not UTF-16LE, although it starts with its mark; expected UTF-8"
+    );
+}
+
+#[test]
+fn a_header_that_could_be_another_line_is_refused_with_both_lines() {
+    let rows = "0;0;1\n1;0;2\n";
+    let error = |text: String| read(text, &Format::default()).unwrap_err();
+    assert_eq!(
+        error(format!("device;serial;place\nt_ms;u_V;x_mm\n{rows}")),
+        "r.csv, lines 1 and 2: each can be the header; expected one line of names above the rows, at most a line of units \
+         below it, and `#` before any other"
+    );
+    let table = "title\nchannel;lowest;highest\n".to_owned() + &"1;-10;10\n".repeat(16);
+    assert!(
+        error(format!("{table}t_ms;u_V;x_mm\n{rows}")).starts_with("r.csv, lines 2 and 19: each can be the header")
+    );
+    // Beyond a hundred titles, the first line counts.
+    let titles = |count: usize| format!("{}t_ms;u_V;x_mm\n{rows}", "a title\n".repeat(count));
+    assert_eq!(read(titles(100), &Format::default()).unwrap().record.rows[0].line, 102);
+    assert!(error(titles(101)).starts_with("r.csv, line 1: no column `time_s`"), "{}", error(titles(101)));
+}
+
+#[test]
+fn a_line_of_units_is_used_where_it_fits_and_said_where_not() {
+    let remarks = |text: &str| read(text, &Format::default()).map(|read| (read.units, read.remarks));
+    let (units, said) = remarks("by X\nt_ms;u;stiffness\ns;kV;N/m\n0;0;1\n1;0;1\n").unwrap();
+    assert_eq!((&*units.time.name, &*units.voltage.name, &*units.reading), ("ms", "kV", "N/m"));
+    assert_eq!(
+        said,
+        [
+            "r.csv: 1 line(s) above the header in line 2, skipped",
+            "r.csv: units s, kV, N/m below the header",
+            "r.csv: column `t_ms` is read in ms, not in s",
+        ]
+    );
+    let stamps = "Time;u_V;x\nUTC;V;mm\n2026-01-31T00:00:02;1;4\n2026-01-31T00:00:03;0;0\n";
+    assert_eq!(remarks(&stamps.replace(";x\n", ";stiffness\n")).unwrap().0.reading, "mm");
+    assert_eq!(
+        remarks("Time;u;stiffness\nsek;V;mm\n0;0;1\n1;0;1\n").unwrap_err(),
+        "r.csv, line 2, column Time: `sek` is not a unit of time; expected ns, us, ms, s, min, h or d"
     );
 }
 

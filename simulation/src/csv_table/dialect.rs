@@ -8,9 +8,6 @@ use anyhow::Result;
 use crate::bad_input;
 use crate::bad_input::BadInput;
 
-/// Number of rows that have to agree with the header about the separator.
-pub(super) const CHECKED_ROWS: usize = 10;
-
 /// How a table is written, as far as its user says; the rest is found in the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dialect {
@@ -30,40 +27,11 @@ impl Separator {
     /// The comma.
     pub const COMMA: Self = Self(b',');
     /// The separators that are recognised, the rarest inside a name first.
-    const USUAL: [Self; 4] = [Self(b'\t'), Self(b';'), Self::COMMA, Self::BLANKS];
-
-    /// Number of fields of a line without empty ones at its end.
-    fn fields(self, line: &str) -> usize {
-        let (mut fields, mut last, mut quoted, mut is_empty) = (0, 0, false, true);
-        for letter in line.trim_end().bytes().chain([self.0]) {
-            if letter == self.0 && !quoted {
-                // Several blanks are one separator.
-                fields += usize::from(!is_empty || self != Self::BLANKS);
-                last = if is_empty { last } else { fields };
-                is_empty = true;
-            } else {
-                quoted ^= letter == b'"';
-                is_empty &= letter == b' ';
-            }
-        }
-        last
-    }
+    pub(super) const USUAL: [Self; 4] = [Self(b'\t'), Self(b';'), Self::COMMA, Self::BLANKS];
 
     /// The separator that a spreadsheet's line `sep=;` names.
     pub(super) fn named_by(line: &str) -> Option<Self> {
         line.trim().strip_prefix("sep=")?.parse().ok()
-    }
-
-    /// Returns the separator of a text that starts with its header: of those that split the header, the first for which the
-    /// rows have as many fields.
-    pub(super) fn of(text: &str) -> Self {
-        let mut lines = text.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
-        let header = lines.next().unwrap_or_default();
-        let rows: Vec<&str> = lines.take(CHECKED_ROWS).collect();
-        let splits = Self::USUAL.into_iter().filter(|separator| separator.fields(header) > 1);
-        let splits: Vec<Self> = splits.collect();
-        let fits = |separator: &&Self| rows.iter().all(|row| separator.fields(row) == separator.fields(header));
-        *splits.iter().find(fits).or(splits.first()).unwrap_or(&Self::COMMA)
     }
 }
 
@@ -126,6 +94,11 @@ impl Numbers {
     pub(super) fn new(dialect: Dialect, separator: Separator) -> Self {
         let point = (separator == Separator::COMMA).then_some(Decimal::Point);
         Self { accepted: dialect.decimal.or(point), found: Cell::new(None) }
+    }
+
+    /// True for a number with either decimal mark.
+    pub(super) fn any(text: &str) -> bool {
+        Self { accepted: None, found: Cell::default() }.value(text).is_some()
     }
 
     /// The number in a cell, not necessarily finite; `None` if it is no number.

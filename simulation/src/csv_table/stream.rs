@@ -7,6 +7,7 @@ use std::mem;
 use encoding_rs::{Decoder, DecoderResult, Encoding, UTF_8, WINDOWS_1252};
 
 use super::dialect::{Separator, is_above_header};
+use super::header::{self, CHECKED_ROWS, MOST_TITLES};
 use super::text::{MOST_BYTES, MOST_ROWS, Source};
 use crate::bad_input::BadInput;
 
@@ -64,12 +65,11 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// Reads the lines above the header; returns the separator that one of them names.
+    /// Reads the comments above the header; returns the separator that a line among them names.
     pub(super) fn skip_preamble(&mut self) -> Result<Option<Separator>, BadInput> {
         let mut separator = None;
         loop {
-            self.lines.origin = self.lines.length - self.pending().len();
-            self.lines.skip_to(self.lines.origin);
+            self.skip(0);
             let end = loop {
                 match self.pending().iter().position(|byte| *byte == b'\n') {
                     Some(feed) => break feed + 1,
@@ -83,8 +83,41 @@ impl<'a> Stream<'a> {
                 return Ok(separator);
             }
             separator = named.or(separator);
-            self.handed += end;
+            self.skip(end);
         }
+    }
+
+    /// Reads the lines of text between the comments and the header; returns the separator of the columns, and the number of the
+    /// header's line if it is not the first one. Where no line can be the header, the first one is.
+    pub(super) fn skip_titles(&mut self, known: Option<Separator>) -> Result<(Separator, Option<usize>), BadInput> {
+        // What is read ahead remains in memory: only a file with titles needs more than a header, units and rows.
+        let head = self.head(2 + CHECKED_ROWS)?;
+        if let [first] = *header::candidates(head, known, 1) {
+            return Ok((first.separator, None));
+        }
+        let head = self.head(MOST_TITLES + 2 + CHECKED_ROWS)?;
+        match *header::candidates(head, known, MOST_TITLES + 1) {
+            [] => Ok((header::separator(head, known), None)),
+            [only] => {
+                self.skip(only.start);
+                Ok((only.separator, (only.start > 0).then(|| self.line_at(0))))
+            }
+            [first, second, ..] => {
+                let [first, second] = [first, second].map(|line| self.line_at(line.start as u64));
+                let name = &self.name;
+                Err(BadInput(format!(
+                    "{name}, lines {first} and {second}: each can be the header; expected one line of names above the rows, at \
+                     most a line of units below it, and `#` before any other"
+                )))
+            }
+        }
+    }
+
+    /// Hands out nothing of the next `bytes` bytes of text, which end with a line; line numbers are searched behind them.
+    fn skip(&mut self, bytes: usize) {
+        self.handed += bytes;
+        self.lines.origin = self.lines.length - self.pending().len();
+        self.lines.skip_to(self.lines.origin);
     }
 
     /// Returns the first `rows` lines that are neither blank nor comments, with what is between and behind them; fewer where

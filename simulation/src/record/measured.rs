@@ -6,8 +6,8 @@ use anyhow::Result;
 
 use super::columns;
 use super::gaps::{median_interval, missed_turns};
-use super::names::{Column, ColumnNames, Columns};
-use super::times::{Clock, Time};
+use super::names::{Column, ColumnNames, Columns, usual};
+use super::times::{Clock, Time, is_dated};
 use super::{MOST_READING, MOST_V, Record, Row};
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
@@ -143,24 +143,31 @@ impl Format {
         let mut table = Table::read(source, dialect)?;
         let columns = self.columns.find(&table)?;
         let below_header = below_header(&mut table, &columns)?;
-        let [time, voltage, reading] = &below_header;
         let units = self.units(&columns, &below_header)?;
         let mut rows =
             Rows { table: &mut table, columns: &columns, units: &units, clock: Clock::default(), sort: self.sort };
         let mut timed = rows.read()?;
         let has_stamps = rows.clock.has_stamps();
-        let mut remarks: Vec<String> = table.remark().map(str::to_owned).into_iter().collect();
+        let mut remarks: Vec<String> = table.remarks().collect();
         if below_header.iter().any(Option::is_some) {
-            let shown = [time, voltage, reading].map(|unit| unit.as_deref().unwrap_or("-"));
+            let shown = below_header.each_ref().map(|unit| unit.as_deref().unwrap_or("-"));
             remarks.push(format!("{name}: units {} below the header", shown.join(", ")));
         }
-        for (column, below, unit, is_known) in [
-            (&columns.time, time, &units.time.name, has_stamps),
-            (&columns.voltage, voltage, &units.voltage.name, false),
+        let [time, voltage, reading] = &below_header;
+        for (column, below, unit, needs_unit) in [
+            (&columns.time, time, &units.time.name, !has_stamps),
+            (&columns.voltage, voltage, &units.voltage.name, true),
+            (&columns.reading, reading, &units.reading, false),
         ] {
-            if column.unit.is_none() && below.is_none() && !is_known {
-                let column = excerpt(table.column(column.index));
-                remarks.push(format!("{name}: column `{column}` has no unit; read in {unit}"));
+            let shown = excerpt(table.column(column.index));
+            match below {
+                Some(below) if below != unit && usual(below).as_ref() != Some(unit) => {
+                    remarks.push(format!("{name}: column `{shown}` is read in {unit}, not in {below}"));
+                }
+                None if needs_unit && column.unit.is_none() => {
+                    remarks.push(format!("{name}: column `{shown}` has no unit; read in {unit}"));
+                }
+                _ => (),
             }
         }
         if self.sort {
@@ -219,25 +226,36 @@ impl Format {
 }
 
 /// The units of time, voltage and reading in the first row below the header, if it is a row of units; any other one is still to
-/// be read.
+/// be read. Above time stamps a unit of time says nothing.
+///
+/// # Errors
+/// [`BadInput`] for a unit of time that is none, where the column does not have another one.
 fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<String>; 3]> {
     const BRACKETS: [char; 5] = ['[', ']', '(', ')', ' '];
+    let in_order = [&columns.time, &columns.voltage, &columns.reading].map(|column| column.index);
+    let time = columns.time.index;
     let Some(row) = table.next_row()? else { return Ok([None, None, None]) };
-    let units = [&columns.time, &columns.voltage, &columns.reading].map(|column| {
-        let unit = row.text(column.index).trim_matches(BRACKETS);
-        (!unit.is_empty() && !row.is_number(column.index) && !is_missing(unit)).then(|| unit.to_owned())
+    let mut units = in_order.map(|column| {
+        let unit = row.text(column).trim_matches(BRACKETS);
+        (!is_missing(unit)).then(|| unit.to_owned())
     });
-    // A column of time stamps has no unit.
-    let is_of_units = match &units[0] {
-        Some(unit) => Unit::of_time(unit).is_ok(),
-        None => {
-            let [time, reading] = [&columns.time, &columns.reading].map(|column| column.index);
-            row.text(time).is_empty() && units[1].is_some() && !row.is_number(reading)
-        }
-    };
+    let unit_of_time = units[0].as_deref().map(Unit::of_time).transpose();
+    let is_of_units = (units[1..].iter().any(Option::is_some) || matches!(unit_of_time, Ok(Some(_))))
+        && !in_order.iter().any(|column| row.is_number(*column))
+        && !is_dated(row.text(time));
     if !is_of_units {
         table.return_row();
         return Ok([None, None, None]);
+    }
+    let place = row.place(time);
+    if let Some(first) = table.next_row()? {
+        let has_stamps = is_dated(first.text(time));
+        table.return_row();
+        match unit_of_time {
+            _ if has_stamps => units[0] = None,
+            Err(error) if columns.time.unit.is_none() => bad_input!("{place}: {error}"),
+            _ => (),
+        }
     }
     Ok(units)
 }

@@ -255,7 +255,7 @@ pub fn with_unit(name: &str, unit: &str) -> String {
 }
 
 /// The name of a usual unit of time, voltage or reading; `None` for a word that is none.
-fn usual(unit: &str) -> Option<String> {
+pub(super) fn usual(unit: &str) -> Option<String> {
     // A header in capitals: `TIME_MS`. A single capital is another unit.
     let lower = if unit.len() > 1 { unit.to_lowercase() } else { unit.to_owned() };
     let time = Unit::of_time(unit).or_else(|_| Unit::of_time(&lower)).ok().map(|unit| unit.name);

@@ -112,7 +112,7 @@ struct Stamp {
 
 impl Stamp {
     fn parse(text: &str) -> Option<Self> {
-        if !is_date(text.get(..10)?) {
+        if !is_dated(text) {
             return None;
         }
         let text = text.replacen(',', ".", 1);
@@ -128,6 +128,11 @@ impl Stamp {
             Some(Self { nanoseconds: nanoseconds(time.timestamp(), time.timestamp_subsec_nanos()), has_zone: true })
         })
     }
+}
+
+/// True for a text that starts with a date, `2026-01-31`.
+pub(super) fn is_dated(text: &str) -> bool {
+    text.get(..10).is_some_and(is_date)
 }
 
 /// True for `2026-01-31`.

@@ -1,0 +1,173 @@
+//! Which line of a text is the header of its table: instruments write titles above it, and units below.
+
+use super::dialect::{Numbers, Separator};
+use crate::units::is_unit;
+
+/// Number of rows below a header that have to agree with it.
+pub(super) const CHECKED_ROWS: usize = 10;
+/// Largest number of lines above a header, without comments and blank lines.
+pub(super) const MOST_TITLES: usize = 100;
+
+/// A line that can be a header: its place in a text, in bytes, and the separator of its columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Candidate {
+    pub(super) start: usize,
+    pub(super) separator: Separator,
+}
+
+/// Returns the lines of a text that can be its header, among the first `most` that are neither blank nor comments: lines of
+/// names without numbers, whose number of columns is that of the next rows of numbers, behind at most one line of units. Of
+/// two such lines of names above the same rows, both.
+pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> Vec<Candidate> {
+    let starts = text.split_inclusive('\n').scan(0, |next, line| {
+        let start = *next;
+        *next += line.len();
+        Some((start, line.trim_end_matches('\n')))
+    });
+    let lines: Vec<(usize, &str)> = starts.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).collect();
+    let mut found = Vec::new();
+    for index in 0..lines.len().min(most) {
+        let below = || lines[index + 1..].iter().map(|(_, line)| *line);
+        let (start, line) = lines[index];
+        let Some(separator) = separators(known, line).find(|separator| is_header(line, below(), *separator)) else {
+            continue;
+        };
+        let header = Cells::of(line, separator);
+        if let Some((start, above)) = index.checked_sub(1).map(|index| lines[index])
+            && Cells::of(above, separator).are_names(header.used)
+        {
+            found.push(Candidate { start, separator });
+        }
+        found.push(Candidate { start, separator });
+    }
+    found
+}
+
+/// Returns the separator of a text that starts with its header: the one that is known, else of those that split the header
+/// the first for which the rows have as many columns.
+pub(super) fn separator(text: &str, known: Option<Separator>) -> Separator {
+    let mut lines = text.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let header = lines.next().unwrap_or_default();
+    let rows: Vec<&str> = lines.take(CHECKED_ROWS).collect();
+    let splits: Vec<Separator> = separators(known, header).collect();
+    let fits = |separator: &&Separator| {
+        let columns = Cells::of(header, **separator).used;
+        rows.iter().all(|row| Cells::of(row, **separator).used == columns)
+    };
+    *splits.iter().find(fits).or(splits.first()).unwrap_or(&known.unwrap_or(Separator::COMMA))
+}
+
+/// The separator that is known, else the usual ones, as far as they split a line.
+fn separators(known: Option<Separator>, line: &str) -> impl Iterator<Item = Separator> {
+    let is_asked = move |separator: &Separator| known.is_none_or(|known| known == *separator);
+    let other = known.filter(|known| !Separator::USUAL.contains(known));
+    let usual = Separator::USUAL.into_iter().filter(is_asked).chain(other);
+    usual.filter(move |separator| Cells::of(line, *separator).used > 1)
+}
+
+/// True for a line of names above as many columns of numbers.
+fn is_header<'t>(line: &str, mut below: impl Iterator<Item = &'t str> + Clone, separator: Separator) -> bool {
+    let header = Cells::of(line, separator);
+    let columns = header.used;
+    if let Some(line) = below.clone().next() {
+        let units = Cells::of(line, separator);
+        if units.fit(columns) && units.are_units() {
+            below.next();
+        }
+    }
+    let mut rows = below.take(CHECKED_ROWS).map(|row| Cells::of(row, separator)).peekable();
+    header.are_names(columns) && rows.peek().is_some() && rows.all(|row| row.fit(columns) && row.have_numbers())
+}
+
+/// A line, split at a separator.
+struct Cells<'t> {
+    cells: Vec<&'t str>,
+    /// Number of cells without empty ones at the end.
+    used: usize,
+}
+
+impl<'t> Cells<'t> {
+    fn of(line: &'t str, separator: Separator) -> Self {
+        let mut is_quoted = false;
+        let cells = line.trim_end_matches([' ', '\r']).split(|letter: char| {
+            is_quoted ^= letter == '"';
+            letter == char::from(separator.0) && !is_quoted
+        });
+        let cells = cells.map(|cell| cell.trim().trim_matches('"').trim());
+        // Several blanks are one separator.
+        let cells: Vec<&str> = cells.filter(|cell| separator != Separator::BLANKS || !cell.is_empty()).collect();
+        let used = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        Self { cells, used }
+    }
+
+    /// True if these can be the cells of a number of columns; the last ones may be empty.
+    fn fit(&self, columns: usize) -> bool {
+        (self.used..=self.cells.len()).contains(&columns)
+    }
+
+    fn have_numbers(&self) -> bool {
+        self.cells.iter().any(|cell| Numbers::any(cell))
+    }
+
+    /// True for the names of a number of columns.
+    fn are_names(&self, columns: usize) -> bool {
+        self.used == columns && !self.have_numbers() && !self.are_units()
+    }
+
+    /// True if at least half of the cells that say something are units, and none is a number.
+    fn are_units(&self) -> bool {
+        let said = self.cells.iter().filter(|cell| !["", "-"].contains(cell));
+        let units = said.clone().filter(|cell| is_unit(cell)).count();
+        units > 0 && 2 * units >= said.count() && !self.have_numbers()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers of the lines that can be the header, from 1.
+    fn found(text: &str) -> Vec<usize> {
+        let line = |Candidate { start, .. }: Candidate| 1 + text[..start].matches('\n').count();
+        candidates(text, None, MOST_TITLES).into_iter().map(line).collect()
+    }
+
+    #[test]
+    fn the_header_is_a_line_of_names_above_as_many_columns_of_numbers() {
+        for (text, expected) in [
+            ("t;u;x\n0;1;2\n1;1;2\n", vec![1]),
+            ("a title\nt;u;x\n0;1,5;2\n1;1;2\n", vec![2]),
+            ("serial;12\nrate;1000;Hz\n\n# a\nt;u;x\ns;kV;mm\n0;1;2\n1;1;2\n", vec![5]),
+            ("a;b;c\n1;2;3\n2;3;4\nt;u;x\n0;1;2\n1;;\n", vec![4]),
+            ("by X, of Y\nTime [s],u (V),x\n2026-01-31 10:00,0,-\n2026-01-31 10:01,0,-\n", vec![2]),
+            // What is not a line of units may be a title.
+            ("device;serial;name\nt;u;x\n0;1;2\n1;1;2\n", vec![1, 2]),
+            ("a;b;c\n1;2;3\n2;3;4\n", vec![1]),
+            ("0;1;2\n1;1;2\n", vec![]),
+            ("a title\nt;u;x\n0;1;2\n1;1\n", vec![]),
+            ("a title\n0;1;2\n", vec![]),
+        ] {
+            assert_eq!(found(text), expected, "{text:?}");
+        }
+        let table = |rows: usize| format!("channel;low;high\n{}", "1;-10;10\n".repeat(rows));
+        let second = "t;u;x\n0;1;2\n1;1;2\n";
+        assert_eq!(found(&(table(9) + second)), [11], "the first table is shorter than what is checked");
+        assert_eq!(found(&(table(16) + second)), [1, 18]);
+    }
+
+    #[test]
+    fn lines_of_units_have_units_in_half_of_their_cells() {
+        for (line, expected) in [
+            ("s;kV;mm", true),
+            ("[ms];[furlong];-", true),
+            (",;%;degC", true),
+            (";;mm", true),
+            ("t;u;x", false),
+            ("time;V;x", false),
+            ("s;1;mm", false),
+            (";;", false),
+        ] {
+            assert_eq!(Cells::of(line, Separator(b';')).are_units(), expected, "{line}");
+        }
+    }
+}
