@@ -34,13 +34,26 @@ impl Axis {
         (value - self.low) / (self.high - self.low)
     }
 
-    /// At most `most` multiples of 1, 2 or 5 times a power of ten that are on the axis, with their decimals.
+    /// At most `most` multiples of 1, 2 or 5 times a power of ten that are on the axis, with their labels.
     pub(super) fn ticks(&self, most: usize) -> Ticks {
+        self.ticks_apart(most, f64::INFINITY, |_| 0.0)
+    }
+
+    /// As [`Axis::ticks`], so few that their labels do not touch: the axis is `room` long, and a label takes `extent` of it.
+    pub(super) fn ticks_apart(&self, most: usize, room: f64, extent: impl Fn(&str) -> f64) -> Ticks {
         let length = self.high - self.low;
         let magnitude = (length / most as f64).log10().floor() as i32;
         let steps = (magnitude..).flat_map(|power| [1, 2, 5].map(|digit| (digit, power)));
-        let mut ticks = steps.map(|(digit, power)| self.multiples(digit, power));
-        ticks.find(|ticks| ticks.values.len() <= most).expect("a step as long as the axis has few multiples")
+        let mut ticks = steps.map(|(digit, power)| (room * self.part_of(digit, power), self.multiples(digit, power)));
+        let fit = |(distance, ticks): &(f64, Ticks)| {
+            ticks.values.len() <= most && ticks.labels().all(|label| extent(&label) <= *distance)
+        };
+        ticks.find(fit).expect("a step as long as the axis has few multiples").1
+    }
+
+    /// A step of `digit * 10^power` as a part of the axis' length.
+    fn part_of(&self, digit: i32, power: i32) -> f64 {
+        f64::from(digit) * 10f64.powi(power) / (self.high - self.low)
     }
 
     /// The multiples of `digit * 10^power` that are on the axis.
@@ -51,7 +64,12 @@ impl Axis {
         let (first, last) = ((self.low / step - slack).ceil(), (self.high / step + slack).floor());
         // Adding zero turns a negative zero into zero.
         let values = (0..=(last - first) as usize).map(|index| (first + index as f64) * step + 0.0).collect();
-        Ticks { values, decimals: usize::try_from(-power).unwrap_or(0) }
+        let mut ticks = Ticks { values, decimals: usize::try_from(-power).unwrap_or(0), origin: None };
+        let labels: Vec<String> = ticks.labels().collect();
+        if labels.windows(2).any(|pair| pair[0] == pair[1]) || labels.iter().any(|label| label.len() > MOST_LETTERS) {
+            ticks.origin = ticks.values.first().copied();
+        }
+        ticks
     }
 }
 
@@ -61,7 +79,12 @@ pub(super) struct Ticks {
     pub(super) values: Vec<f64>,
     /// Number of decimals of their labels.
     decimals: usize,
+    /// The value that the labels count from, if it is not zero: differences of large values have short labels.
+    origin: Option<f64>,
 }
+
+/// Largest length of a label that is written whole.
+const MOST_LETTERS: usize = 7;
 
 /// Largest number of decimals before a label is written with an exponent.
 const MOST_DECIMALS: usize = 4;
@@ -69,8 +92,20 @@ const MOST_DECIMALS: usize = 4;
 const LARGE: f64 = 1e6;
 
 impl Ticks {
-    /// The label of a tick.
-    pub(super) fn label(&self, value: f64) -> String {
+    /// The labels, in the order of the values.
+    pub(super) fn labels(&self) -> impl Iterator<Item = String> {
+        self.values.iter().map(|value| self.label(value - self.origin.unwrap_or(0.0)))
+    }
+
+    /// The name of an axis, with the value that the labels count from.
+    pub(super) fn quantity(&self, name: &str) -> String {
+        match self.origin {
+            Some(origin) => format!("{name}, from {origin:.*}", self.decimals),
+            None => name.to_owned(),
+        }
+    }
+
+    fn label(&self, value: f64) -> String {
         if value != 0.0 && (self.decimals > MOST_DECIMALS || value.abs() >= LARGE) {
             let digits = (value.abs().log10().floor() as i32 + self.decimals as i32).clamp(0, 15) as usize;
             let digits = if value.abs() >= LARGE { 3 } else { digits };
@@ -88,30 +123,49 @@ impl Ticks {
 mod tests {
     use super::*;
 
+    fn labels(axis: Axis, most: usize) -> Vec<String> {
+        axis.ticks(most).labels().collect()
+    }
+
     #[test]
     fn axis_ends_near_the_values_and_not_at_the_next_tick() {
         let axis = Axis::beyond([-2.0, 500.0].into_iter());
         assert!(axis.low > -25.0 && axis.high < 525.0, "{axis:?}");
-        let labels: Vec<String> = {
-            let ticks = axis.ticks(6);
-            ticks.values.iter().map(|&tick| ticks.label(tick)).collect()
-        };
-        assert_eq!(labels, ["0", "100", "200", "300", "400", "500"]);
+        assert_eq!(labels(axis, 6), ["0", "100", "200", "300", "400", "500"]);
     }
 
     #[test]
-    fn ticks_are_few_and_labels_short_for_every_range() {
-        for (low, high) in [(0.0, 74.5), (-1e-7, 3e-7), (1e9, 3e9), (0.1, 0.1), (0.0, 0.0), (-5.0, -4.99), (0.0, 7e6)] {
-            let ticks = Axis::beyond([low, high].into_iter()).ticks(7);
-            assert!((1..=7).contains(&ticks.values.len()), "{low} to {high}: {:?}", ticks.values);
-            for &tick in &ticks.values {
-                assert!(ticks.label(tick).len() <= 7, "{}", ticks.label(tick));
-            }
+    fn ticks_are_few_and_labels_short_and_distinct_for_every_range() {
+        for (low, high) in [
+            (0.0, 74.5),
+            (-1e-7, 3e-7),
+            (1e9, 3e9),
+            (0.1, 0.1),
+            (0.0, 0.0),
+            (-5.0, -4.99),
+            (0.0, 7e6),
+            (101_325.0, 101_325.02),
+            (1_767_225_600.0, 1_767_225_605.0),
+        ] {
+            let labels = labels(Axis::beyond([low, high].into_iter()), 7);
+            assert!((1..=7).contains(&labels.len()), "{low} to {high}: {labels:?}");
+            assert!(labels.iter().all(|label| label.len() <= MOST_LETTERS), "{labels:?}");
+            assert!(labels.windows(2).all(|pair| pair[0] != pair[1]), "{labels:?}");
         }
-        let ticks = Axis::exact([-1e-7, 3e-7].into_iter()).ticks(5);
-        assert_eq!(
-            ticks.values.iter().map(|&tick| ticks.label(tick)).collect::<Vec<_>>(),
-            ["-1e-7", "0", "1e-7", "2e-7", "3e-7"]
-        );
+        assert_eq!(labels(Axis::exact([-1e-7, 3e-7].into_iter()), 5), ["-1e-7", "0", "1e-7", "2e-7", "3e-7"]);
+    }
+
+    #[test]
+    fn labels_of_large_values_count_from_the_first_tick() {
+        let ticks = Axis::exact([1_767_225_600.0, 1_767_225_604.0].into_iter()).ticks(5);
+        assert_eq!(ticks.labels().collect::<Vec<_>>(), ["0", "1", "2", "3", "4"]);
+        assert_eq!(ticks.quantity("time [s]"), "time [s], from 1767225600");
+    }
+
+    #[test]
+    fn there_are_fewer_ticks_where_their_labels_would_touch() {
+        let axis = Axis::exact([0.0120, 0.0127].into_iter());
+        let count = |room: f64| axis.ticks_apart(8, room, |label| label.len() as f64 + 1.0).labels().count();
+        assert_eq!([count(100.0), count(40.0), count(20.0)], [8, 4, 2]);
     }
 }

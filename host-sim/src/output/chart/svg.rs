@@ -18,6 +18,10 @@ const LINE: f64 = 30.0;
 const BELOW: f64 = 26.0;
 /// Width of a letter in a narrow plot.
 const LETTER: f64 = 13.0;
+/// Width of a digit in a narrow plot, in a wide typeface.
+const DIGIT: f64 = 14.0;
+/// Distance from a label to the axis that it is left of.
+const GAP: f64 = 8.0;
 /// Width of the sample of a line in the legend, with its distances.
 const SAMPLE: f64 = 64.0;
 /// Largest number of labels on the horizontal and the vertical axis.
@@ -115,7 +119,9 @@ impl<'a> Panel<'a> {
         if !chart.title.is_empty() {
             text(out, (0.5 * WIDTH, self.title), "middle", " font-weight=\"600\"", &chart.title)?;
         }
-        text(out, (8.0, top - 12.0), "start", "", &chart.y)?;
+        let across = self.axes[0].ticks_apart(MOST[0], right - LEFT, |label| width_of(label) + beyond(label) + GAP);
+        let upwards = self.axes[1].ticks_apart(MOST[1], bottom - top, |_| 0.75 * LINE);
+        text(out, (8.0, top - 12.0), "start", "", &upwards.quantity(&chart.y))?;
         if let Some(band) = chart.band {
             let [high, low] = [band, -band].map(|y| self.at((0.0, y)).1);
             let (width, height) = (right - LEFT, low - high);
@@ -124,7 +130,6 @@ impl<'a> Panel<'a> {
                 r##"<rect x="{LEFT}" y="{high:.1}" width="{width}" height="{height:.1}" fill="#888888" fill-opacity="0.25"/>"##
             )?;
         }
-        let [across, upwards] = [self.axes[0].ticks(MOST[0]), self.axes[1].ticks(MOST[1])];
         write!(out, r#"<path d=""#)?;
         for x in across.values.iter().map(|&tick| self.at((tick, 0.0)).0) {
             write!(out, "M{x:.1} {top}V{bottom}")?;
@@ -134,13 +139,15 @@ impl<'a> Panel<'a> {
         }
         writeln!(out, r#"" stroke="{GRID}"/>"#)?;
         writeln!(out, r#"<path d="M{LEFT} {top}V{bottom}H{right}" stroke="{INK}" fill="none"/>"#)?;
-        for &tick in &across.values {
-            text(out, (self.at((tick, 0.0)).0, bottom + BELOW), "middle", "", &across.label(tick))?;
+        for (&tick, label) in across.values.iter().zip(across.labels()) {
+            let x = self.at((tick, 0.0)).0.min(WIDTH - 0.5 * width_of(&label));
+            text(out, (x, bottom + BELOW), "middle", "", &label)?;
         }
-        for &tick in &upwards.values {
-            text(out, (LEFT - 8.0, self.at((0.0, tick)).1 + 6.0), "end", "", &upwards.label(tick))?;
+        for (&tick, label) in upwards.values.iter().zip(upwards.labels()) {
+            let right = (LEFT - GAP).max(width_of(&label)).min(LEFT - 1.0);
+            text(out, (right, self.at((0.0, tick)).1 + 6.0), "end", "", &label)?;
         }
-        text(out, (0.5 * (LEFT + right), bottom + BELOW + LINE), "middle", "", &chart.x)?;
+        text(out, (0.5 * (LEFT + right), bottom + BELOW + LINE), "middle", "", &across.quantity(&chart.x))?;
         chart.series.iter().try_for_each(|series| self.series(out, series))?;
         for (series, &(x, y)) in chart.series.iter().zip(&self.legend) {
             sample(out, series, (x, y - 6.0))?;
@@ -229,6 +236,16 @@ fn sample(out: &mut String, series: &Series, (x, y): (f64, f64)) -> std::fmt::Re
     disc(out, series, (x + 15.0, y))
 }
 
+/// Length by which the label of a tick at the right end would exceed a narrow plot.
+fn beyond(label: &str) -> f64 {
+    (0.5 * width_of(label) - RIGHT).max(0.0)
+}
+
+/// Width of the label of a tick in a narrow plot.
+fn width_of(label: &str) -> f64 {
+    label.chars().map(|letter| if ['.', '-'].contains(&letter) { 0.55 * DIGIT } else { DIGIT }).sum()
+}
+
 fn text(out: &mut String, (x, y): (f64, f64), anchor: &str, more: &str, text: &str) -> std::fmt::Result {
     if text.is_empty() {
         return Ok(());
@@ -245,6 +262,8 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prop_assert;
+    use proptest::test_runner::{Config, TestRunner};
 
     fn chart(names: &[&str], size: f64) -> Chart {
         let series = names.iter().map(|name| Series::line(name, "#0072b2", vec![(0.0, -size), (10.0, size)]));
@@ -279,6 +298,48 @@ mod tests {
             assert!(*y > panel.span[1] + BELOW && *y < panel.bottom, "{name}: {y}");
             assert!(x + SAMPLE + LETTER * name.len() as f64 <= WIDTH, "{name}: {x}");
         }
+    }
+
+    /// Left, right, upper and lower end of the labels of both axes in a narrow plot.
+    fn boxes(svg: &str) -> Vec<[f64; 4]> {
+        let value = |line: &str, name: &str| -> Option<f64> {
+            line.split_once(&format!(" {name}=\""))?.1.split('"').next()?.parse().ok()
+        };
+        let of = |line: &str| {
+            let label = line.split_once('>')?.1.split('<').next()?;
+            label.parse::<f64>().ok()?;
+            let (x, y, width) = (value(line, "x")?, value(line, "y")?, width_of(label));
+            let left = x - if line.contains("\"middle\"") { 0.5 * width } else { width };
+            Some([left, left + width, y - 16.0, y])
+        };
+        svg.lines().filter(|line| line.starts_with("<text")).filter_map(of).collect()
+    }
+
+    #[test]
+    fn labels_of_the_axes_neither_touch_nor_leave_a_narrow_plot() {
+        let mut random = TestRunner::new(Config { failure_persistence: None, ..Config::with_cases(2000) });
+        let ends = (-1e5..1e5f64, -6..5i32, 0.0..1.0f64);
+        let both = ((ends.clone(), ends), 100.0..300.0f64);
+        random
+            .run(&both, |((x, y), height)| {
+                let from =
+                    |(low, power, length): (f64, i32, f64), part: f64| low + part * (0.01 + length) * 10f64.powi(power);
+                let points =
+                    (0..9).map(|part| f64::from(part) / 8.0).map(|part| (from(x, part), from(y, part))).collect();
+                let series = vec![Series::line("a", "#0072b2", points)];
+                let boxes = boxes(&file(&[&Chart { height, ..Chart::new("", "t", "y", series) }]));
+                prop_assert!(boxes.len() >= 4, "{boxes:?}");
+                for (index, [left, right, top, bottom]) in boxes.iter().enumerate() {
+                    prop_assert!(*left >= -5.0 && *right <= WIDTH, "{left} to {right}");
+                    for [other_left, other_right, other_top, other_bottom] in &boxes[..index] {
+                        let apart =
+                            right <= other_left || other_right <= left || bottom <= other_top || other_bottom <= top;
+                        prop_assert!(apart, "{boxes:?}");
+                    }
+                }
+                Ok(())
+            })
+            .unwrap();
     }
 
     #[test]
