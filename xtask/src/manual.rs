@@ -37,8 +37,8 @@ default-theme = \"light\"
 preferred-dark-theme = \"navy\"
 ";
 
-/// Builds the book. Returns the folder of its pages.
-pub(crate) fn build() -> Result<PathBuf> {
+/// Builds the book with the help of the program `vsj`. Returns the folder of its pages.
+pub(crate) fn build(vsj: &Path) -> Result<PathBuf> {
     let target = shell::target_directory()?;
     let mdbook = MDBOOK.program()?;
     let folder = target.join("manual");
@@ -48,7 +48,7 @@ pub(crate) fn build() -> Result<PathBuf> {
     for file in files::tracked(&SOURCES)?.iter().filter(|file| *file != CONTENTS) {
         files::copy(&shell::root().join(file), &sources.join(file))?;
     }
-    let commands = commands(&build::vsj()?, &sources.join("commands"))?;
+    let commands = commands(vsj, &sources.join("commands"))?;
     let contents =
         fs::read_to_string(shell::root().join(CONTENTS)).with_context(|| format!("cannot read {CONTENTS}"))?;
     files::write(&sources.join("SUMMARY.md"), &contents_of_book(&contents, &causes()?, &commands)?)?;
@@ -59,7 +59,7 @@ pub(crate) fn build() -> Result<PathBuf> {
 
 /// Builds the book and prints the path of its first page.
 pub(crate) fn run() -> Result<()> {
-    println!("{}", build()?.join("index.html").display());
+    println!("{}", build(&build::vsj()?)?.join("index.html").display());
     Ok(())
 }
 

@@ -43,7 +43,7 @@ pub(crate) fn run() -> Result<()> {
     for text in TEXTS {
         files::copy(&shell::root().join(text), &new.join(text))?;
     }
-    copy_folder(&manual::build()?, &new.join("manual"))?;
+    copy_folder(&manual::build(&program)?, &new.join("manual"))?;
     copy_folder(&page::build()?, &new.join("page"))?;
     let changes = fs::read_to_string(shell::root().join("CHANGELOG.md")).context("cannot read CHANGELOG.md")?;
     files::write(&new.join("CHANGES.md"), section(&changes, version)?)?;
