@@ -12,8 +12,8 @@ use crate::output::diagnosis::tables;
 use crate::output::page::Row;
 
 /// Explanation of the table.
-const CAPTION: &str = "Causes that come closest to a finding and are none. Each would be one with so many nats more; an error that \
-                       grows means that the rest of the record does not predict the cause. One that the extended simulation \
+const CAPTION: &str = "Causes that come closest to a finding and are none: the score of each lacks this number of nats. An error that grows \
+                       means that the rest of the record does not predict the cause. One that the extended simulation \
                        contains has a probability below 0.5.";
 
 /// The table for the terminal; empty without suspects.
