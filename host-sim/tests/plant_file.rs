@@ -18,6 +18,21 @@ fn json(output: &Output) -> serde_json::Value {
 }
 
 #[test]
+fn what_the_tick_does_not_simulate_is_remarked_on_by_every_command_that_runs_it() {
+    let folder = tempdir().unwrap();
+    let heater = format!("{}\n", WHOLE.replace("voltage = \"V\"", "voltage = \"%\""));
+    std::fs::write(folder.path().join("plant.toml"), heater).unwrap();
+    for arguments in ["stair --input step", "compare", "export c --out out"] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
+        command.current_dir(folder.path()).args(arguments.split(' ')).args(["--plant", "plant.toml"]);
+        let said = String::from_utf8(command.output().unwrap().stderr).unwrap();
+        assert!(said.contains("plant.toml: not simulated: amplifier.delay_s, drift, remarks\n"), "{arguments}: {said}");
+        let unit = "plant.toml: the command is in %: every V of target, voltage and stiffness is a %, within the range of --limit-v";
+        assert!(said.contains(unit), "{arguments}: {said}");
+    }
+}
+
+#[test]
 fn an_extended_spring_behind_its_recorded_amplifier() {
     let folder = tempdir().unwrap();
     let weaker = WHOLE.replace("650.0", "450.0");

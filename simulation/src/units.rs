@@ -132,6 +132,11 @@ impl UnitNames {
             reading: self.reading.clone().unwrap_or(default.reading),
         })
     }
+
+    /// Name of the command's unit if it is no voltage.
+    pub fn other_command(&self) -> Option<&str> {
+        self.voltage.as_deref().filter(|name| usual_volts(name).is_none())
+    }
 }
 
 impl From<&Units> for UnitNames {
@@ -153,6 +158,9 @@ mod tests {
         assert_eq!(UnitNames::from(&units), names);
         assert_eq!(UnitNames::default().units().unwrap(), Units::default());
         assert_eq!(Unit::of_voltage("%").si, 1.0);
+        assert_eq!(names.other_command(), None);
+        let heater = UnitNames { voltage: Some("%".into()), ..names };
+        assert_eq!(heater.other_command(), Some("%"));
         assert!(Unit::of_time("parsec").unwrap_err().to_string().contains("expected ns, us, ms, s, min, h or d"));
     }
 }

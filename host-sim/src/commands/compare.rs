@@ -8,8 +8,8 @@ use model::Amplifier;
 use simulation::bad_input;
 use simulation::comparison::{Actual, compare};
 use simulation::option_names::{SETTINGS, named};
-use simulation::plant_file;
 
+use super::plant;
 use super::spring_error::{ErrorOf, Known, together};
 
 /// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller
@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if arguments.limit_v.len() > MOST_AMPLIFIERS {
         bad_input!("--limit-v: {} amplifiers; expected at most {MOST_AMPLIFIERS}", arguments.limit_v.len());
     }
-    let file = plant_file::load(&arguments.plant)?;
+    let file = plant::load(&arguments.plant)?;
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
     let actual = arguments.actual()?;

@@ -17,6 +17,7 @@ pub(crate) mod link;
 pub(crate) mod log;
 mod loop_arguments;
 pub(crate) mod plan;
+mod plant;
 mod record_arguments;
 pub(crate) mod reproduce;
 mod spring_error;

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::choice::{BETWEEN, one_of};
 use super::loop_arguments::LoopArguments;
+use super::plant;
 use anyhow::Result;
 use clap::{Args, Parser};
 use host_sim::output::file::write_whole;
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, remark, wrote};
+use host_sim::output::terminal::{json, print, wrote};
 use host_sim::output::ticks::Ticks;
 use host_sim::output::{plots, stair};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -19,7 +20,7 @@ use simulation::bad_input::number;
 use simulation::control_loop::{Controller, Options};
 use simulation::experiment::paper_spring;
 use simulation::option_names::{SETTINGS, named};
-use simulation::plant_file::{self, PlantFile};
+use simulation::plant_file::PlantFile;
 use simulation::record::{MEASURED, Record};
 use simulation::schedule::Between;
 
@@ -116,11 +117,7 @@ impl Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     arguments.check()?;
     let options = arguments.control.options()?;
-    let file = plant_file::load(&arguments.control.plant)?;
-    let left_out = file.left_out();
-    if !left_out.is_empty() {
-        remark(&format!("{}: not simulated: {}", arguments.control.plant, left_out.join(", ")));
-    }
+    let file = plant::load(&arguments.control.plant)?;
     let stride = arguments.stride(options.rate_hz)?;
     let record = match arguments.input.as_str() {
         "stair" | "step" => None,

@@ -10,10 +10,10 @@ use host_sim::output::tune as output;
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::option_names::{SETTINGS, named};
-use simulation::plant_file;
 use simulation::tune::{Knowledge, Specification, tune};
 
 use super::identified::errors;
+use super::plant;
 use super::spring_error::ErrorOf;
 
 /// Choose gains and settings for a spring and an amplifier, with stability margins and the effect of model errors
@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if !(0.0..=100.0).contains(&overshoot_percent) {
         bad_input!("--overshoot-percent {overshoot_percent}: expected 0 to 100");
     }
-    let file = plant_file::load(&arguments.plant)?;
+    let file = plant::load(&arguments.plant)?;
     let amplifier =
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
     let knowledge = arguments.knowledge()?;

@@ -15,8 +15,10 @@ pub fn text(tuning: &Tuning, plant: &str) -> String {
     let mut text = String::new();
     let Tuning { limit_v, proportional_integral, fast, trade, uncertainty } = tuning;
     line(&mut text, &format!("Slowest step of the ideal stair, up to {limit_v} V:"));
-    let worst =
-        |worst: &Worst| format!("t97 {} s, overshoot {:.2} %", optional(worst.t97_s, 3), worst.overshoot_percent);
+    let worst = |worst: &Worst| {
+        let reached = worst.t97_s.map_or("a step ends before its 97 %".to_owned(), |t97| format!("t97 {t97:.3} s"));
+        format!("{reached}, overshoot {:.2} %", worst.overshoot_percent)
+    };
     match proportional_integral {
         None => line(
             &mut text,

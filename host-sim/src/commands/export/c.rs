@@ -6,11 +6,11 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::output::export::c::{Answer, text, write};
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, remark, wrote};
+use host_sim::output::terminal::{json, print, wrote};
 use simulation::control_loop::ControlLoop;
-use simulation::plant_file;
 
 use super::super::loop_arguments::LoopArguments;
+use super::super::plant;
 
 /// Write the controller's settings for C, with the header of its library and an example
 ///
@@ -39,11 +39,8 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let (name, options) = (&arguments.control.plant, arguments.control.options()?);
-    let plant = plant_file::load(name)?;
+    let plant = plant::load(name)?;
     let not_simulated = plant.left_out();
-    if !not_simulated.is_empty() {
-        remark(&format!("{name}: not simulated: {}", not_simulated.join(", ")));
-    }
     ControlLoop::new(&plant, &options)?;
     let mut files = Files::new(&arguments.out)?;
     write(&options.settings(&plant), name, &not_simulated, &mut files)?;

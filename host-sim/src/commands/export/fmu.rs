@@ -7,13 +7,14 @@ use clap::Args;
 use host_sim::output::export::fmu::{Units, text, write};
 use host_sim::output::export::library::{Library, find};
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, remark, wrote};
+use host_sim::output::terminal::{json, print, wrote};
 use simulation::bad_input;
 use simulation::plant_file;
 use vsj_fmu::{Kind, Unit, Version};
 
 use super::super::choice::{FMI, UNIT, one_of};
 use super::super::loop_arguments::LoopArguments;
+use super::super::plant::remark_on;
 
 /// Name of the library beside `vsj`, without its ending.
 const LIBRARY: &str = "vsj_fmu";
@@ -55,10 +56,8 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let (plant, plant_text) = plant_file::load_with_text(&arguments.control.plant)?;
+    remark_on(&arguments.control.plant, &plant);
     let not_simulated = plant.left_out();
-    if !not_simulated.is_empty() {
-        remark(&format!("{}: not simulated: {}", arguments.control.plant, not_simulated.join(", ")));
-    }
     let unit = Unit { kind: Kind::Both, plant, options: arguments.control.options()? };
     unit.check()?;
     let libraries = libraries(&arguments.library)?;

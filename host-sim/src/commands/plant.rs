@@ -1,0 +1,26 @@
+//! Plant files of the commands that run the tick.
+
+use anyhow::Result;
+use simulation::plant_file::{self, PlantFile};
+
+use host_sim::output::terminal::remark;
+
+/// Reads a plant file, and remarks on what the tick does not simulate of it.
+pub(crate) fn load(name: &str) -> Result<PlantFile> {
+    let file = plant_file::load(name)?;
+    remark_on(name, &file);
+    Ok(file)
+}
+
+/// Remarks on effects that the tick does not simulate, and on a command that is no voltage.
+pub(crate) fn remark_on(name: &str, file: &PlantFile) {
+    let left_out = file.left_out();
+    if !left_out.is_empty() {
+        remark(&format!("{name}: not simulated: {}", left_out.join(", ")));
+    }
+    if let Some(unit) = file.units.as_ref().and_then(|units| units.other_command()) {
+        remark(&format!(
+            "{name}: the command is in {unit}: every V of target, voltage and stiffness is a {unit}, within the range of --limit-v"
+        ));
+    }
+}
