@@ -73,6 +73,28 @@ fn a_diagnosis_does_not_depend_on_the_format_of_the_file() {
     assert!((error(&plain) / error(&foreign) - 1.0).abs() < 1e-3, "{plain} {foreign}");
 }
 
+/// Titles above the header and units below it change no byte of the answers.
+#[test]
+fn titles_and_units_change_no_answer() {
+    let hidden = Recipe { rows: 600, ..Recipe::of(&[Cause::GainError]) }.draw(4);
+    let folder = tempdir().expect("a folder");
+    let rows: Vec<String> = hidden.csv().lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect();
+    let (header, rows) = rows.split_first().expect("a header");
+    let rows = rows.join("\n");
+    let [plain, titled] = ["", "Rig 4, test 17\nChannels,3\n"].map(|titles| {
+        let units = if titles.is_empty() { "" } else { "s,V,V\n" };
+        let file = folder.path().join("record.csv");
+        fs::write(file, format!("{titles}{header}\n{units}{rows}\n")).expect("a file");
+        ["identify", "diagnose"].map(|command| run(folder.path(), &[command, "record.csv", "--json"]))
+    });
+    for (plain, titled) in plain.iter().zip(&titled) {
+        assert!(plain.status.success() && !plain.stdout.is_empty(), "{}", text(&plain.stderr));
+        assert_eq!(text(&titled.stdout), text(&plain.stdout));
+        let said = "vsj: record.csv: 2 line(s) above the header in line 3, skipped\nvsj: record.csv: units s, V, V below the header\n";
+        assert!(text(&titled.stderr).starts_with(said), "{}", text(&titled.stderr));
+    }
+}
+
 #[test]
 fn a_schedule_may_have_other_separators_but_no_missing_voltage() {
     let folder = tempdir().expect("a folder");
