@@ -20,6 +20,7 @@ const SOURCES: [&str; 5] = ["docs", "data", "README.md", "CONTRIBUTING.md", "CHA
 const CONTENTS: &str = "docs/SUMMARY.md";
 /// Lines of the contents that are replaced by lists.
 const CAUSES: &str = "<!-- causes -->";
+const CAMPAIGNS: &str = "<!-- campaigns -->";
 const COMMANDS: &str = "<!-- commands -->";
 
 const BOOK: &str = "\
@@ -31,6 +32,10 @@ language = \"en\"
 [build]
 build-dir = \"book\"
 create-missing = false
+# A README.md keeps its name, which links to it use.
+use-default-preprocessors = false
+
+[preprocessor.links]
 
 [output.html]
 default-theme = \"light\"
@@ -51,7 +56,7 @@ pub(crate) fn build(vsj: &Path) -> Result<PathBuf> {
     let commands = commands(vsj, &sources.join("commands"))?;
     let contents =
         fs::read_to_string(shell::root().join(CONTENTS)).with_context(|| format!("cannot read {CONTENTS}"))?;
-    files::write(&sources.join("SUMMARY.md"), &contents_of_book(&contents, &causes()?, &commands)?)?;
+    files::write(&sources.join("SUMMARY.md"), &contents_of_book(&contents, &causes()?, &campaigns()?, &commands)?)?;
     files::write(&folder.join("book.toml"), BOOK)?;
     shell::run(shell::command(&mdbook).arg("build").arg(&folder))?;
     Ok(folder.join("book"))
@@ -100,13 +105,20 @@ fn causes() -> Result<String> {
     Ok(names.iter().map(|name| format!("- [{}](causes/{name}.md)\n", title(name))).collect())
 }
 
+/// The lines of the contents for the results of the campaigns, below the page about all of them.
+fn campaigns() -> Result<String> {
+    let pages = files::tracked(&["docs/identification"])?;
+    let names = pages.iter().filter_map(|page| page.strip_prefix("docs/identification/")?.strip_suffix(".md"));
+    Ok(names.map(|name| format!("  - [{name}](identification/{name}.md)\n")).collect())
+}
+
 /// The contents with links relative to the book instead of the documents' folder, and with the lists in their places.
-fn contents_of_book(contents: &str, causes: &str, commands: &str) -> Result<String> {
-    for place in [CAUSES, COMMANDS] {
+fn contents_of_book(contents: &str, causes: &str, campaigns: &str, commands: &str) -> Result<String> {
+    for place in [CAUSES, CAMPAIGNS, COMMANDS] {
         ensure!(contents.contains(place), "{CONTENTS} has no line {place}");
     }
-    let with_causes = contents.replace(CAUSES, causes.trim_end());
-    let relative = with_causes.replace("](", "](docs/").replace("](docs/../", "](");
+    let with_lists = contents.replace(CAUSES, causes.trim_end()).replace(CAMPAIGNS, campaigns.trim_end());
+    let relative = with_lists.replace("](", "](docs/").replace("](docs/../", "](");
     Ok(relative.replace(COMMANDS, commands.trim_end()))
 }
 
@@ -116,11 +128,24 @@ mod tests {
 
     #[test]
     fn links_of_the_contents_start_at_the_root_of_the_book() {
-        let contents = "[vsj](../README.md)\n- [Stair](stair.md)\n<!-- causes -->\n<!-- commands -->\n";
-        let book = contents_of_book(contents, "- [All](causes/README.md)\n", "- [vsj](commands/vsj.md)\n").unwrap();
-        let expected =
-            "[vsj](README.md)\n- [Stair](docs/stair.md)\n- [All](docs/causes/README.md)\n- [vsj](commands/vsj.md)\n";
+        let contents =
+            "[vsj](../README.md)\n- [Stair](stair.md)\n<!-- campaigns -->\n<!-- causes -->\n<!-- commands -->\n";
+        let [causes, campaigns] = ["- [All](causes/README.md)\n", "  - [pairs](identification/pairs.md)\n"];
+        let book = contents_of_book(contents, causes, campaigns, "- [vsj](commands/vsj.md)\n").unwrap();
+        let expected = "[vsj](README.md)\n- [Stair](docs/stair.md)\n  - [pairs](docs/identification/pairs.md)\n\
+                        - [All](docs/causes/README.md)\n- [vsj](commands/vsj.md)\n";
         assert_eq!(book, expected);
-        assert!(contents_of_book("<!-- causes -->", "", "").is_err());
+        assert!(contents_of_book("<!-- causes -->", "", "", "").is_err());
+    }
+
+    /// What is not in the contents is no page of the book, and links to it lead nowhere.
+    #[test]
+    fn every_document_is_in_the_contents() {
+        let contents = fs::read_to_string(shell::root().join(CONTENTS)).unwrap();
+        let book = contents_of_book(&contents, &causes().unwrap(), &campaigns().unwrap(), "").unwrap();
+        for page in files::tracked(&["*.md"]).unwrap() {
+            let is_of_book = SOURCES.iter().any(|source| page == *source || page.starts_with(&format!("{source}/")));
+            assert!(!is_of_book || page == CONTENTS || book.contains(&format!("]({page})")), "{page}");
+        }
     }
 }
