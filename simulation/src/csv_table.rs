@@ -99,7 +99,10 @@ impl<'a> Table<'a> {
         keep_columns(&mut header, separator, |index| index <= last_name);
         let twice =
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
-        if let Some((_, column)) = header.iter().enumerate().find(twice) {
+        // Numbers are no names: the error for a missing column says so.
+        if !are_numbers(&header)
+            && let Some((_, column)) = header.iter().enumerate().find(twice)
+        {
             let column = excerpt(column);
             bad_input!(
                 "{}: column `{column}` appears twice; expected every column once",
@@ -178,7 +181,7 @@ impl<'a> Table<'a> {
         if self.columns().any(unclosed) {
             return BadInput(format!("{place}: {UNCLOSED}; expected a header with {expected}"));
         }
-        if self.columns().all(|column| column.parse::<f64>().is_ok()) {
+        if are_numbers(&self.header) {
             return BadInput(format!("{place}: numbers instead of names; expected a header with {expected}"));
         }
         let found = excerpt(&self.columns().collect::<Vec<_>>().join(","));
@@ -249,6 +252,11 @@ fn keep_columns(record: &mut StringRecord, separator: Separator, keep: impl Fn(u
     let mut kept: StringRecord = (0..).zip(cells).filter(|(index, _)| keep(*index)).map(|(_, cell)| cell).collect();
     kept.set_position(position);
     *record = kept;
+}
+
+/// True for a row of numbers where names were expected.
+fn are_numbers(header: &StringRecord) -> bool {
+    header.iter().all(|column| column.parse::<f64>().is_ok())
 }
 
 /// A column's name without case, blanks, quotes and byte order marks.

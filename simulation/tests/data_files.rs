@@ -325,6 +325,12 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
             "line 1: no column `stiffness`; expected a header with t, voltage_v, stiffness, or --time t --voltage u --reading y, found `t,u,y`",
         ),
         (
+            "time,u_V,x_mm\n31.01.2026 10:00,1,2\n".into(),
+            &any,
+            "line 2, column time: `31.01.2026 10:00` is not a time stamp of ISO 8601; expected a number or one such as 2026",
+        ),
+        ("0,0,2\n1,2,3\n".into(), &any, "line 1: numbers instead of names; expected a header with time_s"),
+        (
             "0,1,2\n1,2,3\n".into(),
             &any,
             "line 1: numbers instead of names; expected a header with time_s, voltage_v, stiffness",

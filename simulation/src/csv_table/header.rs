@@ -109,9 +109,10 @@ impl<'t> Cells<'t> {
         self.cells.iter().any(|cell| Numbers::any(cell))
     }
 
-    /// True for the names of a number of columns.
+    /// True for the names of a number of columns: different ones, of which the first may be empty, as spreadsheets write indices.
     fn are_names(&self, columns: usize) -> bool {
-        self.used == columns && !self.have_numbers() && !self.are_units()
+        let is_new = |index: usize| !self.cells[index].is_empty() && !self.cells[..index].contains(&self.cells[index]);
+        self.used == columns && (1..columns).all(is_new) && !self.have_numbers() && !self.are_units()
     }
 
     /// True if at least half of the cells that say something are units, and none is a number.
@@ -143,6 +144,8 @@ mod tests {
             // What is not a line of units may be a title.
             ("device;serial;name\nt;u;x\n0;1;2\n1;1;2\n", vec![1, 2]),
             ("a;b;c\n1;2;3\n2;3;4\n", vec![1]),
+            (";a;b\n1;2;3\n2;3;4\n", vec![1]),
+            ("\"X\",\"7\"\n\"t\",\"u\",\"x\"\n\"s\",\"V\",\"mm\"\n\"\",\"Avg\",\"Avg\"\n0,1,2\n1,1,2\n", vec![]),
             ("0;1;2\n1;1;2\n", vec![]),
             ("a title\nt;u;x\n0;1;2\n1;1\n", vec![]),
             ("a title\n0;1;2\n", vec![]),

@@ -5,6 +5,7 @@ use chrono::{DateTime, NaiveDateTime};
 use anyhow::Result;
 
 use crate::bad_input;
+use crate::bad_input::excerpt;
 use crate::csv_table::Row;
 
 /// A time as read from a cell.
@@ -54,6 +55,12 @@ impl Clock {
             None if is_date(text) => bad_input!(
                 "{}: `{text}` is a date without time; expected a number or a time stamp such as 2026-01-31T23:59:58.5",
                 row.place(column)
+            ),
+            // A clock's time or a date of another form.
+            None if text.contains([':', '/']) => bad_input!(
+                "{}: `{}` is not a time stamp of ISO 8601; expected a number or one such as 2026-01-31T23:59:58.5",
+                row.place(column),
+                excerpt(text)
             ),
             None => First::Number(row.number(column)?, Exact::parse(text)),
         });
