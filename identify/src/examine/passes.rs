@@ -261,6 +261,12 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
         report.suspects.clear();
     }
     report.take_out = unsupported_terms;
+    // What stands in for a part of the plant file counts by what it removes beyond that part.
+    for finding in &mut report.findings {
+        finding.rmse_before = finding.rmse_before.min(report.baseline.rmse).max(finding.rmse_after);
+    }
+    credibility::with_unknown_laws(&mut report.findings);
+    diagnosis::without_the_unearned(report, &without.extended);
     without.baseline = with.baseline;
     let [before, _] = with.held_out;
     without.held_out[0] = before;
