@@ -6,6 +6,7 @@ use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
 use crate::fit::engine::Fit;
 use crate::noise::Noise;
+use crate::search::evaluator::Breadth;
 use crate::search::{Evaluator, Search, WarmStart, effects};
 
 /// Price of every block, in nats.
