@@ -67,6 +67,12 @@ pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
     findings.iter_mut().filter(spoils).for_each(|finding| lower(finding, IF_SPOILING.get()));
 }
 
+/// True if there are causes, not proved by exact equality of readings, and each is less likely true than untrue.
+pub(crate) fn are_unlikely(findings: &[Finding]) -> bool {
+    let mut causes = findings.iter().filter(|finding| !EXACT.contains(&finding.cause)).peekable();
+    causes.peek().is_some() && causes.all(|finding| finding.probability < EVEN)
+}
+
 /// In a record with the verdict `unexplained`, makes suspects of the findings that are less likely true than untrue.
 pub(crate) fn unlikely_to_suspects(report: &mut Report) {
     if report.verdict == Verdict::Unexplained {
@@ -128,6 +134,10 @@ mod tests {
         let mut findings = [finding("hysteresis", 20.0), finding("resonance", 15.0), finding("hum", 4.0)];
         with_unknown_laws(&mut findings);
         assert!(probabilities(&findings).iter().all(|probability| *probability > 0.97), "{findings:?}");
+        assert!(!are_unlikely(&findings) && !are_unlikely(&[]));
+        let mut findings = [finding("resonance", 1.02), finding("quantisation", 1.0)];
+        with_unknown_laws(&mut findings);
+        assert!(are_unlikely(&findings), "{findings:?}");
     }
 
     #[test]
