@@ -85,12 +85,14 @@ impl<'e, E: Evaluator> Search<'e, E> {
         }
     }
 
-    /// Tries the forms that are seldom needed, with the work that was kept for them: alone, in addition to the best structure, and in
-    /// place of each of its blocks; then extends what was found as usual.
+    /// Tries the forms that are seldom needed, with the work that was kept for them: for the best structure's causes, alone, in
+    /// addition to it, and in place of each of its blocks; then extends what was found as usual.
     fn with_rare_forms(&mut self, best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
         self.evaluator.begin_rare_forms();
         let common = best.fit.model.structure();
         self.try_forms(Forms::Rare);
+        let reformed = self.reformed(best);
+        let best = self.pruned(reformed);
         let root = self.root();
         let children = [root, best.clone()].map(|node| self.children(&node)).into_iter().flatten();
         let mut best = children.fold(best, |best, other| if other.score > best.score { other } else { best });

@@ -39,7 +39,9 @@ const APART: [&str; 2] = ["hum", "outliers"];
 pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
     let removed: Vec<f64> = findings.iter().map(|finding| explained(finding).max(0.0)).collect();
     let largest_but = |index: usize| {
-        let others = removed.iter().enumerate().filter(|(other, _)| *other != index);
+        // What equality of readings proves follows no law that another cause could correct.
+        let corrected = |other: usize| other != index && !EXACT.contains(&findings[other].cause);
+        let others = removed.iter().enumerate().filter(|(other, _)| corrected(*other));
         others.map(|(_, removed)| *removed).fold(0.0, f64::max)
     };
     let own = |(index, finding): (usize, &Finding)| {
