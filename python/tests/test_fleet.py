@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 
 import distributed
 import numpy as np
@@ -204,6 +205,67 @@ def test_a_row_is_the_diagnosis_of_its_record(copied, tmp_path, engine):
     assert len(frame) >= 4
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--plant", "identify"),
+        ("--time", "nope"),
+        ("--voltage", "nope"),
+        ("--reading", "nope"),
+        ("--column", "nope"),
+        ("--columns", "columns.toml"),
+        ("--separator", ";"),
+        ("--decimal", ","),
+        ("--sort",),
+        ("--input", "linear"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_every_option_of_a_diagnosis_reaches_its_record(copied, tmp_path, engine, command, monkeypatch, words):
+    """The row is what the command answers with the option, and another one than without it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "columns.toml").write_text('[columns]\ntime = "nope"\n')
+    path = sorted(copied.glob("s1/*.csv"))[0]
+    if words[0] == "--sort":
+        header, first, second, *rest = path.read_text().splitlines(keepends=True)
+        path.write_text("".join([header, second, first, *rest]))
+    (copied / "list.csv").write_text(f"record\n{path.relative_to(copied)}\n")
+
+    def row(*options):
+        out = str(tmp_path / "-".join(["out", *(it.strip("-.;,") for it in options)]))
+        fleet.main([str(copied / "list.csv"), "--out", out, "--scheduler", engine, "--effort", "quick", *options])
+        [only] = rows_of(out).values()
+        return only["error"], only["rmse"]
+
+    options = [tmp_path / "columns.toml" if it == "columns.toml" else it for it in words]
+    run = subprocess.run([command.path, "diagnose", path, "--effort", "quick", "--json", *options], capture_output=True, text=True)
+    if run.returncode == 0:
+        expected = None, json.loads(run.stdout)["baseline"]["rmse"]
+    else:
+        expected = run.stderr.strip().splitlines()[-1].removeprefix("vsj: "), None
+    assert row(*words) == expected != row()
+
+
+def test_the_effort_is_that_of_the_option(copied, tmp_path, engine, monkeypatch):
+    efforts = []
+
+    def diagnose(measured, options, plant, effort, within):
+        efforts.append(effort)
+        return _vsj.diagnose(measured, options, plant, "quick", within)
+
+    monkeypatch.setattr(work, "_vsj", types.SimpleNamespace(diagnose=diagnose, identify=_vsj.identify))
+    for effort in ("quick", "thorough"):
+        assert fleet.main([str(copied), "--out", str(tmp_path / effort), "--scheduler", engine, "--effort", effort]) == 0
+    assert efforts == ["quick"] * 4 + ["thorough"] * 4
+
+
+def test_an_error_in_the_file_of_options_names_the_option(copied, tmp_path, engine):
+    file, out = tmp_path / "columns.toml", tmp_path / "out"
+    file.write_text("[columns]\nspace = 1\n")
+    assert fleet.main([str(copied), "--out", str(out), "--scheduler", engine, "--columns", str(file)]) == 1
+    assert all(row["error"].startswith("--columns, line 2, column 1: unknown field `space`") for row in rows_of(out).values())
+
+
 def test_only_what_has_changed_is_diagnosed_again(copied, tmp_path, engine, capsys):
     out = tmp_path / "out"
 
@@ -337,6 +399,9 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
         ([folder, "--plant", tmp_path / "bad.toml"], "bad.toml"),
         ([folder, "--columns", "no.toml"], "--columns no.toml: cannot be read"),
         ([folder, "--scheduler", "10.0.0.5"], "expected local, slurm, or an address"),
+        ([folder, "--scheduler", engine, "--workers", 2], "--workers 2: " + engine),
+        ([folder, "--cores", 2], "--cores: applies to an estimate only"),
+        ([folder, "--price", 1], "--price: applies to an estimate only"),
         ([folder, "--batch", "0"], "expected a number, 1 to 100000"),
         ([folder, "--effort", "much"], "quick"),
         ([], "RECORDS: expected"),

@@ -204,6 +204,8 @@ fn what_cannot_be_run_is_one_line_and_exit_code_2() {
         (&["tune", "--identified", "falling.toml"], "expected the JSON of `vsj identify`"),
         (&["tune", "--within-s", "0"], "--within-s 0: expected a number above 0"),
         (&["stair", "--controller", "fast", "--known", "tau=5"], "--known applies to the robust controller only"),
+        (&["stair", "--controller", "fast", "--kp", "5"], "--kp and --ki apply to the paper controller only"),
+        (&["export", "c", "--known", "tau=3", "--ki", "1"], "--kp and --ki apply to the paper controller only"),
         (&["export", "c", "--known", "tau=30"], "--known: margin.time_constant = 0.3 is not allowed"),
         (&["export", "fmu", "--controller", "paper", "--known", "tau=3"], "--known applies to the robust controller"),
         (&["compare", "--sensor-noise", "0"], "--sensor-noise 0: expected 0.001 to 10"),

@@ -10,6 +10,8 @@ const TOOL: Tool = Tool { name: "cargo-deny", version: "0.20.2" };
 /// had, that is said and is a failure only with `require_advisories`.
 pub(crate) fn run(require_advisories: bool) -> Result<()> {
     let program = TOOL.program()?;
+    // Those that only other platforms compile as well: the offline check reads their licences.
+    shell::run(shell::cargo().args(["fetch", "--quiet", "--locked"]))?;
     let check = ["check", "--hide-inclusion-graph"];
     shell::run(shell::command(&program).arg("--offline").args(check).args(["licenses", "bans", "sources"]))?;
     let advisories = shell::run(shell::command(&program).args(check).arg("advisories"));

@@ -24,7 +24,7 @@ const INPUT_BYTES: u32 = 16_384;
 /// Options of `cargo xtask fuzz`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The formats: csv, schedule, plant, log, elf, recording, wire; default: all of them
+    /// The formats: csv, schedule, plant, settings, log, elf, recording, wire; default: all of them
     #[arg(value_name = "TARGET")]
     targets: Vec<String>,
     /// Time for each format, in s
@@ -123,6 +123,29 @@ mod tests {
                     stat::number_of_executed_units: 200000\nstat::peak_rss_mb:  90\n";
         assert_eq!(statistics(text), Some((200_000, 812)));
         assert_eq!(statistics("Done"), None);
+    }
+
+    /// The folder is a workspace of its own: no build of the root updates its lock file.
+    #[test]
+    fn the_lock_file_has_the_packages_and_dependencies_of_today() {
+        let text = fs::read_to_string(shell::root().join(FOLDER).join("Cargo.lock")).unwrap();
+        let lock: toml::Table = text.parse().unwrap();
+        let metadata = shell::metadata().unwrap();
+        for package in lock["package"].as_array().unwrap() {
+            let name = package["name"].as_str().unwrap();
+            if package.get("source").is_some() || name == "fuzz" {
+                continue;
+            }
+            let known = metadata["packages"].as_array().unwrap().iter().find(|known| known["name"] == name);
+            let known = known.unwrap_or_else(|| panic!("{name} is no package of the workspace"));
+            let locked = package["dependencies"].as_array().unwrap().iter();
+            let locked: Vec<&str> = locked.filter_map(|it| it.as_str()?.split(' ').next()).collect();
+            for dependency in known["dependencies"].as_array().unwrap() {
+                let needed = dependency["kind"].is_null() && dependency["optional"] == false;
+                let wanted = dependency["name"].as_str().unwrap();
+                assert!(!needed || locked.contains(&wanted), "{name} lacks {wanted}: cargo update -w, in {FOLDER}");
+            }
+        }
     }
 
     #[test]

@@ -115,8 +115,12 @@ fn try_changes(program: &Path, args: &Args, package: &str, tests: &[&str], itera
     if iterate {
         command.arg("--iterate");
     }
-    // Its copies are built with the settings of its own profile.
+    // Its copies are built with the settings of its own profile, one at a time in a folder that stays, so that dependencies are
+    // compiled once.
     command.env_remove("CARGO_INCREMENTAL");
+    if args.jobs == 1 {
+        command.env("CARGO_TARGET_DIR", shell::target_directory()?.join("mutants/build"));
+    }
     let status = command.stdout(std::io::stderr()).status().context("cannot start cargo-mutants")?;
     match status.code() {
         Some(0 | 2 | 3) => Ok(()),

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 use model::Gains;
+use simulation::bad_input;
 use simulation::control_loop::{Controller, Options};
 
 use super::choice::{CONTROLLER, one_of};
@@ -30,12 +31,12 @@ pub(crate) struct LoopArguments {
     /// Width of the DAC, in bits
     #[arg(long, default_value_t = 12, value_name = "BITS")]
     dac_bits: u32,
-    /// Proportional gain of the controller
-    #[arg(long, default_value_t = Gains::PAPER.proportional, value_name = "GAIN", allow_negative_numbers = true)]
-    kp: f64,
-    /// Integral gain of the controller, in 1/s
-    #[arg(long, default_value_t = Gains::PAPER.integral_per_s, value_name = "GAIN", allow_negative_numbers = true)]
-    ki: f64,
+    /// Proportional gain of the paper controller; default: 4
+    #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
+    kp: Option<f64>,
+    /// Integral gain of the paper controller, in 1/s; default: 1.35
+    #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
+    ki: Option<f64>,
     /// Time constant of the fast controller's approach to the target, in s, 0 to 1; default: 0
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     approach_s: Option<f64>,
@@ -56,6 +57,9 @@ impl LoopArguments {
         let margin = self.known.margin()?;
         let default = if margin.is_some() { Controller::Robust } else { Controller::Paper };
         let controller = self.controller.unwrap_or(default);
+        if (kp.is_some() || ki.is_some()) && controller != Controller::Paper {
+            bad_input!("--kp and --ki apply to the paper controller only: expected --controller paper");
+        }
         let feedback = None;
         let options = Options {
             controller,
@@ -63,8 +67,8 @@ impl LoopArguments {
             min_v,
             slew_v_per_s,
             dac_bits,
-            kp,
-            ki,
+            kp: kp.unwrap_or(Gains::PAPER.proportional),
+            ki: ki.unwrap_or(Gains::PAPER.integral_per_s),
             approach_s,
             margin,
             rate_hz,

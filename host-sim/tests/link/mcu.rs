@@ -55,6 +55,12 @@ pub(crate) struct Shared {
     pub(crate) ordered: Vec<Command>,
     /// The latest sample.
     pub(crate) sample: Telemetry,
+    /// The first sample, and each one whose state differs from that of the sample before.
+    pub(crate) changes: Vec<Telemetry>,
+    /// Tick in which the host was heard last.
+    pub(crate) heard: u64,
+    /// Time by which the MCU's clock is ahead of the host's.
+    pub(crate) ahead: Duration,
     /// Counters of received frames.
     pub(crate) counters: Counters,
     /// What the isolation bank says.
@@ -201,7 +207,8 @@ impl Mcu {
                     chip.shared.lock().unwrap().seed = next_seed();
                     (chip, start) = (Chip::new(setup, chip.shared), Instant::now());
                 }
-                while chip.view.sample.tick as f64 * chip.period.as_secs_f64() < start.elapsed().as_secs_f64() {
+                let now = start.elapsed() + chip.shared.lock().unwrap().ahead;
+                while chip.view.sample.tick as f64 * chip.period.as_secs_f64() < now.as_secs_f64() {
                     chip.tick(Command::default());
                 }
                 for byte in &bytes[..count] {
@@ -274,13 +281,13 @@ impl Chip {
     }
 
     fn tick(&mut self, command: Command) {
-        let heard = self.server.take_heard();
+        let heard = self.server.take_heard() || command.heard;
         let (interlock_closed, fault) = {
             let mut shared = self.shared.lock().unwrap();
             (!shared.interlock_open, shared.fault.take())
         };
         let sensors = Sensors { interlock_closed, fault, ..Sensors::default() };
-        let tick = self.control.tick(&Command { heard: heard || command.heard, ..command }, &sensors, &mut Untimed);
+        let tick = self.control.tick(&Command { heard, ..command }, &sensors, &mut Untimed);
         let supervisor = self.control.supervisor();
         let sample = Telemetry {
             tick: self.view.sample.tick + 1,
@@ -296,6 +303,12 @@ impl Chip {
         };
         self.recorder.tick(&self.memory, &sample, 0);
         let mut shared = self.shared.lock().unwrap();
+        if shared.changes.last().is_none_or(|last| last.state != sample.state) {
+            shared.changes.push(sample);
+        }
+        if heard {
+            shared.heard = sample.tick;
+        }
         (shared.sample, shared.counters) = (sample, self.server.counters());
         let (state, standing) = (supervisor.state(), supervisor.standing());
         self.view = View { sample, state, standing, refusal: supervisor.refusal(), overruns: 0 };

@@ -1,3 +1,5 @@
+mod faults;
+
 use super::*;
 use crate::units::SampleTime;
 use crate::validated::Validate;
@@ -46,15 +48,15 @@ fn the_noise_of_a_block_is_that_of_a_mean_of_correlated_readings() {
 
 /// With overflow checks, as all tests.
 #[test]
-#[cfg_attr(miri, ignore = "slow under Miri")]
 fn no_input_overflows_and_garbage_is_not_named() {
+    let ticks = if cfg!(miri) { 1500 } else { 400_000u32 };
     for rate_hz in [100.0, 1000.0, 10_000.0] {
         let (config, mut state, mut bits) = (config(rate_hz), State::default(), 7u32);
         let mut any = |wild: bool| {
             let value = next(&mut bits) as i32;
             if wild { value } else { value >> 4 }
         };
-        for tick in 0..400_000u32 {
+        for tick in 0..ticks {
             // Stretches of values of the whole range of a signal, and of ordinary ones.
             let wild = tick & 0x8000 == 0;
             let applied = Volts(Signal::from_bits(any(wild)));
@@ -63,12 +65,15 @@ fn no_input_overflows_and_garbage_is_not_named() {
             config.tick(&mut state, applied, model, reading);
             assert!(!matches!(state.verdict(), Verdict::Named(_)), "{:?}", state.verdict());
         }
-        assert_eq!(state.verdict(), Verdict::Unknown);
-        assert!(state.decisions() > 10);
+        if !cfg!(miri) {
+            assert_eq!(state.verdict(), Verdict::Unknown);
+            assert!(state.decisions() > 10);
+        }
     }
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_stuck_sensor_is_named_and_an_acknowledged_alarm_comes_again() {
     let (config, mut state, mut bits) = (config(1000.0), State::default(), 7u32);
     let mut alarms = 0;
@@ -94,6 +99,7 @@ fn a_stuck_sensor_is_named_and_an_acknowledged_alarm_comes_again() {
 
 /// The mean of a block is that of the readings that have come, so that the fault of a sensor that is silent for 20 s is the same one.
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_gap_in_the_readings_is_a_part_of_the_time_since_the_fault_began() {
     let (config, mut bits) = (config(1000.0), 7u32);
     let (mut whole, mut gap) = (State::default(), State::default());
@@ -122,7 +128,7 @@ fn a_block_with_all_the_readings_that_its_interval_promises_is_used() {
 #[test]
 fn missing_readings_leave_the_bank_quiet() {
     let (config, mut state) = (config(1000.0), State::default());
-    for tick in 0..20_000u32 {
+    for tick in 0..if cfg!(miri) { 2000 } else { 20_000u32 } {
         let volts = Signal::from_num((tick / 3000) * 100);
         config.tick(&mut state, Volts(volts), ScaledStiffness(volts), None);
     }

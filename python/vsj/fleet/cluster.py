@@ -23,7 +23,7 @@ def connected(scheduler, workers, wait_s):
     scheduler : str
         ``"local"`` for processes on this machine, ``"slurm"`` for jobs, or the address of a scheduler, ``tcp://HOST:PORT``.
     workers : int or None
-        Number of processes or jobs; an address has the workers that it has.
+        Number of processes or jobs; ``None`` for an address, which has the workers that it has.
     wait_s : float
         Longest time until the first worker is there, in s.
 
@@ -74,4 +74,6 @@ def _cluster(scheduler, workers):
     else:
         if not parse_address(scheduler)[0] or "://" not in scheduler:
             raise BadInput(f"--scheduler {scheduler}: expected local, slurm, or an address such as tcp://HOST:8786")
+        if workers is not None:
+            raise BadInput(f"--workers {workers}: {scheduler} has the workers that it has; expected --scheduler local or slurm")
         yield None

@@ -37,6 +37,9 @@ def main(arguments=None):
             return _cost(wanted)
         if wanted.records is None:
             parser.error("RECORDS: expected a folder of records, or a manifest")
+        for name in ("cores", "price"):
+            if getattr(wanted, name) is not None:
+                parser.error(f"--{name}: applies to an estimate only; expected --cost")
         return _diagnose(wanted)
     except BadInput as error:
         return _said(error, 2)
@@ -157,7 +160,9 @@ def _json(found, outcome):
 
 def _cost(wanted):
     measured = cost.measured(wanted.out)
-    estimate = cost.estimate(measured, wanted.cost, wanted.cores, wanted.price, wanted.batch)
+    cores = cost.CORES if wanted.cores is None else wanted.cores
+    price = cost.PRICE if wanted.price is None else wanted.price
+    estimate = cost.estimate(measured, wanted.cost, cores, price, wanted.batch)
     if wanted.json:
         print(json.dumps(cost.as_json(measured, estimate)))
     else:
@@ -224,6 +229,6 @@ def _parser():
     paper = parser.add_argument_group("cost of a larger fleet, computed from the results in --out")
     add = paper.add_argument
     add("--cost", type=_number(int, 1), metavar="RECORDS", help="compute time and price of this number of records; diagnose nothing")
-    add("--cores", type=_number(int, 1), default=100, metavar="N", help="cores; default: 100")
-    add("--price", type=_number(float, 0), default=0.04, metavar="X", help="price of a core for an hour, in any currency; default: 0.04")
+    add("--cores", type=_number(int, 1), metavar="N", help=f"cores; default: {cost.CORES}")
+    add("--price", type=_number(float, 0), metavar="X", help=f"price of a core for an hour, in any currency; default: {cost.PRICE}")
     return parser

@@ -26,6 +26,8 @@ from .. import BadInput
 from . import store
 from .records import filesystem
 
+CORES, PRICE = 100, 0.04
+"""Cores, and the price of one for an hour, unless others are given."""
 PUTS_PER_S, GETS_PER_S = 3500, 5500
 """Requests in a second that an object store guarantees for one prefix."""
 GET_S = 0.1

@@ -22,6 +22,8 @@ DIAGNOSED, REFUSED, FAILED = "diagnosed", "refused", "failed"
 """Status of a row. Another run tries failed ones again: a record that could not be read, a program error."""
 
 _CHUNK = 1 << 20
+_COLUMNS = "--columns.toml"
+"""Name of the file ``--columns`` in a worker's folder, which no record has."""
 
 
 def diagnose(batch, plants, settings, folder, out):
@@ -84,8 +86,9 @@ def _row(record, plants, settings, folder):
                 row |= _answer(copy, settings, plant if text is None else (plant, text), scratch)
             except BadInput as error:
                 row |= {"status": REFUSED, "error": str(error)}
-            # The record's own address, not that of the copy.
-            shown = lambda it: it.replace(copy, fs.unstrip_protocol(path).removeprefix("file://"))
+            # The record's own address, not that of the copy; the option, not the copy of its file.
+            address, columns = fs.unstrip_protocol(path).removeprefix("file://"), os.path.join(scratch, _COLUMNS)
+            shown = lambda it: it.replace(copy, address).replace(columns, "--columns")
             row["error"] = shown(row["error"]) if row.get("error") else None
             row["remarks"] = [shown(it) for it in row.get("remarks", [])]
     except (KeyboardInterrupt, SystemExit):
@@ -112,7 +115,7 @@ def _answer(path, settings, plant, scratch):
     """The columns of a row that come from identification and diagnosis."""
     options = settings.options
     if settings.columns is not None:
-        columns = os.path.join(scratch, "columns.toml")
+        columns = os.path.join(scratch, _COLUMNS)
         with open(columns, "w", encoding="utf-8") as file:
             file.write(settings.columns)
         options = options | {"columns": columns}

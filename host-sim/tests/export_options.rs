@@ -1,0 +1,48 @@
+//! No option of `vsj export` is without an effect on what is exported.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+fn vsj(arguments: &[&str], out: &Path) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
+    let output = command.args(["export", "c"]).args(arguments).arg("--out").arg(out).output().unwrap();
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn every_option_of_the_loop_changes_the_settings_for_c() {
+    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/plant.toml");
+    let cases: [&[&str]; 15] = [
+        &[],
+        &["--controller", "fast"],
+        &["--plant", plant],
+        &["--limit-v", "500"],
+        &["--min-v", "10"],
+        &["--slew-v-per-s", "1000"],
+        &["--dac-bits", "10"],
+        &["--kp", "5"],
+        &["--ki", "1"],
+        &["--approach-s", "0.1", "--controller", "fast"],
+        &["--known", "tau=5"],
+        &["--known", "share=5"],
+        &["--known", "gain=5"],
+        &["--overshoot-percent", "3", "--known", "tau=5"],
+        &["--rate-hz", "2000"],
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let exported = cases.map(|arguments| {
+        vsj(arguments, folder.path());
+        let text = std::fs::read_to_string(folder.path().join("vsj_settings.h")).unwrap();
+        // Without the comments, which name the plant file.
+        text.lines().filter(|line| line.trim_start().starts_with('.')).collect::<Vec<_>>().join("\n")
+    });
+    assert_eq!(exported.iter().collect::<BTreeSet<_>>().len(), cases.len(), "{exported:#?}");
+    let help = vsj(&["--help"], folder.path());
+    let known = help.lines().filter_map(|line| line.trim_start().strip_prefix("--")?.split_whitespace().next());
+    for option in known.filter(|option| !["out", "json"].contains(option)) {
+        let tried = |arguments: &&[&str]| arguments.iter().any(|it| it.strip_prefix("--") == Some(option));
+        assert!(cases.iter().any(tried), "--{option}");
+    }
+}
