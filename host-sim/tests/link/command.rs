@@ -8,9 +8,10 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use link::isolation::Off;
-use link::{Frame, IsolationReport, Reply, State, Status};
+use link::{AdaptationReport, Frame, IsolationReport, Reply, State, Status};
+use model::adaptation::{Parameters, Phase, Settings};
 use model::isolation::{Cause, Causes, Finding, Verdict};
-use model::supervisor;
+use model::{Plant, supervisor};
 use serialport::{SerialPort, TTYPort};
 use simulation::record::{MEASURED, Record};
 
@@ -72,6 +73,32 @@ fn status_and_isolation_show_what_the_isolation_bank_says_and_its_alarm_is_ackno
     assert_eq!((&isolation["since_s"], &isolation["trip_on_cause"][0]), (&20.096.into(), &"stuck-sensor".into()));
     assert_eq!(json(port, &["isolation", "--acknowledge"])["verdict"], "quiet");
     assert!(good(port, &["status"]).contains("isolation  quiet\n"));
+}
+
+#[test]
+fn status_and_adaptation_show_the_parameters_in_use_and_switch_it() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let port = &mcu.port;
+    mcu.with(|shared| shared.adaptation = AdaptationReport::off(Off::Settings, 0));
+    assert!(good(port, &["status"]).contains("adaptation off: settings\n"));
+    assert!(bad(1, port, &["adaptation", "--on"]).contains("nothing can adapt: settings"));
+    let parameters = Parameters { time_constant: 1.2, share: 1.0, gain: 0.95 };
+    let report = AdaptationReport::new(Phase::Trial, &parameters, &Settings::TYPICAL, Plant::PAPER);
+    let report = AdaptationReport { exchanges: 34, exchange_tick: 39_680, ..report };
+    mcu.with(|shared| shared.adaptation = report);
+    let said = "trial, time constant 6.6000 s (model 5.5000, 4.1250 to 6.8750), share 0.0909 (model 0.0909, 0.0682 to 0.1136), \
+                gain 0.9500 (model 1.0000, 0.8500 to 1.1500), 34 exchanges, the last at 39.68 s";
+    assert!(good(port, &["status"]).contains(&format!("adaptation {said}\n")));
+    assert_eq!(good(port, &["adaptation"]), format!("{said}\n"));
+    let status = json(port, &["status"]);
+    let adaptation = &status["adaptation"];
+    assert_eq!((&adaptation["phase"], &adaptation["exchanges"]), (&"trial".into(), &34.into()));
+    let tau_s = &adaptation["parameters"]["tau_s"];
+    assert_eq!([&tau_s["value"], &tau_s["model"], &tau_s["low"], &tau_s["high"]], [6.6, 5.5, 4.125, 6.875]);
+    assert_eq!(adaptation["last_exchange_s"], 39.68);
+    assert_eq!(json(port, &["adaptation", "--off"])["phase"], "returning");
+    assert_eq!(json(port, &["adaptation", "--on"])["phase"], "watching");
+    assert!(bad(2, port, &["adaptation", "--on", "--off"]).contains("cannot be used with"));
 }
 
 #[test]
