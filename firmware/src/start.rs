@@ -150,6 +150,9 @@ fn read(payload: &[u8], built_in: &device::Settings) -> Result<device::Settings,
         return Err(Reason::NotBuiltIn(Field::named("adaptation.enabled")));
     }
     settings.check().map_err(|error| Reason::of_settings(&error))?;
+    if cfg!(feature = "adaptation") {
+        settings.check_adaptation().map_err(|error| Reason::of_settings(&error))?;
+    }
     Ok(settings)
 }
 

@@ -446,7 +446,7 @@ impl Source {
     pub fn over(&self, built_in: &WireSettings) -> Result<WireSettings> {
         match self.file.over(built_in).over(&device::Settings::PAPER) {
             Ok(settings) => {
-                settings.check().map_err(|error| self.error(&error))?;
+                settings.check().and_then(|()| settings.check_adaptation()).map_err(|error| self.error(&error))?;
                 // Without what the controller does not use, which the MCU does not keep.
                 Ok(WireSettings::new(&settings))
             }

@@ -181,15 +181,15 @@ fn watch_on_a_terminal_refreshes_in_place() {
     let mut watching =
         vsj(&mcu.port, &["watch", "--every", "0.05"]).stdout(terminal.try_clone().unwrap()).spawn().unwrap();
     let mut text = String::new();
-    while text.matches("\x1b[9A").count() < 3 {
+    while text.matches("\x1b[10A").count() < 3 {
         let mut buffer = [0; 256];
         let count = screen.read(&mut buffer).unwrap();
         text += std::str::from_utf8(&buffer[..count]).unwrap();
     }
     watching.kill().unwrap();
     watching.wait().unwrap();
-    let shown = text.split("\x1b[9A").nth(1).unwrap();
-    assert_eq!(shown.matches("\x1b[K").count(), 9, "{shown}");
+    let shown = text.split("\x1b[10A").nth(1).unwrap();
+    assert_eq!(shown.matches("\x1b[K").count(), 10, "{shown}");
     assert!(shown.starts_with("state      disarmed, fault none"), "{shown}");
 }
 

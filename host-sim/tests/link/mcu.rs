@@ -16,7 +16,7 @@ use firmware::reset_cause::Cause;
 use firmware::start::{self, Start};
 use firmware::store::{Memory, Store};
 use firmware::update;
-use link::isolation::Isolation;
+use link::isolation::{Isolation, Off};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
@@ -166,7 +166,8 @@ impl Mcu {
 
     fn new(port: String) -> Self {
         let stop = Arc::default();
-        let shared = Arc::new(Mutex::new(Shared { seed: next_seed(), ..Shared::default() }));
+        let adaptation = AdaptationReport::off(Off::NotBuiltIn, 0);
+        let shared = Arc::new(Mutex::new(Shared { seed: next_seed(), adaptation, ..Shared::default() }));
         Self { port, shared, stop, thread: None, _folder: None, _terminal: None }
     }
 

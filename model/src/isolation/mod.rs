@@ -297,8 +297,9 @@ impl Config {
     }
 
     /// Advances the bank by one tick: applied voltage, the model's stiffness just after it was applied without the sensor's
-    /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop.
-    #[inline]
+    /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop. Not inlined: within a larger function the
+    /// MCU has too few registers for it.
+    #[inline(never)]
     pub fn tick(&self, state: &mut State, applied: Volts, model: ScaledStiffness, reading: Option<ScaledStiffness>) {
         let step = state.sums.ticks;
         state.sums.add(self, applied, model, reading.map(|reading| reading.0));
