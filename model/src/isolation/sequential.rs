@@ -63,7 +63,7 @@ const fn largest_of_interest() -> f64 {
 /// Adds a bounded increment to a statistic.
 #[inline(always)]
 fn added(statistic: i32, nats: i64) -> i32 {
-    statistic.saturating_add(saturated_to_32(nats).max(LEAST).min(MOST)).max(0)
+    statistic.saturating_add(saturated_to_32(nats).clamp(LEAST, MOST)).max(0)
 }
 
 /// Sum of the magnitudes of the doubtful vectors times their sizes, in standard deviations with 10 fraction bits.
