@@ -20,17 +20,28 @@ fn uniform(seed: u64) -> impl FnMut() -> f64 {
 
 /// Returns a record of levels that are held for 6 to 16 s. `tau_s` is the time constant over settled stiffness and relaxed part,
 /// `reads` makes a reading of row and stiffness; noise of 1 V is added.
-fn record(seed: u64, tau_s: impl Fn(f64, f64) -> f64, mut reads: impl FnMut(usize, f64) -> f64) -> Record {
+fn record(seed: u64, tau_s: impl Fn(f64, f64) -> f64, reads: impl FnMut(usize, f64) -> f64) -> Record {
+    settling(seed, |voltage_v| voltage_v, tau_s, reads)
+}
+
+/// Returns the same of a spring whose settled stiffness `settles` computes from each new voltage.
+fn settling(
+    seed: u64,
+    mut settles: impl FnMut(f64) -> f64,
+    tau_s: impl Fn(f64, f64) -> f64,
+    mut reads: impl FnMut(usize, f64) -> f64,
+) -> Record {
     let mut random = uniform(seed);
-    let (mut voltage_v, mut relaxed, mut until) = (0.0, 0.0, 40);
+    let (mut voltage_v, mut settled, mut relaxed, mut until) = (0.0, 0.0, 0.0, 40);
     let row = |row: usize| {
         if row == until {
             voltage_v = 50.0 * (11.0 * random()).floor();
+            settled = settles(voltage_v);
             until += 60 + (100.0 * random()) as usize;
         }
-        let stiffness = voltage_v / 11.0 + 10.0 / 11.0 * relaxed;
+        let stiffness = settled / 11.0 + 10.0 / 11.0 * relaxed;
         for _ in 0..STEPS {
-            relaxed += (voltage_v - relaxed) * SAMPLE_S / STEPS as f64 / tau_s(voltage_v, relaxed);
+            relaxed += (settled - relaxed) * SAMPLE_S / STEPS as f64 / tau_s(settled, relaxed);
         }
         let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
         Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured: Some(reads(row, stiffness) + noise) }
@@ -85,4 +96,100 @@ fn step_of_the_gain_is_a_drift() {
         assert!((value(&report, "factor") - factor).abs() < 0.003, "{report:?}");
         assert!((value(&report, "at_s") - SAMPLE_S * at as f64).abs() < 1.0, "{report:?}");
     }
+}
+
+#[test]
+fn friction_under_load_is_hysteresis() {
+    let mut before = 0.0;
+    let mut gain = 1.05;
+    let settles = |voltage_v: f64| {
+        if voltage_v != before {
+            gain = if voltage_v > before { 1.05 } else { 0.95 };
+            before = voltage_v;
+        }
+        gain * voltage_v
+    };
+    let (cause, report) = first(&settling(7, settles, |_, _| TAU_S, |_, stiffness| stiffness));
+    assert_eq!(cause, "hysteresis", "{report:?}");
+    // Equal outputs of both branches: 475 V of 500 V down and of 452.4 V up.
+    assert!((value(&report, "width_v") - (500.0 - 475.0 / 1.05)).abs() < 0.5, "{report:?}");
+}
+
+/// What is linear of it is a gain error.
+#[test]
+fn dead_band_is_a_static_nonlinearity() {
+    let (_, report) =
+        first(&settling(8, |voltage_v| (voltage_v - 40.0).max(0.0), |_, _| TAU_S, |_, stiffness| stiffness));
+    let causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
+    assert!(causes.contains(&"static-nonlinearity"), "{report:?}");
+    assert!(causes.iter().all(|cause| ["static-nonlinearity", "gain-error"].contains(cause)), "{report:?}");
+}
+
+#[test]
+fn slow_wave_and_warming_up_are_drifts() {
+    let time_s = |row: usize| SAMPLE_S * row as f64;
+    let wave = |row: usize, y: f64| y * (1.0 + 0.04 * (std::f64::consts::TAU * time_s(row) / 150.0).sin());
+    let warm = |row: usize, y: f64| y + 20.0 * -(-time_s(row) / 60.0).exp_m1();
+    let (cause, report) = first(&record(9, |_, _| TAU_S, wave));
+    assert_eq!(cause, "drift", "{report:?}");
+    assert!((value(&report, "freq_hz") - 1.0 / 150.0).abs() < 1e-4, "{report:?}");
+    let (cause, report) = first(&record(9, |_, _| TAU_S, warm));
+    assert_eq!(cause, "drift", "{report:?}");
+    assert!((value(&report, "change") - 20.0 / 500.0).abs() < 0.002, "{report:?}");
+}
+
+#[test]
+fn flow_is_a_second_relaxation_that_is_added() {
+    let mut flowing = record(10, |_, _| TAU_S, |_, stiffness| stiffness);
+    let mut flow = 0.0;
+    for row in &mut flowing.rows {
+        row.measured = row.measured.map(|reading| reading + flow);
+        flow += 5e-4 * SAMPLE_S * row.voltage_v;
+    }
+    let (cause, report) = first(&flowing);
+    assert_eq!(cause, "second-relaxation", "{report:?}");
+}
+
+#[test]
+fn sensor_that_overshoots_slightly_is_a_lag() {
+    // A damping ratio of 0.7 at 2 rad/s; the voltage passes the sensor before the spring, which has the same response.
+    let mut overshoots = record(12, |_, _| TAU_S, |_, stiffness| stiffness);
+    let mut random = uniform(16);
+    let (mut x, mut rate, mut relaxed) = (0.0f64, 0.0f64, 0.0f64);
+    for row in &mut overshoots.rows {
+        let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
+        row.measured = Some(x / 11.0 + 10.0 / 11.0 * relaxed + noise);
+        for _ in 0..STEPS {
+            let step_s = SAMPLE_S / STEPS as f64;
+            relaxed += (x - relaxed) * step_s / TAU_S;
+            rate += step_s * (4.0 * (row.voltage_v - x) - 2.0 * 0.7 * 2.0 * rate);
+            x += step_s * rate;
+        }
+    }
+    let (cause, report) = first(&overshoots);
+    assert_eq!(cause, "series-lag", "{report:?}");
+    assert!((value(&report, "zeta") - 0.7).abs() < 0.05, "{report:?}");
+}
+
+#[test]
+fn hum_may_follow_the_response() {
+    let modulated = |row: usize, y: f64| y * (1.0 + 0.03 * (std::f64::consts::TAU * 0.7 * SAMPLE_S * row as f64).sin());
+    let (cause, report) = first(&record(13, |_, _| TAU_S, modulated));
+    assert_eq!(cause, "hum", "{report:?}");
+    assert!((value(&report, "freq_hz") - 0.7).abs() < 1e-3, "{report:?}");
+}
+
+/// Nothing else is wrong with the spring whose readings were lost.
+#[test]
+fn readings_that_were_lost_are_late_and_the_others_are_diagnosed() {
+    let mut held = record(14, |_, _| TAU_S, |_, stiffness| stiffness);
+    let mut random = uniform(15);
+    for row in 1..ROWS {
+        if random() < 0.4 {
+            held.rows[row].measured = held.rows[row - 1].measured;
+        }
+    }
+    let (cause, report) = first(&held);
+    assert!(cause == "delay" && report.findings.len() == 1 && report.rows == ROWS, "{report:?}");
+    assert!((value(&report, "delay_s") - 0.1 * 0.4 / 0.6).abs() < 0.01, "{report:?}");
 }

@@ -28,6 +28,8 @@ from vsj.fleet.settings import Settings
 
 SPRINGS, RECORDS, ROWS = 3, 12, 120
 STEP = 7
+# Other than the default, one for each core.
+WORKERS = os.cpu_count() + 1
 
 
 def csv_of(random, gain):
@@ -54,7 +56,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="session")
 def engine():
     """The address of a scheduler with one worker in this process."""
-    with distributed.LocalCluster(1, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster:
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster:
         yield cluster.scheduler_address
 
 
@@ -94,7 +96,7 @@ def program(*arguments):
 
 
 def test_ctrl_c_and_a_killed_worker_cost_no_record_and_double_none(folder, tmp_path):
-    arguments = (folder, "--out", tmp_path, "--workers", 2, "--batch", 1, "--json")
+    arguments = (folder, "--out", tmp_path, "--workers", WORKERS, "--batch", 1, "--json")
     first = program(*arguments)
     until(lambda: len(parts(tmp_path)) >= 3)
     os.killpg(first.pid, signal.SIGINT)
@@ -108,7 +110,7 @@ def test_ctrl_c_and_a_killed_worker_cost_no_record_and_double_none(folder, tmp_p
     second = program(*arguments)
     until(lambda: len(parts(tmp_path)) >= before + 3)
     workers = [it for it in psutil.Process(second.pid).children(recursive=True) if "spawn_main" in " ".join(it.cmdline())]
-    assert len(workers) == 2
+    assert len(workers) == WORKERS
     workers[0].kill()
     out, error = second.communicate(timeout=120)
     assert second.returncode == 0, error
@@ -293,7 +295,7 @@ def test_a_record_that_ends_its_workers_has_a_row_and_the_others_too(copied, tmp
         return diagnose(batch, *rest)
 
     monkeypatch.setattr(work, "diagnose", deadly)
-    with distributed.LocalCluster(1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
         cluster.scheduler.allowed_failures = 0
         with distributed.Client(cluster) as client:
             outcome = run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, out, 2, lambda _: None)

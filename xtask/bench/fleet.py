@@ -18,7 +18,7 @@ import vsj
 from vsj import _vsj
 
 RANDOM_SEED = 1
-SPRINGS, RECORDS, ROWS = 4, 60, 2401
+SPRINGS, RECORDS, ROWS = 4, 30, 2401
 ROUNDS = 2
 
 

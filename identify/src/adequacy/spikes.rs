@@ -1,8 +1,9 @@
 //! Check for large errors that are no outliers: they follow changes of the command, or come in runs.
 //!
-//! Outliers are independent of the command and of each other. A delay that varies leaves spikes of one or two rows just after
-//! changes of the voltage; a reading that is held for some rows leaves runs of spikes of one sign. A noise model with two
-//! scales takes both for outliers. Of `n` far readings, independent ones leave about `n p` just after a change, `p` being the
+//! Outliers are independent of the command and of each other, and the error returns after each. A delay that varies leaves spikes of
+//! one or two rows just after changes of the voltage; a reading that is held for some rows leaves runs of spikes of one sign; an
+//! error that steps leaves one spike of the innovations at each step, after which it stays. A noise model with two
+//! scales takes all for outliers. Of `n` far readings, independent ones leave about `n p` just after a change, `p` being the
 //! fraction of all rows that are; and of neighbours that are both far, equally many have equal and opposite signs:
 //!
 //! ```text
@@ -14,11 +15,17 @@ use crate::adequacy::localisation::Localisation;
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
 use crate::record::data::Data;
+use crate::stats::median::median;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{
     CHANGE_OF_FULL_SCALE, FAR_OFF_SCALES, ROWS_AFTER_CHANGE, SHARE_AFTER_CHANGES, SHARE_IN_RUNS,
 };
 use crate::stats::thresholds::probability::Z_RARE;
+
+/// Rows whose median is the level of the error before or after a far row.
+const LEVEL: usize = 3;
+/// Fewest steps of the error that are not a chance.
+const FEWEST_STEPS: usize = 3;
 
 /// The check of a fit whose noise is a mixture of two scales.
 pub(super) struct Spikes;
@@ -41,9 +48,15 @@ pub(crate) fn spikes(engine: &Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
     let white = fit.noise.innovations(&errors);
     let far = far_off(&fit.noise, &white);
     let after = after_changes(data, fit.model.chain(engine.base(), data).delay_s);
-    let place = match count_after_changes(&far, &after) {
-        Some(count) => format!("in {count} readings far off just after changes of the voltage"),
-        None => format!("in {} readings far off that come in runs to one side", count_in_runs(&far, &white)?),
+    let place = if let Some(count) = count_after_changes(&far, &after) {
+        format!("in {count} readings far off just after changes of the voltage")
+    } else if let Some(count) = count_in_runs(&far, &white) {
+        format!("in {count} readings far off that come in runs to one side")
+    } else {
+        format!(
+            "in an error that steps at {} readings and stays there",
+            count_of_steps(&far, &errors, fit.noise.sigma)?
+        )
     };
     let far_ones: Vec<f64> = white.iter().zip(&far).map(|(white, far)| if *far { *white } else { 0.0 }).collect();
     // Compared with the innovations, because the autoregression may have been fitted to follow each spike.
@@ -69,6 +82,25 @@ fn count_in_runs(far: &[bool], white: &[f64]) -> Option<usize> {
     let (alike, unlike) = (alike.len() as f64, unlike.len() as f64);
     let z = (alike - unlike) / (alike + unlike).sqrt();
     (alike > SHARE_IN_RUNS.get() * count as f64 && z > Z_RARE).then_some(count)
+}
+
+/// Number of far rows at which the error steps from one level to another, if they are more than those at which it returns: levels
+/// are medians of the rows before and after.
+fn count_of_steps(far: &[bool], errors: &[f64], sigma: f64) -> Option<usize> {
+    let (mut steps, mut spikes) = (0, 0);
+    let level = |rows: &[f64]| median(&mut rows.to_vec());
+    for row in (LEVEL..far.len().saturating_sub(LEVEL)).filter(|&row| far[row]) {
+        let sides = [level(&errors[row - LEVEL..row]), level(&errors[row + 1..=row + LEVEL])];
+        let [Some(before), Some(after)] = sides.map(|level| Some(errors[row] - level?)) else { continue };
+        let is_far = |apart: f64| apart.abs() > 0.5 * FAR_OFF_SCALES.get() * sigma;
+        // Neither is an echo of an earlier spike in the innovations.
+        match (is_far(before), is_far(after)) {
+            (true, true) if before * after > 0.0 => spikes += 1,
+            (false, false) => {}
+            _ => steps += 1,
+        }
+    }
+    (steps > spikes && steps >= FEWEST_STEPS).then_some(steps)
 }
 
 /// For each row, true if the reading is far off by its innovation.

@@ -6,11 +6,16 @@
 //! | exponential | `y exp(rate t)` |
 //! | added | `y + rate t full scale` |
 //! | step | `y factor` from one reading on, `y` before |
+//! | wave, added wave | `y (1 + w)`, `y + w full scale` with `w = a cos(2 pi f t) + b sin(2 pi f t)`: fewer periods than a hum |
+//! | settling, added settling | `y (1 + w)`, `y + w full scale` with `w = change (1 - exp(-t / T))`: as of a sensor that warms up |
+
+use std::f64::consts::TAU;
 
 use crate::dimension::Dimension;
-use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms};
 use crate::record::data::Data;
-use crate::stats::thresholds::empirical::{LEAST_PART_OF_STEP, SHORTEST_RUN};
+use crate::record::spectrum;
+use crate::stats::thresholds::empirical::{FEWEST_PERIODS, LEAST_PART_OF_STEP, SHORTEST_RUN};
 use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
 
 pub(super) struct Drift;
@@ -18,6 +23,58 @@ pub(super) struct Drift;
 const STRAIGHT: usize = 0;
 const EXPONENTIAL: usize = 1;
 const STEP: usize = 3;
+const WAVE: usize = 4;
+const ADDED_WAVE: usize = 5;
+const SETTLING: usize = 6;
+const ADDED_SETTLING: usize = 7;
+/// Fewest periods of a wave in the record; the beginning of a slower one is straight or settles.
+const FEWEST_PERIODS_OF_WAVE: f64 = 0.75;
+/// Intervals between the numbers of periods of initial waves, of which the best are tried.
+const INITIAL_PERIODS: f64 = 0.5;
+const INITIAL_WAVES: usize = 2;
+/// Approximate number of rows in which initial waves are looked for.
+const ROWS_OF_WAVES: usize = 400;
+/// Number of times of a settling at initial points, and the longest time, in durations of the record.
+const INITIAL_SETTLING: u32 = 4;
+const LONGEST_SETTLING: f64 = 2.0;
+/// Largest bound of the shortest time, relative to the longest.
+const LATEST_SHORTEST: f64 = 0.25;
+
+/// Returns the bounds of the time of a settling, in s: a faster one than the shortest is over before the record shows the response, and
+/// is a gain error or a shift of all readings.
+fn settling_times(data: &Data) -> (f64, f64) {
+    let all: f64 = data.reading.iter().map(|reading| reading * reading).sum();
+    let mut seen = data.reading.iter().scan(0.0, |sum, reading| {
+        *sum += reading * reading;
+        Some(*sum)
+    });
+    let row = seen.position(|sum| sum > LEAST_PART_OF_STEP.get() * all).unwrap_or(0);
+    let longest = LONGEST_SETTLING * data.duration_s().max(1e-9);
+    ((data.time_s[row] - data.time_s[0]).max(data.sample_s).min(LATEST_SHORTEST * longest), longest)
+}
+
+/// Returns the initial waves that explain most of the residual, as frequency, cosine and sine; a part of the rows shows so slow ones.
+fn initial_waves(form: usize, FitContext { data, residual, .. }: &FitContext) -> Vec<Vec<f64>> {
+    let every = data.rows().div_ceil(ROWS_OF_WAVES);
+    let carrier = |row: usize| if form == WAVE { data.reading[row] } else { data.full_scale_v };
+    let wave = |count: usize| {
+        let frequency = INITIAL_PERIODS * count as f64 / data.duration_s().max(1e-9);
+        let [mut cc, mut ss, mut cs, mut c, mut s] = [0.0; 5];
+        for row in (0..data.rows()).step_by(every) {
+            let (sin, cos) = (TAU * frequency * (data.time_s[row] - data.time_s[0])).sin_cos();
+            let (sin, cos) = (carrier(row) * sin, carrier(row) * cos);
+            (cc, ss, cs) = (cc + cos * cos, ss + sin * sin, cs + cos * sin);
+            (c, s) = (c + cos * residual[row], s + sin * residual[row]);
+        }
+        let determinant = cc * ss - cs * cs;
+        let (a, b) = ((c * ss - s * cs) / determinant, (s * cc - c * cs) / determinant);
+        (a * c + b * s, vec![frequency, a, b])
+    };
+    let most = (FEWEST_PERIODS.get() / INITIAL_PERIODS) as usize;
+    let mut waves: Vec<(f64, Vec<f64>)> = (2..most).map(wave).filter(|(gain, _)| gain.is_finite()).collect();
+    waves.sort_by(|a, b| b.0.total_cmp(&a.0));
+    waves.into_iter().take(INITIAL_WAVES).map(|(_, point)| point).collect()
+}
 
 /// Returns the row from which on a factor other than 1 reduces the squared error most, and the factor less 1; NaN rows do not count.
 fn best_step(FitContext { data, residual, .. }: &FitContext) -> Option<Vec<f64>> {
@@ -63,6 +120,10 @@ impl Effect for Drift {
     }
 
     fn forms(&self) -> usize {
+        8
+    }
+
+    fn common_forms(&self) -> usize {
         4
     }
 
@@ -70,8 +131,19 @@ impl Effect for Drift {
         if form == STEP {
             return vec![Coordinate::fixed(0.0, data.rows() as f64), Coordinate::new(-0.9, 2.0)];
         }
-        let most = 2.0 / data.duration_s().max(1e-9);
-        vec![Coordinate::new(-most, most)]
+        let duration_s = data.duration_s().max(1e-9);
+        let change = Coordinate::new(-2.0, 2.0);
+        match form {
+            WAVE | ADDED_WAVE => {
+                let frequency = Coordinate::new(FEWEST_PERIODS_OF_WAVE / duration_s, FEWEST_PERIODS.get() / duration_s);
+                vec![frequency, change, change]
+            }
+            SETTLING | ADDED_SETTLING => {
+                let (shortest, longest) = settling_times(data);
+                vec![change, Coordinate::log(shortest, longest)]
+            }
+            _ => vec![Coordinate::new(-2.0 / duration_s, 2.0 / duration_s)],
+        }
     }
 
     /// A step of one of several records is looked for in that record alone.
@@ -79,12 +151,23 @@ impl Effect for Drift {
         if form == STEP {
             return best_step(context).into_iter().filter(|_| !context.data.is_joined()).collect();
         }
-        let rate = 0.05 / context.data.duration_s().max(1e-9);
-        vec![vec![-rate], vec![rate]]
+        let duration_s = context.data.duration_s().max(1e-9);
+        match form {
+            WAVE | ADDED_WAVE => initial_waves(form, context),
+            SETTLING | ADDED_SETTLING => {
+                let times = logarithms(settling_times(context.data), INITIAL_SETTLING);
+                times.flat_map(|time| [vec![-0.05, time], vec![0.05, time]]).collect()
+            }
+            _ => vec![vec![-0.05 / duration_s], vec![0.05 / duration_s]],
+        }
     }
 
     fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
-        if form == STEP { (data.rows() as f64).max(1.0).ln() } else { 0.0 }
+        match form {
+            STEP => (data.rows() as f64).max(1.0).ln(),
+            WAVE | ADDED_WAVE => FEWEST_PERIODS.get().ln(),
+            _ => 0.0,
+        }
     }
 
     fn searched(&self, form: usize) -> bool {
@@ -127,7 +210,17 @@ impl Effect for Drift {
                 Quantity::new("at_s", Dimension::TimePoint, at_s),
             ];
         }
-        vec![Quantity::new("per_s", Dimension::Rate, point[0])]
+        match form {
+            WAVE | ADDED_WAVE => vec![
+                Quantity::new("amplitude", Dimension::Ratio, point[1].hypot(point[2])),
+                Quantity::new("freq_hz", Dimension::Frequency, point[0]),
+            ],
+            SETTLING | ADDED_SETTLING => vec![
+                Quantity::new("change", Dimension::Ratio, point[0]),
+                Quantity::new("settling_s", Dimension::Time, point[1].exp()),
+            ],
+            _ => vec![Quantity::new("per_s", Dimension::Rate, point[0])],
+        }
     }
 
     fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
@@ -136,11 +229,20 @@ impl Effect for Drift {
             readings[row..].iter_mut().for_each(|reading| *reading *= 1.0 + point[1]);
             return;
         }
+        if matches!(form, WAVE | ADDED_WAVE) {
+            for (reading, (sin, cos)) in readings.iter_mut().zip(spectrum::oscillation(point[0], data)) {
+                let carrier = if form == WAVE { *reading } else { data.full_scale_v };
+                *reading += carrier * (point[1] * cos + point[2] * sin);
+            }
+            return;
+        }
         let start = data.time_s.first().copied().unwrap_or(0.0);
+        let settling = matches!(form, SETTLING | ADDED_SETTLING);
         for (reading, time) in readings.iter_mut().zip(&data.time_s) {
-            let grown = point[0] * (time - start);
+            let since = time - start;
+            let grown = if settling { -point[0] * (-since / point[1].exp()).exp_m1() } else { point[0] * since };
             match form {
-                STRAIGHT => *reading *= 1.0 + grown,
+                STRAIGHT | SETTLING => *reading *= 1.0 + grown,
                 EXPONENTIAL => *reading *= grown.exp(),
                 _ => *reading += grown * data.full_scale_v,
             }

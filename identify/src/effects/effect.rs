@@ -158,6 +158,11 @@ pub trait Effect: Sync {
         1
     }
 
+    /// Returns the number of forms, from the first, that every search tries; the others are tried where these leave structure.
+    fn common_forms(&self) -> usize {
+        self.forms()
+    }
+
     /// Returns the coordinates of a form.
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate>;
 

@@ -1,15 +1,48 @@
-//! A periodic disturbance is added to the readings: `a cos(2 pi f t) + b sin(2 pi f t)`.
+//! A periodic disturbance is added to the readings.
+//!
+//! | form | disturbance |
+//! | --- | --- |
+//! | sine | `a cos(2 pi f t) + b sin(2 pi f t)` |
+//! | in proportion | `y (a cos(2 pi f t) + b sin(2 pi f t))`: the response is modulated, by a load or a supply |
+//! | with harmonics | `sum_k a_k cos(2 pi k f t) + b_k sin(2 pi k f t)`, `k` 1 to 3: no sine, as of a load that is switched |
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
-use crate::record::spectrum;
-use crate::stats::thresholds::empirical::FEWEST_PERIODS;
+use crate::record::spectrum::{self, Peak};
+use crate::stats::thresholds::empirical::{FEWEST_PERIODS, LINE_TO_NEIGHBOURS};
 
 pub(super) struct Hum;
 
 /// Number of spectral peaks that are tried.
 const PEAKS: usize = 3;
+const SINE: usize = 0;
+const IN_PROPORTION: usize = 1;
+const WITH_HARMONICS: usize = 2;
+/// Number of sines of the form with harmonics.
+const HARMONICS: usize = 3;
+
+/// Frequencies that are tried on each side of a line, and their distance, in periods per record.
+const LINE_STEPS: i32 = 5;
+const LINE_STEP: f64 = 0.1;
+
+/// Returns the number of sines of a form.
+fn sines(form: usize) -> usize {
+    if form == WITH_HARMONICS { HARMONICS } else { 1 }
+}
+
+/// Returns the sine near a frequency whose multiples explain most of a residual: the phases of the multiples tell the frequency better
+/// than the spectrum does.
+fn likeliest(form: usize, frequency_hz: f64, residual: &[f64], data: &Data) -> Peak {
+    let step_hz = LINE_STEP / data.duration_s();
+    let near = (-LINE_STEPS..=LINE_STEPS).map(|step| frequency_hz + f64::from(step) * step_hz);
+    let power = |frequency_hz: f64| -> f64 {
+        let lines = (1..=sines(form)).map(|k| spectrum::line(residual, data, k as f64 * frequency_hz));
+        lines.map(|line| line.cosine.powi(2) + line.sine.powi(2)).sum()
+    };
+    let best = near.max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(frequency_hz);
+    spectrum::line(residual, data, best)
+}
 
 impl Effect for Hum {
     fn cause(&self) -> &'static str {
@@ -32,23 +65,50 @@ impl Effect for Hum {
         "readings at constant voltage, at another sample time: a line that is an alias moves"
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        let most = 2.0 * data.full_scale_v.max(1.0);
-        let frequency = Coordinate::new(0.9 * FEWEST_PERIODS.get() / data.duration_s().max(1e-9), 0.5 / data.sample_s);
-        vec![frequency, Coordinate::new(-most, most), Coordinate::new(-most, most)]
+    fn forms(&self) -> usize {
+        3
     }
 
-    fn initial_points(&self, _: usize, FitContext { data, residual, .. }: &FitContext) -> Vec<Vec<f64>> {
-        spectrum::peaks(residual, data, PEAKS)
+    fn common_forms(&self) -> usize {
+        1
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        let most = if form == IN_PROPORTION { 1.0 } else { 2.0 * data.full_scale_v.max(1.0) };
+        let frequency = Coordinate::new(0.9 * FEWEST_PERIODS.get() / data.duration_s().max(1e-9), 0.5 / data.sample_s);
+        let mut coordinates = vec![frequency];
+        coordinates.resize(1 + 2 * sines(form), Coordinate::new(-most, most));
+        coordinates
+    }
+
+    fn initial_points(&self, form: usize, FitContext { data, residual, .. }: &FitContext) -> Vec<Vec<f64>> {
+        let level_v = data.reading.iter().map(|reading| reading.abs()).sum::<f64>() / data.rows() as f64;
+        let scale = if form == IN_PROPORTION { 1.0 / level_v.max(f64::MIN_POSITIVE) } else { 1.0 };
+        // What is synchronous with the schedule is no disturbance: the forms other than a sine need a line that stands out.
+        let stands_out = || {
+            let line = spectrum::most_prominent_line(residual, data)?;
+            (line.prominence > LINE_TO_NEIGHBOURS.get()).then(|| likeliest(form, line.frequency_hz, residual, data))
+        };
+        let peaks =
+            if form == SINE { spectrum::peaks(residual, data, PEAKS) } else { stands_out().into_iter().collect() };
+        let start = |peak: Peak| {
+            let further = (2..=sines(form)).map(|k| spectrum::line(residual, data, k as f64 * peak.frequency_hz));
+            let each = std::iter::once(peak).chain(further).flat_map(|it| [scale * it.cosine, scale * it.sine]);
+            std::iter::once(peak.frequency_hz).chain(each).collect()
+        };
+        peaks
             .into_iter()
             .filter(|peak| peak.frequency_hz > FEWEST_PERIODS.get() / data.duration_s())
-            .map(|peak| vec![peak.frequency_hz, peak.cosine, peak.sine])
+            .map(start)
             .collect()
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+    /// The amplitude of a disturbance in proportion to the response is that at the largest voltage.
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        let scale = if form == IN_PROPORTION { data.full_scale_v } else { 1.0 };
+        let power: f64 = point[1..].iter().map(|amplitude| amplitude * amplitude).sum();
         vec![
-            Quantity::new("amplitude", Dimension::ReadingSize, point[1].hypot(point[2])),
+            Quantity::new("amplitude", Dimension::ReadingSize, scale * power.sqrt()),
             Quantity::new("freq_hz", Dimension::Frequency, point[0]),
         ]
     }
@@ -58,9 +118,15 @@ impl Effect for Hum {
         ((data.rows() as f64 / 2.0).max(1.0).ln() - 4.5).max(0.0)
     }
 
-    fn modify_readings(&self, _: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+    fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
         for (reading, (sin, cos)) in readings.iter_mut().zip(spectrum::oscillation(point[0], data)) {
-            *reading += point[1] * cos + point[2] * sin;
+            let mut turned = (1.0, 0.0);
+            let mut sum = 0.0;
+            for amplitudes in point[1..].chunks_exact(2) {
+                turned = (turned.0 * cos - turned.1 * sin, turned.1 * cos + turned.0 * sin);
+                sum += amplitudes[0] * turned.0 + amplitudes[1] * turned.1;
+            }
+            *reading += if form == IN_PROPORTION { *reading * sum } else { sum };
         }
     }
 }

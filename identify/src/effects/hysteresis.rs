@@ -10,12 +10,14 @@
 //! | bank | five, at r / 5 to r | r, weights |
 //! | behind | one, weight 1, behind the relaxation: the sensor's backlash | r |
 //! | cycled part, cycled bank | the same, with the initial condition on the descending branch | the same |
+//! | load | none: a [`LoadFriction`], whose branches differ in proportion to the voltage | part |
 //!
 //! The initial condition belongs to the record, not to the spring.
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
+use crate::plant::load_friction::LoadFriction;
 use crate::plant::play_bank::PlayBank;
 use crate::record::data::Data;
 
@@ -23,9 +25,10 @@ pub(super) struct Hysteresis;
 
 const WHOLE: usize = 0;
 const BEHIND: usize = 5;
+const LOAD: usize = 6;
 
 /// Number of plays, and initial condition on the descending branch, for each form.
-const FORMS: [(usize, bool); 6] = [(1, false), (1, false), (5, false), (1, true), (5, true), (1, false)];
+const FORMS: [(usize, bool); 7] = [(1, false), (1, false), (5, false), (1, true), (5, true), (1, false), (0, false)];
 /// Thresholds of a bank relative to `r`.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
@@ -68,7 +71,14 @@ impl Effect for Hysteresis {
         FORMS.len()
     }
 
+    fn common_forms(&self) -> usize {
+        6
+    }
+
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        if form == LOAD {
+            return vec![Coordinate::new(-0.5, 0.5)];
+        }
         let (count, _) = FORMS[form];
         let mut coordinates = vec![Coordinate::log(1e-4 * data.full_scale_v, 0.5 * data.full_scale_v)];
         if !matches!(form, WHOLE | BEHIND) {
@@ -77,10 +87,14 @@ impl Effect for Hysteresis {
         coordinates
     }
 
-    /// The play behind the relaxation is not tried with an unknown initial state, in which its prediction is not linear.
+    /// The play behind the relaxation and the friction under load are not tried with an unknown initial state, in which their
+    /// predictions are not linear.
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
-        if form == BEHIND && data.initial_state_unknown {
+        if matches!(form, BEHIND | LOAD) && data.initial_state_unknown {
             return Vec::new();
+        }
+        if form == LOAD {
+            return vec![vec![-0.02], vec![0.02]];
         }
         let (count, _) = FORMS[form];
         let start = |part: f64, weight: f64| {
@@ -95,17 +109,25 @@ impl Effect for Hysteresis {
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("width_v", Dimension::Voltage, bank(form, point).width(data.full_scale_v))]
+        let width = match form {
+            LOAD => LoadFriction::new(point[0]).width(data.full_scale_v),
+            _ => bank(form, point).width(data.full_scale_v),
+        };
+        vec![Quantity::new("width_v", Dimension::Voltage, width)]
     }
 
     /// A plant file holds a limited number of plays, before the relaxation.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
-        (form == BEHIND || !chain.memory.fits_plant_file()).then(|| table(self, form, point, data))
+        (matches!(form, BEHIND | LOAD) || !chain.memory.fits_plant_file()).then(|| table(self, form, point, data))
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         if form == BEHIND {
             chain.memory_behind = bank(form, point);
+            return;
+        }
+        if form == LOAD {
+            chain.friction = LoadFriction::new(point[0]);
             return;
         }
         chain.memory = bank(form, point).composed_with(&chain.memory);

@@ -18,6 +18,7 @@ mod hum;
 mod hysteresis;
 mod instantaneous_share;
 pub mod model;
+mod offset_levels;
 mod outliers;
 mod quantisation;
 mod reading_offset;

@@ -4,25 +4,56 @@
 //! | --- | --- |
 //! | run | one interval of them |
 //! | whole | all of them: the sensor's zero |
+//! | levels | several stretches, each by a constant of its own ([`offset_levels`](super::offset_levels)) |
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
+use crate::effects::offset_levels::{Stretch, stretches};
 use crate::record::data::Data;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::second_differences;
 use crate::stats::thresholds::empirical::{CLIP_FOR_RUN, PRICE_OF_RUN, ROWS_FOR_ZERO, SHORTEST_RUN};
-use crate::stats::thresholds::probability::{NATS_WITHIN_INTERVAL, Z_ZERO};
+use crate::stats::thresholds::probability::{NATS_WITHIN_INTERVAL, Z_RARE, Z_ZERO};
 
 pub(super) struct ReadingOffset;
 
 const RUN: usize = 0;
 const WHOLE: usize = 1;
+const LEVELS: usize = 2;
+/// Largest number of stretches with a level of their own.
+const MOST_STRETCHES: usize = 16;
+/// Fewest stretches that are more than one shifted run.
+const FEWEST_STRETCHES: usize = 4;
 
-/// Returns the rows that are shifted and the shift, in V: rows from `point[0]` up to but not including `point[1]` by
-/// `point[2]`, or all by `point[0]`.
+/// Returns the point of the form with levels: the first rows of all stretches, then the shifts, in V. What is left of the places is
+/// behind the record's end.
+fn levels(rows: usize, stretches: &[Stretch]) -> Vec<f64> {
+    let mut point = vec![rows as f64; MOST_STRETCHES];
+    point.resize(2 * MOST_STRETCHES, 0.0);
+    for (place, stretch) in stretches.iter().enumerate() {
+        (point[place], point[MOST_STRETCHES + place]) = (stretch.from as f64, stretch.level);
+    }
+    point
+}
+
+/// Returns the stretches of a point of the form with levels.
+fn stretches_of(point: &[f64], rows: usize) -> impl Iterator<Item = Stretch> {
+    let (first, shifts) = point.split_at(MOST_STRETCHES);
+    let starts = first.iter().map(move |&row| (row as usize).min(rows));
+    let ends = starts.clone().skip(1).chain([rows]);
+    let each = starts.zip(ends).zip(shifts).map(|((from, to), &level)| Stretch { from, to, level });
+    each.filter(|stretch| stretch.from < stretch.to)
+}
+
+/// Returns the rows that are shifted and the shift, in V: rows from `point[0]` up to but not including `point[1]` by `point[2]`, all by
+/// `point[0]`, or of several stretches the one that is shifted most.
 fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, f64) {
     if form == WHOLE {
         return (0..rows, point[0]);
+    }
+    if form == LEVELS {
+        let far = stretches_of(point, rows).max_by(|a, b| a.level.abs().total_cmp(&b.level.abs()));
+        return far.map_or((0..0, 0.0), |far| (far.from..far.to, far.level));
     }
     let to = (point[1] as usize).min(rows);
     ((point[0] as usize).min(to)..to, point[2])
@@ -69,8 +100,10 @@ fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>>
     let (_, from, to) = refined(best.1, best.2, rows, &gain)?;
     // The median is not affected by an outlier in the run.
     let mut run: Vec<f64> = residual[from..to].iter().copied().filter(|value| !value.is_nan()).collect();
-    run.sort_by(f64::total_cmp);
-    Some(vec![from as f64, to as f64, run[run.len() / 2]])
+    let noise = robust_deviation(second_differences(&run)).unwrap_or(0.0);
+    let shift = median(&mut run)?;
+    // In a burst of stronger noise the mean of a run is far from 0 by chance.
+    (shift.abs() * (run.len() as f64).sqrt() > Z_RARE * noise).then(|| vec![from as f64, to as f64, shift])
 }
 
 /// Returns the best run whose edges are close to those of the given one.
@@ -125,6 +158,10 @@ impl Effect for ReadingOffset {
     }
 
     fn forms(&self) -> usize {
+        3
+    }
+
+    fn common_forms(&self) -> usize {
         2
     }
 
@@ -135,6 +172,7 @@ impl Effect for ReadingOffset {
         let start = data.normalisation.start.map_or(0.0, |start| start.offset);
         match form {
             RUN => vec![Coordinate::fixed(0.0, rows), Coordinate::fixed(0.0, rows), offset],
+            LEVELS => [Coordinate::fixed(0.0, rows), offset].map(|it| vec![it; MOST_STRETCHES]).concat(),
             _ => vec![Coordinate::new(-most + 2.0 * start.min(0.0), most + 2.0 * start.max(0.0))],
         }
     }
@@ -142,6 +180,11 @@ impl Effect for ReadingOffset {
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         match form {
             RUN => best_run(context).into_iter().collect(),
+            LEVELS => {
+                let found = stretches(context.residual, MOST_STRETCHES);
+                let several = (found.len() >= FEWEST_STRETCHES).then(|| levels(context.data.rows(), &found));
+                several.into_iter().collect()
+            }
             _ if shows_at_rest(context.data) => vec![vec![-context.sigma], vec![context.sigma]],
             _ => Vec::new(),
         }
@@ -150,24 +193,38 @@ impl Effect for ReadingOffset {
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
         let (run, offset) = shifted(form, point, data.rows());
         let last = data.rows() - 1;
-        vec![
+        let count = (form == LEVELS).then(|| {
+            let shifts = stretches_of(point, data.rows()).count() as f64;
+            Quantity::new("levels", Dimension::Ratio, shifts)
+        });
+        let mut quantities = vec![
             Quantity::new("from_s", Dimension::TimePoint, data.time_s[run.start.min(last)]),
             Quantity::new("to_s", Dimension::TimePoint, data.time_s[run.end.saturating_sub(1).min(last)]),
             Quantity::new("offset", Dimension::ReadingDifference, offset),
-        ]
+        ];
+        quantities.extend(count);
+        quantities
     }
 
     fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
         // Both edges are searched; neighbouring runs are nearly equivalent.
-        if form == RUN { PRICE_OF_RUN.get() * (data.rows() as f64).max(1.0).ln() } else { 0.0 }
+        let run = PRICE_OF_RUN.get() * (data.rows() as f64).max(1.0).ln();
+        match form {
+            RUN => run,
+            // A run has two edges.
+            LEVELS => 0.5 * MOST_STRETCHES as f64 * run,
+            _ => 0.0,
+        }
     }
 
     fn searched(&self, form: usize) -> bool {
-        form == RUN
+        form != WHOLE
     }
 
-    fn refine_searched(&self, _: usize, point: &mut [f64], context: &FitContext) {
-        if let Some(best) = best_run(context) {
+    fn refine_searched(&self, form: usize, point: &mut [f64], context: &FitContext) {
+        if form == LEVELS {
+            point.copy_from_slice(&levels(context.data.rows(), &stretches(context.residual, MOST_STRETCHES)));
+        } else if let Some(best) = best_run(context) {
             point.copy_from_slice(&best);
         }
     }
@@ -204,6 +261,12 @@ impl Effect for ReadingOffset {
     }
 
     fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+        if form == LEVELS {
+            for Stretch { from, to, level } in stretches_of(point, data.rows()) {
+                readings[from..to].iter_mut().for_each(|reading| *reading += level);
+            }
+            return;
+        }
         let (run, offset) = shifted(form, point, data.rows());
         for reading in &mut readings[run] {
             *reading += offset;

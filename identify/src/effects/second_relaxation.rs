@@ -1,4 +1,5 @@
-//! A part of the response relaxes with a second, slower time constant (creep); the settled value does not change.
+//! A part of the response relaxes with a second, slower time constant (creep); the settled value does not change unless creep is
+//! added to the response.
 //!
 //! | form | what relaxes |
 //! | --- | --- |
@@ -6,9 +7,11 @@
 //! | of everything | `y = (1 - creep) (share_0 q + (1 - share_0) lag(tau; q)) + creep lag(slow; q)` |
 //! | by decades | as of everything, in three equal parts: `slow / 10`, `slow`, `10 slow` (logarithmic creep) |
 //! | spread | of the rest, in two equal parts, to both sides: `slow` and `tau^2 / slow` (a broad relaxation) |
+//! | added | `y = share_0 q + (1 - share_0) lag(tau; q) + creep lag(slow; q)`; a flow for a `slow` beyond the record |
+//! | added by decades | added, in three parts in the ratio `1 : r : r^2` at `slow / 10`, `slow`, `10 slow` (power-law creep) |
 
 use crate::dimension::Dimension;
-use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
+use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
 use crate::plant::relaxation::Part;
 use crate::record::data::Data;
@@ -23,6 +26,19 @@ const INITIAL_TIME_CONSTANTS_S: [f64; 7] = [9.0, 15.0, 25.0, 45.0, 80.0, 150.0, 
 const OF_THE_REST: usize = 0;
 const OF_EVERYTHING: usize = 1;
 const BY_DECADES: usize = 2;
+const SPREAD: usize = 3;
+const ADDED: usize = 4;
+const ADDED_BY_DECADES: usize = 5;
+/// Largest creep that is added within the record's duration, relative to the nominal response.
+const MOST_ADDED: f64 = 3.0;
+/// Largest ratio of the parts of two decades.
+const STEEPEST: f64 = 5.0;
+
+/// Returns the settled value of the creep that is added, relative to the nominal response. The first coordinate is what is added within
+/// the record's duration: of a flow that is known, the settled value is not.
+fn added(point: &[f64], data: &Data) -> f64 {
+    point[0] / -(-data.duration_s() / point[1].exp()).exp_m1()
+}
 
 impl Effect for SecondRelaxation {
     fn cause(&self) -> &'static str {
@@ -41,47 +57,72 @@ impl Effect for SecondRelaxation {
         "one step, held for minutes: creep goes on rising to the same settled value"
     }
 
+    /// What is added also changes the settled value.
+    fn affects(&self, form: usize) -> Affects {
+        if matches!(form, ADDED | ADDED_BY_DECADES) { Affects::StaticResponse } else { Affects::Relaxation }
+    }
+
     fn forms(&self) -> usize {
+        6
+    }
+
+    fn common_forms(&self) -> usize {
         4
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let fastest = FASTEST_CREEP.get() * REFERENCE_TIME_CONSTANT_S;
-        vec![Coordinate::new(0.0, 0.9), Coordinate::log(fastest, 10.0 * data.duration_s().max(fastest))]
+        let most = if matches!(form, ADDED | ADDED_BY_DECADES) { MOST_ADDED } else { 0.9 };
+        let slow = Coordinate::log(fastest, 10.0 * data.duration_s().max(fastest));
+        let mut coordinates = vec![Coordinate::new(0.0, most), slow];
+        coordinates.extend((form == ADDED_BY_DECADES).then(|| Coordinate::log(1.0 / STEEPEST, STEEPEST)));
+        coordinates
     }
 
-    fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
-        INITIAL_TIME_CONSTANTS_S
-            .into_iter()
-            .filter(|&tau: &f64| tau < 3.0 * data.duration_s())
-            .map(|tau| vec![0.1, tau.ln()])
-            .collect()
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
+        let start = |tau: f64| {
+            let mut start = vec![0.1, tau.ln()];
+            start.extend((form == ADDED_BY_DECADES).then_some(0.0));
+            start
+        };
+        INITIAL_TIME_CONSTANTS_S.into_iter().filter(|&tau| tau < 3.0 * data.duration_s()).map(start).collect()
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![
-            Quantity::new("share", Dimension::Ratio, point[0]),
-            Quantity::new("tau_s", Dimension::Time, point[1].exp()),
-        ]
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        let share = if matches!(form, ADDED | ADDED_BY_DECADES) { added(point, data) } else { point[0] };
+        vec![Quantity::new("share", Dimension::Ratio, share), Quantity::new("tau_s", Dimension::Time, point[1].exp())]
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
         None
     }
 
-    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        let (creep, slow_s) = (point[0], point[1].exp());
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
+        let mut creep = point[0];
+        if matches!(form, ADDED | ADDED_BY_DECADES) {
+            let added = added(point, data);
+            chain.law.push(move |voltage| voltage * (1.0 + added));
+            // Relative to the settled value, which includes what is added.
+            creep = added / (1.0 + added);
+        }
+        let slow_s = point[1].exp();
         let relaxation = &mut chain.relaxation;
         let parts = |times: &[f64]| {
             let part = |&tau_s: &f64| Part { part: creep / times.len() as f64, tau_s };
             std::array::from_fn(|index| times.get(index).map(part).unwrap_or_default())
         };
         relaxation.further = match form {
-            OF_THE_REST | OF_EVERYTHING => parts(&[slow_s]),
+            OF_THE_REST | OF_EVERYTHING | ADDED => parts(&[slow_s]),
             BY_DECADES => parts(&[0.1 * slow_s, slow_s, 10.0 * slow_s]),
+            ADDED_BY_DECADES => {
+                let ratio = point[2].exp();
+                let of_decade =
+                    |weight: f64, tau_s: f64| Part { part: creep * weight / (1.0 + ratio + ratio * ratio), tau_s };
+                [of_decade(1.0, 0.1 * slow_s), of_decade(ratio, slow_s), of_decade(ratio * ratio, 10.0 * slow_s)]
+            }
             _ => parts(&[slow_s, relaxation.tau_s * relaxation.tau_s / slow_s]),
         };
-        if form == OF_EVERYTHING || form == BY_DECADES {
+        if !matches!(form, OF_THE_REST | SPREAD) {
             relaxation.share *= 1.0 - creep;
         }
     }

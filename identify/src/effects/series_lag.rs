@@ -5,6 +5,8 @@
 //! | one | `tau dy'/dt = y - y'` behind the relaxation |
 //! | two | two of them in series, an overdamped second order |
 //! | in front | `tau du/dt = command - u` before hysteresis and static law, which cannot be distinguished without these |
+//! | damped | `tau^2 d2y'/dt2 + 2 zeta tau dy'/dt + y' = y` with a `zeta` of 0.5 to 1; with less it is a `resonance` |
+//! | mean | the mean of `y` over the last `window`: a sensor that integrates |
 //!
 //! A shift in time is a `delay`, an exponential approach a `series-lag`. With two time constants in series the one that
 //! replaces the nominal spring's is its `time-constant`, the other one the lag.
@@ -12,20 +14,29 @@
 use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
 use crate::plant::chain::Chain;
+use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
-use crate::stats::thresholds::empirical::FASTEST_SERIES_LAG;
+use crate::record::signal::{Oscillator, Signal};
+use crate::stats::thresholds::empirical::{CHANGE_OF_FULL_SCALE, FASTEST_SERIES_LAG};
 
 pub(super) struct SeriesLag;
 
 const ONE: usize = 0;
 const TWO: usize = 1;
 const IN_FRONT: usize = 2;
+const DAMPED: usize = 3;
+const MEAN: usize = 4;
+/// Ratio of two heights of steps that are different.
+const DIFFERENT: f64 = 1.5;
 /// Largest time constant at initial points, in reference time constants.
 const LONGEST_INITIAL: f64 = 3.0;
 /// Product of the two time constants of an overdamped second order, as a fraction of the square of their sum: the smallest,
 /// at initial points, and the largest, at which they are equal. Sum and product change the response smoothly also there.
 const PRODUCTS: [f64; 3] = [0.01, 0.2, 0.25];
+/// The same of a damped second order, `1 / (4 zeta^2)`: the smallest, near that of two equal time constants, at initial points, and
+/// the largest, of a damping ratio of 0.5.
+const PRODUCTS_IF_DAMPED: [f64; 3] = [0.2501, 0.45, 1.0];
 
 /// Largest lag, or sum of two, relative to the time constant of a first-order fit if the nominal spring is far from the record: a
 /// longer one would take the place of the time constant.
@@ -45,6 +56,30 @@ fn time_constants_s(point: &[f64]) -> impl Iterator<Item = f64> {
     std::iter::once(0.5 * (1.0 + root)).chain(point.get(1).map(|_| 0.5 * (1.0 - root))).map(move |part| part * sum_s)
 }
 
+/// Returns the products of a form of second order; `None` for another.
+fn products(form: usize) -> Option<[f64; 3]> {
+    match form {
+        TWO => Some(PRODUCTS),
+        DAMPED => Some(PRODUCTS_IF_DAMPED),
+        _ => None,
+    }
+}
+
+/// Returns true if steps of the voltage have different heights. Otherwise the mean of the response cannot be distinguished from the ramps
+/// of an amplifier's slew rate.
+fn steps_differ(data: &Data) -> bool {
+    let changes = data.voltage_v.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let steps = changes.filter(|change| *change > CHANGE_OF_FULL_SCALE.get() * data.full_scale_v);
+    let (low, high) = steps.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), step| (low.min(step), high.max(step)));
+    high > DIFFERENT * low
+}
+
+/// Returns angular frequency, in 1/s, and damping ratio of a damped second order at a point.
+fn oscillation(point: &[f64]) -> (f64, f64) {
+    let root = point[1].sqrt();
+    (1.0 / (root * point[0].exp()), 0.5 / root)
+}
+
 impl Effect for SeriesLag {
     fn cause(&self) -> &'static str {
         "series-lag"
@@ -55,7 +90,11 @@ impl Effect for SeriesLag {
     }
 
     fn affects(&self, form: usize) -> Affects {
-        if form == IN_FRONT { Affects::Amplifier } else { Affects::Relaxation }
+        match form {
+            IN_FRONT => Affects::Amplifier,
+            DAMPED | MEAN => Affects::Response,
+            _ => Affects::Relaxation,
+        }
     }
 
     fn description(&self) -> &'static str {
@@ -67,40 +106,73 @@ impl Effect for SeriesLag {
     }
 
     fn forms(&self) -> usize {
+        5
+    }
+
+    fn common_forms(&self) -> usize {
         3
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (shortest, longest) = range(data);
         let mut coordinates = vec![Coordinate::log(shortest, longest)];
-        coordinates.extend((form == TWO).then_some(Coordinate::new(PRODUCTS[0], PRODUCTS[2])));
+        coordinates.extend(products(form).map(|products| Coordinate::new(products[0], products[2])));
         coordinates
     }
 
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
+        if form == MEAN && !steps_differ(data) {
+            return Vec::new();
+        }
         let (shortest, longest) = range(data);
         let longest = longest.min(LONGEST_INITIAL * REFERENCE_TIME_CONSTANT_S).max(3.0 * shortest);
         let count = if form == ONE { 10 } else { 4 };
-        let product = (form == TWO).then_some(PRODUCTS[1]);
+        let product = products(form).map(|products| products[1]);
         logarithms((2.0 * shortest, longest), count).map(|tau| std::iter::once(tau).chain(product).collect()).collect()
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+    fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        let time = |name: &str, time_s| Quantity::new(name, Dimension::Time, time_s);
+        match form {
+            DAMPED => {
+                let (omega, zeta) = oscillation(point);
+                return vec![time("tau_s", omega.recip()), Quantity::new("zeta", Dimension::Ratio, zeta)];
+            }
+            // As late as a lag of half the window.
+            MEAN => return vec![time("tau_s", 0.5 * point[0].exp()), time("window_s", point[0].exp())],
+            _ => {}
+        }
         let names = ["tau_s", "second_tau_s"];
-        let of = |(name, tau_s)| Quantity::new(name, Dimension::Time, tau_s);
-        names.into_iter().zip(time_constants_s(point)).map(of).collect()
+        names.into_iter().zip(time_constants_s(point)).map(|(name, tau_s)| time(name, tau_s)).collect()
     }
 
     /// A plant file holds lags behind the relaxation as further time constants of the same, unless that varies with the voltage
     /// or has no place left.
     fn unmodelled(&self, form: usize, point: &[f64], data: &Data, chain: &Chain) -> Option<toml::Value> {
-        (form == IN_FRONT || !chain.series_lags_fit_plant_file()).then(|| table(self, form, point, data))
+        let in_file = matches!(form, ONE | TWO) && chain.series_lags_fit_plant_file();
+        (!in_file).then(|| table(self, form, point, data))
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         match form {
             IN_FRONT => chain.output_tau_s = point[0].exp(),
+            DAMPED | MEAN => {}
             _ => chain.series_s.extend(time_constants_s(point)),
+        }
+    }
+
+    fn modify_response(&self, form: usize, point: &[f64], signal: &mut Signal, start: &mut InitialState) {
+        match form {
+            DAMPED => {
+                let (omega, zeta) = oscillation(point);
+                let (x, rate) = (signal.before + start.next_offset_v(), omega * start.next_offset_v());
+                let mut sensor = Oscillator::at(omega, zeta, x, rate);
+                if !sensor.is_zero() || !signal.is_zero() {
+                    signal.pass(|piece| sensor.pass(piece));
+                }
+            }
+            MEAN => signal.average(point[0].exp()),
+            _ => {}
         }
     }
 }

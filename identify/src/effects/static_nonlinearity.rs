@@ -5,6 +5,9 @@
 //! | --- | --- |
 //! | exponential | `s(x) / s(X)` with `s(x) = (1 - exp(-k x)) / x` |
 //! | quadratic, cubic, quintic | `1 + a (x - X)`, `+ b (x^2 - X^2)`, `+ c (x^3 - X^3) + d (x^4 - X^4)` |
+//! | power | `(x / X)^(p - 1)`: a square root, a square (electrostriction) |
+//! | kink | `s(x) / s(X)` with `s(x) = (a min(x, k) + max(x - k, 0)) / x`: a dead band, a contact |
+//! | uneven | as cubic with the sign of the voltage, `x = u / full scale`: other curves for negative voltages |
 //!
 //! Every curve is fixed at 0 V and at the reference voltage of the nominal spring, where the static gain is 1: what is linear
 //! belongs to `gain-error`.
@@ -27,11 +30,15 @@ enum Curve {
     Exponential,
     /// A polynomial with this number of free coefficients.
     Polynomial(usize),
+    Power,
+    Kink,
+    /// The polynomial with two free coefficients of the voltage with its sign.
+    Uneven,
 }
-use Curve::{Exponential, Polynomial};
+use Curve::{Exponential, Kink, Polynomial, Power, Uneven};
 
 /// Curve of each form, and whether it is behind the relaxation.
-const FORMS: [(Curve, bool); 8] = [
+const FORMS: [(Curve, bool); 11] = [
     (Polynomial(1), false),
     (Exponential, false),
     (Polynomial(2), false),
@@ -40,7 +47,18 @@ const FORMS: [(Curve, bool); 8] = [
     (Exponential, true),
     (Polynomial(2), true),
     (Polynomial(4), true),
+    (Power, false),
+    (Kink, false),
+    (Uneven, false),
 ];
+
+/// Smallest `x` of a power, which may have no finite slope at 0.
+const LEAST_OF_POWER: f64 = 1e-9;
+/// Places of a kink, and slopes below it relative to that above, at initial points.
+const INITIAL_KINKS: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.7];
+const INITIAL_SLOPES: [f64; 2] = [0.5, 1.5];
+/// Fraction of the rows with each sign of the voltage from which a curve for both signs can be found.
+const ROWS_OF_SIGN: f64 = 0.1;
 
 /// Number of points of the curve that are reported.
 const POINTS: u32 = 5;
@@ -58,7 +76,13 @@ impl Curve {
                 let secant = |x: f64| if x < 1e-9 { k } else { -(-k * x).exp_m1() / x };
                 secant(x) / secant(fixed)
             }
-            Polynomial(_) => {
+            Power => (x.max(LEAST_OF_POWER) / fixed).powf(point[0] - 1.0),
+            Kink => {
+                let [place, slope] = [point[0], point[1]];
+                let secant = |x: f64| if x < place { slope } else { 1.0 + (slope - 1.0) * place / x };
+                secant(x) / secant(fixed)
+            }
+            Polynomial(_) | Uneven => {
                 let polynomial = |x: f64| x * point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient);
                 1.0 + polynomial(x) - polynomial(fixed)
             }
@@ -68,8 +92,9 @@ impl Curve {
     /// Returns the number of free parameters.
     fn coefficients(self) -> usize {
         match self {
-            Exponential => 1,
+            Exponential | Power => 1,
             Polynomial(coefficients) => coefficients,
+            Kink | Uneven => 2,
         }
     }
 }
@@ -77,7 +102,8 @@ impl Curve {
 /// Returns `f / u` of a form at a voltage.
 fn secant(form: usize, point: &[f64], voltage: f64, data: &Data) -> f64 {
     let full_scale_v = data.full_scale_v;
-    FORMS[form].0.secant(point, voltage.abs() / full_scale_v, REFERENCE_VOLTAGE_V / full_scale_v)
+    let voltage = if matches!(FORMS[form].0, Uneven) { voltage } else { voltage.abs() };
+    FORMS[form].0.secant(point, voltage / full_scale_v, REFERENCE_VOLTAGE_V / full_scale_v)
 }
 
 /// Returns the number of levels of the voltage other than 0 at which the record has rows.
@@ -91,6 +117,13 @@ fn levels(data: &Data) -> usize {
         }
     }
     rows.iter().filter(|rows| **rows as f64 >= ROWS_OF_LEVEL * data.rows() as f64).count()
+}
+
+/// Returns true if the record has rows at voltages of both signs.
+fn has_both_signs(data: &Data) -> bool {
+    let positive = data.voltage_v.iter().filter(|voltage| **voltage > 0.0).count() as f64;
+    let negative = data.voltage_v.iter().filter(|voltage| **voltage < 0.0).count() as f64;
+    positive.min(negative) > ROWS_OF_SIGN * data.rows() as f64
 }
 
 impl Effect for StaticNonlinearity {
@@ -114,11 +147,18 @@ impl Effect for StaticNonlinearity {
         FORMS.len()
     }
 
+    fn common_forms(&self) -> usize {
+        8
+    }
+
     fn coordinates(&self, form: usize, _: &Data) -> Vec<Coordinate> {
         match FORMS[form].0 {
             Exponential => vec![Coordinate::new(-8.0, 8.0)],
             Polynomial(1) => vec![Coordinate::new(-2.0, 2.0)],
             Polynomial(coefficients) => vec![Coordinate::new(-100.0, 100.0); coefficients],
+            Uneven => vec![Coordinate::new(-2.0, 2.0); 2],
+            Power => vec![Coordinate::new(0.2, 5.0)],
+            Kink => vec![Coordinate::new(0.01, 0.95), Coordinate::new(0.0, 10.0)],
         }
     }
 
@@ -126,11 +166,16 @@ impl Effect for StaticNonlinearity {
     /// unknown initial state, in which their prediction is not linear.
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         let (curve, behind) = FORMS[form];
-        if levels(context.data) <= curve.coefficients() || behind && context.data.initial_state_unknown {
+        let levels = levels(context.data);
+        let unknown = behind && context.data.initial_state_unknown;
+        if levels <= curve.coefficients() || unknown || matches!(curve, Uneven) && !has_both_signs(context.data) {
             return Vec::new();
         }
         match curve {
             Exponential => vec![vec![0.3], vec![-0.3]],
+            Power => vec![vec![0.9], vec![1.1]],
+            Kink => INITIAL_KINKS.iter().flat_map(|&place| INITIAL_SLOPES.map(|slope| vec![place, slope])).collect(),
+            Uneven => vec![vec![0.1, 0.0], vec![-0.1, 0.0]],
             Polynomial(1) => vec![vec![0.1], vec![-0.1]],
             Polynomial(coefficients) => {
                 let start = |of: &[f64]| {
@@ -165,9 +210,14 @@ impl Effect for StaticNonlinearity {
         (1..=POINTS).map(at).collect()
     }
 
-    /// In the fixed-point tick the law is in front of the relaxation.
+    /// In the fixed-point tick the law is in front of the relaxation, and the same for both signs of the voltage.
     fn unmodelled(&self, form: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
-        FORMS[form].1.then(|| "fitted behind the relaxation, written before it".into())
+        match FORMS[form] {
+            (Uneven, _) => {
+                Some("fitted with a curve for each sign of the voltage, written for positive voltages".into())
+            }
+            (_, behind) => behind.then(|| "fitted behind the relaxation, written before it".into()),
+        }
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {

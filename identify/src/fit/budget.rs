@@ -55,13 +55,16 @@ impl Effort {
 }
 
 /// Work for a record of at most [`ROWS`] rows at the normal effort.
-const WORK: f64 = 700e6;
+const WORK: f64 = 780e6;
 /// Rows up to which the work is constant.
 const ROWS: f64 = 4000.0;
 /// Exponent of the growth with the rows.
 const GROWTH: f64 = 0.55;
 /// Fraction of a search's budget after which it only follows the most promising extensions.
 const SCARCE: f64 = 0.5;
+
+/// Fraction of a search's budget that is kept for the forms of causes that are seldom needed.
+const FOR_RARE_FORMS: f64 = 0.125;
 
 /// Ratio of the largest work on a record to the work that a diagnosis may do if nothing fits: the rest is for a diagnosis once a
 /// model leaves nothing but noise, or for the search of an equation (see [`Budget::left`]).
@@ -80,8 +83,11 @@ pub struct Budget {
     /// Work at which the present search became or becomes scarce of work, and at which it ends.
     scarce: AtomicU64,
     limit: AtomicU64,
-    /// Work that was granted to the present search.
+    /// Work that was granted to the present search, and the part of it that is kept back.
     granted: AtomicU64,
+    reserved: AtomicU64,
+    /// True once the present search does the work that was kept back.
+    released: AtomicBool,
     /// True if a search ended because its work was done.
     cut: AtomicBool,
     /// True if a search has found a model that leaves nothing but noise, and may do more work.
@@ -100,6 +106,8 @@ impl Budget {
             scarce: AtomicU64::new(total),
             limit: AtomicU64::new(total),
             granted: AtomicU64::new(total),
+            reserved: AtomicU64::new(0),
+            released: AtomicBool::new(false),
             cut: AtomicBool::new(false),
             extended: AtomicBool::new(false),
             stop,
@@ -143,11 +151,28 @@ impl Budget {
         self.scarce.store(granted(SCARCE), Ordering::Relaxed);
         self.limit.store(granted(1.0), Ordering::Relaxed);
         self.granted.store(granted(1.0) - spent, Ordering::Relaxed);
+        self.reserved.store(0, Ordering::Relaxed);
+        self.released.store(false, Ordering::Relaxed);
+    }
+
+    /// Keeps a part of the present search's work back until [`Budget::release`] or [`Budget::extend`].
+    pub fn reserve(&self) {
+        self.reserved.store((FOR_RARE_FORMS * self.granted() as f64) as u64, Ordering::Relaxed);
+    }
+
+    /// Lets the present search do the work that was kept back, half of it before work is scarce.
+    pub fn release(&self) {
+        self.note_cut();
+        self.released.store(true, Ordering::Relaxed);
+        self.reserved.store(0, Ordering::Relaxed);
+        let left = self.limit.load(Ordering::Relaxed).saturating_sub(self.spent());
+        self.scarce.fetch_max(self.spent() + (SCARCE * left as f64) as u64, Ordering::Relaxed);
     }
 
     /// Allows the present search more work, once: it has found a model that leaves nothing but noise, so that the work left is for
     /// simpler models of the same record.
     pub fn extend(&self) {
+        self.reserved.store(0, Ordering::Relaxed);
         if self.extended.swap(true, Ordering::Relaxed) {
             return;
         }
@@ -169,7 +194,7 @@ impl Budget {
 
     /// Returns true if the search has to end.
     pub fn is_over(&self) -> bool {
-        self.spent() >= self.limit.load(Ordering::Relaxed) || self.is_stopped()
+        self.spent() + self.reserved.load(Ordering::Relaxed) >= self.limit.load(Ordering::Relaxed) || self.is_stopped()
     }
 
     /// Returns true if the end was requested.
@@ -179,10 +204,15 @@ impl Budget {
 
     /// Ends a search: notes whether its work was cut, and lets the rest of the work be used for its report.
     pub fn close(&self) {
-        if self.is_over() {
+        self.note_cut();
+        self.grant(1.0);
+    }
+
+    /// Notes whether the present search was cut, if it is not in the work that was kept back.
+    fn note_cut(&self) {
+        if self.is_over() && !self.released.load(Ordering::Relaxed) || self.is_stopped() {
             self.cut.store(true, Ordering::Relaxed);
         }
-        self.grant(1.0);
     }
 
     /// Returns true if a search ended because its work was done, or because the end was requested.

@@ -37,10 +37,15 @@ const LEAST: (f64, f64, f64) = (1e-3, 1e-5, 1e-13);
 
 /// Fits the best models of order 0 to [`LARGEST_ORDER`], as far as the readings allow.
 pub fn best_of_each_order(problem: &Problem) -> Vec<Fit> {
+    best_up_to(problem, LARGEST_ORDER)
+}
+
+/// Fits the best models of order 0 to `largest`, as far as the readings allow.
+pub fn best_up_to(problem: &Problem, largest: usize) -> Vec<Fit> {
     let part = (problem.rows() > ROWS_TO_SEARCH).then(|| problem.part(ROWS_TO_SEARCH, PIECES_TO_SEARCH));
     let searched = part.as_ref().unwrap_or(problem);
     let mut found: Vec<Vec<Poles>> = Vec::new();
-    for order in 0..=LARGEST_ORDER {
+    for order in 0..=largest {
         let parameters = problem.linear_columns(order) + order + 1;
         if order > 0 && problem.rows() < READINGS_PER_PARAMETER * parameters {
             break;

@@ -20,7 +20,7 @@ use simulation::record::Record;
 use simulation::units::Units;
 
 use crate::answer::{LinearError, SCHEMA};
-use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
+use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, best_up_to, held_out_residual};
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::plant::VoltageRange;
@@ -28,8 +28,9 @@ use crate::nominal::report::{InputLaw, Noise, Nominal, Oscillation, Quantity, Re
 use crate::record::input::Input;
 use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
+use crate::stats::segments::excess;
 use crate::stats::sums::dot;
-use crate::stats::thresholds::probability::{RIVAL_ODDS, Z};
+use crate::stats::thresholds::probability::{RIVAL_ODDS, Z, Z_DOUBTFUL, Z_WORSE};
 
 /// A larger model is preferred if its held-out error is smaller by this part, ...
 const WORTHWHILE: f64 = 0.005;
@@ -40,6 +41,8 @@ const MOST_SPOILED: f64 = 10.0;
 const PRICE_OF_POLE: f64 = 4.0;
 /// ... and that it has to bring if the last part of the records confirms it by a smaller error.
 const PRICE_IF_CONFIRMED: f64 = 3.0;
+/// Errors that are larger than their scatter from row to row by this factor are no noise of the sensor.
+const STRUCTURED: f64 = 3.0;
 /// Largest held-out error under the square of a voltage of one sign, relative to that under the voltage, with which it is the law.
 const MOST_OF_SQUARE: f64 = 0.5;
 /// Fewest readings of a record.
@@ -143,8 +146,9 @@ fn error(order: usize, fit: &Fit, held_out: &[f64], last_part: f64) -> LinearErr
     }
 }
 
-/// True if the held-out error of a larger model is smaller by more than is worthwhile, the gain in log-likelihood is beyond chance,
-/// and the model extrapolates as well. Of autocorrelated errors as many count as have the same information on a mean:
+/// True if the held-out error of a larger model is smaller by more than is worthwhile and beyond chance, and the model extrapolates. The
+/// difference is beyond chance if even the larger model's errors are no noise, if it is in most of the record's segments, or if the
+/// gain in log-likelihood is. Of autocorrelated errors as many count as have the same information on a mean:
 ///
 /// ```text
 /// gain = n_eff ln(error of the smaller / error of the larger),      n_eff = n variance (1 - sum phi)^2 / variance of innovations
@@ -154,11 +158,16 @@ fn beats(problem: &Problem, large: &Model, small: &Model) -> bool {
     if ratio.is_nan() || ratio > 1.0 - WORTHWHILE || large.last_part > MOST_SPOILED * small.last_part {
         return false;
     }
+    let confirmed = large.last_part < (1.0 - WORTHWHILE) * small.last_part;
+    // Errors of a spring that is not linear are no noise, so that no order is right and their likelihood says little.
+    let is_structure = root_mean_square(&large.fit.residual) > STRUCTURED * scatter(problem, &large.fit.residual);
+    if is_structure || excess(&small.held_out, &large.held_out) > if confirmed { Z_DOUBTFUL } else { Z_WORSE } {
+        return true;
+    }
     let Spectrum { ar, innovations } = Spectrum::of(&large.held_out, problem.starts(), &[]);
     let power = dot(&large.held_out, &large.held_out);
     let rows = large.held_out.len() as f64;
     let effective = power * (1.0 - ar.iter().sum::<f64>()).powi(2) / innovations;
-    let confirmed = large.last_part < (1.0 - WORTHWHILE) * small.last_part;
     let price = if confirmed { PRICE_IF_CONFIRMED } else { PRICE_OF_POLE };
     let more = (large.fit.poles.order() - small.fit.poles.order()) as f64;
     -effective.min(rows) * ratio.ln() > RIVAL_ODDS + price * more
@@ -189,8 +198,8 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     let most = if both_signs { 1.0 } else { MOST_OF_SQUARE };
     let full_scale = series.iter().map(Series::full_scale).fold(0.0, f64::max);
     let squared: Vec<Series> = series.iter().map(|series| series.squared(full_scale)).collect();
-    let poles = models.fits[models.chosen].fit.poles.clone();
-    if Problem::new(squared.clone()).fit(poles).cost < models.fits[models.chosen].fit.cost {
+    let (order, best) = models.fits.iter().enumerate().take(2).next_back().expect("a model of order 0");
+    if best_up_to(&Problem::new(squared.clone()), order)[order].cost < best.fit.cost {
         let square = Models::of(squared, InputLaw::Square);
         if square.held_out_rmse() < most * models.held_out_rmse() {
             models = square;
@@ -288,13 +297,10 @@ fn identified(records: &[Record], models: Models, voltage: VoltageRange, units: 
         .map(|(record, (zero, offset))| Start { record: record.name.clone(), zero, offset })
         .collect();
     let degrees = (rows.saturating_sub(fit.degrees())).max(1) as f64;
-    let differences = problem.starts().iter().zip(&problem.series).flat_map(|(&first, series)| {
-        second_differences(&fit.residual[first..first + series.rows()]).collect::<Vec<_>>()
-    });
     let noise = Noise {
         sigma: (fit.cost / degrees).sqrt(),
         autocorrelation: Spectrum::neighbours(&fit.residual),
-        scatter: robust_deviation(differences).unwrap_or(0.0),
+        scatter: scatter(problem, &fit.residual),
     };
     let plant = plant::plant_file(&nominal, &oscillation, *law, voltage, units, problem.spacing);
     let mut report = Report {
@@ -330,6 +336,15 @@ fn identified(records: &[Record], models: Models, voltage: VoltageRange, units: 
     };
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
     Identified { report, plant, linear: None, records }
+}
+
+/// Scatter of errors from row to row: what is left of them without their slow part.
+fn scatter(problem: &Problem, residual: &[f64]) -> f64 {
+    let differences =
+        problem.starts().iter().zip(&problem.series).flat_map(|(&first, series)| {
+            second_differences(&residual[first..first + series.rows()]).collect::<Vec<_>>()
+        });
+    robust_deviation(differences).unwrap_or(0.0)
 }
 
 /// The directions in which a fit has taken errors away; none for a long record, which has lost a small part of them.

@@ -4,10 +4,9 @@ use simulation::units::Units;
 
 use crate::dimension::significant;
 use crate::linear::{Fit, Problem};
+use crate::nominal::STRUCTURED;
 use crate::nominal::report::{InputLaw, Report};
 
-/// Errors that are larger than their scatter from row to row by this factor are no noise of the sensor.
-const STRUCTURED: f64 = 3.0;
 /// A time constant with a larger ratio of its bounds is hardly known.
 const HARDLY_KNOWN: f64 = 4.0;
 

@@ -1,8 +1,8 @@
 //! The chain from command to stiffness, in the order of [`model::extended`]:
 //!
 //! ```text
-//! command -> limit -> slew -> output lag -> delay -> (magnitude) -> hysteresis -> law -> leakage -> relaxation -> lags in
-//! series -> play -> output law -> stiffness
+//! command -> limit -> slew -> output lag -> delay -> (magnitude) -> friction under load -> hysteresis -> law -> leakage
+//! -> relaxation -> lags in series -> play -> output law -> stiffness
 //! ```
 //!
 //! A plant file cannot hold a law behind the relaxation; it is written in front of it, where it settles at the same
@@ -16,6 +16,7 @@
 use crate::plant::initial_state::InitialState;
 use crate::plant::law::Law;
 use crate::plant::leakage::{InstantaneousLoss, Loss};
+use crate::plant::load_friction::LoadFriction;
 use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
 use crate::plant::visited::{Range, Visited};
@@ -41,6 +42,8 @@ pub struct Chain<'a> {
     pub even: bool,
     /// Hysteresis: a bank of play operators.
     pub memory: PlayBank,
+    /// Hysteresis in proportion to the voltage, in front of that; a plant file cannot hold it.
+    pub friction: LoadFriction,
     /// Static law from voltage to settled stiffness.
     pub law: Law<'a>,
     /// A second bank of play operators, behind the relaxation.
@@ -78,6 +81,7 @@ impl<'a> Chain<'a> {
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
             even: file.even,
             memory: PlayBank::of(file.memory.as_ref()),
+            friction: LoadFriction::new(0.0),
             law: Law::of(file.law.as_ref()),
             memory_behind: PlayBank::of(None),
             law_behind: Law::of(None),
@@ -165,6 +169,10 @@ impl<'a> Chain<'a> {
 
     /// Maps the voltage on the electrodes to the settled stiffness, by hysteresis and static law.
     pub fn static_response(&self, signal: &mut Signal) {
+        if !self.friction.is_none() {
+            let mut friction = self.friction;
+            signal.map(|voltage| friction.at(voltage));
+        }
         let mut memory = self.memory.clone();
         if memory.table().is_some() {
             signal.map(|voltage| memory.at(voltage));
@@ -195,8 +203,8 @@ impl<'a> Chain<'a> {
         let mut signal = command.clone();
         self.amplify(&mut signal);
         let applied = signal.clone();
-        let mut memory = self.memory.clone();
-        signal.map(|voltage| memory.at(voltage));
+        let (mut friction, mut memory) = (self.friction, self.memory.clone());
+        signal.map(|voltage| memory.at(friction.at(voltage)));
         let law = Range::of(&signal);
         signal.map(|voltage| self.law.at(voltage));
         let mut levels_v = Vec::new();

@@ -13,6 +13,7 @@ pub mod initial_state;
 pub mod knots;
 pub mod law;
 pub mod leakage;
+pub mod load_friction;
 pub mod play_bank;
 pub mod relaxation;
 pub mod visited;

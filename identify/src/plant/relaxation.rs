@@ -41,7 +41,7 @@ const EXPONENTIAL: u64 = 4;
 /// Work of an integration step where the spring's state sets the time constant.
 const STEP_BY_STATE: u64 = 16;
 /// Work of one piece of an oscillation, in units of one lag.
-const WORK_OF_MODE: usize = 3;
+const WORK_OF_MODE: usize = 6;
 
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]

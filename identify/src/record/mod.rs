@@ -13,6 +13,7 @@ pub mod data;
 mod decay;
 mod first_order;
 pub(crate) mod folds;
+pub mod held;
 pub mod heteroscedasticity;
 pub mod input;
 pub mod normalisation;

@@ -126,7 +126,7 @@ pub fn oscillation(frequency_hz: f64, data: &Data) -> impl Iterator<Item = (f64,
 }
 
 /// Returns the sinusoid of one frequency that fits best in least squares, with sine and cosine taken as orthogonal.
-fn line(residual: &[f64], data: &Data, frequency_hz: f64) -> Peak {
+pub fn line(residual: &[f64], data: &Data, frequency_hz: f64) -> Peak {
     let (mut cosine, mut sine) = (0.0, 0.0);
     for (value, (s, c)) in residual.iter().zip(oscillation(frequency_hz, data)) {
         cosine += value * c;

@@ -14,6 +14,25 @@ use crate::stats::thresholds::empirical::{
     GAIN_PER_PRICE, MISFIT_OF_FORM, MISFIT_PER_FLOOR, NATS_TO_FIT, PRICE_OF_BLOCK, PRICE_OF_COORDINATE,
 };
 
+/// Which extensions of a structure a search fits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Breadth {
+    /// True for effects, too, that the noise's autocorrelation may hide.
+    pub exhaustive: bool,
+    /// Which forms of an effect.
+    pub forms: Forms,
+}
+
+/// Forms of an effect.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Forms {
+    /// Those that every search tries.
+    #[default]
+    Common,
+    /// The others, for a record in which those leave structure.
+    Rare,
+}
+
 /// Fits structures and evaluates them.
 pub trait Evaluator {
     /// Returns the models from which the search starts in addition to the simulation as it is given.
@@ -33,9 +52,8 @@ pub trait Evaluator {
     /// Log-likelihood of all rows, in nats, each predicted by a fit to the other folds.
     fn held_out(&mut self, fit: &Fit) -> f64;
 
-    /// First fits of the structures with one block more, whose effect is `wanted`, in every form that is worth fitting; if
-    /// `exhaustive` also of blocks whose gain the noise's autocorrelation may hide.
-    fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit>;
+    /// First fits of the structures with one block more, whose effect is `wanted`, in every form that is worth fitting.
+    fn extended(&mut self, fit: &Fit, breadth: Breadth, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit>;
 
     /// First fit of the structure with one effect more, in the form and from the start with the largest predicted gain; `None` if
     /// the effect has no start.
@@ -55,6 +73,12 @@ pub trait Evaluator {
 
     /// Factor by which prices are multiplied for the residual of a fit, 1 or more.
     fn penalty_factor(&mut self, fit: &Fit) -> f64;
+
+    /// Keeps work for forms that are seldom needed, until [`Evaluator::begin_rare_forms`].
+    fn reserve_for_rare_forms(&mut self) {}
+
+    /// Takes note that the search tries forms that are seldom needed from here on.
+    fn begin_rare_forms(&mut self) {}
 
     /// Takes note that a structure with effects leaves nothing but noise, for which more work is allowed.
     fn found_adequate(&mut self);
@@ -88,8 +112,9 @@ impl Evaluator for Engine<'_> {
         self.held_out_log_likelihood(fit)
     }
 
-    fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
-        let mut extensions = extensions(self, fit, exhaustive, wanted, NATS_TO_FIT.get());
+    fn extended(&mut self, fit: &Fit, breadth: Breadth, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+        let mut extensions = extensions(self, fit, breadth, wanted, NATS_TO_FIT.get());
+        let exhaustive = breadth.exhaustive;
         // A search that is not exhaustive relies on the noise of the present fit, and on predicted gains.
         let law = if exhaustive { Noise::default_robust() } else { fit.noise.clone() };
         if !exhaustive {
@@ -108,18 +133,20 @@ impl Evaluator for Engine<'_> {
     }
 
     fn extended_by(&mut self, fit: &Fit, effect: usize) -> Option<Fit> {
-        let extensions = extensions(self, fit, false, &|other| other == effect, f64::NEG_INFINITY).into_iter();
+        let extensions =
+            extensions(self, fit, Breadth::default(), &|other| other == effect, f64::NEG_INFINITY).into_iter();
         let Extension { block, point, .. } = extensions.max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))?;
         Some(self.fit_added(fit.model.with(block, point), &fit.noise, effect))
     }
 
     fn price(&self, block: &Block) -> f64 {
         let effect = block.effect();
+        let forms = if block.form < effect.common_forms() { effect.common_forms() } else { effect.forms() };
         let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
         PRICE_OF_BLOCK.get()
             + PRICE_OF_COORDINATE.get() * fitted as f64
             + effect.ln_candidates(block.form, self.data)
-            + (effect.forms() as f64).ln()
+            + (forms as f64).ln()
     }
 
     fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {
@@ -141,6 +168,14 @@ impl Evaluator for Engine<'_> {
         if negligible(&fit.residual) { 1.0 } else { penalty_factor(&self.terms(&fit.noise, &fit.residual)) }
     }
 
+    fn reserve_for_rare_forms(&mut self) {
+        self.budget().reserve();
+    }
+
+    fn begin_rare_forms(&mut self) {
+        self.budget().release();
+    }
+
     fn found_adequate(&mut self) {
         self.budget().extend();
     }
@@ -158,6 +193,8 @@ impl Evaluator for Engine<'_> {
 const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.
 const STARTS_IF_SCARCE: usize = 16;
+/// Forms of [`Forms::Rare`] that are fitted, those with the largest predicted gains.
+const RARE_FORMS_FITTED: usize = 4;
 /// Work of a predicted gain for each row, in units of one piece of the voltage through one lag.
 const PREDICTION: u64 = 5;
 
@@ -174,7 +211,7 @@ struct Extension {
 fn extensions(
     engine: &mut Engine,
     fit: &Fit,
-    exhaustive: bool,
+    Breadth { exhaustive, forms: wanted_forms }: Breadth,
     wanted: &dyn Fn(usize) -> bool,
     least: f64,
 ) -> Vec<Extension> {
@@ -200,7 +237,11 @@ fn extensions(
             return Vec::new();
         }
         let mut of_effect: Vec<Extension> = Vec::new();
-        for form in 0..effect.forms() {
+        let forms = match wanted_forms {
+            Forms::Common => 0..effect.common_forms(),
+            Forms::Rare => effect.common_forms()..effect.forms(),
+        };
+        for form in forms.clone() {
             let block = Block { effect: index, form };
             let scene = FitContext { data: engine.data, residual: &fit.residual, sigma };
             let points = effect.initial_points(form, &scene);
@@ -216,7 +257,7 @@ fn extensions(
             let mut starts: Vec<Extension> = starts.collect();
             starts.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
             // Two starts where the first may be a local maximum.
-            starts.truncate(1 + usize::from(starts.len() > 4 && effect.forms() == 1));
+            starts.truncate(1 + usize::from(starts.len() > 4 && forms.len() == 1));
             of_effect.extend(starts);
         }
         if scarce {
@@ -227,6 +268,10 @@ fn extensions(
         if of_effect.iter().any(|extension| extension.predicted_gain > least) {
             found.extend(of_effect);
         }
+    }
+    if wanted_forms == Forms::Rare {
+        found.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
+        found.truncate(RARE_FORMS_FITTED);
     }
     found
 }

@@ -38,16 +38,18 @@ impl<E: Evaluator> Search<'_, E> {
     pub(super) fn first_fits(&mut self, node: &Fit, wanted: Option<usize>) -> Vec<Fit> {
         let model = &node.model;
         let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();
-        if let Some(kept) = kept.find(|kept| kept.of == *model && kept.by == wanted) {
+        if let Some(kept) = kept.find(|kept| kept.of == *model && kept.by == wanted && kept.forms == self.breadth.forms)
+        {
             return kept.fits.clone();
         }
         let new =
             |effect| wanted.is_none_or(|wanted| wanted == effect) && !model.has(effect) && !contained(effect, model);
-        let fits = self.evaluator.extended(node, self.exhaustive, &new);
+        let fits = self.evaluator.extended(node, self.breadth, &new);
         if self.keeps_first_fits {
             self.first_fits.entry(model.structure()).or_default().push(FirstFits {
                 of: model.clone(),
                 by: wanted,
+                forms: self.breadth.forms,
                 fits: fits.clone(),
             });
         }
@@ -60,7 +62,7 @@ impl<E: Evaluator> Search<'_, E> {
             fit.log_likelihood - self.evaluated.price(self.evaluator, fit) - fit.model.points().len() as f64
         };
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
-        if !self.exhaustive {
+        if !self.breadth.exhaustive {
             let lost = first_score(node) - NATS_TO_LOSE_AT_FIRST.get();
             fits.retain(|(score, _)| *score > lost);
         }
@@ -83,7 +85,7 @@ impl<E: Evaluator> Search<'_, E> {
             .filter(|(_, fit)| fit.white_noise_log_likelihood > node.white_noise_log_likelihood)
             .collect();
         plain.sort_by(|a, b| b.1.white_noise_log_likelihood.total_cmp(&a.1.white_noise_log_likelihood));
-        if self.exhaustive && !node.noise.autocorrelation.is_white() {
+        if self.breadth.exhaustive && !node.noise.autocorrelation.is_white() {
             fits.extend(plain.into_iter().take(as_independent));
         }
         let mut evaluated = Vec::new();

@@ -6,7 +6,7 @@ use crate::effects::EFFECTS;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::Fit;
 use crate::search::evaluated::Evaluated;
-use crate::search::evaluator::Evaluator;
+use crate::search::evaluator::{Breadth, Evaluator, Forms};
 use crate::search::scored::{Scored, effects};
 use crate::search::warm_start::WarmStart;
 use crate::stats::thresholds::empirical::NATS_TO_LOSE_IN_BEAM;
@@ -30,8 +30,8 @@ pub struct Search<'e, E> {
     pub(super) first_fits: HashMap<Vec<Block>, Vec<FirstFits>>,
     /// True if first fits are kept for another pass.
     pub(super) keeps_first_fits: bool,
-    /// True if effects that the noise's autocorrelation may hide are also tried.
-    pub(super) exhaustive: bool,
+    /// Which extensions are fitted.
+    pub(super) breadth: Breadth,
 }
 
 /// First fits of a model's extensions.
@@ -40,6 +40,8 @@ pub(super) struct FirstFits {
     pub(super) of: Model,
     /// The effect that is added, or `None` for all.
     pub(super) by: Option<usize>,
+    /// The forms of it.
+    pub(super) forms: Forms,
     /// The fits.
     pub(super) fits: Vec<Fit>,
 }
@@ -54,7 +56,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
             extended,
             first_fits,
             keeps_first_fits: true,
-            exhaustive: true,
+            breadth: Breadth { exhaustive: true, forms: Forms::Common },
         }
     }
 
@@ -66,6 +68,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     /// Searches from the simulation as it is given and returns the best structure; `progress` receives each structure that
     /// becomes the best.
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
+        self.evaluator.reserve_for_rare_forms();
         loop {
             let best = self.pass(&mut progress);
             let penalty_factor = self.evaluator.penalty_factor(&best.fit);
@@ -74,11 +77,37 @@ impl<'e, E: Evaluator> Search<'e, E> {
                 || self.evaluator.is_over()
             {
                 self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
-                return self.repriced(best, &mut progress);
+                let best = self.repriced(best, &mut progress);
+                return if self.evaluator.doubts(&best.fit) { self.with_rare_forms(best, &mut progress) } else { best };
             }
             self.extended.clear();
             self.evaluated.reprice(self.evaluator, penalty_factor);
         }
+    }
+
+    /// Tries the forms that are seldom needed, with the work that was kept for them: alone, in addition to the best structure, and in
+    /// place of each of its blocks; then extends what was found as usual.
+    fn with_rare_forms(&mut self, best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
+        self.evaluator.begin_rare_forms();
+        let common = best.fit.model.structure();
+        self.try_forms(Forms::Rare);
+        let root = self.root();
+        let children = [root, best.clone()].map(|node| self.children(&node)).into_iter().flatten();
+        let mut best = children.fold(best, |best, other| if other.score > best.score { other } else { best });
+        best = self.pruned(best);
+        best = self.settled(best);
+        self.try_forms(Forms::Common);
+        if best.fit.model.structure() == common {
+            return best;
+        }
+        progress(&best);
+        self.extended_greedily(best, progress)
+    }
+
+    /// Extends structures by other forms from here on.
+    fn try_forms(&mut self, forms: Forms) {
+        self.breadth.forms = forms;
+        self.extended.clear();
     }
 
     /// Searches from the models of a warm start, which are evaluated and then extended, and returns the best structure.
@@ -87,7 +116,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
         WarmStart { models, penalty_factor }: WarmStart,
         mut progress: impl FnMut(&Scored),
     ) -> Scored {
-        self.exhaustive = false;
+        self.breadth.exhaustive = false;
         // On all rows of a long record they would take much memory.
         self.keeps_first_fits = false;
         self.evaluated.penalty_factor = penalty_factor;
@@ -108,7 +137,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
             return best;
         }
         // An effect too quick for a part of the rows may be hidden by the noise's autocorrelation.
-        self.exhaustive = true;
+        self.breadth.exhaustive = true;
         self.extended.clear();
         self.extended_greedily(best, &mut progress)
     }

@@ -6,6 +6,7 @@ use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
 use crate::fit::engine::Fit;
 use crate::noise::Noise;
+use crate::search::evaluator::Breadth;
 use crate::search::{Evaluator, Search, WarmStart, effects};
 
 /// Price of every block, in nats.
@@ -79,7 +80,7 @@ impl Evaluator for Tabulated {
         fit.log_likelihood
     }
 
-    fn extended(&mut self, fit: &Fit, exhaustive: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+    fn extended(&mut self, fit: &Fit, Breadth { exhaustive, .. }: Breadth, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
         let tried = |effect: &usize| wanted(*effect) && (exhaustive || self.hidden != Some(*effect));
         let blocks =
             (0..EFFECTS.len()).filter(tried).collect::<Vec<_>>().into_iter().map(|effect| Block { effect, form: 0 });

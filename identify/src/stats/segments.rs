@@ -13,13 +13,15 @@ pub(crate) const SEGMENTS: usize = 40;
 
 /// True if the errors `ours` are larger than `theirs` by more than a `factor` in root mean square, and beyond chance.
 pub(crate) fn is_worse(ours: &[f64], theirs: &[f64], factor: f64) -> bool {
-    if root_mean_square(ours) <= factor * root_mean_square(theirs) {
-        return false;
-    }
+    root_mean_square(ours) > factor * root_mean_square(theirs) && excess(ours, theirs) > Z_WORSE
+}
+
+/// Standard normal quantile `z` of the excess of the errors `ours` over `theirs`; 0 for equal errors.
+pub(crate) fn excess(ours: &[f64], theirs: &[f64]) -> f64 {
     let length = ours.len().div_ceil(SEGMENTS).max(1);
     let more = |(ours, theirs): (&[f64], &[f64])| dot(ours, ours) - dot(theirs, theirs);
     let more: Vec<f64> = ours.chunks(length).zip(theirs.chunks(length)).map(more).collect();
-    more.iter().sum::<f64>() > Z_WORSE * dot(&more, &more).sqrt()
+    more.iter().sum::<f64>() / dot(&more, &more).sqrt().max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]

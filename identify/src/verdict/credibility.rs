@@ -16,7 +16,8 @@
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
 //! ```
 //!
-//! and what is then less likely true than untrue is a suspect, no finding.
+//! and what is then less likely true than untrue is a suspect, no finding. In other records what is improbable beside a likely finding
+//! is a suspect.
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
 use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
@@ -25,6 +26,8 @@ use crate::verdict::finding::explained;
 
 /// Probability of what is as likely true as untrue.
 const EVEN: f64 = 0.5;
+/// Probability below which nothing is a finding beside a likely one.
+const IMPROBABLE: f64 = 0.1;
 
 /// Causes that exact equality of readings proves.
 const EXACT: [&str; 2] = ["quantisation", "sensor-saturation"];
@@ -67,18 +70,32 @@ pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
     findings.iter_mut().filter(spoils).for_each(|finding| lower(finding, IF_SPOILING.get()));
 }
 
-/// In a record with the verdict `unexplained`, makes suspects of the findings that are less likely true than untrue.
-pub(crate) fn unlikely_to_suspects(report: &mut Report) {
-    if report.verdict == Verdict::Unexplained {
-        let unlikely = unlikely(&mut report.findings);
-        report.suspects.splice(0..0, unlikely);
-    }
+/// True if there are causes, not proved by exact equality of readings, and each is less likely true than untrue.
+pub(crate) fn are_unlikely(findings: &[Finding]) -> bool {
+    findings.iter().any(|finding| !EXACT.contains(&finding.cause)) && !findings.iter().any(is_likely_cause)
 }
 
-/// Takes the findings with a probability below [`EVEN`] out; returns them as suspects, the likeliest first.
-fn unlikely(findings: &mut Vec<Finding>) -> Vec<Suspect> {
+/// Makes suspects of findings: in a record with the verdict `unexplained` of those that are less likely true than untrue, in another of
+/// the improbable ones beside a likely one, whose form they rather correct.
+pub(crate) fn unlikely_to_suspects(report: &mut Report) {
+    let least = match report.verdict {
+        Verdict::Unexplained => EVEN,
+        _ if report.findings.iter().any(is_likely_cause) => IMPROBABLE,
+        _ => return,
+    };
+    let unlikely = unlikely(&mut report.findings, least);
+    report.suspects.splice(0..0, unlikely);
+}
+
+/// True for a cause, not proved by exact equality of readings, that is at least as likely true as untrue.
+fn is_likely_cause(finding: &Finding) -> bool {
+    !EXACT.contains(&finding.cause) && finding.probability >= EVEN
+}
+
+/// Takes the findings with a probability below `least` out; returns them as suspects, the likeliest first.
+fn unlikely(findings: &mut Vec<Finding>, least: f64) -> Vec<Suspect> {
     let causes: Vec<&str> = findings.iter().map(|finding| finding.cause).collect();
-    let mut unlikely: Vec<Finding> = findings.extract_if(.., |finding| finding.probability < EVEN).collect();
+    let mut unlikely: Vec<Finding> = findings.extract_if(.., |finding| finding.probability < least).collect();
     unlikely.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let suspect = |Finding { cause, probability, parameters, rmse_before, rmse_after, .. }| Suspect {
         cause,
@@ -128,6 +145,10 @@ mod tests {
         let mut findings = [finding("hysteresis", 20.0), finding("resonance", 15.0), finding("hum", 4.0)];
         with_unknown_laws(&mut findings);
         assert!(probabilities(&findings).iter().all(|probability| *probability > 0.97), "{findings:?}");
+        assert!(!are_unlikely(&findings) && !are_unlikely(&[]));
+        let mut findings = [finding("resonance", 1.02), finding("quantisation", 1.0)];
+        with_unknown_laws(&mut findings);
+        assert!(are_unlikely(&findings), "{findings:?}");
     }
 
     #[test]
@@ -142,7 +163,7 @@ mod tests {
     fn what_is_less_likely_than_not_is_a_suspect() {
         let probable = |cause, probability| Finding { probability, ..finding(cause, 2.0) };
         let mut findings = vec![probable("hum", 0.2), probable("drift", 0.6), probable("delay", 0.4)];
-        let suspects = unlikely(&mut findings);
+        let suspects = unlikely(&mut findings, EVEN);
         assert!(findings.len() == 1 && findings[0].cause == "drift");
         let suspects: Vec<_> = suspects.into_iter().map(|it| (it.cause, it.probability, it.with)).collect();
         let expected = [("delay", Some(0.4), vec!["hum", "drift"]), ("hum", Some(0.2), vec!["drift", "delay"])];

@@ -115,9 +115,11 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let after = quality(engine, extended, &held_out[1], true);
 
     let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
-    let unexplained = structured || !spoiling.is_empty() || unfinished;
     let mut findings = findings(engine, &found);
     credibility::with_unknown_laws(&mut findings);
+    // An autoregression follows errors of the model as well as slow noise.
+    let unearned = !extended.noise.autocorrelation.is_white() && credibility::are_unlikely(&findings);
+    let unexplained = structured || !spoiling.is_empty() || unfinished || unearned;
     credibility::of_spoiling(&mut findings, &spoiling);
     if unexplained {
         let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
@@ -172,6 +174,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
             _ if structured => left(),
             Some(spoils) => Some(spoils.sentence(data.scales())),
             None if unfinished => Some(UNFINISHED.to_owned()),
+            None if unearned => Some(UNEARNED.to_owned()),
             None => left(),
         },
         noise: noise_report(&extended.noise),
@@ -222,8 +225,21 @@ fn verdict(unexplained: bool, alternatives: &[Vec<&'static str>], insufficient: 
     }
 }
 
+/// Makes the verdict `unexplained` if the residual is autocorrelated and no cause removes much of it: an autoregression follows errors
+/// of the model as well as slow noise.
+pub(crate) fn without_the_unearned(report: &mut Report, extended: &Fit) {
+    if !extended.noise.autocorrelation.is_white() && credibility::are_unlikely(&report.findings) {
+        report.verdict = Verdict::Unexplained;
+        report.leftover.get_or_insert_with(|| UNEARNED.to_owned());
+    }
+}
+
 /// The report's sentence on a search that its budget ended.
 const UNFINISHED: &str = "The search ended before it had tried all that it would, and the residual may hold structure: a larger effort may find more";
+
+/// The report's sentence on causes that remove little of an autocorrelated error.
+const UNEARNED: &str =
+    "The residual is autocorrelated, slow noise or an error of the simulation, and no cause removes much of it";
 
 /// The report's sentence on unmodelled dynamics.
 fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics, scales: &Scales) -> String {

@@ -63,7 +63,7 @@ fn exchanged(engine: &mut Engine, best: &Fit, set: &[&str]) -> Option<Fit> {
     for effect in wanted.into_iter().filter(|&effect| !best.model.has(effect)) {
         let residual = engine.residual(&model);
         let context = FitContext { data: engine.data, residual: &residual, sigma: best.noise.sigma };
-        let starts = (0..EFFECTS[effect].forms()).filter_map(|form| {
+        let starts = (0..EFFECTS[effect].common_forms()).filter_map(|form| {
             let points = EFFECTS[effect].initial_points(form, &context);
             Some((Block { effect, form }, points.get(points.len() / 2)?.clone()))
         });

@@ -25,6 +25,7 @@ mod extrapolation;
 pub mod finding;
 mod form_average;
 pub(crate) mod found;
+pub(crate) mod held_findings;
 pub(crate) mod hypotheses;
 pub(crate) mod linear_rival;
 pub mod margins;

@@ -11,12 +11,17 @@ use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::{FINEST_V, STEP_TO_REPORT};
 use crate::stats::thresholds::probability::Z;
 
+/// Smallest noise from row to row with which a step is compared, relative to the whole error.
+const LEAST_STEP_PER_ERROR: f64 = 0.2;
+
 /// Findings in the readings; far readings are outliers only if `isolated`, which says that they neither come in runs nor follow
 /// changes of the command.
 pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isolated: bool) -> Vec<Finding> {
     let mut findings = Vec::new();
     let raw = root_mean_square(&fit.residual);
     let stopped_raw = root_mean_square(&observed.errors(&fit.residual));
+    // An error that nothing explains does not make coarse steps fine.
+    let noise_v = observed.scatter_v.max(LEAST_STEP_PER_ERROR * stopped_raw);
     let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();
     let scales = data.scales();
     let single = |name: &str, value: f64, low: f64, high: f64, dimension| {
@@ -26,7 +31,8 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
         )]
     };
     if let Some(QuantisationGrid { step, low, high }) = observed.grid
-        && (step > (STEP_TO_REPORT.get() * stopped_raw).max(2.0 * FINEST_V.get()) || observed.truncation_v != 0.0)
+        && (step > (STEP_TO_REPORT.get() * stopped_raw.min(noise_v)).max(2.0 * FINEST_V.get())
+            || observed.truncation_v != 0.0)
     {
         let grid = data.reading[0];
         let after: Vec<f64> = data

@@ -55,7 +55,11 @@ def _cluster(scheduler, workers):
     if scheduler == LOCAL:
         # One thread in each process: a diagnosis uses one processor.
         with LocalCluster(
-            workers, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL", preload=[_WITHOUT_CTRL_C]
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=":0",
+            silence_logs="CRITICAL",
+            preload=[_WITHOUT_CTRL_C],
         ) as cluster:
             yield cluster
     elif scheduler == SLURM:

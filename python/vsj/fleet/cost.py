@@ -87,7 +87,7 @@ def measured(out):
 
 def task_s():
     """The time of an empty task, in s: 2000 of them, at most 100 in progress, one process on this machine."""
-    with LocalCluster(1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster, Client(cluster) as client:
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster, Client(cluster) as client:
         client.submit(_nothing, -1, pure=False).result()
         start = time.perf_counter()
         completed = as_completed([client.submit(_nothing, it, pure=False) for it in range(100)])

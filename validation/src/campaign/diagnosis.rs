@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use identify::Diagnosis;
+use identify::effects::model::Model;
 use identify::equation::problem::Problem;
 use identify::equation::scale::Scale;
 use identify::fit::budget::UNLIMITED;
@@ -136,8 +137,7 @@ pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3
         let normalisation = &identified.data.normalisation;
         let prepared =
             |record: &Record| Data::thinned(&normalisation.record(record), identify::Input::Hold, 1, normalisation);
-        let first = Record { name: record.name.clone(), rows: record.rows[..rows].to_vec() };
-        let (first, data) = (prepared(&first), prepared(record));
+        let (first, data) = (prepared(&first(record, rows)), prepared(record));
         let observed = Observed::new(&data);
         let mut problem = Problem::new(&data, &observed, &UNLIMITED);
         problem.scale = Scale::of(&first);
@@ -147,26 +147,37 @@ pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3
     Ok([finite(extended), linear.and_then(finite), finite(equation.unwrap_or(extended))])
 }
 
-/// Readings less predictions beyond the first `rows` rows of a record, by the model identified on these, in the reading's unit. An
-/// initial state that is not known is estimated from the rows in which it has not decayed.
+/// Readings less predictions beyond the first `rows` rows of a record, in the reading's unit, of the spring in the options and of the
+/// same extended by what was identified on these. An initial state that is not known is estimated from the rows in which it has not
+/// decayed.
 ///
 /// # Errors
 /// The record is rejected.
-pub fn residual_beyond(record: &Record, rows: usize, options: &Options) -> Result<Vec<f64>> {
-    let (mut residual, identified) = residual(record, rows, options)?;
-    Ok(residual.split_off(identified.data.rows()))
+pub fn residuals_beyond(record: &Record, rows: usize, options: &Options) -> Result<[Vec<f64>; 2]> {
+    let identified = examine(&first(record, rows), options, |_| ())?;
+    let beyond = |model: &Model| residual_of(model, record, options, &identified).split_off(identified.data.rows());
+    Ok([&Model::default(), &identified.extended.model].map(beyond))
+}
+
+/// The first rows of a record.
+fn first(record: &Record, rows: usize) -> Record {
+    Record { name: record.name.clone(), rows: record.rows[..rows].to_vec() }
 }
 
 /// Readings less predictions of a whole record by the model identified on its first `rows` rows, and the diagnosis of these.
 fn residual(record: &Record, rows: usize, options: &Options) -> Result<(Vec<f64>, Diagnosis)> {
-    let first = Record { name: record.name.clone(), rows: record.rows[..rows].to_vec() };
-    let identified = examine(&first, options, |_| ())?;
+    let identified = examine(&first(record, rows), options, |_| ())?;
+    Ok((residual_of(&identified.extended.model, record, options, &identified), identified))
+}
+
+/// Readings less predictions of a whole record by a model of the diagnosis of its first rows.
+fn residual_of(model: &Model, record: &Record, options: &Options, identified: &Diagnosis) -> Vec<f64> {
     let normalisation = &identified.data.normalisation;
     let data = Data::thinned(&normalisation.record(record), options.input, 1, normalisation);
     // Some parameters of the model are relative to the full scale of the record that it was identified on.
     let full_scale_v = identified.data.full_scale_v / normalisation.scales.volt_v;
     let data = Data { full_scale_v, ..data };
     let (observed, base) = (Observed::new(&data), options.base.normalised(normalisation));
-    let residual = Engine::new(&data, &observed, &base).residual(&identified.extended.model);
-    Ok((residual.into_iter().map(|left| normalisation.scales.reading * left).collect(), identified))
+    let residual = Engine::new(&data, &observed, &base).residual(model);
+    residual.into_iter().map(|left| normalisation.scales.reading * left).collect()
 }

@@ -29,7 +29,7 @@ use serde::Serialize;
 use simulation::record::{Format, Record, columns_file};
 use simulation::units::Units;
 
-use super::diagnosis::residual_beyond;
+use super::diagnosis::residuals_beyond;
 use super::rivals::{self, Answer, LEARN};
 use crate::ground_truth::other_plants;
 use crate::markdown;
@@ -182,17 +182,14 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
     let first = Record { name: record.name.clone(), rows: record.rows[..learnt].to_vec() };
     let of_first = identify(std::slice::from_ref(&first), *input, units)?;
     let options = Options { base: Base::new(of_first.plant)?, linear: of_first.linear, ..options };
-    let beyond = residual_beyond(record, learnt, &options)?;
+    let beyond = residuals_beyond(record, learnt, &options)?.map(|left| Some(root_mean_square(&left)));
 
     let linear = |most: usize| {
         let orders = report.linear.iter().filter(|of| of.order <= most);
         Errors { held_out: orders.map(|of| of.held_out_rmse).min_by(f64::total_cmp), last: None }
     };
-    let nominal = Errors { held_out: Some(report.held_out_rmse), last: Some(report.last_40_percent_rmse) };
-    let extended = Errors {
-        held_out: Some(diagnosis.report.extended.quality.held_out_rmse),
-        last: Some(root_mean_square(&beyond)),
-    };
+    let nominal = Errors { held_out: Some(report.held_out_rmse), last: beyond[0] };
+    let extended = Errors { held_out: Some(diagnosis.report.extended.quality.held_out_rmse), last: beyond[1] };
     let read: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
     let verdict = serde_json::to_value(diagnosis.report.verdict)?;
     let findings = diagnosis.report.findings.iter();
@@ -242,7 +239,7 @@ fn others(subjects: &[Subject]) -> Result<Vec<Vec<Answer>>> {
 pub fn table(rows: &[Row]) -> String {
     let mut text = "\
 Errors are root mean squares in percent of the standard deviation of the record's readings: on held-out segments, then on the last
-40 % by a fit to the first 60 %. `nominal` is what `vsj identify` finds, `extended` what `vsj diagnose --plant identify` adds to it,
+40 % by what was found, structure included, on the first 60 %. `nominal` is what `vsj identify` finds, `extended` what `vsj diagnose --plant identify` adds to it,
 `linear` the best linear output-error model of order 1 to 3, and to 4. PySINDy and SysIdentPy are run on the last 40 % alone. `-`: not
 asked for, or diverged.
 

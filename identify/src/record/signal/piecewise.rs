@@ -112,6 +112,39 @@ impl Signal {
         }
     }
 
+    /// Replaces the signal by its mean over the last `window_s` seconds, in s; between starts of pieces it is straight.
+    pub fn average(&mut self, window_s: f64) {
+        let input = self.pieces.clone();
+        // Integral of the input from the start of the signal, and from there back to the start of the window, which is `ago` s into
+        // the piece `oldest`; before the first piece the input is constant.
+        let integral = |piece: &Piece, until_s: f64| {
+            let slope = if piece.from == piece.to { 0.0 } else { (piece.to - piece.from) / piece.duration_s };
+            until_s * (piece.from + 0.5 * slope * until_s)
+        };
+        let (mut now_s, mut area) = (0.0, 0.0);
+        let (mut oldest, mut oldest_s, mut oldest_area) = (0, 0.0, 0.0);
+        let mut mean = |now_s: f64, area: f64| {
+            let from_s = now_s - window_s;
+            if from_s <= 0.0 {
+                return (area - from_s * self.before) / window_s;
+            }
+            while oldest_s + input[oldest].duration_s < from_s && oldest + 1 < input.len() {
+                oldest_area += integral(&input[oldest], input[oldest].duration_s);
+                oldest_s += input[oldest].duration_s;
+                oldest += 1;
+            }
+            (area - oldest_area - integral(&input[oldest], from_s - oldest_s)) / window_s
+        };
+        let mut start = mean(0.0, 0.0);
+        for piece in &mut self.pieces {
+            area += integral(piece, piece.duration_s);
+            now_s += piece.duration_s;
+            let end = mean(now_s, area);
+            (piece.from, piece.to) = (start, end);
+            start = end;
+        }
+    }
+
     /// Returns the signal delayed by `delay_s`, in s; rows keep their times.
     pub fn delayed(&self, delay_s: f64) -> Self {
         let mut later = self.emptied();
@@ -266,6 +299,20 @@ mod tests {
         assert_eq!((kink[0].from, kink[0].to, kink[1].from, kink[1].to), (30.0, 0.0, 0.0, 10.0));
         assert!((kink[0].duration_s - 3.0 * kink[1].duration_s).abs() < 1e-12);
         assert_eq!(rows(&magnitude), [0.0, 30.0, 10.0, 10.0, 10.0]);
+    }
+
+    #[test]
+    fn mean_over_a_window_ramps_from_level_to_level() {
+        for (window_s, expected) in [(2.0, [0.0, 0.0, 50.0, 100.0, 100.0]), (4.0, [0.0, 0.0, 25.0, 50.0, 75.0])] {
+            let mut mean = step();
+            mean.average(window_s);
+            assert!(rows(&mean).iter().zip(expected).all(|(got, expected)| (got - expected).abs() < 1e-9), "{mean:?}");
+        }
+        let mut constant = step();
+        constant.before = 7.0;
+        constant.pieces.iter_mut().for_each(|piece| (piece.from, piece.to) = (7.0, 7.0));
+        constant.average(2.5);
+        assert!(rows(&constant).iter().all(|value| (value - 7.0).abs() < 1e-12));
     }
 
     #[test]

@@ -64,6 +64,12 @@ thresholds! {
     COARSE = 2.0, "scales of the noise";
     /// Truncation instead of rounding is considered from this size of a step.
     LEAST_TRUNCATION = 0.5, "scales of the noise";
+    /// Smallest part of the readings that repeat the one before, from which they are examined for having been held.
+    LEAST_HELD = 0.15, "of the readings";
+    /// Readings of which more return to the one before last are on a grid, and not held.
+    MOST_RETURNS = 0.02, "of the new readings";
+    /// Readings on a grid with a larger step repeat because of it, and are not held.
+    COARSEST_GRID_OF_HELD = 0.05, "of the median change";
     /// A spectral line with fewer periods in the record may be a harmonic of the schedule that a nonlinear spring makes.
     FEWEST_PERIODS = 10.0, "periods";
     /// Records with fewer rows have no spectral lines.

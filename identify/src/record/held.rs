@@ -1,0 +1,216 @@
+//! Readings that repeat the one before because no new one was taken or sent: a lossy link, a sample-and-hold, a sensor that reports
+//! changes only.
+//!
+//! Continuous noise does not give the same number twice, and readings on a coarse grid return to the number before last. Readings
+//! that repeat but do not return were held. They say nothing new, so that a record is diagnosed without them.
+//!
+//! What holds them shows in the number of rows from one new reading to the next: readings that are lost at random leave numbers that
+//! are independent of each other, a sensor that reports changes leaves few rows while the response changes and many while it rests.
+
+use simulation::record::Record;
+
+use crate::record::quantisation_grid::QuantisationGrid;
+use crate::stats::median::median;
+use crate::stats::thresholds::empirical::{COARSEST_GRID_OF_HELD, FEWEST_TIES, LEAST_HELD, MOST_RETURNS};
+use crate::stats::thresholds::probability::Z_RARE;
+
+/// Part of the changes that is smaller than the smallest one that counts.
+const SMALLEST: f64 = 0.05;
+/// Smallest change, relative to the median change, that shows a threshold.
+const THRESHOLD: f64 = 0.3;
+/// Part of the changes that turn back, from which readings are noise and not a smooth curve; of white noise two thirds do.
+const TURNING: f64 = 0.2;
+/// Scatter of the numbers of rows from one new reading to the next, relative to their mean, below which a clock sets them.
+const CLOCK: f64 = 0.3;
+/// Largest part of the held readings in one run: beyond, the sensor was stuck for a while.
+const LARGEST_RUN: f64 = 0.25;
+/// Fewest new readings.
+const FEWEST_NEW: usize = 30;
+/// Largest difference of equal readings, relative to the range of all: what converting between units leaves.
+const ROUNDING: f64 = 1e-12;
+
+/// Why readings were held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// A reading is reported only after the response has changed.
+    ReportsChanges,
+    /// New readings are missing at random.
+    Lost,
+    /// The sensor takes new readings at a lower rate than the record's.
+    SlowClock,
+}
+
+/// What the held readings of a record show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Held {
+    /// Why they were held.
+    pub reason: Reason,
+    /// Number of them.
+    pub count: usize,
+    /// Their fraction of all readings.
+    pub fraction: f64,
+    /// Smallest and median change between new readings, in the reading's unit.
+    pub changes: [f64; 2],
+    /// Mean age of all readings, in s, with its standard error.
+    pub age_s: [f64; 2],
+    /// Root mean square difference of all readings from straight lines between the new ones, in the reading's unit.
+    pub error: f64,
+}
+
+/// Returns what the held readings of a record show, and the record without them; `None` if it has none.
+pub fn without_held(record: &Record) -> Option<(Held, Record)> {
+    let rows: Vec<(usize, f64, f64)> =
+        record.rows.iter().enumerate().filter_map(|(row, of)| Some((row, of.time_s, of.measured?))).collect();
+    let reading = |row: usize| rows[row].2;
+    let range = |(low, high): (f64, f64), row: usize| (low.min(reading(row)), high.max(reading(row)));
+    let (low, high) = (0..rows.len()).fold((f64::INFINITY, f64::NEG_INFINITY), range);
+    let equal = |one: f64, other: f64| (one - other).abs() <= ROUNDING * (high - low);
+    let repeats = |row: usize| row > 0 && equal(reading(row), reading(row - 1));
+    // A sensor at its bound and a spring at rest repeat readings as well.
+    let is_special = |value: f64| [low, high, 0.0].iter().any(|&special| equal(value, special));
+    let changing: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || is_special(reading(row))).collect();
+    let values: Vec<f64> = changing.iter().map(|&row| reading(row)).collect();
+    let too_few = (rows.len() - changing.len()) < (LEAST_HELD.get() * rows.len() as f64) as usize;
+    if too_few || changing.len() < FEWEST_NEW || !is_held(&values, equal) {
+        return None;
+    }
+    // A held reading may be the highest one, but a bound is reached again and again.
+    let begins = |value: f64| (0..rows.len()).filter(|&row| equal(reading(row), value) && !repeats(row)).count();
+    let bounds: Vec<f64> = [low, high].into_iter().filter(|&extreme| begins(extreme) >= FEWEST_TIES.count()).collect();
+    let stays = |value: f64| bounds.iter().chain(&[0.0]).any(|&special| equal(value, special));
+    let new: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || stays(reading(row))).collect();
+    let count = rows.len() - new.len();
+    let fraction = count as f64 / rows.len() as f64;
+    let lengths: Vec<f64> = new.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
+    if lengths.iter().any(|length| length - 1.0 > LARGEST_RUN * count as f64) {
+        return None;
+    }
+    let changes = changes(&values);
+    let reason = reason(&lengths);
+    let (mut ages, mut squares) = (Vec::new(), 0.0);
+    for pair in new.windows(2) {
+        let [(_, from_s, from), (_, to_s, to)] = [rows[pair[0]], rows[pair[1]]];
+        for (_, time_s, value) in &rows[pair[0]..pair[1]] {
+            let age_s = time_s - from_s;
+            ages.push(age_s);
+            squares += (value - from - (to - from) * age_s / (to_s - from_s)).powi(2);
+        }
+    }
+    let rows_aged = ages.len() as f64;
+    let mean_s = ages.iter().sum::<f64>() / rows_aged;
+    let spread_s = (ages.iter().map(|age| (age - mean_s).powi(2)).sum::<f64>() / rows_aged).sqrt();
+    let mut shorter = record.clone();
+    let held = (0..rows.len()).filter(|row| new.binary_search(row).is_err());
+    held.for_each(|row| shorter.rows[rows[row].0].measured = None);
+    let held = Held {
+        reason,
+        count,
+        fraction,
+        changes: [changes[(SMALLEST * changes.len() as f64) as usize], changes[changes.len() / 2]],
+        age_s: [mean_s, spread_s / (new.len() as f64).sqrt()],
+        error: (squares / rows_aged).sqrt(),
+    };
+    Some((held, shorter))
+}
+
+/// Returns true if readings, of which none repeats the one before, are new ones of a continuous sensor that were held in between.
+fn is_held(new: &[f64], equal: impl Fn(f64, f64) -> bool) -> bool {
+    let changes = changes(new);
+    let [smallest, middle] = [changes[(SMALLEST * changes.len() as f64) as usize], changes[changes.len() / 2]];
+    let returns = new.windows(3).filter(|of| equal(of[2], of[0]) && !equal(of[1], of[0])).count();
+    let turns = new.windows(3).filter(|of| (of[1] - of[0]) * (of[2] - of[1]) < 0.0).count();
+    let part = |count: usize| count as f64 / new.len() as f64;
+    let mut distinct = new.to_vec();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup_by(|a, b| equal(*a, *b));
+    let grid = QuantisationGrid::of(&distinct).map_or(0.0, |grid| grid.step);
+    part(returns) < MOST_RETURNS.get()
+        && grid < COARSEST_GRID_OF_HELD.get() * middle
+        && (part(turns) > TURNING || smallest > THRESHOLD * middle)
+}
+
+/// Returns the sizes of all changes, in ascending order.
+fn changes(new: &[f64]) -> Vec<f64> {
+    let mut changes: Vec<f64> =
+        new.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0).collect();
+    changes.sort_by(f64::total_cmp);
+    changes
+}
+
+/// Returns why readings were held for numbers of rows: if these are correlated with the next ones beyond chance, because they depend on
+/// the response. They are clipped, so that a few long rests do not hide that.
+fn reason(lengths: &[f64]) -> Reason {
+    let most = 4.0 * median(&mut lengths.to_vec()).unwrap_or(1.0);
+    let clipped: Vec<f64> = lengths.iter().map(|length| length.min(most)).collect();
+    let mean = clipped.iter().sum::<f64>() / clipped.len() as f64;
+    let variance: f64 = clipped.iter().map(|length| (length - mean).powi(2)).sum();
+    let product: f64 = clipped.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum();
+    let rows = clipped.len() as f64;
+    if variance < (CLOCK * mean).powi(2) * rows {
+        Reason::SlowClock
+    } else if product / variance * rows.sqrt() > Z_RARE {
+        Reason::ReportsChanges
+    } else {
+        Reason::Lost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::scale::normals;
+    use simulation::record::Row;
+
+    const ROWS: usize = 2000;
+
+    /// A record of steps of 100 V with noise of 1 V and a time constant of 30 rows, read as `read` says: from the reading before, the
+    /// new one and a random number from 0 to 1.
+    fn record(read: impl Fn(f64, f64, f64) -> f64) -> Record {
+        let (mut state, mut before, mut random) = (0.0, 0.0, 1u32);
+        let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
+            let voltage_v = 100.0 * (row / 200 % 4) as f64;
+            state += (voltage_v - state) / 30.0;
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            before = read(before, state + noise, f64::from(random >> 8) / f64::from(1 << 24));
+            Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured: Some(before) }
+        });
+        Record { name: String::new(), rows: rows.collect() }
+    }
+
+    #[test]
+    fn lost_readings_and_reports_of_changes_are_held() {
+        let (lost, shorter) =
+            without_held(&record(|before, new, random| if random < 0.4 { before } else { new })).unwrap();
+        assert!(lost.reason == Reason::Lost && (lost.fraction - 0.4).abs() < 0.05, "{lost:?}");
+        // A reading that is lost with probability p is p / (1 - p) rows old.
+        assert!((lost.age_s[0] - 0.1 * 0.4 / 0.6).abs() < 4.0 * lost.age_s[1], "{lost:?}");
+        assert_eq!(shorter.rows.iter().filter(|row| row.measured.is_some()).count(), ROWS - lost.count);
+        let sent = record(|before, new, _| if (new - before).abs() < 6.0 { before } else { new });
+        let (sent, _) = without_held(&sent).unwrap();
+        assert!(sent.reason == Reason::ReportsChanges && sent.changes[0] >= 6.0, "{sent:?}");
+        let mut slow = record(|_, new, _| new);
+        (0..ROWS).filter(|row| row % 3 > 0).for_each(|row| slow.rows[row].measured = slow.rows[row - 1].measured);
+        assert_eq!(without_held(&slow).unwrap().0.reason, Reason::SlowClock);
+    }
+
+    #[test]
+    fn a_sensor_that_sticks_for_a_while_is_not_left_out() {
+        let mut stuck = record(|_, new, _| new);
+        (701..1200).for_each(|row| stuck.rows[row].measured = stuck.rows[700].measured);
+        assert_eq!(without_held(&stuck), None);
+    }
+
+    #[test]
+    fn readings_on_a_grid_at_a_bound_and_without_noise_are_not_held() {
+        let grid = |step: f64| record(move |_, new, _| (new / step).round() * step);
+        let bound = record(|_, new, _| new.min(120.0));
+        let (mut state, mut smooth) = (0.0, bound.clone());
+        for row in &mut smooth.rows {
+            state += (row.voltage_v - state) / 3.0;
+            row.measured = Some((1e3f64 * state).round() / 1e3);
+        }
+        for record in [grid(0.01), grid(1.0), grid(4.0), grid(12.0), bound, smooth, record(|_, new, _| new)] {
+            assert!(without_held(&record).is_none());
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! The finding that readings were held, which the repeated numbers prove.
+
+use simulation::units::Units;
+
+use crate::answer::{Finding, Parameter, Report, Verdict};
+use crate::dimension::Dimension;
+use crate::record::held::{Held, Reason};
+use crate::stats::thresholds::probability::Z;
+use crate::verdict::finding::explained;
+
+/// Adds the finding to a report, in the file's units, on the same record without the held readings.
+pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
+    report.rows += held.count;
+    let parameter = |value, low, high, dimension: Dimension| Parameter {
+        value,
+        low,
+        high,
+        unit: dimension.unit(units),
+        at_bound: false,
+        extrapolated_from_v: None,
+        dimension,
+    };
+    let percent = 100.0 * held.fraction;
+    let (cause, name, value, why) = match held.reason {
+        // What a sensor does as it should is no error of the simulation.
+        Reason::SlowClock => return,
+        Reason::ReportsChanges => {
+            let [smallest, middle] = held.changes;
+            let step = parameter(smallest, 0.0, middle, Dimension::ReadingSize);
+            ("quantisation", "step", step, "they change seldom while the response rests: only changes are reported")
+        }
+        Reason::Lost => {
+            let [age_s, error_s] = held.age_s;
+            let late = parameter(age_s, age_s - Z * error_s, age_s + Z * error_s, Dimension::Time);
+            ("delay", "delay_s", late, "independently of the response: new readings are late or lost")
+        }
+    };
+    if report.findings.iter().any(|finding| finding.cause == cause) {
+        return;
+    }
+    let after = report.extended.quality.rmse;
+    report.findings.push(Finding {
+        cause,
+        probability: 1.0,
+        parameters: vec![(name.to_owned(), value)],
+        rmse_before: after.hypot(held.error),
+        rmse_after: after,
+        evidence: format!("{percent:.0} % of the readings repeat the one before, to the last digit, and {why}; the other readings alone are diagnosed"),
+    });
+    report.findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
+    report.suspects.retain(|suspect| suspect.cause != cause);
+    if matches!(report.verdict, Verdict::Consistent | Verdict::Insufficient) {
+        report.verdict = Verdict::Explained;
+        report.suspects.clear();
+    }
+}
