@@ -14,10 +14,11 @@ fn main() {
     // memory.x of the workspace includes the board's flash.x and the controller's stack.x.
     let package = env::var("CARGO_MANIFEST_DIR").unwrap();
     let has = |feature: &str| env::var_os(format!("CARGO_FEATURE_{feature}")).is_some();
-    let stack = match (has("ADAPTATION"), has("ROBUST")) {
-        (true, _) => "adaptation",
-        (false, true) => "robust",
-        (false, false) => "usual",
+    let stack = match (has("ADAPTATION"), has("ROBUST"), has("ISOLATION")) {
+        (true, ..) => "adaptation",
+        (_, true, _) => "robust",
+        (_, _, true) => "isolation",
+        _ => "usual",
     };
     let stack = format!("{package}/../stack/{stack}");
     for (folder, script) in [(format!("{package}/.."), "memory.x"), (stack, "stack.x"), (package, "flash.x")] {

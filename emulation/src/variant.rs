@@ -20,13 +20,13 @@ pub(crate) const fn settings(variant: Variant) -> Settings {
 }
 
 /// The number of instructions that a control tick with voltage may need, at least and at most, supervisor included. The
-/// ends are 5 % beyond those that were measured: 289 to 319 with the paper's controller and an amplifier of 700 V. The fast and the robust
-/// one took 409 to 440 and 493 to 541 before the tick without its controller took 30 less: the lower ends are as many below.
+/// ends are 5 % beyond those that were measured: 291 to 320 with the paper's controller, 361 to 390 with the fast and 421 to 467 with the
+/// robust one, with an amplifier of 700 V.
 pub(crate) const fn instructions(variant: Variant) -> RangeInclusive<u64> {
     match variant.controller {
-        Controller::Paper => 275..=335,
-        Controller::Fast => 360..=462,
-        Controller::Robust => 438..=568,
+        Controller::Paper => 276..=336,
+        Controller::Fast => 343..=410,
+        Controller::Robust => 400..=491,
     }
 }
 

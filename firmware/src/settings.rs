@@ -8,8 +8,8 @@ use model::Compensation;
 #[cfg(feature = "robust")]
 use model::Margin;
 use model::device::{self, Watchdogs};
-use model::isolation::Causes;
-use model::{Amplifier, Feedback, Settings, supervisor};
+use model::isolation::{Causes, Tolerance};
+use model::{Amplifier, Feedback, Settings, adaptation, supervisor};
 
 /// Rate of the control tick that is built in, in Hz.
 pub const RATE_HZ: u32 = 1000;
@@ -52,6 +52,9 @@ const SENSOR: Option<Feedback> = None;
 /// Correction by the stiffness sensor; it has no effect on a board without one.
 #[cfg(feature = "feedback")]
 const SENSOR: Option<Feedback> = Some(Feedback::TYPICAL);
+/// Adaptation of the model to what the isolation bank names.
+const ADAPTATION: Option<adaptation::Settings> =
+    if cfg!(feature = "adaptation") { Some(adaptation::Settings::TYPICAL) } else { None };
 /// Settings of the supervisor, unless others are stored.
 pub const SUPERVISION: supervisor::Settings = supervisor::Settings::DEFAULT;
 
@@ -60,9 +63,16 @@ pub const WATCHDOGS: Watchdogs = Watchdogs::DEFAULT;
 /// All settings of the flashed image.
 pub const BUILT_IN: device::Settings = built_in(FLASHED);
 
-/// All settings of an image with the settings `control` of its loop.
+/// All settings of an image with the settings `control` of its loop. Without a sensor nothing adapts.
 pub const fn built_in(control: Settings) -> device::Settings {
-    device::Settings { control, supervision: SUPERVISION, watchdogs: WATCHDOGS, trip_on_cause: Causes::NONE }
+    device::Settings {
+        control,
+        supervision: SUPERVISION,
+        watchdogs: WATCHDOGS,
+        trip_on_cause: Causes::NONE,
+        tolerance: Tolerance::NONE,
+        adaptation: if control.feedback.is_some() { ADAPTATION } else { None },
+    }
 }
 
 /// The paper's controller with `amplifier`, without a sensor.

@@ -146,7 +146,13 @@ fn read(payload: &[u8], built_in: &device::Settings) -> Result<device::Settings,
     if !cfg!(feature = "isolation") && !settings.trip_on_cause.is_empty() {
         return Err(Reason::NotBuiltIn(Field::named("trip_on_cause")));
     }
+    if !cfg!(feature = "adaptation") && settings.adaptation.is_some() {
+        return Err(Reason::NotBuiltIn(Field::named("adaptation.enabled")));
+    }
     settings.check().map_err(|error| Reason::of_settings(&error))?;
+    if cfg!(feature = "adaptation") {
+        settings.check_adaptation().map_err(|error| Reason::of_settings(&error))?;
+    }
     Ok(settings)
 }
 
@@ -175,6 +181,7 @@ mod tests {
     use crate::store::{Memory, Page, Side, WORD};
     use link::wire_model::FORMAT;
     use link::{Controller, Field, frame, wire_settings};
+    use model::adaptation;
     use model::supervisor::{Faults, State};
     use std::vec::Vec;
 
@@ -377,6 +384,15 @@ mod tests {
         assert_eq!(check(sensor), contains(sensor_is_there, "sensor"));
         if sensor_is_there {
             assert_eq!(check(with_sensor(0x8000)), contains(cfg!(feature = "isolation"), "trip_on_cause"));
+            let adaptation = Some(adaptation::Settings::TYPICAL.values());
+            let adapts = WireSettings { adaptation, ..with_sensor(0) };
+            let built_in = cfg!(feature = "adaptation");
+            assert_eq!(check(adapts), contains(built_in, "adaptation.enabled"));
+            if built_in {
+                let wide = check(WireSettings { adaptation: Some([0.9; 6]), ..adapts });
+                let field = Field::named("adaptation.time_constant");
+                assert!(matches!(wide, Err(Reason::BadSettings { field: found, .. }) if found == field));
+            }
         }
         assert_eq!(check(WireSettings { controller: Controller::None, ..built_in_settings() }), Ok(()));
     }

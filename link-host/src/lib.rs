@@ -6,7 +6,7 @@
 //! | [`Client`] | sends requests and repeats them until they are answered; collects telemetry |
 //! | [`fault`] | the fault with a name or a number |
 //! | [`heartbeat`] | how often an armed MCU must hear of its host |
-//! | [`StatusReport`], [`IsolationRow`], [`Row`] | status, isolation bank and telemetry of the MCU, as text and JSON |
+//! | [`StatusReport`], [`IsolationRow`], [`AdaptationRow`], [`Row`] | status, isolation bank, adaptation and telemetry of the MCU, as text and JSON |
 
 mod client;
 mod command;
@@ -19,4 +19,4 @@ pub use client::{Client, Patience, heartbeat};
 pub use command::fault;
 pub use failure::Failure;
 pub use port::Port;
-pub use report::{IsolationRow, Row, StatusReport};
+pub use report::{AdaptationRow, IsolationRow, Row, StatusReport};

@@ -2,7 +2,7 @@
 
 use link::isolation::Off;
 use link::session::Counters;
-use link::{IsolationReport, Status, Telemetry};
+use link::{AdaptationReport, IsolationReport, Status, Telemetry};
 use model::Limits;
 use model::isolation::Cause;
 use serde::Serialize;
@@ -77,6 +77,80 @@ impl IsolationRow {
     }
 }
 
+/// What the adaptation of the MCU does; times are those since the MCU started.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AdaptationRow {
+    /// Time of the report, in s.
+    pub time_s: f64,
+    /// `watching`, `moving`, `settling`, `trial`, `frozen`, `returning`, `stopped`, or `off`.
+    pub phase: &'static str,
+    /// Why nothing can adapt: `not-built-in`, `no-sensor`, `extended-spring`, `out-of-range` or `settings`; `None` if something can.
+    pub why: Option<&'static str>,
+    /// The parameters in use; `None` if nothing can adapt.
+    pub parameters: Option<Adapted>,
+    /// Number of exchanges of the configuration since the start.
+    pub exchanges: u32,
+    /// Time of the last exchange, in s; `None` without one.
+    pub last_exchange_s: Option<f64>,
+}
+
+/// The parameters that can adapt.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Adapted {
+    /// Time constant, in s.
+    pub tau_s: Parameter,
+    /// Instantaneous share, without a unit.
+    pub share: Parameter,
+    /// Gain, without a unit; the stored model's is 1.
+    pub gain: Parameter,
+}
+
+/// A parameter of the running model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Value in use.
+    pub value: f64,
+    /// Value of the stored model.
+    pub model: f64,
+    /// Lowest value that the adaptation may set.
+    pub low: f64,
+    /// Highest value that it may set.
+    pub high: f64,
+}
+
+impl AdaptationRow {
+    /// Converts a report of an MCU with `rate_hz` ticks per second.
+    pub fn new(report: &AdaptationReport, rate_hz: u32) -> Self {
+        let AdaptationReport { tick, ratios, bounds, stored: [tau_s, share], exchanges, exchange_tick, .. } = *report;
+        let seconds = |tick: u64| tick as f64 / f64::from(rate_hz.max(1));
+        let why = report.why_off().map(Off::name);
+        let of = |index: usize, model: f64| {
+            let bound = bounds[index];
+            Parameter { value: ratios[index] * model, model, low: (1.0 - bound) * model, high: (1.0 + bound) * model }
+        };
+        let parameters = report.phase().map(|_| Adapted { tau_s: of(0, tau_s), share: of(1, share), gain: of(2, 1.0) });
+        let last_exchange_s = (exchanges > 0).then(|| seconds(exchange_tick));
+        Self { time_s: seconds(tick), phase: report.word(), why, parameters, exchanges, last_exchange_s }
+    }
+
+    /// What the adaptation does in a line.
+    pub fn text(&self) -> String {
+        let why = self.why.map(|why| format!(": {why}")).unwrap_or_default();
+        let parameter = |name: &str, Parameter { value, model, low, high }: Parameter, unit: &str| {
+            format!(", {name} {value:.4}{unit} (model {model:.4}, {low:.4} to {high:.4})")
+        };
+        let parameters = self.parameters.as_ref().map_or_else(String::new, |Adapted { tau_s, share, gain }| {
+            parameter("time constant", *tau_s, " s") + &parameter("share", *share, "") + &parameter("gain", *gain, "")
+        });
+        let exchanges = match self.last_exchange_s {
+            None if self.parameters.is_none() => String::new(),
+            None => ", no exchange".to_owned(),
+            Some(last_s) => format!(", {} exchanges, the last at {last_s:.2} s", self.exchanges),
+        };
+        format!("{}{why}{parameters}{exchanges}", self.phase)
+    }
+}
+
 /// The status of the MCU.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StatusReport {
@@ -106,6 +180,8 @@ pub struct StatusReport {
     pub sample: Row,
     /// What the isolation bank says; `None` if the MCU's program does not know the request.
     pub isolation: Option<IsolationRow>,
+    /// What the adaptation does; `None` if the MCU's program does not know the request.
+    pub adaptation: Option<AdaptationRow>,
     /// Counters of received frames.
     pub link: Counters,
 }
@@ -153,8 +229,8 @@ impl Row {
 }
 
 impl StatusReport {
-    /// Converts a status, and what the isolation bank says.
-    pub fn new(status: &Status, isolation: Option<&IsolationReport>) -> Self {
+    /// Converts a status, what the isolation bank says, and what the adaptation does.
+    pub fn new(status: &Status, isolation: Option<&IsolationReport>, adaptation: Option<&AdaptationReport>) -> Self {
         let firmware = &status.firmware;
         let revision = match firmware.revision {
             0 => String::new(),
@@ -174,6 +250,7 @@ impl StatusReport {
             last_fault: status.last_fault.name(),
             sample: Row::new(&status.sample, status.rate_hz),
             isolation: isolation.map(|report| IsolationRow::new(report, status.rate_hz)),
+            adaptation: adaptation.map(|report| AdaptationRow::new(report, status.rate_hz)),
             link: status.counters,
         }
     }
@@ -186,6 +263,7 @@ impl StatusReport {
         let remedy = link::Fault(self.fault_code).remedy().map(|remedy| format!("remedy     {remedy}\n"));
         let remedy = remedy.unwrap_or_default();
         let isolation = self.isolation.as_ref().map(|row| format!("isolation  {}\n", row.text())).unwrap_or_default();
+        let adaptation = self.adaptation.as_ref().map(|row| format!("adaptation {}\n", row.text())).unwrap_or_default();
         let limits = if sample.limits.is_empty() { "none".to_owned() } else { sample.limits.join(", ") };
         format!(
             "state      {}, fault {fault}, last reset's {last_fault}\n\
@@ -193,7 +271,7 @@ impl StatusReport {
              applied    {:.3} V, DAC code {}\n\
              stiffness  {:.3} V estimated; measured: {measured}\n\
              limits     {limits}; monitors: {}, sensor: {}\n\
-             {isolation}running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
+             {isolation}{adaptation}running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
              firmware   {firmware}, controller {controller}, protocol {protocol}, host may be silent for {silence_limit_s} s\n\
              link       {} accepted, {} repeated, {} damaged, {} oversize, {} bad version, {} out of order, {} unknown, \
              {} samples dropped\n",

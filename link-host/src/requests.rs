@@ -1,9 +1,13 @@
 //! The requests of a client, one function each.
 
+use link::adaptation::Adaptation;
 use link::block::PART;
 use link::capture::{Capture, Captured, Row};
 use link::isolation::Isolation;
-use link::{Block, BlockId, Blocks, IsolationReport, Part, Reason, Reply, Request, Status, WireModel, WireSettings};
+use link::{
+    AdaptationReport, Block, BlockId, Blocks, IsolationReport, Part, Reason, Reply, Request, Status, WireModel,
+    WireSettings,
+};
 
 use crate::client::{Client, status};
 use crate::failure::Failure;
@@ -103,6 +107,19 @@ impl Client {
     pub fn isolation(&mut self, request: Isolation) -> Result<Option<IsolationReport>, Failure> {
         match self.ask(Request::Isolation(request)) {
             Ok(Reply::Isolation(report)) => Ok(Some(report)),
+            Ok(other) => Err(Failure::unexpected(other)),
+            Err(Failure::Refused(Reason::UnknownRequest)) => Ok(None),
+            Err(failure) => Err(failure),
+        }
+    }
+
+    /// What the adaptation does; `None` if the MCU's program does not know the request.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn adaptation(&mut self, request: Adaptation) -> Result<Option<AdaptationReport>, Failure> {
+        match self.ask(Request::Adaptation(request)) {
+            Ok(Reply::Adaptation(report)) => Ok(Some(report)),
             Ok(other) => Err(Failure::unexpected(other)),
             Err(Failure::Refused(Reason::UnknownRequest)) => Ok(None),
             Err(failure) => Err(failure),

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Field(pub u8);
 
 /// Names in the order of their codes. The order is part of the protocol: new names are appended.
-const NAMES: [&str; 49] = [
+const NAMES: [&str; 59] = [
     "memory.direct",
     "memory.thresholds_v",
     "memory.weights",
@@ -60,6 +60,16 @@ const NAMES: [&str; 49] = [
     "margin.share",
     "margin.gain",
     "margin.overshoot",
+    "adaptation.enabled",
+    "adaptation.time_constant",
+    "adaptation.share",
+    "adaptation.gain",
+    "adaptation.rate_per_s",
+    "adaptation.precision",
+    "adaptation.excitation",
+    "tolerance.time_constant",
+    "tolerance.share",
+    "tolerance.gain",
 ];
 
 impl Field {

@@ -32,11 +32,11 @@ pub struct IsolationReport {
     pub trip_on_cause: u16,
 }
 
-/// Why no isolation bank runs.
+/// Why no isolation bank runs, or no adaptation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Off {
-    /// The image is built without it.
+    /// The image is built without the bank, or without the adaptation.
     NotBuiltIn = 1,
     /// The settings have no stiffness sensor.
     NoSensor = 2,
@@ -44,11 +44,14 @@ pub enum Off {
     ExtendedSpring = 3,
     /// Noise, interval, range or time constant are outside of what the bank can use.
     OutOfRange = 4,
+    /// The settings switch the adaptation off; the bank has no such setting.
+    Settings = 5,
 }
 
 impl Off {
     /// Every reason, in the order of the codes.
-    pub const ALL: [Self; 4] = [Self::NotBuiltIn, Self::NoSensor, Self::ExtendedSpring, Self::OutOfRange];
+    pub const ALL: [Self; 5] =
+        [Self::NotBuiltIn, Self::NoSensor, Self::ExtendedSpring, Self::OutOfRange, Self::Settings];
 
     /// Name for tables and JSON.
     pub const fn name(self) -> &'static str {
@@ -57,6 +60,7 @@ impl Off {
             Self::NoSensor => "no-sensor",
             Self::ExtendedSpring => "extended-spring",
             Self::OutOfRange => "out-of-range",
+            Self::Settings => "settings",
         }
     }
 }
@@ -113,8 +117,9 @@ mod tests {
         let words = [0, 0x100, 0x200, 0x300, 0x4a0, 0x501, 0x5ff, 0x600].map(word).join(" ");
         assert_eq!(words, "quiet alarm unknown named ambiguous off off unknown-code");
         let why = |code| IsolationReport { verdict: OFF | code, ..IsolationReport::default() }.why_off().map(Off::name);
-        let names = [Some("not-built-in"), Some("no-sensor"), Some("extended-spring"), Some("out-of-range"), None];
-        assert_eq!([1, 2, 3, 4, 5].map(why), names);
+        let names = ["not-built-in", "no-sensor", "extended-spring", "out-of-range", "settings"];
+        assert_eq!([1, 2, 3, 4, 5].map(why), names.map(Some));
+        assert_eq!(why(6), None);
         assert_eq!(IsolationReport::off(Off::NoSensor, 7, Causes::NONE).verdict(), None);
         let trips = Causes::NONE.with(Cause::GainError).with(Cause::StuckSensor);
         let report = IsolationReport::new(Verdict::Named(Cause::Delay), None, 7, 5, trips);

@@ -25,7 +25,7 @@
 //! | [`value`] | Voltages and desired stiffness in their wire format. |
 //! | [`block`] | Blocks that the MCU stores: their identity, and the parts in which they are sent. |
 //! | [`capture`] | Rows of the fast capture, and the requests that start and read it. |
-//! | [`isolation`] | What the isolation bank says, and the request for it. |
+//! | [`isolation`], [`adaptation`] | What the isolation bank says and what the adaptation does, and the requests for it. |
 //! | [`wire_model`], [`wire_settings`] | A spring's model and the MCU's settings in the format in which they are sent and stored. |
 //! | [`fault`], [`field`] | Numeric codes of the MCU's faults and of the fields of a model or of settings. |
 //! | [`diagnosis`] | Numeric codes of what the amplifier's monitors and the sensor show. |
@@ -42,6 +42,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod adaptation;
 pub mod block;
 pub mod capture;
 pub mod checksum;
@@ -65,6 +66,7 @@ pub mod value;
 pub mod wire_model;
 pub mod wire_settings;
 
+pub use adaptation::AdaptationReport;
 pub use block::{Block, BlockId, Blocks, Part};
 pub use command::Command;
 pub use diagnosis::{Mismatch, Sensor};

@@ -4,6 +4,7 @@ use model::Compensation;
 use model::supervisor::Faults;
 use serde::{Deserialize, Serialize};
 
+use crate::adaptation::AdaptationReport;
 use crate::block::{Blocks, Part};
 use crate::capture::{Captured, Rows};
 use crate::diagnosis::Mismatch;
@@ -45,6 +46,8 @@ pub enum Reply {
     Rows(Rows),
     /// What the isolation bank says.
     Isolation(IsolationReport),
+    /// What the adaptation does.
+    Adaptation(AdaptationReport),
 }
 
 /// Report of the faults that have come since the start.

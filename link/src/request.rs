@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::adaptation::Adaptation;
 use crate::block::PART;
 use crate::capture::Capture;
 use crate::fault::Fault;
@@ -85,6 +86,8 @@ pub enum Request {
     Capture(Capture),
     /// Reads what the isolation bank says, or ends its alarm.
     Isolation(Isolation),
+    /// Reads what the adaptation does, or switches it.
+    Adaptation(Adaptation),
 }
 
 impl Request {

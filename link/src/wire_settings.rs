@@ -5,23 +5,25 @@
 
 use heapless::Vec;
 use model::device::{self, Watchdogs};
-use model::isolation::Causes;
-use model::{Amplifier, Approach, Compensation, Feedback, Gains, Margin, Settings, supervisor};
+use model::isolation::{Causes, Tolerance};
+use model::{Amplifier, Approach, Compensation, Feedback, Gains, Margin, Settings, adaptation, supervisor};
 use serde::{Deserialize, Serialize};
 
 use crate::block::{self, PART};
 use crate::field::Field;
 use crate::reply::Controller;
 
-/// Newest version of the payload's format: the second one, and `margin` behind it. A payload has the oldest version that holds its
-/// settings, so that programs which know no newer one go on reading what they can run.
-pub const FORMAT: u8 = 3;
+/// Newest version of the payload's format: the first one, and `trip_on_cause`, `margin?`, `tolerance?` and `adaptation?` behind it. A
+/// payload has the oldest version that holds its settings, so that programs which know no newer one go on reading what they can run.
+pub const FORMAT: u8 = 4;
 /// First version of the payload's format.
 const FIRST: u8 = 1;
 /// Second version of the payload's format: the first one, and `trip_on_cause` behind it.
 const SECOND: u8 = 2;
+/// Third version of the payload's format: the second one, and `margin` behind it.
+const THIRD: u8 = 3;
 /// Largest number of parts of a payload.
-pub const MOST_PARTS: u8 = 8;
+pub const MOST_PARTS: u8 = 10;
 /// Length of the longest payload, in bytes.
 pub const MOST_BYTES: usize = PART * MOST_PARTS as usize;
 
@@ -76,12 +78,19 @@ pub struct WireSettings {
     /// than the third.
     #[serde(skip)]
     pub margin: Option<[f64; 4]>,
+    /// Errors of the model that are no fault for the isolation bank, as [`Tolerance::values`]; `None` for none, and in a payload of an
+    /// earlier version than the fourth, as the next.
+    #[serde(skip)]
+    pub tolerance: Option<[f64; 3]>,
+    /// Adaptation of the running model, as [`adaptation::Settings::values`]; `None` if nothing adapts.
+    #[serde(skip)]
+    pub adaptation: Option<[f64; 6]>,
 }
 
 impl WireSettings {
     /// The part of `settings` that can be changed. What the chosen controller does not use has its default value.
     pub fn new(settings: &device::Settings) -> Self {
-        let device::Settings { control, supervision, watchdogs, trip_on_cause } = settings;
+        let device::Settings { control, supervision, watchdogs, trip_on_cause, tolerance, adaptation } = settings;
         let Settings { compensation, amplifier, feedback, .. } = control;
         let (gains, approach_s, margin) = match compensation {
             Compensation::None => (Gains::PAPER, 0.0, None),
@@ -111,6 +120,8 @@ impl WireSettings {
             watchdogs_ms: [watchdogs.hang_ms, watchdogs.stall_ms, watchdogs.reset_ms],
             trip_on_cause: trip_on_cause.bits(),
             margin,
+            tolerance: (*tolerance != Tolerance::NONE).then(|| tolerance.values()),
+            adaptation: adaptation.as_ref().map(adaptation::Settings::values),
         }
     }
 
@@ -165,16 +176,20 @@ impl WireSettings {
             },
             watchdogs: Watchdogs { hang_ms, stall_ms, reset_ms },
             trip_on_cause: Causes::from_bits(self.trip_on_cause),
+            tolerance: self.tolerance.map_or(Tolerance::NONE, Tolerance::from_values),
+            adaptation: self.adaptation.map(adaptation::Settings::from_values),
         })
     }
 
     /// Serialises the payload. `None` if it is longer than [`MOST_BYTES`], which a test excludes for the longest.
     #[inline(never)]
     pub fn payload(&self) -> Option<Payload> {
-        let (format, behind) = match (self.margin, self.trip_on_cause) {
-            (None, 0) => (FIRST, Behind::Nothing),
-            (None, trip_on_cause) => (SECOND, Behind::Trip(trip_on_cause)),
-            (Some(margin), trip_on_cause) => (FORMAT, Behind::Margin(trip_on_cause, margin)),
+        let Self { trip_on_cause, margin, tolerance, adaptation, .. } = *self;
+        let (format, behind) = match (tolerance, adaptation, margin) {
+            (None, None, None) if trip_on_cause == 0 => (FIRST, Behind::Nothing),
+            (None, None, None) => (SECOND, Behind::Trip(trip_on_cause)),
+            (None, None, Some(margin)) => (THIRD, Behind::Margin(trip_on_cause, margin)),
+            _ => (FORMAT, Behind::Adaptation(trip_on_cause, margin, tolerance, adaptation)),
         };
         block::write(format, &(self, behind))
     }
@@ -187,9 +202,13 @@ impl WireSettings {
         if *format >= SECOND {
             (settings.trip_on_cause, bytes) = postcard::take_from_bytes(bytes).ok()?;
         }
-        if *format == FORMAT {
+        if *format == THIRD {
             let (margin, rest) = postcard::take_from_bytes(bytes).ok()?;
             (settings.margin, bytes) = (Some(margin), rest);
+        }
+        if *format == FORMAT {
+            let (behind, rest) = postcard::take_from_bytes(bytes).ok()?;
+            ((settings.margin, settings.tolerance, settings.adaptation), bytes) = (behind, rest);
         }
         ((FIRST..=FORMAT).contains(format) && bytes.is_empty()).then_some(settings)
     }
@@ -202,6 +221,7 @@ enum Behind {
     Nothing,
     Trip(u16),
     Margin(u16, [f64; 4]),
+    Adaptation(u16, Option<[f64; 4]>, Option<[f64; 3]>, Option<[f64; 6]>),
 }
 
 #[cfg(test)]
@@ -221,6 +241,8 @@ mod tests {
             controller: Controller::Robust,
             trip_on_cause: u16::MAX,
             margin: Some([0.25; 4]),
+            tolerance: Some([0.5; 3]),
+            adaptation: Some([0.125; 6]),
             ..WireSettings::new(&BUILT_IN)
         }
     }
@@ -228,7 +250,7 @@ mod tests {
     #[test]
     fn the_longest_settings_fit_and_survive_a_round_trip() {
         let payload = longest().payload().unwrap();
-        assert_eq!((payload.len(), WireSettings::read(&payload)), (240, Some(longest())));
+        assert_eq!((payload.len(), WireSettings::read(&payload)), (315, Some(longest())));
         assert!(payload.len() <= MOST_BYTES);
     }
 
@@ -261,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_robust_controller_needs_a_payload_of_the_newest_format() {
+    fn only_the_robust_controller_needs_a_payload_of_the_third_format() {
         let margin = [0.05, 0.125, 0.0, 0.02];
         let robust = WireSettings { controller: Controller::Robust, ..WireSettings::new(&BUILT_IN) };
         let without = robust.payload().unwrap();
@@ -279,6 +301,37 @@ mod tests {
         }
         assert_eq!((without[0], WireSettings::read(&without)), (1, Some(robust)));
         assert_eq!(robust.over(&BUILT_IN), Err(Field::named("controller")), "without a margin, as before");
+    }
+
+    /// What no earlier program can run is in a payload that none of them reads.
+    #[test]
+    fn only_an_adaptation_and_a_tolerance_need_a_payload_of_the_newest_format() {
+        let without = WireSettings::new(&BUILT_IN);
+        let first = without.payload().unwrap();
+        let (tolerance, adaptation, margin) = (Some([0.01, 0.02, 0.25]), Some([0.5; 6]), Some([0.05; 4]));
+        let robust = WireSettings { margin, ..without };
+        for (settings, options) in [
+            (WireSettings { tolerance, ..without }, [0, 1, 0]),
+            (WireSettings { adaptation, ..without }, [0, 0, 1]),
+            (WireSettings { tolerance, adaptation, trip_on_cause: 5, ..robust }, [1, 1, 1]),
+        ] {
+            let payload = settings.payload().unwrap();
+            assert_eq!((payload[0], WireSettings::read(&payload)), (FORMAT, Some(settings)));
+            let (head, tail) = payload[1..].split_at(first.len() - 1);
+            assert_eq!(*head, first[1..], "the newer format has the first one in it");
+            assert_eq!(u16::from(tail[0]), settings.trip_on_cause);
+            let mut at = 1;
+            for (there, numbers) in options.into_iter().zip([4, 3, 6]) {
+                assert_eq!(tail[at], there);
+                at += 1 + usize::from(there) * 8 * numbers;
+            }
+            assert_eq!(at, tail.len());
+        }
+        for old in [FIRST, SECOND, THIRD] {
+            let mut payload = longest().payload().unwrap();
+            payload[0] = old;
+            assert_eq!(WireSettings::read(&payload), None, "format {old}");
+        }
     }
 
     #[test]
@@ -305,7 +358,9 @@ mod tests {
         };
         let watchdogs = Watchdogs { hang_ms: 20, stall_ms: 60, reset_ms: 200 };
         let trip_on_cause = Causes::NONE.with(model::isolation::Cause::GainError);
-        let meant = device::Settings { control, supervision, watchdogs, trip_on_cause };
+        let tolerance = Tolerance { time_constant: 0.01, share: 0.02, gain: 0.005 };
+        let adaptation = Some(adaptation::Settings { gain: 0.1, ..adaptation::Settings::TYPICAL });
+        let meant = device::Settings { control, supervision, watchdogs, trip_on_cause, tolerance, adaptation };
         let payload = WireSettings::new(&meant).payload().unwrap();
         assert_eq!(WireSettings::read(&payload).unwrap().over(&BUILT_IN), Ok(meant));
         for compensation in [Compensation::None, Compensation::Robust(Margin::TYPICAL)] {

@@ -4,13 +4,14 @@
 mod by_hand;
 
 use by_hand::by_hand;
+use link::adaptation::Adaptation;
 use link::capture::{Capture, Captured, ROWS, Rows};
 use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, IsolationReport, Message, Mismatch, Nonce,
-    Part, Reason, Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
+    AdaptationReport, BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, IsolationReport, Message,
+    Mismatch, Nonce, Part, Reason, Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
 };
 
 /// Returns the message and its frame as a line of the file for other clients.
@@ -64,6 +65,9 @@ fn requests() {
         (Request::Capture(Capture::Read { first: 300 }), "1102ac02"),
         (Request::Isolation(Isolation::Read), "1200"),
         (Request::Isolation(Isolation::Acknowledge), "1201"),
+        (Request::Adaptation(Adaptation::Read), "1300"),
+        (Request::Adaptation(Adaptation::Off), "1301"),
+        (Request::Adaptation(Adaptation::On), "1302"),
     ] {
         frames += &check(&request, b'Q', golden);
     }
@@ -200,6 +204,19 @@ fn replies() {
                 trip_on_cause: 0x8001,
             }),
             "0af0a204a009ac02000000000000d03f000000000000f03f0000000000000000818002",
+        ),
+        (
+            Reply::Adaptation(AdaptationReport {
+                tick: 70_000,
+                phase: 3,
+                ratios: [1.0, 2.0, 0.5],
+                bounds: [0.25, 0.125, 0.0],
+                stored: [4.0, 8.0],
+                exchanges: 300,
+                exchange_tick: 200,
+            }),
+            "0bf0a20403000000000000f03f0000000000000040000000000000e03f\
+             000000000000d03f000000000000c03f000000000000000000000000000010400000000000002040ac02c801",
         ),
         (
             Reply::SettingsPart(Part { number: 2, length: 300, bytes: [0xa5; 32] }),

@@ -18,10 +18,10 @@ fn a_fault_has_the_name_and_the_remedy_of_the_supervisor() {
 
 #[test]
 fn a_field_keeps_its_name_across_the_link() {
-    for name in ["memory.direct", "leakage.share", "integral_gain_per_s", "controller", "reset_ms", "margin.share"] {
+    for name in ["memory.direct", "leakage.share", "integral_gain_per_s", "controller", "reset_ms", "tolerance.gain"] {
         assert_eq!(Field::named(name).name(), name);
     }
-    for unknown in [Field::named("no such field"), Field(49)] {
+    for unknown in [Field::named("no such field"), Field(59)] {
         assert_eq!(unknown.name(), "another setting");
     }
     assert_eq!(Field::named("no such field"), Field::OTHER);
@@ -32,6 +32,7 @@ fn a_field_keeps_its_name_across_the_link() {
 fn every_field_of_the_settings_that_a_check_can_name_has_a_code() {
     let settings = include_str!("../../model/src/device.rs");
     let others = [
+        include_str!("../../model/src/adaptation/mod.rs"),
         include_str!("../../model/src/amplifier.rs"),
         include_str!("../../model/src/pre_compensator.rs"),
         include_str!("../../model/src/time_optimal/enabled/mod.rs"),
@@ -44,7 +45,7 @@ fn every_field_of_the_settings_that_a_check_can_name_has_a_code() {
     let listed =
         settings.split("(\"").skip(1).filter_map(|rest| rest.split('"').next()).filter(|name| name.ends_with("_ms"));
     let names: Vec<&str> = others.into_iter().chain([settings]).flat_map(named).chain(listed).collect();
-    assert!(names.len() >= 29, "{names:?}");
+    assert!(names.len() >= 35, "{names:?}");
     // What is the board's own cannot be sent.
     let fixed = ["dac_bits", "lowest_supply_v", "highest_supply_v"];
     for name in names.iter().filter(|name| !fixed.contains(name)) {

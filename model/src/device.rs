@@ -10,10 +10,11 @@
 //! [`Settings::check`] demands that. Host and MCU call the same check, the one before it sends settings, the other before
 //! it stores and before it runs them.
 
+use crate::adaptation;
 use crate::controller;
 use crate::error::OutOfRange;
 use crate::estimator::Plant;
-use crate::isolation::{self, Causes};
+use crate::isolation::{self, Causes, Tolerance};
 use crate::supervisor;
 use crate::units::SampleTime;
 use crate::validated::Validate;
@@ -45,6 +46,10 @@ pub struct Settings {
     /// Causes that are a fault once the isolation bank has named them, so that the output is disabled; none by default. A set that is
     /// not empty needs a sensor.
     pub trip_on_cause: Causes,
+    /// Errors of the model that are no fault for the isolation bank; none by default.
+    pub tolerance: Tolerance,
+    /// Adaptation of the running model to what the isolation bank names; `None` if nothing adapts. It needs a sensor.
+    pub adaptation: Option<adaptation::Settings>,
 }
 
 /// Times after which the three watchdogs act, in ms.
@@ -73,13 +78,23 @@ impl Settings {
         supervision: supervisor::Settings::DEFAULT,
         watchdogs: Watchdogs::DEFAULT,
         trip_on_cause: Causes::NONE,
+        tolerance: Tolerance::NONE,
+        adaptation: None,
     };
 
     /// Returns the settings of the isolation bank for the spring `plant` behind an amplifier with this highest voltage, in V: noise and
     /// interval are those of the sensor. `None` without one.
     pub fn isolation(&self, plant: Plant, highest_v: f64) -> Option<isolation::Settings> {
         let [noise_v, _, _, interval_s, ..] = self.control.feedback.as_ref()?.values();
-        Some(isolation::Settings { plant, noise_v, interval_s, range_v: highest_v, ..isolation::Settings::PAPER })
+        let tolerance = self.tolerance;
+        Some(isolation::Settings {
+            plant,
+            noise_v,
+            interval_s,
+            range_v: highest_v,
+            tolerance,
+            ..isolation::Settings::PAPER
+        })
     }
 
     /// Returns the rate of the tick, in whole Hz.
@@ -87,16 +102,18 @@ impl Settings {
         self.control.rate_hz as u32
     }
 
-    /// Checks every field, and the fields against each other.
+    /// Checks every field, and the fields against each other, but for [`Settings::check_adaptation`].
     ///
     /// # Errors
     /// [`OutOfRange`] names the first field outside its allowed range, its value and the range.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        let Self { control, supervision, watchdogs: Watchdogs { hang_ms, stall_ms, reset_ms }, trip_on_cause } = self;
+        let Self { control, supervision, watchdogs: Watchdogs { hang_ms, stall_ms, reset_ms }, trip_on_cause, .. } =
+            self;
         check_rate(control.rate_hz)?;
         control.validate()?;
         let sample_time = SampleTime::from_rate(control.rate_hz)?;
         supervision.validate(sample_time)?;
+        self.tolerance.check()?;
         if !trip_on_cause.is_empty() {
             match self.isolation(control.plant, control.amplifier.max_v) {
                 Some(bank) => bank.validate(sample_time).map(drop)?,
@@ -122,6 +139,20 @@ impl Settings {
         let reset_ms_from = others_ms + others_ms.div_ceil(10);
         let allowed = f64::from(reset_ms_from)..=f64::from(LONGEST_RESET_MS);
         OutOfRange::check("reset_ms", f64::from(*reset_ms), allowed, "ms")
+    }
+
+    /// Checks the adaptation, with the springs at all ends of its bounds. A function of its own: an image without an adaptation has none
+    /// to check.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the first field outside its allowed range, its value and the range.
+    #[inline(never)]
+    pub fn check_adaptation(&self) -> Result<(), OutOfRange> {
+        let Self { control, adaptation: Some(adaptation), .. } = self else { return Ok(()) };
+        let bank = self.isolation(control.plant, control.amplifier.max_v);
+        OutOfRange::check_count("adaptation.enabled", 1, 0..=usize::from(bank.is_some()), "without a sensor")?;
+        adaptation.validate(SampleTime::from_rate(control.rate_hz)?)?;
+        bank.map_or(Ok(()), |bank| adaptation.check_for(control, &bank))
     }
 }
 
@@ -217,6 +248,44 @@ mod tests {
             assert_eq!(with(rare, Causes::NONE), Ok(()));
             assert_eq!(with(rare, trip_on_cause).unwrap_err().field, "interval_s");
         }
+    }
+
+    #[test]
+    fn an_adaptation_needs_a_sensor_and_bounds_within_which_the_spring_can_be_run() {
+        let with = |adaptation, feedback| {
+            let control = controller::Settings { feedback, ..GOOD.control };
+            Settings { control, adaptation: Some(adaptation), ..GOOD }.check_adaptation().map_err(|error| error.field)
+        };
+        let typical = adaptation::Settings::TYPICAL;
+        assert_eq!(with(typical, None), Err("adaptation.enabled"));
+        if let Some(feedback) = crate::Feedback::from_values([1.0, 1.0, 0.1, 1e-3, 0.01, -50.0, 1000.0, 2.0]) {
+            assert_eq!(with(typical, Some(feedback)), Ok(()));
+            for (index, value, field) in [
+                (0, 0.6, "adaptation.time_constant"),
+                (1, f64::NAN, "adaptation.share"),
+                (2, -0.1, "adaptation.gain"),
+                (3, 0.0, "adaptation.rate_per_s"),
+                (4, 0.2, "adaptation.precision"),
+                (5, 2.0, "adaptation.excitation"),
+            ] {
+                let mut values = typical.values();
+                values[index] = value;
+                assert_eq!(with(adaptation::Settings::from_values(values), Some(feedback)), Err(field));
+            }
+        }
+    }
+
+    #[test]
+    fn a_tolerance_is_at_most_a_quarter() {
+        for (values, field) in [
+            ([0.3, 0.0, 0.0], "tolerance.time_constant"),
+            ([0.0, -0.1, 0.0], "tolerance.share"),
+            ([0.0, 0.0, f64::NAN], "tolerance.gain"),
+        ] {
+            let tolerance = Tolerance::from_values(values);
+            assert_eq!(Settings { tolerance, ..GOOD }.check().unwrap_err().field, field);
+        }
+        assert_eq!(Settings { tolerance: Tolerance::from_values([0.25; 3]), ..GOOD }.check(), Ok(()));
     }
 
     #[test]

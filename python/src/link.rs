@@ -7,6 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Reason, Request, Status};
 use link_host::{Client, Failure, Patience, Row, StatusReport, heartbeat};
@@ -50,9 +51,10 @@ impl Connection {
     fn status(&mut self) -> Result<String> {
         let name = self.name();
         self.status = self.client.status().with_context(|| name.clone())?;
-        let isolation = self.client.isolation(Isolation::Read).with_context(|| name)?;
+        let isolation = self.client.isolation(Isolation::Read).with_context(|| name.clone())?;
+        let adaptation = self.client.adaptation(Adaptation::Read).with_context(|| name)?;
         self.heard = Instant::now();
-        Ok(serde_json::to_string(&StatusReport::new(&self.status, isolation.as_ref()))?)
+        Ok(serde_json::to_string(&StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref()))?)
     }
 
     fn models(&mut self, plant: Option<Plant>) -> Result<String> {

@@ -62,6 +62,12 @@ pub struct SettingsFile {
     /// What the naming of a cause does.
     #[serde(default)]
     pub isolation: Isolation,
+    /// Errors of the stored model that are no fault for the isolation bank.
+    #[serde(default)]
+    pub tolerance: Tolerance,
+    /// Adaptation of the running model to what the isolation bank names.
+    #[serde(default)]
+    pub adaptation: Adaptation,
 }
 
 /// Name of a pre-compensator.
@@ -195,6 +201,36 @@ table! {
         trip_on_cause: Trips,
     }
 }
+table! {
+    /// How well the stored model is known: half the widths of 95 % intervals, without a unit.
+    Tolerance {
+        /// Largest relative error of the time constant that is no fault, both ways.
+        time_constant: f64,
+        /// Largest relative error of the instantaneous share that is no fault, both ways.
+        share: f64,
+        /// Largest relative error of the gain that is no fault, both ways.
+        gain: f64,
+    }
+}
+table! {
+    /// The model follows what the isolation bank has named, within bounds around the stored one; all but the rate without a unit.
+    Adaptation {
+        /// Whether the model adapts; true if the table has another key.
+        enabled: bool,
+        /// Largest relative deviation of the time constant, both ways.
+        time_constant: f64,
+        /// Largest relative deviation of the instantaneous share, both ways.
+        share: f64,
+        /// Largest relative deviation of the gain, both ways.
+        gain: f64,
+        /// Largest relative change of a parameter in a second, in 1/s.
+        rate_per_s: f64,
+        /// Largest half width of the 95 % interval of a parameter that is taken over, relative to it.
+        precision: f64,
+        /// Distance between lowest and highest voltage since the fault began, as a part of the range.
+        excitation: f64,
+    }
+}
 
 impl From<&WireSettings> for SettingsFile {
     /// A file with every value.
@@ -236,6 +272,8 @@ impl From<&WireSettings> for SettingsFile {
             },
             watchdogs: Watchdogs { hang_ms: Some(hang_ms), stall_ms: Some(stall_ms), reset_ms: Some(reset_ms) },
             isolation: Isolation { trip_on_cause: Some(Trips(Causes::from_bits(wire.trip_on_cause))) },
+            tolerance: Tolerance::from(wire.tolerance.unwrap_or_default()),
+            adaptation: Adaptation::from(wire.adaptation),
         }
     }
 }
@@ -262,6 +300,41 @@ impl Sensor {
     }
 }
 
+impl From<[f64; 3]> for Tolerance {
+    fn from(values: [f64; 3]) -> Self {
+        let [time_constant, share, gain] = values.map(Some);
+        Self { time_constant, share, gain }
+    }
+}
+
+impl Tolerance {
+    /// The tolerance: the values of the file, else the built-in ones; `None` if each of them is 0.
+    fn over(&self, built_in: Option<[f64; 3]>) -> Option<[f64; 3]> {
+        let Self { time_constant, share, gain } = *self;
+        Some(over([time_constant, share, gain], built_in.unwrap_or_default())).filter(|values| *values != [0.0; 3])
+    }
+}
+
+impl From<Option<[f64; 6]>> for Adaptation {
+    fn from(values: Option<[f64; 6]>) -> Self {
+        let enabled = Some(values.is_some());
+        let Some([time_constant, share, gain, rate_per_s, precision, excitation]) = values.map(|v| v.map(Some)) else {
+            return Self { enabled, ..Self::default() };
+        };
+        Self { enabled, time_constant, share, gain, rate_per_s, precision, excitation }
+    }
+}
+
+impl Adaptation {
+    /// The adaptation: the values of the file, else the built-in ones, else the typical ones; `None` if nothing adapts.
+    fn over(&self, built_in: Option<[f64; 6]>) -> Option<[f64; 6]> {
+        let Self { enabled, time_constant, share, gain, rate_per_s, precision, excitation } = *self;
+        let keys = [time_constant, share, gain, rate_per_s, precision, excitation];
+        let enabled = enabled.unwrap_or(*self != Self::default() || built_in.is_some());
+        enabled.then(|| over(keys, built_in.unwrap_or(model::adaptation::Settings::TYPICAL.values())))
+    }
+}
+
 impl Margin {
     /// The margin: the values of the file, else the built-in ones, else the typical ones.
     fn over(&self, built_in: Option<[f64; 4]>) -> [f64; 4] {
@@ -273,7 +346,7 @@ impl Margin {
 impl SettingsFile {
     /// The settings to be sent: those of the file over the built-in ones.
     pub fn over(&self, built_in: &WireSettings) -> WireSettings {
-        let Self { gains, approach, margin, amplifier, sensor, supervision, watchdogs, isolation, .. } = self;
+        let Self { gains, approach, margin, amplifier, sensor, supervision, watchdogs, .. } = self;
         let [hang_ms, stall_ms, reset_ms] = built_in.watchdogs_ms;
         let controller = match self.controller {
             None => built_in.controller,
@@ -306,8 +379,10 @@ impl SettingsFile {
                 watchdogs.stall_ms.unwrap_or(stall_ms),
                 watchdogs.reset_ms.unwrap_or(reset_ms),
             ],
-            trip_on_cause: isolation.trip_on_cause.map_or(built_in.trip_on_cause, |trips| trips.0.bits()),
+            trip_on_cause: self.isolation.trip_on_cause.map_or(built_in.trip_on_cause, |trips| trips.0.bits()),
             margin: (controller == Controller::Robust).then(|| margin.over(built_in.margin)),
+            tolerance: self.tolerance.over(built_in.tolerance),
+            adaptation: self.adaptation.over(built_in.adaptation),
         }
     }
 
@@ -346,7 +421,7 @@ impl Source {
             let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
             BadInput(format!(
                 "{}: {what}; expected schema, rate_hz, controller, and [gains], [approach], [margin], [amplifier], [sensor], \
-                 [supervision], [watchdogs], [isolation]; pins, converters, monitor scales and baud rate need another image",
+                 [supervision], [watchdogs], [isolation], [tolerance], [adaptation]; pins, converters, monitor scales and baud rate need another image",
                 place::line_and_column(name, text, at)
             ))
         })?;
@@ -371,7 +446,7 @@ impl Source {
     pub fn over(&self, built_in: &WireSettings) -> Result<WireSettings> {
         match self.file.over(built_in).over(&device::Settings::PAPER) {
             Ok(settings) => {
-                settings.check().map_err(|error| self.error(&error))?;
+                settings.check().and_then(|()| settings.check_adaptation()).map_err(|error| self.error(&error))?;
                 // Without what the controller does not use, which the MCU does not keep.
                 Ok(WireSettings::new(&settings))
             }
@@ -392,7 +467,9 @@ fn key(field: &str) -> String {
         "proportional_gain" => return "gains.proportional".into(),
         "integral_gain_per_s" => return "gains.integral_per_s".into(),
         "approach_s" => return "approach.tau_s".into(),
-        _ if field.starts_with("margin.") => return field.into(),
+        _ if ["margin.", "tolerance.", "adaptation."].iter().any(|table| field.starts_with(table)) => {
+            return field.into();
+        }
         "full_scale_v" | "min_v" | "max_v" | "slew_v_per_s" => "amplifier",
         "hang_ms" | "stall_ms" | "reset_ms" => "watchdogs",
         "range_v" => return "amplifier.max_v".into(),
@@ -450,6 +527,21 @@ mod tests {
     }
 
     #[test]
+    fn an_adaptation_is_on_if_its_table_has_a_key_and_keeps_what_the_table_does_not_name() {
+        let sensor = "schema = 1\n[sensor]\nenabled = true\n";
+        let adaptation = |text: &str| over(&format!("{sensor}{text}")).unwrap().adaptation;
+        assert_eq!(adaptation(""), None);
+        assert_eq!(adaptation("[adaptation]\nenabled = true"), Some([0.25, 0.25, 0.15, 0.05, 0.01, 0.1]));
+        assert_eq!(adaptation("[adaptation]\ngain = 0.02"), Some([0.25, 0.25, 0.02, 0.05, 0.01, 0.1]));
+        let adapts =
+            WireSettings { sensor: Some(model::Feedback::TYPICAL.values()), adaptation: Some([0.1; 6]), ..built_in() };
+        let over = |text| Source::parse("s.toml", text).unwrap().over(&adapts).unwrap().adaptation;
+        assert_eq!(over("schema = 1"), Some([0.1; 6]));
+        assert_eq!(over("schema = 1\n[adaptation]\nshare = 0.2"), Some([0.1, 0.2, 0.1, 0.1, 0.1, 0.1]));
+        assert_eq!(over("schema = 1\n[adaptation]\nenabled = false"), None);
+    }
+
+    #[test]
     fn every_value_reads_the_same_after_it_was_written() {
         let values = [2.0, 3.0, 0.5, 2e-3, 0.02, -20.0, 700.0, 4.0];
         for wire in [
@@ -458,6 +550,8 @@ mod tests {
             WireSettings { sensor: Some(values), controller: Controller::None, ..built_in() },
             WireSettings { controller: Controller::Robust, margin: Some([0.1, 0.05, 0.01, 0.03]), ..built_in() },
             WireSettings { sensor: Some(values), trip_on_cause: 0x8001, ..built_in() },
+            WireSettings { tolerance: Some([0.01, 0.02, 0.0]), ..built_in() },
+            WireSettings { sensor: Some(values), adaptation: Some([0.1, 0.2, 0.05, 0.04, 0.02, 0.3]), ..built_in() },
         ] {
             let text = SettingsFile::from(&wire).to_toml().unwrap();
             assert_eq!(over(&text).unwrap(), wire, "{text}");
@@ -502,6 +596,23 @@ mod tests {
                 "schema = 1\ncontroller = \"robust\"\n[margin]\novershoot = 0.5",
                 "s.toml, line 4, column 13: margin.overshoot = 0.5 is not allowed: expected 0 to 0.2 of a step",
             ),
+            (
+                "schema = 1\n[tolerance]\ngain = 0.3",
+                "s.toml, line 3, column 8: tolerance.gain = 0.3 is not allowed: expected 0 to 0.25 of the model's",
+            ),
+            (
+                "schema = 1\n[adaptation]\nenabled = true",
+                "s.toml, line 3, column 11: adaptation.enabled = 1 is not allowed: expected 0 without a sensor",
+            ),
+            (
+                "schema = 1\n[sensor]\nenabled = true\n[adaptation]\nrate_per_s = 2",
+                "s.toml, line 5, column 14: adaptation.rate_per_s = 2 is not allowed: expected 0.001 to 1 1/s",
+            ),
+            (
+                "schema = 1\n[sensor]\nenabled = true\n[adaptation]\nexcitation = 0.0",
+                "s.toml, line 5, column 14: adaptation.excitation = 0 is not allowed: expected 0.01 to 1 of the range",
+            ),
+            ("schema = 1\n[adaptation]\ntau = 0.1", "s.toml, line 3, column 1: unknown field `tau`"),
             ("schema = 1\n[margin]\ntau = 0.1", "s.toml, line 3, column 1: unknown field `tau`"),
             ("schema = 1\n[pins]\ndac = 4", "s.toml, line 2, column 2: unknown field `pins`"),
             ("schema = 1\ncontroller = 7", "s.toml, line 2, column 14:"),

@@ -14,6 +14,7 @@ use xtask::variant::{Controller, Variant};
 use super::lock_step::{Disturbance, TICK_S};
 use super::sensor::sensing;
 use super::stage::Stage;
+use super::switching;
 use crate::binary::{audit, size};
 
 /// What happens, under a name, and the gain of the spring at the end.
@@ -43,6 +44,9 @@ pub(super) fn check(stage: &Stage) -> Result<()> {
     let lines: Vec<String> = CASES.par_iter().map(run).collect::<Result<_>>()?;
     lines.iter().for_each(|line| println!("{line}"));
     println!("each code and each change as on the host, bit for bit");
+    let status = switching::check(stage, &build::vsj()?).context("commanded by vsj link")?;
+    println!("its status says: {status}");
+    println!("switched off and on; settings taken over, and refused while armed and out of range");
     Ok(())
 }
 

@@ -18,6 +18,7 @@ mod isolation;
 mod lock_step;
 mod sensor;
 mod stage;
+mod switching;
 mod table;
 
 use std::time::Instant;

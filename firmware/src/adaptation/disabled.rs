@@ -1,5 +1,8 @@
 //! Stand-ins without values, built without the feature `adaptation`.
 
+use link::adaptation::Adaptation as Request;
+use link::isolation::Off;
+use link::{AdaptationReport, Reply};
 use model::{Amplifier, Input, Output, Reading, ScaledStiffness, Volts, device};
 
 use crate::control::{Control, Tick};
@@ -60,3 +63,8 @@ pub fn after_tick(_: &mut Control, _: &mut Isolation, _: &Tick, _: u32) {}
 
 /// Without the feature `adaptation` there is nothing to plan.
 pub fn serve(_: &mut Planner) {}
+
+/// Replies that the image is built without the adaptation.
+pub async fn execute(_: Request, tick: u64) -> Reply {
+    Reply::Adaptation(AdaptationReport::off(Off::NotBuiltIn, tick))
+}

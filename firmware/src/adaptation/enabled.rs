@@ -2,6 +2,8 @@
 
 pub use model::adaptation::Scale;
 
+use link::AdaptationReport;
+use link::isolation::Off;
 use model::adaptation::{Observation, Parameters, Phase, Settings, State, Variant};
 use model::isolation::{self, bank};
 use model::{Amplifier, SampleTime, Validate, controller, device};
@@ -9,10 +11,10 @@ use model::{Amplifier, SampleTime, Validate, controller, device};
 use crate::control::{Control, Tick};
 use crate::isolation::Isolation;
 
-/// What the adaptation starts from, in SI units; `None` if nothing adapts: no bank runs, or the spring cannot be run at the ends of the
-/// bounds.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Terms(Option<Stored>);
+/// What the adaptation starts from, in SI units; or why nothing can adapt: the settings say so, no bank runs, or the spring cannot be run
+/// at the ends of the bounds.
+#[derive(Clone, Copy, Debug)]
+pub struct Terms(Result<Stored, Off>);
 
 /// Controller and bank with the stored model.
 #[derive(Clone, Copy, Debug)]
@@ -23,16 +25,21 @@ struct Stored {
 }
 
 impl Terms {
-    /// The adaptation beside the bank of `isolation`; `amplifier` has the limits of the running model. Its bounds are
-    /// [`Settings::TYPICAL`].
+    /// No bank runs.
+    pub const NONE: Self = Self(Err(Off::NoSensor));
+
+    /// The adaptation beside the bank of `isolation`; `amplifier` has the limits of the running model.
     #[inline(never)]
     pub fn new(settings: &device::Settings, amplifier: Amplifier, isolation: &crate::isolation::Terms) -> Self {
-        Self(isolation.bank().and_then(|bank| {
+        Self(settings.adaptation.ok_or(Off::Settings).and_then(|adaptation| {
+            let bank = isolation.bank()?;
             let control = controller::Settings { plant: bank.plant, amplifier, ..settings.control };
-            let settings = Settings::TYPICAL;
-            settings.validate(SampleTime::from_rate(control.rate_hz).ok()?).ok()?;
-            settings.check_for(&control, &bank).ok()?;
-            Some(Stored { control, bank, settings })
+            let in_range = SampleTime::from_rate(control.rate_hz).and_then(|sample_time| {
+                adaptation.validate(sample_time)?;
+                adaptation.check_for(&control, &bank)
+            });
+            in_range.map_err(|_| Off::OutOfRange)?;
+            Ok(Stored { control, bank, settings: adaptation })
         }))
     }
 }
@@ -52,6 +59,8 @@ pub struct Planner {
     terms: Terms,
     state: State,
     reported: Change,
+    /// Number of exchanges, and the last tick before the last of them.
+    exchanged: (u32, u32),
     /// What is to be exchanged at the end of the next block.
     next: Option<Variant>,
 }
@@ -60,22 +69,49 @@ impl Planner {
     /// A planner for the stored model.
     pub fn new(terms: Terms) -> Self {
         let reported = Change { phase: Phase::Watching, parameters: Parameters::STORED };
-        Self { terms, state: State::default(), reported, next: None }
+        Self { terms, state: State::default(), reported, exchanged: (0, 0), next: None }
     }
 
-    /// Plans from what a block has shown. Returns what has changed; [`Planner::next`] is the plan.
-    pub fn plan(&mut self, seen: &Observation) -> Option<Change> {
-        let Some(Stored { control, settings, .. }) = &self.terms.0 else { return None };
+    /// Plans from what the block that ended with `tick` has shown. Returns what has changed; [`Planner::next`] is the plan.
+    pub fn plan(&mut self, seen: &Observation, tick: u32) -> Option<Change> {
+        let Ok(Stored { control, settings, .. }) = &self.terms.0 else { return None };
         let block_s = bank::block_s(control.rate_hz);
         let next = self.state.update(settings, seen, control.plant, control.amplifier.max_v, block_s);
-        let now = Change { phase: self.state.phase(), parameters: self.state.parameters() };
-        let change = (now != self.reported).then_some(now);
-        self.reported = now;
+        if seen.exchanged {
+            self.exchanged = (self.exchanged.0.saturating_add(1), tick);
+        }
         self.next = None;
         if let Some(parameters) = next {
             self.build(&parameters);
         }
-        change
+        self.change()
+    }
+
+    /// Switches the adaptation off, so that the model goes back to the stored one, or on again. Returns what has changed.
+    pub fn switch(&mut self, on: bool) -> Option<Change> {
+        self.terms.0.ok()?;
+        self.state.switch(on);
+        self.change()
+    }
+
+    /// Returns what has changed since the last time.
+    fn change(&mut self) -> Option<Change> {
+        let now = Change { phase: self.state.phase(), parameters: self.state.parameters() };
+        let before = core::mem::replace(&mut self.reported, now);
+        (now != before).then_some(now)
+    }
+
+    /// Returns what the host is told, without a tick.
+    pub fn report(&self) -> AdaptationReport {
+        match &self.terms.0 {
+            Err(why) => AdaptationReport::off(*why, 0),
+            Ok(Stored { control, settings, .. }) => {
+                let Change { phase, parameters } = self.reported;
+                let (exchanges, exchange_tick) = (self.exchanged.0, self.exchanged.1.into());
+                let report = AdaptationReport::new(phase, &parameters, settings, control.plant);
+                AdaptationReport { exchanges, exchange_tick, ..report }
+            }
+        }
     }
 
     /// Returns what is to be exchanged at the end of the next block.
@@ -86,7 +122,7 @@ impl Planner {
     /// Builds the next variant. Not inlined: its frame is large.
     #[inline(never)]
     fn build(&mut self, parameters: &Parameters) {
-        if let Some(Stored { control, bank, .. }) = &self.terms.0 {
+        if let Ok(Stored { control, bank, .. }) = &self.terms.0 {
             // Parameters within the bounds have been checked at the start.
             self.next = Variant::new(control, bank, parameters).ok();
         }
@@ -95,19 +131,29 @@ impl Planner {
 
 /// Planner and control task in one thread: what a host runs instead of two tasks.
 #[derive(Debug)]
-pub struct Alone(Planner);
+pub struct Alone {
+    planner: Planner,
+    ticks: u32,
+}
 
 impl Alone {
     /// At the start.
     pub fn new(terms: Terms) -> Self {
-        Self(Planner::new(terms))
+        Self { planner: Planner::new(terms), ticks: 0 }
+    }
+
+    /// The planner.
+    pub fn planner(&mut self) -> &mut Planner {
+        &mut self.planner
     }
 
     /// After a tick of the bank: exchanges at the end of a block what was planned at the end of the last one. Returns what has changed.
     pub fn after_tick(&mut self, control: &mut Control, isolation: &mut Isolation, tick: &Tick) -> Option<Change> {
+        self.ticks = self.ticks.wrapping_add(1);
         if !isolation.ends_block(tick) {
             return None;
         }
-        self.0.plan(&isolation.end_block(control, tick, self.0.next()))
+        let seen = isolation.end_block(control, tick, self.planner.next());
+        self.planner.plan(&seen, self.ticks)
     }
 }

@@ -7,7 +7,7 @@ use super::shared_mailbox::{capture, hand_over, with_mailbox};
 use super::shared_store;
 use crate::board::Line;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
-use crate::{isolation, stop};
+use crate::{adaptation, isolation, stop};
 
 /// Longest wait for a byte, and thereby the period of the check whether telemetry is due.
 const READ_TIMEOUT: Duration = Duration::from_millis(1);
@@ -50,6 +50,11 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                 Some(Step::Isolation(request)) => {
                     // Nor here.
                     let bytes = server.answered(&isolation::execute(request, view.sample.tick).await);
+                    send(line, bytes).await;
+                }
+                Some(Step::Adaptation(request)) => {
+                    // Nor here.
+                    let bytes = server.answered(&adaptation::execute(request, view.sample.tick).await);
                     send(line, bytes).await;
                 }
                 Some(Step::Restart(bytes)) => {

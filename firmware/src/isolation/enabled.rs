@@ -35,10 +35,13 @@ impl Terms {
         Self { bank: bank.and_then(in_range), rate_hz, trip_on_cause: settings.trip_on_cause }
     }
 
-    /// The bank's settings; `None` if no bank runs.
+    /// The bank's settings.
+    ///
+    /// # Errors
+    /// Why no bank runs.
     #[cfg(feature = "adaptation")]
-    pub fn bank(&self) -> Option<isolation::Settings> {
-        self.bank.ok()
+    pub fn bank(&self) -> Result<isolation::Settings, Off> {
+        self.bank
     }
 
     /// Checks that a bank runs if the settings demand a trip.

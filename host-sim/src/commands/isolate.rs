@@ -6,12 +6,16 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::output::isolate::text;
 use host_sim::output::terminal::{json, print};
-use model::isolation::Settings;
+use model::isolation::{Settings, Tolerance};
 use simulation::bad_input;
 use simulation::isolation::trace::{self, noise_v};
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::load_plain;
 use simulation::record::Record;
+use simulation::spring_error::SpringError;
+
+use super::identified::errors;
+use super::spring_error::ErrorOf;
 
 /// Run the MCU's fault isolation over a record and print what it says, and when
 ///
@@ -23,6 +27,8 @@ use simulation::record::Record;
 Examples:
   vsj isolate data/sample_hysteresis.csv           the trace: alarm, names
   vsj isolate record.csv --plant out/nominal/plant.toml --limit-v 1000
+  vsj isolate record.csv --known tau=2 --known gain=1     a spring that is known to within 2 and 1 %
+  vsj isolate record.csv --plant out/nominal/plant.toml --identified identified.json
   vsj isolate record.csv --noise-v 0.5 --json | jq .last")]
 pub(crate) struct Arguments {
     /// The record: time_s, voltage_v (held between the rows) and the readings, rows at most 0.6 s apart
@@ -34,6 +40,13 @@ pub(crate) struct Arguments {
     /// The nominal spring: `paper`, or a plant file with a share and one time constant only
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
+    /// `tau`, `gain` or `share` of the nominal spring is known to within this, both ways, 0 to 25 %: errors within it raise no alarm;
+    /// repeatable
+    #[arg(long, value_name = "KEY=PERCENT", allow_hyphen_values = true)]
+    known: Vec<ErrorOf>,
+    /// It is known to within the 95 % intervals of this file, what `vsj identify --json` prints; at most 16 MiB
+    #[arg(long, value_name = "FILE.json", conflicts_with = "known")]
+    identified: Option<PathBuf>,
     /// Standard deviation of a reading, in V; default: from the readings
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     noise_v: Option<f64>,
@@ -64,12 +77,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Some(noise_v) => noise_v,
         None => bad_input!("{}: fewer than 10 readings; expected more, or --noise-v", record.name),
     };
+    let SpringError { time_constant, share, gain } =
+        errors("--known", &arguments.known, arguments.identified.as_deref())?;
     let settings = Settings {
         plant: load_plain(&arguments.plant)?,
         noise_v,
         noise_correlation_s: arguments.noise_correlation_s,
         range_v: arguments.limit_v,
         alarm_nats: arguments.alarm_nats,
+        tolerance: Tolerance { time_constant, share, gain },
         ..Settings::PAPER
     };
     let options = [
@@ -78,6 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         ("range_v", "--limit-v"),
         ("alarm_nats", "--alarm-nats"),
         ("plant.time_constant_s", "--plant"),
+        ("tolerance.", if arguments.identified.is_some() { "--identified" } else { "--known" }),
     ];
     let trace = trace::run(&record, settings).map_err(|error| named(named(error, SETTINGS), &options))?;
     print(&if arguments.json { json(&trace)? } else { text(&trace) })

@@ -1,6 +1,6 @@
 //! What the worker reports to the screen, and what the screen orders.
 
-use link::{Desired, FaultReport, IsolationReport, Status, Telemetry};
+use link::{AdaptationReport, Desired, FaultReport, IsolationReport, Status, Telemetry};
 
 /// What happened on the link.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +20,8 @@ pub enum Event {
     },
     /// What the isolation bank says.
     Isolation(IsolationReport),
+    /// What the adaptation does.
+    Adaptation(AdaptationReport),
     /// The MCU has reported faults.
     Faults(FaultReport),
     /// An order was carried out; what it did.

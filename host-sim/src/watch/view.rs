@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use link::{Fault, IsolationReport, State, Status, Telemetry};
+use link::{AdaptationReport, Fault, IsolationReport, State, Status, Telemetry};
 
 use super::history::History;
 use super::message::{Event, Playing, Progress};
@@ -57,6 +57,8 @@ pub struct View {
     pub(super) history: History,
     /// What the isolation bank says.
     pub(super) isolation: Option<IsolationReport>,
+    /// What the adaptation does.
+    pub(super) adaptation: Option<AdaptationReport>,
     /// Standing faults, as last reported, besides the one that the status shows.
     reported: Vec<Fault>,
     pub(super) note: Option<Note>,
@@ -84,6 +86,7 @@ impl View {
             sample: status.sample,
             history: History::default(),
             isolation: None,
+            adaptation: None,
             reported: Vec::new(),
             note: None,
             prompt: None,
@@ -106,7 +109,7 @@ impl View {
                     self.note("connected again", false);
                 }
                 self.connection = Connection::Connected;
-                self.isolation = None;
+                (self.isolation, self.adaptation) = (None, None);
                 self.arrivals.clear();
                 self.take_status(status);
             }
@@ -125,6 +128,7 @@ impl View {
                 }
             }
             Event::Isolation(report) => self.isolation = Some(report),
+            Event::Adaptation(report) => self.adaptation = Some(report),
             Event::Faults(report) => self.reported = report.faults().collect(),
             Event::Done(text) => self.note(&text, false),
             Event::Failed(text) => self.note(&text, true),

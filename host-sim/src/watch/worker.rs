@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Reason, Request, State, Status};
 use simulation::schedule::{Reader, Schedule};
@@ -82,6 +83,8 @@ pub struct Worker<'a> {
     must_disarm: bool,
     /// False once the MCU's program has refused to report what the isolation bank says.
     knows_isolation: bool,
+    /// False once it has refused to report what the adaptation does.
+    knows_adaptation: bool,
     begin: Instant,
     outcome: Outcome,
 }
@@ -100,6 +103,7 @@ impl<'a> Worker<'a> {
             state: status.sample.state,
             must_disarm: false,
             knows_isolation: true,
+            knows_adaptation: true,
             begin: Instant::now(),
             outcome: Outcome::default(),
         }
@@ -200,6 +204,11 @@ impl<'a> Worker<'a> {
             let isolation = client.isolation(Isolation::Read)?;
             self.knows_isolation = isolation.is_some();
             isolation.into_iter().for_each(|report| self.say(Event::Isolation(report)));
+        }
+        if self.knows_adaptation {
+            let adaptation = client.adaptation(Adaptation::Read)?;
+            self.knows_adaptation = adaptation.is_some();
+            adaptation.into_iter().for_each(|report| self.say(Event::Adaptation(report)));
         }
         Ok(())
     }

@@ -8,9 +8,10 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use link::isolation::Off;
-use link::{Frame, IsolationReport, Reply, State, Status};
+use link::{AdaptationReport, Frame, IsolationReport, Reply, State, Status};
+use model::adaptation::{Parameters, Phase, Settings};
 use model::isolation::{Cause, Causes, Finding, Verdict};
-use model::supervisor;
+use model::{Plant, supervisor};
 use serialport::{SerialPort, TTYPort};
 use simulation::record::{MEASURED, Record};
 
@@ -75,6 +76,32 @@ fn status_and_isolation_show_what_the_isolation_bank_says_and_its_alarm_is_ackno
 }
 
 /// Read from what the MCU has noted, tick by tick: how fast this machine is decides nothing.
+#[test]
+fn status_and_adaptation_show_the_parameters_in_use_and_switch_it() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let port = &mcu.port;
+    mcu.with(|shared| shared.adaptation = AdaptationReport::off(Off::Settings, 0));
+    assert!(good(port, &["status"]).contains("adaptation off: settings\n"));
+    assert!(bad(1, port, &["adaptation", "--on"]).contains("nothing can adapt: settings"));
+    let parameters = Parameters { time_constant: 1.2, share: 1.0, gain: 0.95 };
+    let report = AdaptationReport::new(Phase::Trial, &parameters, &Settings::TYPICAL, Plant::PAPER);
+    let report = AdaptationReport { exchanges: 34, exchange_tick: 39_680, ..report };
+    mcu.with(|shared| shared.adaptation = report);
+    let said = "trial, time constant 6.6000 s (model 5.5000, 4.1250 to 6.8750), share 0.0909 (model 0.0909, 0.0682 to 0.1136), \
+                gain 0.9500 (model 1.0000, 0.8500 to 1.1500), 34 exchanges, the last at 39.68 s";
+    assert!(good(port, &["status"]).contains(&format!("adaptation {said}\n")));
+    assert_eq!(good(port, &["adaptation"]), format!("{said}\n"));
+    let status = json(port, &["status"]);
+    let adaptation = &status["adaptation"];
+    assert_eq!((&adaptation["phase"], &adaptation["exchanges"]), (&"trial".into(), &34.into()));
+    let tau_s = &adaptation["parameters"]["tau_s"];
+    assert_eq!([&tau_s["value"], &tau_s["model"], &tau_s["low"], &tau_s["high"]], [6.6, 5.5, 4.125, 6.875]);
+    assert_eq!(adaptation["last_exchange_s"], 39.68);
+    assert_eq!(json(port, &["adaptation", "--off"])["phase"], "returning");
+    assert_eq!(json(port, &["adaptation", "--on"])["phase"], "watching");
+    assert!(bad(2, port, &["adaptation", "--on", "--off"]).contains("cannot be used with"));
+}
+
 #[test]
 fn the_voltage_ramps_down_once_the_host_is_silent() {
     let mcu = Mcu::on_socket(Setup::default());
@@ -161,15 +188,15 @@ fn watch_on_a_terminal_refreshes_in_place() {
     let mut watching =
         vsj(&mcu.port, &["watch", "--every", "0.05"]).stdout(terminal.try_clone().unwrap()).spawn().unwrap();
     let mut text = String::new();
-    while text.matches("\x1b[9A").count() < 3 {
+    while text.matches("\x1b[10A").count() < 3 {
         let mut buffer = [0; 256];
         let count = screen.read(&mut buffer).unwrap();
         text += std::str::from_utf8(&buffer[..count]).unwrap();
     }
     watching.kill().unwrap();
     watching.wait().unwrap();
-    let shown = text.split("\x1b[9A").nth(1).unwrap();
-    assert_eq!(shown.matches("\x1b[K").count(), 9, "{shown}");
+    let shown = text.split("\x1b[10A").nth(1).unwrap();
+    assert_eq!(shown.matches("\x1b[K").count(), 10, "{shown}");
     assert!(shown.starts_with("state      disarmed, fault none"), "{shown}");
 }
 

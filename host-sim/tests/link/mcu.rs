@@ -16,10 +16,14 @@ use firmware::reset_cause::Cause;
 use firmware::start::{self, Start};
 use firmware::store::{Memory, Store};
 use firmware::update;
-use link::isolation::Isolation;
+use link::isolation::{Isolation, Off};
 use link::reply::Firmware;
 use link::session::Counters;
-use link::{About, Block, Command, Controller, Fault, IsolationReport, Reply, Server, State, Step, Telemetry, View};
+use link::{
+    About, AdaptationReport, Block, Command, Controller, Fault, IsolationReport, Reply, Server, State, Step, Telemetry,
+    View,
+};
+use model::adaptation::Phase;
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Spring, device, supervisor};
 use serialport::{SerialPort, TTYPort};
@@ -65,6 +69,8 @@ pub(crate) struct Shared {
     pub(crate) counters: Counters,
     /// What the isolation bank says.
     pub(crate) isolation: IsolationReport,
+    /// What the adaptation does.
+    pub(crate) adaptation: AdaptationReport,
     /// True if the interlock is open.
     pub(crate) interlock_open: bool,
     /// Fault that another part of the program finds in the next tick.
@@ -166,7 +172,8 @@ impl Mcu {
 
     fn new(port: String) -> Self {
         let stop = Arc::default();
-        let shared = Arc::new(Mutex::new(Shared { seed: next_seed(), ..Shared::default() }));
+        let adaptation = AdaptationReport::off(Off::NotBuiltIn, 0);
+        let shared = Arc::new(Mutex::new(Shared { seed: next_seed(), adaptation, ..Shared::default() }));
         Self { port, shared, stop, thread: None, _folder: None, _terminal: None }
     }
 
@@ -341,6 +348,17 @@ impl Chip {
                     shared.isolation = IsolationReport::default();
                 }
                 let reply = Reply::Isolation(IsolationReport { tick: self.view.sample.tick, ..shared.isolation });
+                drop(shared);
+                out.extend_from_slice(self.server.answered(&reply));
+            }
+            Some(Step::Adaptation(request)) => {
+                let mut shared = self.shared.lock().unwrap();
+                if let Some(on) = request.switch()
+                    && shared.adaptation.phase().is_some()
+                {
+                    shared.adaptation.phase = if on { Phase::Watching } else { Phase::Returning } as u8;
+                }
+                let reply = Reply::Adaptation(AdaptationReport { tick: self.view.sample.tick, ..shared.adaptation });
                 drop(shared);
                 out.extend_from_slice(self.server.answered(&reply));
             }

@@ -6,8 +6,8 @@
 //!    [`Step::Command`]: pass the command to the control tick, wait until that tick has run, then send what
 //!    [`Server::command_done`] returns for its view; process no byte before that. [`Step::Update`]: likewise with the
 //!    store and [`Server::updated`]. [`Step::ReadSettings`]: send what [`Server::settings_part`]
-//!    returns. [`Step::Capture`], [`Step::Isolation`]: send what [`Server::answered`] returns.
-//!    [`Step::Restart`]: send the bytes and restart.
+//!    returns. [`Step::Capture`], [`Step::Isolation`], [`Step::Adaptation`]: send what
+//!    [`Server::answered`] returns. [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
 //! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns.
 //! 4. Periodically send what [`Server::telemetry`] returns; [`Server::telemetry_lost`] if that does not succeed.
@@ -19,6 +19,7 @@ mod reports;
 use model::Spring;
 use model::supervisor::{self, Faults, Refusal};
 
+use crate::adaptation::Adaptation;
 use crate::block::{Block, BlockId, Blocks, PART, Part};
 use crate::capture::Capture;
 use crate::command::Command;
@@ -86,6 +87,8 @@ pub enum Step<'a> {
     Capture(Capture),
     /// Execute the request, then call [`Server::answered`] with the reply.
     Isolation(Isolation),
+    /// Execute the request, then call [`Server::answered`] with the reply.
+    Adaptation(Adaptation),
     /// Send the bytes, then restart.
     Restart(&'a [u8]),
 }
@@ -131,6 +134,7 @@ impl Server {
                 Request::Settings => Reply::Settings(self.about.settings),
                 Request::Capture(capture) => return Some(Step::Capture(capture)),
                 Request::Isolation(isolation) => return Some(Step::Isolation(isolation)),
+                Request::Adaptation(adaptation) => return Some(Step::Adaptation(adaptation)),
                 Request::ReadSettings { built_in, number } => return Some(Step::ReadSettings { built_in, number }),
                 Request::ModelPart { .. }
                 | Request::ModelEnd { .. }
@@ -219,7 +223,7 @@ impl Server {
         self.session.answer(&Reply::SettingsPart(part))
     }
 
-    /// The reply to the request of the last [`Step::Capture`] or [`Step::Isolation`].
+    /// The reply to the request of the last [`Step::Capture`], [`Step::Isolation`] or [`Step::Adaptation`].
     pub fn answered(&mut self, reply: &Reply) -> &[u8] {
         self.session.answer(reply)
     }

@@ -1,6 +1,7 @@
 //! Tests of the replies, and of the commands for the control tick.
 
 use super::*;
+use crate::adaptation::AdaptationReport;
 use crate::capture::Captured;
 use crate::diagnosis::{Mismatch, Sensor};
 use crate::frame::Frame;
@@ -83,6 +84,7 @@ fn exchange(request: Request, before: &View, after: &View) -> (Option<Command>, 
             }
             Some(Step::Send(bytes) | Step::Restart(bytes)) => answer = Some(reply(bytes)),
             Some(Step::Capture(_)) => answer = Some(reply(server.answered(&Reply::Captured(Captured::default())))),
+            Some(Step::Adaptation(_)) => answer = Some(reply(server.answered(&Reply::Adaptation(Default::default())))),
             Some(Step::Isolation(_)) => answer = Some(reply(server.answered(&Reply::Isolation(Default::default())))),
             Some(Step::Update(block, _)) => answer = Some(reply(server.updated(block, Ok(None), after))),
             Some(Step::ReadSettings { built_in, number }) => {
@@ -194,7 +196,7 @@ fn the_running_and_the_built_in_settings_can_be_read_in_any_state() {
 }
 
 #[test]
-fn a_capture_and_the_isolation_bank_are_read_in_any_state() {
+fn capture_isolation_bank_and_adaptation_are_read_in_any_state() {
     for view in [ARMED, DISARMED, FAULTED] {
         for capture in [Capture::Start { rows: 9 }, Capture::State, Capture::Read { first: 3 }] {
             let (command, reply) = exchange(Request::Capture(capture), &view, &view);
@@ -203,6 +205,10 @@ fn a_capture_and_the_isolation_bank_are_read_in_any_state() {
         for isolation in [Isolation::Read, Isolation::Acknowledge] {
             let (command, reply) = exchange(Request::Isolation(isolation), &view, &view);
             assert_eq!((command, reply), (None, Reply::Isolation(IsolationReport::default())));
+        }
+        for adaptation in [Adaptation::Read, Adaptation::Off, Adaptation::On] {
+            let (command, reply) = exchange(Request::Adaptation(adaptation), &view, &view);
+            assert_eq!((command, reply), (None, Reply::Adaptation(AdaptationReport::default())));
         }
     }
 }

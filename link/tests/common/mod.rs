@@ -1,12 +1,13 @@
 //! Strategies that generate every kind of message.
 
+use link::adaptation::Adaptation;
 use link::capture::{Capture, Captured, ROWS, Rows};
 use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, IsolationReport, Mismatch, Part, Reason, Reply,
-    Request, Sensor, State, Status, Telemetry, WireVolts,
+    AdaptationReport, BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, IsolationReport, Mismatch, Part,
+    Reason, Reply, Request, Sensor, State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
@@ -48,6 +49,7 @@ pub(crate) fn request() -> impl Strategy<Value = Request> {
         Just(Request::Capture(Capture::State)),
         any::<u32>().prop_map(|first| Request::Capture(Capture::Read { first })),
         prop::sample::select(vec![Isolation::Read, Isolation::Acknowledge]).prop_map(Request::Isolation),
+        prop::sample::select(vec![Adaptation::Read, Adaptation::Off, Adaptation::On]).prop_map(Request::Adaptation),
     ]
 }
 
@@ -170,6 +172,13 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
             |([tick, since_tick], [verdict, trip_on_cause], [size, half_width, explained])| {
                 let report = IsolationReport { tick, verdict, since_tick, size, half_width, explained, trip_on_cause };
                 Reply::Isolation(report)
+            }
+        ),
+        (any::<[u64; 2]>(), any::<u8>(), any::<u32>(), prop::collection::vec(number(), 8)).prop_map(
+            |([tick, exchange_tick], phase, exchanges, numbers)| {
+                let (ratios, bounds) = ([numbers[0], numbers[1], numbers[2]], [numbers[3], numbers[4], numbers[5]]);
+                let stored = [numbers[6], numbers[7]];
+                Reply::Adaptation(AdaptationReport { tick, phase, ratios, bounds, stored, exchanges, exchange_tick })
             }
         ),
         (model(), model()).prop_map(|(active, stored)| Reply::Settings(Blocks { active, stored })),

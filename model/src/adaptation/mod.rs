@@ -23,7 +23,7 @@
 //! - **Reversible.** A takeover is confirmed once the bank was quiet for the time that it needs to name an error, while the voltage
 //!   moved. If it names a fault of the sensor or none that it knows before that, or the same cause with a size that has not halved, or
 //!   if a parameter is at its bound, the model goes back to the last confirmed parameters (to the stored ones from a bound) and stays
-//!   there until [`State::acknowledge`].
+//!   there until [`State::switch`] is called. The same function switches the adaptation off: the model goes back to the stored one.
 //! - **Gain.** The plain spring has none. The loop runs on stiffness divided by the gain: target and reading are divided before the
 //!   tick, the estimate is multiplied after it ([`Scale`]).
 //!
@@ -76,6 +76,17 @@ impl Settings {
     /// Time constant and share within 25 %, the gain within 15 %; 5 % in a second; intervals of 1 %; a tenth of the range.
     pub const TYPICAL: Self =
         Self { time_constant: 0.25, share: 0.25, gain: 0.15, rate_per_s: 0.05, precision: 0.01, excitation: 0.1 };
+
+    /// The values in the order of the fields: time constant, share, gain, rate, precision, excitation.
+    pub const fn values(&self) -> [f64; 6] {
+        [self.time_constant, self.share, self.gain, self.rate_per_s, self.precision, self.excitation]
+    }
+
+    /// Settings with these values, in the order of [`Settings::values`].
+    pub const fn from_values(values: [f64; 6]) -> Self {
+        let [time_constant, share, gain, rate_per_s, precision, excitation] = values;
+        Self { time_constant, share, gain, rate_per_s, precision, excitation }
+    }
 
     /// Checks that the springs at both ends of the bounds can be run in place of the one that `control` and `bank` have.
     ///

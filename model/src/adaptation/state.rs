@@ -35,14 +35,24 @@ pub enum Phase {
     Frozen,
     /// It goes back to earlier parameters.
     Returning,
-    /// It has gone back, and does nothing until [`State::acknowledge`].
+    /// It has gone back, and does nothing until [`State::switch`] is called.
     Stopped,
+    /// It is switched off, and the stored model runs.
+    Off,
 }
 
 impl Phase {
     /// All phases, in the order of their numbers.
-    pub const ALL: [Self; 7] =
-        [Self::Watching, Self::Moving, Self::Settling, Self::Trial, Self::Frozen, Self::Returning, Self::Stopped];
+    pub const ALL: [Self; 8] = [
+        Self::Watching,
+        Self::Moving,
+        Self::Settling,
+        Self::Trial,
+        Self::Frozen,
+        Self::Returning,
+        Self::Stopped,
+        Self::Off,
+    ];
 
     /// Returns the word for logs and JSON.
     pub const fn name(self) -> &'static str {
@@ -54,6 +64,7 @@ impl Phase {
             Self::Frozen => "frozen",
             Self::Returning => "returning",
             Self::Stopped => "stopped",
+            Self::Off => "off",
         }
     }
 }
@@ -74,6 +85,8 @@ pub struct State {
     /// Whether the bank is to begin anew, which it does with an exchange for the same parameters.
     anew: bool,
     phase: Phase,
+    /// What follows [`Phase::Returning`].
+    after_return: Phase,
 }
 
 /// What was taken over.
@@ -113,10 +126,17 @@ impl State {
         self.phase
     }
 
-    /// Ends [`Phase::Stopped`]: parameters are taken over again.
-    pub fn acknowledge(&mut self) {
-        if self.phase == Phase::Stopped {
-            self.phase = Phase::Watching;
+    /// Switches the adaptation off, so that the model goes back to the stored one and stays there, or on again. Switching on also ends
+    /// [`Phase::Stopped`].
+    pub fn switch(&mut self, on: bool) {
+        match (on, self.phase) {
+            (true, Phase::Returning) => self.after_return = Phase::Watching,
+            (true, Phase::Stopped | Phase::Off) => self.phase = Phase::Watching,
+            (true, _) | (false, Phase::Off) => {}
+            (false, _) => {
+                self.undo(Parameters::STORED);
+                self.after_return = Phase::Off;
+            }
         }
     }
 
@@ -137,8 +157,8 @@ impl State {
         }
         let trusted = seen.trusted_blocks > 0;
         match self.phase {
-            Phase::Stopped => {}
-            Phase::Returning if self.now == self.goal => self.phase = Phase::Stopped,
+            Phase::Stopped | Phase::Off => {}
+            Phase::Returning if self.now == self.goal => self.phase = self.after_return,
             Phase::Moving if self.now == self.goal => self.phase = Phase::Settling,
             // The bank begins anew with each exchange, and says nothing of a model that has just moved.
             Phase::Returning | Phase::Moving => {}
@@ -242,7 +262,7 @@ impl State {
     }
 
     fn undo(&mut self, goal: Parameters) {
-        (self.goal, self.confirmed, self.phase) = (goal, goal, Phase::Returning);
+        (self.goal, self.confirmed, self.phase, self.after_return) = (goal, goal, Phase::Returning, Phase::Stopped);
         (self.trial, self.takeovers) = (None, 0);
     }
 }

@@ -199,8 +199,40 @@ fn what_is_not_confirmed_is_undone() {
         });
         assert_eq!((state.parameters(), state.phase()), (Parameters::STORED, Phase::Stopped), "{cause:?}");
         assert!(farthest > 1.1, "{cause:?}");
-        state.acknowledge();
+        state.switch(true);
         assert_eq!(state.phase(), Phase::Watching);
+    }
+}
+
+/// From each phase the model goes back to the stored one, and nothing is taken over until it is switched on.
+#[test]
+fn switched_off_it_goes_back_to_the_stored_model_and_on_again_it_follows() {
+    let until = |state: &mut State, phase| {
+        let mut exchanged = false;
+        for _ in 0..1000 {
+            if state.phase() == phase {
+                return;
+            }
+            exchanged = update(state, &Observation { exchanged, ..seen(TAU, 0.125) }).is_some();
+        }
+        panic!("never {phase:?}");
+    };
+    for phase in [Phase::Watching, Phase::Moving, Phase::Settling, Phase::Trial] {
+        let mut state = State::default();
+        until(&mut state, phase);
+        state.switch(false);
+        follow(&mut state, |_| seen(TAU, 0.125));
+        assert_eq!((state.parameters(), state.phase()), (Parameters::STORED, Phase::Off), "{phase:?}");
+        state.switch(true);
+        assert_eq!(state.phase(), Phase::Watching, "{phase:?}");
+        until(&mut state, Phase::Trial);
+        assert!(state.parameters().time_constant > 1.1, "{phase:?}");
+        // On again before it has gone back.
+        state.switch(false);
+        assert_eq!(state.phase(), Phase::Returning);
+        state.switch(true);
+        until(&mut state, Phase::Watching);
+        assert_eq!(state.parameters(), Parameters::STORED, "{phase:?}");
     }
 }
 

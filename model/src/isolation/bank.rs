@@ -192,6 +192,9 @@ pub const SMALLEST: [(usize, f64); 11] = [
     (OFFSET, 1.0),
 ];
 
+/// Vectors of the errors that the model may have: of time constant, share and gain, as [`super::Tolerance`].
+pub const DOUBTFUL: [usize; 3] = [TAU, SHARE, GAIN];
+
 /// Number of blocks from one decision to the next.
 pub const ROUND: u32 = 20;
 /// Smallest number of readings of a block, as a fraction of the expected number in 256ths; a block with fewer is left out.

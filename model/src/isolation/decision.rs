@@ -4,7 +4,7 @@
 //! time is eliminated: `m_ij -= m_ki m_kj / m_kk`. What remains in the last element is the energy that the hypothesis leaves.
 
 use super::bank::{HYPOTHESES, Hypothesis, NESTED};
-use super::products::PRODUCTS;
+use super::products::{Table, element};
 use super::{CAUSES, Cause, Config, Verdict, thresholds};
 use crate::units::saturated_to_32;
 
@@ -66,10 +66,13 @@ pub(super) struct Decision {
     own: [i32; 8],
     scales: [u8; 8],
     reciprocal: i32,
-    shift: u8,
+    /// Bits by which a product is shifted to the right before it is multiplied by the reciprocal, 0 to 29.
+    right: u8,
     information: i32,
     /// Number of blocks in the copied sums.
     blocks: u32,
+    /// What an error of the model within its tolerance can add to a leftover: twice its energy, since `(a + b)^2 <= 2 a^2 + 2 b^2`.
+    doubted: i64,
     none: i64,
     least: [i64; CAUSES],
     best: u8,
@@ -116,6 +119,15 @@ fn shifted(value: i64, by: i32) -> i64 {
     }
 }
 
+/// Shifts right by 0 to 31 bits, on each half: for a whole one of a variable number of bits the MCU's compiler calls a function.
+#[inline(always)]
+fn shifted_right(value: i64, by: u8) -> i64 {
+    let by = by & 31;
+    let (high, low) = ((value >> 32) as i32, value as u32);
+    let low = low >> by | (high << 1 << (31 - by)) as u32;
+    i64::from(high >> by) << 32 | i64::from(low)
+}
+
 impl Decision {
     /// Before the first decision.
     pub(super) const NEW: Self = Self {
@@ -129,9 +141,10 @@ impl Decision {
         own: [0; 8],
         scales: [0; 8],
         reciprocal: 0,
-        shift: 0,
+        right: 0,
         information: 0,
         blocks: 0,
+        doubted: 0,
         none: 0,
         least: [i64::MAX; CAUSES],
         best: 0,
@@ -156,12 +169,13 @@ impl Decision {
         self.stage == Stage::Idle
     }
 
-    /// Starts a decision on the copied sums of `blocks` blocks.
-    pub(super) fn begin(&mut self, blocks: u32) {
+    /// Starts a decision on the copied sums of `blocks` blocks, of which `doubted` may be the energy of an error of the model.
+    pub(super) fn begin(&mut self, blocks: u32, doubted: i64) {
         self.stage = Stage::Scale;
         self.hypothesis = 0;
         self.offset = 0;
         self.blocks = blocks;
+        self.doubted = 2 * doubted;
         self.least = [i64::MAX; CAUSES];
         self.best = 0;
     }
@@ -173,7 +187,7 @@ impl Decision {
 
     /// Does one step.
     #[inline(never)]
-    pub(super) fn step(&mut self, config: &Config, copy: &[i64; PRODUCTS], released: bool) {
+    pub(super) fn step(&mut self, config: &Config, copy: &Table<i64>, released: bool) {
         let Some(hypothesis) = HYPOTHESES.get(usize::from(self.hypothesis)) else {
             return self.judge(config, released);
         };
@@ -189,10 +203,10 @@ impl Decision {
         }
     }
 
-    fn scale(&mut self, copy: &[i64; PRODUCTS], last: u8) {
+    fn scale(&mut self, copy: &Table<i64>, last: u8) {
         let mut index = usize::from(self.offset);
         for (row, scale) in self.scales.iter_mut().enumerate().take(usize::from(last) + 1) {
-            let diagonal = copy.get(index).copied().unwrap_or(0);
+            let diagonal = element(copy, index);
             let bits = 64 - diagonal.leading_zeros();
             *scale = (bits.saturating_sub(BITS - 1) / 2) as u8;
             index += usize::from(last) + 1 - row;
@@ -202,11 +216,11 @@ impl Decision {
         self.stage = Stage::Load;
     }
 
-    fn load(&mut self, copy: &[i64; PRODUCTS], last: u8) {
+    fn load(&mut self, copy: &Table<i64>, last: u8) {
         let row = self.row;
         let mine = self.scales[usize::from(row) & 7];
         for column in row..=last {
-            let sum = copy.get(usize::from(self.offset)).copied().unwrap_or(0);
+            let sum = element(copy, self.offset.into());
             let shift = u32::from(mine) + u32::from(self.scales[usize::from(column) & 7]);
             self.matrix[at(row, column)] = saturated_to_32(sum >> (shift & 63));
             self.offset += 1;
@@ -234,8 +248,9 @@ impl Decision {
             self.pivot += 1;
             return;
         }
-        self.shift = (diagonal.leading_zeros() - 2) as u8;
-        let mantissa = i64::from(diagonal) << self.shift;
+        let left = diagonal.leading_zeros().saturating_sub(2).min(29);
+        self.right = (29 - left) as u8;
+        let mantissa = i64::from(diagonal) << left;
         self.reciprocal = (1i64 << 59).checked_div(mantissa).unwrap_or(0) as i32;
         self.information = diagonal;
         (self.row, self.column) = (k + 1, k + 1);
@@ -245,7 +260,7 @@ impl Decision {
     /// Returns `product / pivot`; its magnitude is below 2^31 if the product is that of two elements of the pivot's row.
     #[inline(always)]
     fn quotient(&self, product: i64) -> i64 {
-        let scaled = saturated_to_32(product >> (29 - i32::from(self.shift)).max(0));
+        let scaled = saturated_to_32(shifted_right(product, self.right));
         (i64::from(scaled) * i64::from(self.reciprocal)) >> 30
     }
 
@@ -316,7 +331,9 @@ impl Decision {
         match self.stage {
             Stage::Bar => {
                 let (least, floor, total) = self.energies_now();
-                let excess = (total >> thresholds::RIVAL_ERROR_BITS).max(thresholds::RIVAL_RATIO * (least - floor));
+                let excess = (total >> thresholds::RIVAL_ERROR_BITS)
+                    .max(thresholds::RIVAL_RATIO * (least - floor))
+                    .max(self.doubted);
                 self.bar = least.max(floor) + config.margin + excess;
                 (self.row, self.rivals) = (0, 1 << (self.best & 31));
                 self.stage = Stage::Rivals;
@@ -369,8 +386,8 @@ impl Decision {
         let left = self.first.1.map_or(least, |_| self.first.0);
         // sqrt(2 n) with 20 fraction bits.
         let sigma = i64::from(((2 * self.blocks) << 18).isqrt()) << 11;
-        let tolerated = thresholds::NOISE_SIGMAS * sigma + (total >> thresholds::MODEL_ERROR_BITS);
-        let says = if total < config.margin {
+        let tolerated = thresholds::NOISE_SIGMAS * sigma + (total >> thresholds::MODEL_ERROR_BITS) + self.doubted;
+        let says = if total < config.margin + self.doubted {
             Verdict::Alarm
         } else if left - floor > tolerated {
             Verdict::Unknown

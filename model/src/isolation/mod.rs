@@ -42,7 +42,7 @@ pub mod thresholds;
 
 pub use cause::{Cause, Causes};
 pub use report::{Finding, Report};
-pub use settings::Settings;
+pub use settings::{Settings, Tolerance};
 
 use crate::coefficient::{Gain, Rate, Weight, WideGain};
 use crate::units::{ScaledStiffness, Signal, Volts, signal, steps};
@@ -135,8 +135,8 @@ pub struct Config {
     ticks: u32,
     shift: u32,
     slew_shift: u32,
-    half: u32,
-    three_quarters: u32,
+    /// Ticks of a quarter of a block, less one.
+    quarter_mask: u32,
     fewest: u32,
     reach: [i32; 3],
     share: Gain,
@@ -160,6 +160,8 @@ pub struct Config {
     correlation: Option<Gain>,
     pinned_below: i32,
     smallest: [i32; bank::SMALLEST.len()],
+    /// Coefficients of [`bank::DOUBTFUL`] that are no fault; `None` if each is 0.
+    doubt: Option<[i32; bank::DOUBTFUL.len()]>,
     bounds: [(i32, i32); bank::HYPOTHESES.len()],
     alarm: i32,
     restart: i32,
@@ -185,8 +187,7 @@ impl Validated<'_, Settings> {
             ticks,
             shift: ticks.trailing_zeros(),
             slew_shift: ticks.trailing_zeros() - bank::SLEW_TICKS.trailing_zeros(),
-            half: ticks / 2,
-            three_quarters: ticks / 4 * 3,
+            quarter_mask: ticks / 4 - 1,
             fewest: (settings.readings(block_s) * bank::FEWEST).div_ceil(256),
             reach: bank::SLEW_RATES
                 .map(|rate| signal(rate * range / tau * sample_time.seconds() * f64::from(bank::SLEW_TICKS)).to_bits()),
@@ -211,6 +212,10 @@ impl Validated<'_, Settings> {
             correlation: (correlation > 0.0).then(|| Gain::new(correlation)),
             pinned_below: signal(-3.0 * sigma_v).to_bits(),
             smallest: bank::SMALLEST.map(|(_, size)| bits(size, 28)),
+            doubt: (settings.tolerance != Tolerance::NONE).then(|| {
+                let Tolerance { time_constant, share: of_share, gain } = settings.tolerance;
+                [libm::log1p(time_constant), of_share * share, gain].map(|size| bits(size, 28))
+            }),
             bounds: bank::HYPOTHESES.map(|hypothesis| (bits(hypothesis.lowest, 16), bits(hypothesis.highest, 16))),
             alarm: bits(settings.alarm_nats, 20),
             restart: bits(thresholds::RESTART_NATS, 20),
@@ -232,12 +237,14 @@ pub struct State {
     products: products::Products,
     mode: products::Mode,
     decision: decision::Decision,
-    /// True while a block is in work.
-    working: bool,
+    /// Step of the present block from which on the block before needs no work but that of a decision.
+    busy_until: u32,
     alarmed: bool,
     blocks: u32,
     age: u32,
     since_decision: u32,
+    /// Largest energy that an error of the model within its tolerance adds to the sums, in variances with 20 fraction bits.
+    doubted: i64,
     pinned: bool,
     pinned_at: Option<i32>,
     released: bool,
@@ -256,11 +263,12 @@ impl State {
         products: products::Products::NEW,
         mode: products::Mode::NEW,
         decision: decision::Decision::NEW,
-        working: false,
+        busy_until: 0,
         alarmed: false,
         blocks: 0,
         age: 0,
         since_decision: 0,
+        doubted: 0,
         pinned: false,
         pinned_at: None,
         released: false,
@@ -277,8 +285,10 @@ impl Default for State {
 const WHITEN: u32 = signatures::STEPS;
 const TEST: u32 = WHITEN + (bank::VECTORS as u32 + 1).div_ceil(WHITENED);
 const ADD: u32 = TEST + sequential::STEPS;
-const DECIDE: u32 = ADD + products::STEPS;
-const _: () = assert!(DECIDE < 116 && bank::VECTORS < SLOTS, "a block of 128 ticks leaves time for the decision");
+const CLOSE: u32 = ADD + products::STEPS as u32;
+/// First tick of the steps of a decision, which takes about 17 blocks with the 30 that are left in a block of 128 ticks.
+const DECIDE: u32 = 98;
+const _: () = assert!(CLOSE < DECIDE && bank::VECTORS < SLOTS, "the sums are complete before a decision begins");
 
 impl Config {
     /// Returns the number of ticks of a block.
@@ -287,29 +297,35 @@ impl Config {
     }
 
     /// Advances the bank by one tick: applied voltage, the model's stiffness just after it was applied without the sensor's
-    /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop.
-    #[inline]
+    /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop. Not inlined: within a larger function the
+    /// MCU has too few registers for it.
+    #[inline(never)]
     pub fn tick(&self, state: &mut State, applied: Volts, model: ScaledStiffness, reading: Option<ScaledStiffness>) {
         let step = state.sums.ticks;
         state.sums.add(self, applied, model, reading.map(|reading| reading.0));
         if step + 1 == self.ticks {
-            state.means = state.sums.finish(self);
-            // A sensor that rounds coarsely repeats readings at many values; one that is stuck or saturated, at one.
-            if state.means.pinned {
-                state.means.pinned =
-                    *state.pinned_at.get_or_insert(state.means.last_reading) == state.means.last_reading;
-            }
-            state.working = true;
-        } else if state.working {
+            self.end_block(state);
+        } else if step < state.busy_until || step >= DECIDE && !state.decision.idle() {
             self.work(state, step);
         }
+    }
+
+    /// Begins the work on the block that has ended.
+    #[inline(never)]
+    fn end_block(&self, state: &mut State) {
+        state.means = state.sums.finish(self);
+        // A sensor that rounds coarsely repeats readings at many values; one that is stuck or saturated, at one.
+        if state.means.pinned {
+            state.means.pinned = *state.pinned_at.get_or_insert(state.means.last_reading) == state.means.last_reading;
+        }
+        state.busy_until = if state.means.usable { ADD } else { u32::MAX };
     }
 
     /// Does the work of one tick for the block before.
     #[inline(never)]
     fn work(&self, state: &mut State, step: u32) {
         if step < WHITEN {
-            state.filters.step(self, &state.means, state.age, step, &mut state.vectors);
+            signatures::step(self, state, step);
         } else if !state.means.usable {
             if step == WHITEN {
                 // A gap in the readings is a part of the time since the restart.
@@ -323,40 +339,47 @@ impl Config {
             if step + 1 == ADD {
                 self.assess(state);
             }
-        } else if step < DECIDE {
+        } else if step < CLOSE {
             if state.blocks > 0 {
                 state.products.step(step - ADD, state.mode, &state.whitened);
+                if step + 1 == CLOSE {
+                    self.close(state);
+                }
             }
         } else {
-            if step == DECIDE {
-                self.close(state);
-            }
             self.decide(state);
         }
     }
 
+    /// Whitens some of the vectors, from slot `first` on.
+    #[inline(never)]
     fn whiten(&self, state: &mut State, first: u32) {
         state.vectors[bank::VECTORS] = state.means.residual;
-        let slots = state.vectors.iter().zip(&mut state.last).zip(&mut state.whitened);
-        for ((new, last), whitened) in slots.skip(first as usize).take(WHITENED as usize) {
+        for slot in first..first + WHITENED {
+            let slot = slot as usize & (SLOTS - 1);
+            let (new, last) = (state.vectors[slot], &mut state.last[slot]);
             let predicted = self.correlation.map_or(0, |gain| gain.times(Signal::from_bits(*last)).to_bits());
             let difference = new.saturating_sub(predicted);
             let value = ((i64::from(difference) * i64::from(self.whitening)) >> 31) as i32;
-            *whitened = value.clamp(-LARGEST - 1, LARGEST);
-            *last = *new;
+            state.whitened[slot] = value.clamp(-LARGEST - 1, LARGEST);
+            *last = new;
         }
     }
 
     /// Restarts the sums, or counts the block.
+    #[inline(never)]
     fn assess(&self, state: &mut State) {
         let highest = state.tests.highest;
         if !state.alarmed && highest < self.restart {
             state.restart();
             return;
         }
+        state.busy_until = CLOSE;
         state.age = state.age.saturating_add(1);
         state.mode.fresh = state.blocks == 0;
         state.blocks += 1;
+        let doubt = i64::from(state.tests.doubt);
+        state.doubted = if state.mode.fresh { 0 } else { state.doubted } + doubt * doubt;
         if state.means.pinned && state.means.residual < self.pinned_below {
             state.pinned = true;
         } else if !state.means.pinned && state.pinned {
@@ -371,13 +394,15 @@ impl Config {
     }
 
     /// Ends the work on the sums.
+    #[inline(never)]
     fn close(&self, state: &mut State) {
         if state.mode.copy {
-            state.decision.begin(state.blocks);
+            state.decision.begin(state.blocks, state.doubted);
             state.since_decision = 0;
         }
         if state.mode.halve {
             state.blocks >>= 1;
+            state.doubted >>= 1;
         }
         state.mode = products::Mode::NEW;
     }

@@ -1,24 +1,30 @@
-//! The products of the whitened vectors of each hypothesis with each other and with the innovation, summed over blocks.
+//! The products of the whitened vectors of each hypothesis with each other and with the innovation, summed over blocks. A product
+//! that several hypotheses have is summed once.
 
 use super::SLOTS;
 use super::bank::{HYPOTHESES, VECTORS};
 
 /// Number of products that one tick adds.
-const EACH: usize = 6;
-/// Number of products of all hypotheses.
-pub(super) const PRODUCTS: usize = count();
+const EACH: usize = 8;
+const _: () = assert!(EACH.is_multiple_of(2), "they are added in pairs");
+/// Number of elements of the matrices of all hypotheses: of each the upper triangle, row by row, the innovation as its last vector.
+const ELEMENTS: usize = elements();
 /// Number of ticks that the products of a block take.
-pub(super) const STEPS: u32 = PRODUCTS.div_ceil(EACH) as u32;
+pub(super) const STEPS: usize = distinct().2.div_ceil(EACH);
+/// The different products of two vectors, in the order of the steps.
+pub(super) type Table<T> = [[T; EACH]; STEPS];
 
-/// The vectors of each product: row by row the upper triangle of each hypothesis's matrix, the innovation as its last vector.
-static PAIRS: [(u8, u8); PRODUCTS] = pairs();
+/// The vectors of each product.
+static PAIRS: Table<(u8, u8)> = pairs();
+/// Product of each element of the matrices.
+static PLACES: [u8; ELEMENTS] = distinct().1;
 
 /// Returns the number of products of a hypothesis with `vectors` vectors.
 pub(super) const fn size(vectors: usize) -> usize {
     (vectors + 1) * (vectors + 2) / 2
 }
 
-const fn count() -> usize {
+const fn elements() -> usize {
     let (mut index, mut total) = (0, 0);
     while index < HYPOTHESES.len() {
         total += size(HYPOTHESES[index].vectors.len());
@@ -27,25 +33,52 @@ const fn count() -> usize {
     total
 }
 
-const fn pairs() -> [(u8, u8); PRODUCTS] {
-    let (mut list, mut next, mut index) = ([(0, 0); PRODUCTS], 0, 0);
+/// Returns the different pairs of vectors, the place of each element's pair among them, and their number.
+const fn distinct() -> ([(u8, u8); ELEMENTS], [u8; ELEMENTS], usize) {
+    let (mut list, mut places, mut count) = ([(0, 0); ELEMENTS], [0; ELEMENTS], 0);
+    let (mut element, mut index) = (0, 0);
     while index < HYPOTHESES.len() {
         let vectors = HYPOTHESES[index].vectors;
         let mut i = 0;
         while i <= vectors.len() {
             let mut j = i;
             while j <= vectors.len() {
-                let first = if i < vectors.len() { vectors[i] } else { VECTORS };
-                let second = if j < vectors.len() { vectors[j] } else { VECTORS };
-                list[next] = (first as u8, second as u8);
-                next += 1;
+                let first = if i < vectors.len() { vectors[i] } else { VECTORS } as u8;
+                let second = if j < vectors.len() { vectors[j] } else { VECTORS } as u8;
+                let mut place = 0;
+                while place < count && !(list[place].0 == first && list[place].1 == second) {
+                    place += 1;
+                }
+                if place == count {
+                    list[count] = (first, second);
+                    count += 1;
+                }
+                places[element] = place as u8;
+                element += 1;
                 j += 1;
             }
             i += 1;
         }
         index += 1;
     }
-    list
+    assert!(count <= 256, "a place is an u8");
+    (list, places, count)
+}
+
+const fn pairs() -> Table<(u8, u8)> {
+    let ((all, _, count), mut table, mut index) = (distinct(), [[(0, 0); EACH]; STEPS], 0);
+    while index < count {
+        table[index / EACH][index % EACH] = all[index];
+        index += 1;
+    }
+    table
+}
+
+/// Returns the sum of an element's product; 0 if there is no such element.
+#[inline(always)]
+pub(super) fn element(sums: &Table<i64>, number: usize) -> i64 {
+    let place = PLACES.get(number).copied().unwrap_or(0) as usize;
+    sums.get(place / EACH).map_or(0, |row| row[place % EACH])
 }
 
 /// What happens to the sums with the present block.
@@ -67,31 +100,36 @@ impl Mode {
 /// Sums of the products, in variances with 20 fraction bits, and their copy for a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Products {
-    sums: [i64; PRODUCTS],
-    pub(super) copy: [i64; PRODUCTS],
+    sums: Table<i64>,
+    pub(super) copy: Table<i64>,
 }
 
 impl Products {
     /// Before the first block.
-    pub(super) const NEW: Self = Self { sums: [0; PRODUCTS], copy: [0; PRODUCTS] };
+    pub(super) const NEW: Self = Self { sums: [[0; EACH]; STEPS], copy: [[0; EACH]; STEPS] };
 
     /// Adds the products of one step.
     #[inline(never)]
     pub(super) fn step(&mut self, step: u32, mode: Mode, whitened: &[i32; SLOTS]) {
-        let first = step as usize * EACH;
-        let (Some(sums), Some(pairs)) = (self.sums.get_mut(first..), PAIRS.get(first..)) else { return };
-        for (sum, (i, j)) in sums.iter_mut().zip(pairs).take(EACH) {
-            let (i, j) = (usize::from(*i) & (SLOTS - 1), usize::from(*j) & (SLOTS - 1));
-            let before = if mode.fresh { 0 } else { *sum };
-            *sum = before + i64::from(whitened[i]) * i64::from(whitened[j]);
+        let step = step as usize;
+        let rows = self.sums.get_mut(step).zip(self.copy.get_mut(step)).zip(PAIRS.get(step));
+        let Some(((sums, copy), pairs)) = rows else { return };
+        if mode.fresh {
+            *sums = [0; EACH];
         }
-        if mode.copy
-            && let Some(copy) = self.copy.get_mut(first..)
-        {
-            copy.iter_mut().zip(&*sums).take(EACH).for_each(|(copy, sum)| *copy = *sum);
+        let product = |(i, j): (u8, u8)| {
+            i64::from(whitened[usize::from(i) & (SLOTS - 1)]) * i64::from(whitened[usize::from(j) & (SLOTS - 1)])
+        };
+        // Two in each round: the MCU's compiler does not unroll the loop.
+        for ([one, other], [first, second]) in sums.as_chunks_mut().0.iter_mut().zip(pairs.as_chunks().0) {
+            *one += product(*first);
+            *other += product(*second);
+        }
+        if mode.copy {
+            *copy = *sums;
         }
         if mode.halve {
-            sums.iter_mut().take(EACH).for_each(|sum| *sum >>= 1);
+            sums.iter_mut().for_each(|sum| *sum >>= 1);
         }
     }
 }

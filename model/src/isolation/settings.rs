@@ -6,6 +6,42 @@ use crate::estimator::Plant;
 use crate::units::SampleTime;
 use crate::validated::Validate;
 
+/// Errors of the stored model that are no fault, both ways: half the widths of the 95 % intervals of its parameters, each 0 to 0.25.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tolerance {
+    /// Relative error of the time constant.
+    pub time_constant: f64,
+    /// Relative error of the instantaneous share.
+    pub share: f64,
+    /// Relative error of the gain.
+    pub gain: f64,
+}
+
+impl Tolerance {
+    /// The model is exact: each error of it is a fault.
+    pub const NONE: Self = Self { time_constant: 0.0, share: 0.0, gain: 0.0 };
+
+    /// The values in the order of the fields: time constant, share, gain.
+    pub const fn values(&self) -> [f64; 3] {
+        [self.time_constant, self.share, self.gain]
+    }
+
+    /// A tolerance with these values, in the order of [`Tolerance::values`].
+    pub const fn from_values([time_constant, share, gain]: [f64; 3]) -> Self {
+        Self { time_constant, share, gain }
+    }
+
+    /// Checks that each error is within 0 to 0.25.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the first one that is not.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        let names = ["tolerance.time_constant", "tolerance.share", "tolerance.gain"];
+        let mut errors = names.into_iter().zip(self.values());
+        errors.try_for_each(|(name, error)| OutOfRange::check(name, error, 0.0..=0.25, "of the model's"))
+    }
+}
+
 /// A bank of residual signatures for one spring and one stiffness sensor, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -23,6 +59,8 @@ pub struct Settings {
     pub alarm_nats: f64,
     /// Difference of log-likelihood below which two causes are not distinguished, 1 to 100 nats.
     pub margin_nats: f64,
+    /// Errors of `plant` that raise no alarm; none by default.
+    pub tolerance: Tolerance,
 }
 
 impl Settings {
@@ -35,6 +73,7 @@ impl Settings {
         range_v: 700.0,
         alarm_nats: 20.0,
         margin_nats: 10.0,
+        tolerance: Tolerance::NONE,
     };
 
     /// Returns the factor from the coefficient of a cause's principal vector to its size in the unit of [`Cause`], for ticks of
@@ -86,6 +125,7 @@ impl Validate for Settings {
         OutOfRange::check("noise_correlation_s", self.noise_correlation_s, 0.0..=10.0, "s")?;
         OutOfRange::check("range_v", self.range_v, 50.0..=1000.0, "V")?;
         OutOfRange::check("alarm_nats", self.alarm_nats, thresholds::RESTART_NATS..=40.0, "nats")?;
-        OutOfRange::check("margin_nats", self.margin_nats, 1.0..=100.0, "nats")
+        OutOfRange::check("margin_nats", self.margin_nats, 1.0..=100.0, "nats")?;
+        self.tolerance.check()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::bank::*;
 use super::sums::{Means, times};
-use super::{Config, SLOTS};
+use super::{Config, SLOTS, State};
 use crate::coefficient::{Rate, saturated, sum, upper};
 use crate::units::{Accumulator, Signal, saturated_to_32};
 
@@ -49,6 +49,12 @@ fn product(a: i32, b: i32) -> i32 {
     saturated_to_32((i64::from(a) * i64::from(b)) >> 20)
 }
 
+/// Computes the vectors of one step.
+#[inline(never)]
+pub(super) fn step(config: &Config, state: &mut State, step: u32) {
+    state.filters.step(config, &state.means, state.age, step, &mut state.vectors);
+}
+
 impl Filters {
     /// At rest.
     pub(super) const NEW: Self = Self {
@@ -76,8 +82,8 @@ impl Filters {
     }
 
     /// Computes the vectors of one step. `age` is the number of blocks since the restart.
-    #[inline(never)]
-    pub(super) fn step(&mut self, config: &Config, means: &Means, age: u32, step: u32, vectors: &mut [i32; SLOTS]) {
+    #[inline(always)]
+    fn step(&mut self, config: &Config, means: &Means, age: u32, step: u32, vectors: &mut [i32; SLOTS]) {
         let (u, y) = (means.voltage, means.model);
         match step {
             0 => {

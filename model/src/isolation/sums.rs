@@ -17,10 +17,12 @@ pub(super) struct Sums {
     model: i32,
     jumps: i64,
     residual: i64,
-    readings: u32,
+    /// Number of ticks without a reading.
+    missing: u32,
     identical: u32,
     lags: [i32; 3],
-    tails: [i32; 2],
+    /// Sums of the model at the beginning of the last quarter and of the last half of the block.
+    marks: [i32; 2],
     slewed: [i32; 3],
     last_voltage: i32,
     last_model: i32,
@@ -72,10 +74,10 @@ impl Sums {
         model: 0,
         jumps: 0,
         residual: 0,
-        readings: 0,
+        missing: 0,
         identical: 0,
         lags: [0; 3],
-        tails: [0; 2],
+        marks: [0; 2],
         slewed: [0; 3],
         last_voltage: 0,
         last_model: 0,
@@ -90,17 +92,14 @@ impl Sums {
         self.last_voltage = voltage;
         self.last_model = model;
         self.voltage += voltage >> config.shift;
-        let part = model >> config.shift;
-        self.model += part;
+        if self.ticks & config.quarter_mask == 0 {
+            // The beginning of a quarter; at the end of the block those of the last two are left.
+            self.marks = [self.model, self.marks[0]];
+        }
+        self.model += model >> config.shift;
         if change.unsigned_abs() > SMOOTH {
             let change = i64::from(change);
             self.jumps += (change * change.abs()) >> 20;
-        }
-        if self.ticks >= config.half {
-            self.tails[1] += part;
-            if self.ticks >= config.three_quarters {
-                self.tails[0] += part;
-            }
         }
         // One of the slewed voltages takes its step.
         let index = (self.ticks % SLEW_TICKS) as usize;
@@ -112,9 +111,10 @@ impl Sums {
         if let Some(reading) = reading {
             let reading = reading.to_bits();
             self.residual += i64::from(reading.saturating_sub(model));
-            self.readings += 1;
             self.identical += u32::from(reading == self.last_reading);
             self.last_reading = reading;
+        } else {
+            self.missing += 1;
         }
         self.ticks += 1;
     }
@@ -122,17 +122,18 @@ impl Sums {
     /// Returns the means and starts the next block.
     #[inline(never)]
     pub(super) fn finish(&mut self, config: &Config) -> Means {
+        let readings = self.ticks.saturating_sub(self.missing);
         let means = Means {
             voltage: self.voltage,
             model: self.model,
             jumps: saturated_to_32(self.jumps >> 10),
             lags: self.lags,
-            tails: self.tails,
+            tails: self.marks.map(|mark| self.model - mark),
             end: self.last_model,
-            residual: self.residual.checked_div(i64::from(self.readings)).unwrap_or(0) as i32,
-            usable: self.readings >= config.fewest,
+            residual: self.residual.checked_div(i64::from(readings)).unwrap_or(0) as i32,
+            usable: readings >= config.fewest,
             last_reading: self.last_reading,
-            pinned: self.readings >= 4 && 4 * self.identical >= 3 * self.readings,
+            pinned: readings >= 4 && 4 * self.identical >= 3 * readings,
         };
         let Self { slewed, last_voltage, last_model, last_reading, .. } = *self;
         *self = Self { slewed, last_voltage, last_model, last_reading, ..Self::NEW };

@@ -32,6 +32,7 @@ fn a_setting_out_of_range_is_rejected_by_name() {
         (Settings { range_v: f64::NAN, ..paper }, "range_v"),
         (Settings { alarm_nats: 1.0, ..paper }, "alarm_nats"),
         (Settings { margin_nats: 0.0, ..paper }, "margin_nats"),
+        (Settings { tolerance: Tolerance { gain: 0.3, ..Tolerance::NONE }, ..paper }, "tolerance.gain"),
     ] {
         assert_eq!(settings.validate(time).unwrap_err().field, field);
     }

@@ -117,7 +117,7 @@ struct Isolation {
     /// First seed; another number gives other runs
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(..500_000))]
     first_seed: u64,
-    /// Write the page to this file
+    /// Write the results to this page, in place of those that it has
     #[arg(long, value_name = "FILE")]
     docs: Option<PathBuf>,
 }
@@ -309,8 +309,11 @@ fn run(cli: &Cli) -> Result<bool> {
         let text = isolation::page(options.first_seed, options.records)?;
         print!("{text}");
         if let Some(path) = &options.docs {
-            let page = format!("{}\n{text}", include_str!("isolation.md"));
-            std::fs::write(path, page).with_context(|| format!("cannot write {}", path.display()))?;
+            let page = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+            // What is written by hand stays.
+            let by_hand = page.split(isolation::TITLE).next().unwrap_or_default();
+            std::fs::write(path, format!("{by_hand}{text}"))
+                .with_context(|| format!("cannot write {}", path.display()))?;
         }
         return Ok(true);
     }

@@ -1,6 +1,6 @@
 //! Time between false alarms: counted at low thresholds, computed by importance sampling at the bank's own.
 
-use model::isolation::{Verdict, bank, thresholds};
+use model::isolation::{Tolerance, Verdict, bank, thresholds};
 use model::{OutOfRange, Volts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +26,7 @@ pub fn count(percent: f64, nats: f64, seeds: std::ops::Range<u64>) -> Result<Ala
     const TICKS: u32 = 500_000;
     let one = |seed: u64| {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut watched = Watched::new(percent, nats, seed, TICKS)?;
+        let mut watched = Watched::new(percent, nats, Tolerance::NONE, seed, TICKS)?;
         let (mut target, mut until, mut alarms) = (Volts::ZERO, 0, 0);
         for tick in 0..TICKS {
             if tick == until {

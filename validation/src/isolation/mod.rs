@@ -5,6 +5,7 @@
 
 mod false_alarms;
 mod fault;
+mod known;
 mod least_squares;
 mod page;
 mod run;
@@ -14,7 +15,7 @@ mod watched;
 pub use false_alarms::{Alarms, count, predicted_per_block};
 pub use fault::{Fault, SIZES};
 pub use least_squares::Thresholds;
-pub use page::page;
+pub use page::{TITLE, page};
 pub use run::{Decision, Outcome, run};
 pub use tables::{Row, rows, summary, table};
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::run::RUN_S;
 use super::watched::RATE_HZ;
-use super::{Fault, NOISES, SIZES, Thresholds, count, predicted_per_block, rows, run, summary, table};
+use super::{Fault, NOISES, SIZES, Thresholds, count, known, predicted_per_block, rows, run, summary, table};
 
 /// First seed of the runs from which the rival's bands are found; no table has it.
 const RIVAL_SEEDS: u64 = 900_000;
@@ -16,6 +16,8 @@ const RIVAL_SEEDS: u64 = 900_000;
 const RIVAL_RUNS: u64 = 30;
 /// Paths of the importance sampling, for each test.
 const PATHS: u32 = 100_000;
+/// Title of the results.
+pub const TITLE: &str = "## Results\n";
 /// Seconds in a day.
 const DAY_S: f64 = 86_400.0;
 
@@ -24,13 +26,15 @@ const DAY_S: f64 = 86_400.0;
 /// # Errors
 /// The model rejects the settings.
 pub fn page(first_seed: u64, runs: u64) -> Result<String> {
-    let mut text = format!("## Results\n\nRuns of {RUN_S} s at 1 kHz, {runs} of each fault and size.\n\n");
+    let mut text = format!("{TITLE}\nRuns of {RUN_S} s at 1 kHz, {runs} of each fault and size.\n\n");
     let refused = |error: model::OutOfRange| anyhow!("{error}");
     for percent in NOISES {
         let thresholds = thresholds(percent).map_err(refused)?;
         let rows = rows(percent, first_seed..first_seed + runs, &thresholds).map_err(refused)?;
         write!(text, "### Noise of {percent} %\n\n{}\n{}\n", summary(&rows), table(&rows))?;
     }
+    let known = known::table(first_seed, runs.div_ceil(2)).map_err(refused)?;
+    write!(text, "### A model that is known to within intervals\n\n{known}\n")?;
     text += &false_alarms(first_seed)?;
     Ok(text)
 }

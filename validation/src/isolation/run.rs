@@ -1,6 +1,6 @@
 //! One run: the controller with its sensor moves a spring between random levels, and a fault begins.
 
-use model::isolation::{Settings, Verdict, bank};
+use model::isolation::{Settings, Tolerance, Verdict, bank};
 use model::{OutOfRange, Volts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::fault::Fault;
 use super::least_squares::{LeastSquares, Thresholds};
 use super::watched::{RATE_HZ, Tick, Watched};
+use crate::ground_truth::Effect;
 
 /// Length of a run, in s.
 pub(super) const RUN_S: f64 = 180.0;
@@ -75,18 +76,43 @@ fn targets(random: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     list
 }
 
+/// How the spring differs from the model from the beginning on, and which errors of the model are no fault. By default the model is
+/// exact, and known to be so.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Known {
+    /// Errors of the model, as effects of the spring.
+    pub(super) errors: Vec<Effect>,
+    /// Errors of the model that are no fault.
+    pub(super) tolerance: Tolerance,
+}
+
 /// Runs a fault of a size, a fraction of full size, in white noise of a percentage of 500 V. It begins after 30 to 60 s.
 ///
 /// # Errors
 /// The model rejects the settings.
 pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresholds) -> Result<Outcome, OutOfRange> {
+    run_with(&Known::default(), fault, size, percent, seed, thresholds)
+}
+
+/// Does what [`run`] does, on a spring that is `known`.
+pub(super) fn run_with(
+    known: &Known,
+    fault: Fault,
+    size: f64,
+    percent: f64,
+    seed: u64,
+    thresholds: &Thresholds,
+) -> Result<Outcome, OutOfRange> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let effect = fault.effect(&mut random, size);
     let onset_s = random.random_range(SETTLED_S..2.0 * SETTLED_S);
     let targets = targets(&mut random);
     let ticks = (RUN_S * RATE_HZ) as u32;
     let alarm_nats = Settings::PAPER.alarm_nats;
-    let mut watched = Watched::new(percent, alarm_nats, seed, ticks)?;
+    let mut watched = Watched::new(percent, alarm_nats, known.tolerance, seed, ticks)?;
+    if !known.errors.is_empty() {
+        watched.change(&known.errors);
+    }
     let mut rival = LeastSquares::new(bank::block_ticks(RATE_HZ), RATE_HZ);
     let mut outcome = Outcome {
         alarm_s: None,
@@ -103,7 +129,8 @@ pub fn run(fault: Fault, size: f64, percent: f64, seed: u64, thresholds: &Thresh
         let now_s = f64::from(tick) / RATE_HZ;
         if now_s >= onset_s && !begun {
             begun = true;
-            watched.change(effect.as_slice());
+            let effects: Vec<Effect> = known.errors.iter().cloned().chain(effect.clone()).collect();
+            watched.change(&effects);
             watched.stuck = fault == Fault::Stuck;
         }
         while targets[at].0 < now_s {

@@ -1,6 +1,6 @@
 //! The controller with its sensor on a spring of the ground truth, and the bank after each of its ticks.
 
-use model::isolation::{self, Verdict};
+use model::isolation::{self, Tolerance, Verdict};
 use model::{
     Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
 };
@@ -41,15 +41,21 @@ pub(super) struct Tick {
 
 impl Watched {
     /// A spring without a fault at rest, for this number of ticks with white noise of a percentage of 500 V; `alarm_nats` is the
-    /// threshold of the bank's sequential tests.
+    /// threshold of the bank's sequential tests, `tolerance` the errors of the model that are no fault.
     ///
     /// # Errors
     /// The model rejects the settings.
-    pub(super) fn new(percent: f64, alarm_nats: f64, seed: u64, ticks: u32) -> Result<Self, OutOfRange> {
+    pub(super) fn new(
+        percent: f64,
+        alarm_nats: f64,
+        tolerance: Tolerance,
+        seed: u64,
+        ticks: u32,
+    ) -> Result<Self, OutOfRange> {
         let noise = Noise::white(percent);
         let noise_v = noise.sigma_v;
         let feedback = Some(Feedback { noise_v, ..Feedback::TYPICAL });
-        let settings = isolation::Settings { noise_v, alarm_nats, ..isolation::Settings::PAPER };
+        let settings = isolation::Settings { noise_v, alarm_nats, tolerance, ..isolation::Settings::PAPER };
         Ok(Self {
             config: Settings { feedback, ..Settings::PAPER }.validate()?.quantize(),
             state: State::default(),

@@ -12,12 +12,13 @@ use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
 use host_sim::link::{Client, Patience, Port, fault as parse_fault};
 use host_sim::output::terminal::remark;
+use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Fault, Request};
 use session::{Session, seconds};
 use simulation::bad_input;
 
-/// Communicate with the MCU over its serial link: status, set, arm, disarm, isolation, watch, record, capture, model, settings
+/// Communicate with the MCU over its serial link: status, set, arm, disarm, isolation, adaptation, watch, record, capture, model, settings
 #[derive(Args, Debug)]
 #[command(
     arg_required_else_help = false,
@@ -33,6 +34,7 @@ Examples:
   vsj link /dev/ttyACM0 capture --input steps.csv --arm --out every-tick.csv
   vsj link /dev/ttyACM0 model out/diagnosis/plant.toml  run the identified model
   vsj link /dev/ttyACM0 settings amplifier.toml         range, gains, rate
+  vsj link /dev/ttyACM0 adaptation --off                back to the stored model
 
 The MCU ramps the voltage down when the host is silent for longer than its limit (see `status`): a target is kept only while \
 a command stays connected: --keep, watch or record. A request is repeated every 0.1 s until it is answered, for --timeout \
@@ -82,6 +84,15 @@ enum Command {
         /// End its alarm first: it looks for a fault anew
         #[arg(long)]
         acknowledge: bool,
+    },
+    /// Show what the adaptation does, with the parameters in use and their bounds
+    Adaptation {
+        /// Switch it off first: the model goes back to the stored one, step by step while it is armed and near its target
+        #[arg(long)]
+        off: bool,
+        /// Switch it on first, also after it has stopped by itself
+        #[arg(long, conflicts_with = "off")]
+        on: bool,
     },
     /// Show the running loop, and keep the MCU from detecting a silent host
     Watch(watch::Arguments),
@@ -190,6 +201,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Isolation { acknowledge } => {
             session.show_isolation(if *acknowledge { Isolation::Acknowledge } else { Isolation::Read })
         }
+        Command::Adaptation { off, on } => session.show_adaptation(match (off, on) {
+            (true, _) => Adaptation::Off,
+            (_, true) => Adaptation::On,
+            _ => Adaptation::Read,
+        }),
         Command::Watch(arguments) => watch::run(&mut session, arguments, baud),
         Command::Record(record) => record::run(&mut session, record, baud),
         Command::Capture(arguments) => capture::run(&mut session, arguments),

@@ -4,9 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use host_sim::link::{Client, IsolationRow, StatusReport, heartbeat};
+use host_sim::link::{AdaptationRow, Client, IsolationRow, StatusReport, heartbeat};
 use host_sim::output::terminal::{json, print, remark};
 use host_sim::signals::on_ctrl_c;
+use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{IsolationReport, Request, Status, WireVolts};
 use serde::Serialize;
@@ -57,10 +58,24 @@ impl Session {
         self.client.isolation(request).with_context(|| self.client.name().to_owned())
     }
 
-    /// The latest status, with what the isolation bank says.
+    /// The latest status, with what the isolation bank says and what the adaptation does.
     pub(super) fn report(&mut self) -> Result<StatusReport> {
         let isolation = self.isolation(Isolation::Read)?;
-        Ok(StatusReport::new(&self.status, isolation.as_ref()))
+        let adaptation = self.client.adaptation(Adaptation::Read).with_context(|| self.client.name().to_owned())?;
+        Ok(StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref()))
+    }
+
+    /// Switches the adaptation if the request demands it, and shows what it does.
+    pub(super) fn show_adaptation(&mut self, request: Adaptation) -> Result<()> {
+        let name = self.client.name().to_owned();
+        let Some(report) = self.client.adaptation(request).with_context(|| name.clone())? else {
+            bail!("{name}: the MCU's program does not know the adaptation");
+        };
+        let row = AdaptationRow::new(&report, self.status.rate_hz);
+        if let (Some(_), Some(why)) = (request.switch(), row.why) {
+            bail!("{name}: nothing can adapt: {why}");
+        }
+        print(&if self.json { json(&row)? } else { row.text() + "\n" })
     }
 
     pub(super) fn show_isolation(&mut self, request: Isolation) -> Result<()> {

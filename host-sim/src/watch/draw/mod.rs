@@ -11,6 +11,7 @@ mod plot;
 use std::path::Path;
 
 use link::State;
+use model::adaptation::Phase;
 use model::isolation::Verdict;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -19,7 +20,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::view::{Connection, View};
-use crate::link::IsolationRow;
+use crate::link::{AdaptationRow, IsolationRow};
 
 /// Height of a panel with its border, in lines.
 const PANEL: u16 = 7;
@@ -32,7 +33,9 @@ const TWO_PLOTS: u16 = 16;
 pub fn draw(view: &View, frame: &mut Frame<'_>) {
     let area = frame.area();
     let mut fault = wrapped(&fault(view).unwrap_or_default(), area.width);
-    fault.extend(wrapped(&isolation(view).unwrap_or_default(), area.width));
+    for text in [isolation(view), adaptation(view)].into_iter().flatten() {
+        fault.extend(wrapped(&text, area.width));
+    }
     let below = 2 + fault.len() as u16;
     let panel = if area.height > PANEL + below { PANEL } else { 0 };
     let [top, plots, panels, warning, note, keys] = Layout::vertical([
@@ -157,6 +160,13 @@ fn isolation(view: &View) -> Option<String> {
     let report =
         view.isolation.as_ref().filter(|report| report.verdict().is_some_and(|says| says != Verdict::Quiet))?;
     Some(format!("ISOLATION {}", IsolationRow::new(report, view.status.rate_hz).text()))
+}
+
+/// What the adaptation does; `None` if it is watching with the parameters of the stored model, or does not run.
+fn adaptation(view: &View) -> Option<String> {
+    let report = view.adaptation.as_ref()?;
+    let rests = report.phase()? == Phase::Watching && report.ratios == [1.0; 3];
+    (!rests).then(|| format!("ADAPTATION {}", AdaptationRow::new(report, view.status.rate_hz).text()))
 }
 
 /// What is being typed, or the latest news.

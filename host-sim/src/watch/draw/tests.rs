@@ -1,7 +1,12 @@
 use std::path::{Path, PathBuf};
 
 use link::reply::{Counters, Firmware};
-use link::{Controller, Fault, FaultReport, IsolationReport, Mismatch, Sensor, State, Status, Telemetry, WireVolts};
+use link::{
+    AdaptationReport, Controller, Fault, FaultReport, IsolationReport, Mismatch, Sensor, State, Status, Telemetry,
+    WireVolts,
+};
+use model::Plant;
+use model::adaptation::{Parameters, Phase, Settings};
 use model::isolation::{Cause, Verdict};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -141,6 +146,22 @@ fn a_cause_that_the_isolation_bank_has_named_is_shown_until_the_bank_is_quiet() 
     assert!(found.contains(expected), "{found}");
     view.on_event(Event::Isolation(report(Verdict::Quiet)));
     assert!(!screen(&view, 110, 30).contains("ISOLATION"));
+}
+
+#[test]
+fn an_adaptation_is_shown_unless_it_watches_with_the_stored_model() {
+    let mut view = view();
+    let report = |phase, gain| {
+        let parameters = Parameters { gain, ..Parameters::STORED };
+        Event::Adaptation(AdaptationReport::new(phase, &parameters, &Settings::TYPICAL, Plant::PAPER))
+    };
+    view.on_event(report(Phase::Watching, 1.05));
+    let found = screen(&view, 200, 30);
+    assert!(found.contains("ADAPTATION watching, time constant 5.5000 s") && found.contains("gain 1.0500"), "{found}");
+    view.on_event(report(Phase::Watching, 1.0));
+    assert!(!screen(&view, 200, 30).contains("ADAPTATION"));
+    view.on_event(report(Phase::Off, 1.0));
+    assert!(screen(&view, 200, 30).contains("ADAPTATION off"));
 }
 
 #[test]
