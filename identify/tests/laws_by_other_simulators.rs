@@ -1,6 +1,6 @@
 //! Laws of a cause that differ from its usual one, in records of a small simulator in this file: the cause is the first finding.
 
-use identify::{Options, Report, diagnose};
+use identify::{Options, Report, Verdict, diagnose};
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 2400;
@@ -115,14 +115,15 @@ fn friction_under_load_is_hysteresis() {
     assert!((value(&report, "width_v") - (500.0 - 475.0 / 1.05)).abs() < 0.5, "{report:?}");
 }
 
-/// What is linear of it is a gain error.
+/// What is linear of it is a gain error. Whatever else is named, the record is then not explained.
 #[test]
 fn dead_band_is_a_static_nonlinearity() {
-    let (_, report) =
+    let (cause, report) =
         first(&settling(8, |voltage_v| (voltage_v - 40.0).max(0.0), |_, _| TAU_S, |_, stiffness| stiffness));
     let causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
-    assert!(causes.contains(&"static-nonlinearity"), "{report:?}");
-    assert!(causes.iter().all(|cause| ["static-nonlinearity", "gain-error"].contains(cause)), "{report:?}");
+    let is_of_it = |cause: &str| ["static-nonlinearity", "gain-error"].contains(&cause);
+    assert!(causes.contains(&"static-nonlinearity") && is_of_it(&cause), "{report:?}");
+    assert!(report.verdict == Verdict::Unexplained || causes.iter().all(|cause| is_of_it(cause)), "{report:?}");
 }
 
 #[test]

@@ -71,6 +71,11 @@ pub trait Evaluator {
     /// True if the residual of a fit may hold structure.
     fn doubts(&mut self, fit: &Fit) -> bool;
 
+    /// True if the residual of a finished search's best fit may hold structure, by the checks of the report as well.
+    fn leaves_structure(&mut self, fit: &Fit) -> bool {
+        self.doubts(fit)
+    }
+
     /// Factor by which prices are multiplied for the residual of a fit, 1 or more.
     fn penalty_factor(&mut self, fit: &Fit) -> f64;
 
@@ -162,6 +167,10 @@ impl Evaluator for Engine<'_> {
         // Before any effect is found, autocorrelation may be the effect's own; so it may where it predicts nearly all errors.
         let autocorrelated = !fit.noise.autocorrelation.is_white();
         autocorrelated && (fit.model.blocks.is_empty() || fit.strongly_autocorrelated()) || adequacy::doubts(self, fit)
+    }
+
+    fn leaves_structure(&mut self, fit: &Fit) -> bool {
+        self.doubts(fit) || adequacy::first_significant(self, fit).is_some()
     }
 
     fn penalty_factor(&mut self, fit: &Fit) -> f64 {

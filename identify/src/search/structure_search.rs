@@ -78,7 +78,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
             {
                 self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
                 let best = self.repriced(best, &mut progress);
-                return if self.evaluator.doubts(&best.fit) { self.with_rare_forms(best, &mut progress) } else { best };
+                let leaves_structure = self.evaluator.leaves_structure(&best.fit);
+                return if leaves_structure { self.with_rare_forms(best, &mut progress) } else { best };
             }
             self.extended.clear();
             self.evaluated.reprice(self.evaluator, penalty_factor);
