@@ -27,8 +27,8 @@ use super::spring_error::ErrorOf;
 Examples:
   vsj isolate data/sample_hysteresis.csv           the trace: alarm, names
   vsj isolate record.csv --plant out/nominal/plant.toml --limit-v 1000
-  vsj isolate record.csv --known tau=2 --known gain=1     a spring that is known to within 2 and 1 %
-  vsj isolate record.csv --plant out/nominal/plant.toml --identified identified.json
+  vsj isolate record.csv --known tau=2 --known gain=1  known within 2 and 1 %
+  vsj isolate record.csv --plant plant.toml --identified identified.json
   vsj isolate record.csv --noise-v 0.5 --json | jq .last")]
 pub(crate) struct Arguments {
     /// The record: time_s, voltage_v (held between the rows) and the readings, rows at most 0.6 s apart

@@ -157,7 +157,9 @@ impl Budget {
 
     /// Keeps a part of the present search's work back until [`Budget::release`] or [`Budget::extend`].
     pub fn reserve(&self) {
-        self.reserved.store((FOR_RARE_FORMS * self.granted() as f64) as u64, Ordering::Relaxed);
+        let reserved = (FOR_RARE_FORMS * self.granted() as f64) as u64;
+        self.reserved.store(reserved, Ordering::Relaxed);
+        self.scarce.fetch_sub((SCARCE * reserved as f64) as u64, Ordering::Relaxed);
     }
 
     /// Lets the present search do the work that was kept back, half of it before work is scarce.

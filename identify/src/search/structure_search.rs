@@ -93,10 +93,14 @@ impl<'e, E: Evaluator> Search<'e, E> {
         let common = best.fit.model.structure();
         self.try_forms(Forms::Rare);
         let reformed = self.reformed(best);
-        let best = self.pruned(reformed);
-        let root = self.root();
-        let children = [root, best.clone()].map(|node| self.children(&node)).into_iter().flatten();
-        let mut best = children.fold(best, |best, other| if other.score > best.score { other } else { best });
+        let mut best = self.pruned(reformed);
+        for node in [self.root(), best.clone()] {
+            if self.evaluator.is_over() {
+                break;
+            }
+            let children = self.children(&node).into_iter();
+            best = children.fold(best, |best, other| if other.score > best.score { other } else { best });
+        }
         best = self.pruned(best);
         best = self.settled(best);
         self.try_forms(Forms::Common);

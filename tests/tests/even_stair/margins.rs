@@ -44,9 +44,9 @@ fn a_record_that_could_not_show_a_gain_error_of_half_is_insufficient() {
     assert!(!report["next_experiment"].is_null(), "{report}");
 }
 
-/// A slowly oscillating gain resembles strongly autocorrelated noise: the report at least proposes the next experiment.
+/// A gain that oscillates slowly resembles strongly autocorrelated noise; it is named, with its amplitude.
 #[test]
-fn an_effect_that_resembles_autocorrelated_noise_is_not_explained() {
+fn a_gain_that_swings_slowly_is_a_drift_and_no_autocorrelated_noise() {
     let swinging = |part: f64| {
         let swing = move |row: usize| 1.0 + part * (row as f64 * SAMPLE_S / 80.0 * std::f64::consts::TAU).sin();
         diagnosed(&read(9, |row, y, noise| swing(row) * y + noise))
@@ -54,6 +54,8 @@ fn an_effect_that_resembles_autocorrelated_noise_is_not_explained() {
     let calm = swinging(0.0);
     assert!(calm["verdict"] == "consistent" && calm["next_experiment"].is_null(), "{calm}");
     let report = swinging(0.06);
-    assert!(report["extended"]["rmse"].as_f64().unwrap() > 5.0, "{report}");
-    assert!(report["verdict"] != "explained" && !report["next_experiment"].is_null(), "{report}");
+    assert!(report["baseline"]["rmse"].as_f64().unwrap() > 5.0, "{report}");
+    let finding = &report["findings"][0];
+    assert_eq!(finding["cause"], "drift", "{report}");
+    assert!((finding["parameters"]["amplitude"]["value"].as_f64().unwrap() - 0.06).abs() < 0.002, "{report}");
 }
