@@ -1,6 +1,9 @@
 //! `cargo xtask test`: every check and test, in order.
 
-use anyhow::Result;
+use std::path::{Path, PathBuf};
+use std::{env, fs, io};
+
+use anyhow::{Context, Result};
 use xtask::{setup, shell};
 
 use crate::steps::{self, Lanes, Progress, Step};
@@ -29,7 +32,19 @@ const LANES: Lanes = Lanes {
         Step::xtask("package", &["python", "--only", "install"]),
     ],
     built: &[
-        Step::new("publish", &["package", "--quiet", "--offline", "--allow-dirty", "-pvsj-model", "-pvsj-link"]),
+        Step::new(
+            "publish",
+            &[
+                "package",
+                "--quiet",
+                "--offline",
+                "--allow-dirty",
+                "--target-dir",
+                PACKAGED,
+                "-pvsj-model",
+                "-pvsj-link",
+            ],
+        ),
         Step::xtask("python", &["python", "--only", "test"]),
         Step::emulation("firmware", &["proof"]),
         Step::emulation("boot", &["boot"]),
@@ -59,11 +74,32 @@ pub(crate) fn help() -> String {
     )
 }
 
+/// Packages that could be published, and the folder in which they are packaged and built.
+const PACKAGES: [&str; 2] = ["vsj-model", "vsj-link"];
+const PACKAGED: &str = "target/publish";
+
+/// Removes the packages of an earlier run, which cargo would take for this run's: a released version never changes.
+fn forget_packages() -> Result<()> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(env::home_dir()?.join(".cargo")));
+    let sources = home.context("no home directory")?.join("registry/src");
+    let registries: Vec<PathBuf> =
+        fs::read_dir(sources).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
+    let version = env!("CARGO_PKG_VERSION");
+    let copies = registries.iter().flat_map(|registry| PACKAGES.map(|name| registry.join(format!("{name}-{version}"))));
+    copies.chain([Path::new(PACKAGED).to_owned()]).try_for_each(|folder| match fs::remove_dir_all(&folder) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot remove {}", folder.display()))
+        }
+        _ => Ok(()),
+    })
+}
+
 /// Runs every step; an error names the first that fails.
 pub(crate) fn run() -> Result<()> {
     let progress = Progress::of(1 + FIRST.len() + LANES.count());
     progress.begin("setup");
     setup::run()?;
+    forget_packages()?;
     for step in FIRST {
         progress.begin(step.name);
         step.run()?;
