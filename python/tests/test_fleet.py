@@ -357,7 +357,7 @@ def test_a_record_that_ends_its_workers_has_a_row_and_the_others_too(copied, tmp
         return diagnose(batch, *rest)
 
     monkeypatch.setattr(work, "diagnose", deadly)
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
         cluster.scheduler.allowed_failures = 0
         with distributed.Client(cluster) as client:
             outcome = run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, out, 2, lambda _: None)

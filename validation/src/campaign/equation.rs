@@ -227,6 +227,7 @@ mod tests {
         assert_eq!((row.verdict.as_str(), row.is_true), ("unexplained", Some(true)), "{row:?}");
         let [extended, linear, equation] = row.held_out.map(|error| error.expect("an error"));
         assert!(equation < AT_FLOOR * row.floor && extended > 1.5 * row.floor && linear > equation, "{row:?}");
-        assert!(row.beyond[2].expect("a free run") < AT_FLOOR * row.floor_beyond, "{row:?}");
+        let [extended, _, equation, ..] = row.beyond;
+        assert!(equation.expect("a free run") <= extended.expect("a free run"), "{row:?}");
     }
 }
