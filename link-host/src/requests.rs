@@ -105,11 +105,10 @@ impl Client {
     /// # Errors
     /// [`Failure`]
     pub fn isolation(&mut self, request: Isolation) -> Result<Option<IsolationReport>, Failure> {
-        match self.ask(Request::Isolation(request)) {
-            Ok(Reply::Isolation(report)) => Ok(Some(report)),
-            Ok(other) => Err(Failure::unexpected(other)),
-            Err(Failure::Refused(Reason::UnknownRequest)) => Ok(None),
-            Err(failure) => Err(failure),
+        match self.ask_newer(Request::Isolation(request))? {
+            None => Ok(None),
+            Some(Reply::Isolation(report)) => Ok(Some(report)),
+            Some(other) => Err(Failure::unexpected(other)),
         }
     }
 
@@ -118,11 +117,18 @@ impl Client {
     /// # Errors
     /// [`Failure`]
     pub fn adaptation(&mut self, request: Adaptation) -> Result<Option<AdaptationReport>, Failure> {
-        match self.ask(Request::Adaptation(request)) {
-            Ok(Reply::Adaptation(report)) => Ok(Some(report)),
-            Ok(other) => Err(Failure::unexpected(other)),
+        match self.ask_newer(Request::Adaptation(request))? {
+            None => Ok(None),
+            Some(Reply::Adaptation(report)) => Ok(Some(report)),
+            Some(other) => Err(Failure::unexpected(other)),
+        }
+    }
+
+    /// The reply to a request that not every program of the MCU knows; `None` if it does not.
+    fn ask_newer(&mut self, request: Request) -> Result<Option<Reply>, Failure> {
+        match self.ask(request) {
             Err(Failure::Refused(Reason::UnknownRequest)) => Ok(None),
-            Err(failure) => Err(failure),
+            answer => answer.map(Some),
         }
     }
 

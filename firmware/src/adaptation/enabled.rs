@@ -101,7 +101,7 @@ impl Planner {
         (now != before).then_some(now)
     }
 
-    /// Returns what the host is told, without a tick.
+    /// Returns the report for the host, whose tick is left 0.
     pub fn report(&self) -> AdaptationReport {
         match &self.terms.0 {
             Err(why) => AdaptationReport::off(*why, 0),

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
-//! which do not respond to the voltage and correct no law), and that is left. Where
+//! which do not respond to the voltage and correct no law; findings that exact equality of readings proves do not count), and that is
+//! left. Where
 //! another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text

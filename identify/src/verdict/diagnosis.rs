@@ -117,8 +117,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let mut findings = findings(engine, &found);
     credibility::with_unknown_laws(&mut findings);
-    // An autoregression follows errors of the model as well as slow noise.
-    let unearned = !extended.noise.autocorrelation.is_white() && credibility::are_unlikely(&findings);
+    let unearned = is_unearned(&findings, extended);
     let unexplained = structured || !spoiling.is_empty() || unfinished || unearned;
     credibility::of_spoiling(&mut findings, &spoiling);
     if unexplained {
@@ -225,10 +224,15 @@ fn verdict(unexplained: bool, alternatives: &[Vec<&'static str>], insufficient: 
     }
 }
 
-/// Makes the verdict `unexplained` if the residual is autocorrelated and no cause removes much of it: an autoregression follows errors
-/// of the model as well as slow noise.
+/// True if the residual is autocorrelated and no cause removes much of it: an autoregression follows errors of the model as well as slow
+/// noise.
+fn is_unearned(findings: &[Finding], extended: &Fit) -> bool {
+    !extended.noise.autocorrelation.is_white() && credibility::are_unlikely(findings)
+}
+
+/// Makes the verdict `unexplained` if no cause removes much of an autocorrelated residual.
 pub(crate) fn without_the_unearned(report: &mut Report, extended: &Fit) {
-    if !extended.noise.autocorrelation.is_white() && credibility::are_unlikely(&report.findings) {
+    if is_unearned(&report.findings, extended) {
         report.verdict = Verdict::Unexplained;
         report.leftover.get_or_insert_with(|| UNEARNED.to_owned());
     }
