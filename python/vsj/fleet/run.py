@@ -1,7 +1,8 @@
 """The loop that has records diagnosed: a bounded number of batches in progress, none done twice, none lost.
 
-A batch whose worker dies is given to another by Dask, three times. Then its records are tried one by one, and one that ends its worker
-again has a row that says so. If the scheduler is lost, the run ends; the next one goes on with what is not finished.
+A batch whose worker dies is given to another by Dask, three times. Then its records are set aside. They are tried when all others are
+finished, one at a time, since Dask counts a death against everything that waits at the worker; one that ends its worker again has a row
+that says so. If the scheduler is lost, the run ends; the next one goes on with what is not finished.
 """
 
 import signal
@@ -105,13 +106,13 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress)
             row["finished"] = finished.get(row["record"], {})
         return start, rows
 
-    def submit(start, rows):
+    def submit(start, rows, alone=False):
         wanted = {row["plant"]: plants[row["plant"]] for row in rows}
         future = client.submit(work.diagnose, rows, wanted, settings, folder, out, pure=False)
-        in_progress[future] = (start, rows)
+        in_progress[future] = (start, rows, alone)
         return future
 
-    in_progress = {}
+    in_progress, set_aside = {}, []
     batches = (batch(start, batch_size) for start in range(0, len(records), batch_size))
     completed = as_completed()
 
@@ -119,17 +120,19 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress)
         ahead = _AHEAD * max(1, sum(client.nthreads().values()))
         while len(in_progress) < ahead and (following := next(batches, None)):
             completed.add(submit(*following))
+        if not in_progress and set_aside:
+            completed.add(submit(*set_aside.pop(0), alone=True))
 
     try:
         fill()
         for future in completed:
-            start, rows = in_progress.pop(future)
+            start, rows, alone = in_progress.pop(future)
             try:
                 done = future.result()
             except KilledWorker:
-                if len(rows) > 1:
-                    for index, row in enumerate(rows):
-                        completed.add(submit(start + index, [row]))
+                if not alone:
+                    set_aside += [(index, [row]) for index, row in enumerate(rows, start)]
+                    fill()
                     continue
                 row = work.failed(rows[0], f"{rows[0]['record']}: every worker that diagnosed it died")
                 store.write_part(out, [row])

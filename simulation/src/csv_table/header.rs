@@ -25,10 +25,20 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
         Some((start, line.trim_end_matches('\n')))
     });
     let lines: Vec<(usize, &str)> = starts.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).collect();
-    let mut found = Vec::new();
+    let mut found: Vec<Candidate> = Vec::new();
+    // Number of columns of the last header, as long as its rows go on.
+    let mut table = None;
     for index in 0..lines.len().min(most) {
         let below = || lines[index + 1..].iter().map(|(_, line)| *line);
         let (start, line) = lines[index];
+        // A row of numbers can look like names to another separator: `high<tab>0,5<tab>0,7` to the comma.
+        table = table.filter(|(columns, separator)| {
+            let cells = Cells::of(line, *separator);
+            cells.are_row(*columns) || cells.are_units_of(*columns)
+        });
+        if table.is_some() {
+            continue;
+        }
         let Some(separator) = separators(known, line).find(|separator| is_header(line, below(), *separator)) else {
             continue;
         };
@@ -39,6 +49,7 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
             found.push(Candidate { start, separator });
         }
         found.push(Candidate { start, separator });
+        table = Some((header.used, separator));
     }
     found
 }
@@ -70,13 +81,12 @@ fn is_header<'t>(line: &str, mut below: impl Iterator<Item = &'t str> + Clone, s
     let header = Cells::of(line, separator);
     let columns = header.used;
     if let Some(line) = below.clone().next() {
-        let units = Cells::of(line, separator);
-        if units.fit(columns) && units.are_units() {
+        if Cells::of(line, separator).are_units_of(columns) {
             below.next();
         }
     }
     let mut rows = below.take(CHECKED_ROWS).map(|row| Cells::of(row, separator)).peekable();
-    header.are_names(columns) && rows.peek().is_some() && rows.all(|row| row.fit(columns) && row.have_numbers())
+    header.are_names(columns) && rows.peek().is_some() && rows.all(|row| row.are_row(columns))
 }
 
 /// A line, split at a separator.
@@ -105,6 +115,11 @@ impl<'t> Cells<'t> {
         (self.used..=self.cells.len()).contains(&columns)
     }
 
+    /// True for a row of numbers of a table with a number of columns.
+    fn are_row(&self, columns: usize) -> bool {
+        self.fit(columns) && self.have_numbers()
+    }
+
     fn have_numbers(&self) -> bool {
         self.cells.iter().any(|cell| Numbers::any(cell))
     }
@@ -113,6 +128,10 @@ impl<'t> Cells<'t> {
     fn are_names(&self, columns: usize) -> bool {
         let is_new = |index: usize| !self.cells[index].is_empty() && !self.cells[..index].contains(&self.cells[index]);
         self.used == columns && (1..columns).all(is_new) && !self.have_numbers() && !self.are_units()
+    }
+
+    fn are_units_of(&self, columns: usize) -> bool {
+        self.fit(columns) && self.are_units()
     }
 
     /// True if at least half of the cells that say something are units, and none is a number.
@@ -145,6 +164,8 @@ mod tests {
             ("device;serial;name\nt;u;x\n0;1;2\n1;1;2\n", vec![1, 2]),
             ("a;b;c\n1;2;3\n2;3;4\n", vec![1]),
             (";a;b\n1;2;3\n2;3;4\n", vec![1]),
+            ("a\tt\tu\tx\non\t0,1\t0,5\tn/a\non\t0,2\t0,5\t\n", vec![1]),
+            ("a\tt\tu\tx\n-\ts\tV\tmm\non\t0,1\t0,5\tn/a\non\t0,2\t0,5\t\n", vec![1]),
             ("\"X\",\"7\"\n\"t\",\"u\",\"x\"\n\"s\",\"V\",\"mm\"\n\"\",\"Avg\",\"Avg\"\n0,1,2\n1,1,2\n", vec![]),
             ("0;1;2\n1;1;2\n", vec![]),
             ("a title\nt;u;x\n0;1;2\n1;1\n", vec![]),
